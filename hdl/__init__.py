@@ -1,1 +1,1 @@
-"""hdl."""
+"""Gateware of the sensors' FPGA boards, written in Amaranth HDL."""

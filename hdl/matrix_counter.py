@@ -1,0 +1,74 @@
+"""Matrix addressing: a column counter and a row counter side by side.
+
+CubeSense thesis, section 6.5: the SRAM address is row : column, so a line always starts at its
+own column 0 whatever happened in the line before. CubeStar's frame of 1024 x 512 is a power of two
+both ways, where the same address is also the linear one of the CubeStar thesis, section 5.2.2.
+"""
+
+from amaranth.hdl import Cat, Module, Signal
+from amaranth.lib.wiring import Component, In, Out
+from amaranth.utils import ceil_log2
+
+__all__ = ["MatrixCounter"]
+
+
+class MatrixCounter(Component):
+    """Position inside a frame of ``columns`` x ``rows`` pixels, in one clock domain.
+
+    The three commands are sampled at the domain's rising edge; ``clear`` wins over ``next_row``,
+    which wins over ``next_column``. The position never leaves the frame: past the last column
+    comes the next row, past the last row the first one.
+
+    Ports:
+        next_column: step to the next pixel.
+        next_row: go to column 0 of the next row.
+        clear: go to column 0 of row 0.
+        last_column, last_row: high on the last one.
+        address: row : column.
+    """
+
+    def __init__(self, columns: int, rows: int, *, domain: str = "sync") -> None:
+        """Make a counter; ``columns`` and ``rows`` are at least 2, else ValueError."""
+        for name, value in (("columns", columns), ("rows", rows)):
+            if value < 2:
+                raise ValueError(f"{name} must be at least 2, not {value}")
+        self._columns = columns
+        self._rows = rows
+        self._domain = domain
+        super().__init__(
+            {
+                "next_column": In(1),
+                "next_row": In(1),
+                "clear": In(1),
+                "last_column": Out(1),
+                "last_row": Out(1),
+                "address": Out(self.address_width(columns, rows)),
+            }
+        )
+
+    @staticmethod
+    def address_width(columns: int, rows: int) -> int:
+        """Bits of the address of a frame of ``columns`` x ``rows`` pixels."""
+        return ceil_log2(columns) + ceil_log2(rows)
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the two counters."""
+        m = Module()
+        column = Signal(range(self._columns))
+        row = Signal(range(self._rows))
+        m.d.comb += [
+            self.last_column.eq(column == self._columns - 1),
+            self.last_row.eq(row == self._rows - 1),
+            self.address.eq(Cat(column, row)),
+        ]
+        with m.If(self.clear):
+            m.d[self._domain] += [column.eq(0), row.eq(0)]
+        with m.Elif(self.next_row | (self.next_column & self.last_column)):
+            m.d[self._domain] += column.eq(0)
+            with m.If(self.last_row):
+                m.d[self._domain] += row.eq(0)
+            with m.Else():
+                m.d[self._domain] += row.eq(row + 1)
+        with m.Elif(self.next_column):
+            m.d[self._domain] += column.eq(column + 1)
+        return m
