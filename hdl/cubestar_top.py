@@ -117,9 +117,7 @@ class CubeStarTop(Component):
             self.ACK.eq(writer.ack),
             reader.memory.eq(self.SRAM_D_I),
             self.DATA.eq(reader.data),
-            self.SRAM_A.eq(
-                Cat(Mux(self.RNW, reader.address, writer.address), bank & self.ENABLE)
-            ),
+            self.SRAM_A.eq(Cat(Mux(self.RNW, reader.address, writer.address), bank & self.ENABLE)),
             self.SRAM_D_O.eq(writer.data),
             self.SRAM_D_OE.eq(writer.store),
             self.SRAM_CE_N.eq(~self.ENABLE),

@@ -1,0 +1,187 @@
+"""Runs a firmware program in virtual time: spends its cycles and performs its requests."""
+
+from collections.abc import Callable, Generator
+from fractions import Fraction
+from typing import Any, Protocol
+
+import simpy
+
+from cubestack.emulator.rtl.engine import RtlEngine
+from cubestack.emulator.virtual_time import PS_PER_S, PS_PER_US, CycleClock
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.hardware import (
+    AwaitPin,
+    CameraTransfer,
+    Pay,
+    ReadTimer,
+    Request,
+    Reset,
+    Routine,
+    SetPin,
+    Sleep,
+    StrobeRead,
+)
+
+__all__ = ["CameraBus", "Processor", "Program"]
+
+Steps = Generator[simpy.Event, Any, Any]
+
+
+class Program(Protocol):
+    """A firmware program: its main routine never returns, it ends in a ``Reset`` request."""
+
+    def main(self) -> Routine[None]:
+        """Run from reset."""
+
+
+class CameraBus(Protocol):
+    """The bus over which the processor controls the camera."""
+
+    def transfer_ps(self, request: CameraTransfer) -> int:
+        """How long ``request`` occupies the bus, in ps."""
+
+    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
+        """Perform ``request``, which ends at ``now_ps``; None when not acknowledged."""
+
+
+class Processor:
+    """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
+
+    Attributes:
+        program: the running program, for the interrupt lines of the peripherals.
+        resets: number of software resets since power-up.
+    """
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        meter: Meter,
+        engine: RtlEngine,
+        camera_bus: CameraBus,
+        boot: Callable[[int], Program],
+        *,
+        boot_us: int,
+        on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
+    ) -> None:
+        """Power up.
+
+        Args:
+            env: kernel; its time is in ps.
+            meter: what the program charges its cycles to; its table gives the clock.
+            engine: the FPGA board.
+            camera_bus: the camera's control bus.
+            boot: makes the program; its argument counts the software resets so far.
+            boot_us: time from reset to the first instruction of ``main``.
+            on_pin: told about every output pin change, after it happened.
+        """
+        self._env = env
+        self._meter = meter
+        self._engine = engine
+        self._camera_bus = camera_bus
+        self._boot = boot
+        self._boot_us = boot_us
+        self._on_pin = on_pin
+        self._clock = CycleClock(meter.table.clock_hz)
+        self._wake = env.event()
+        self.resets = 0
+        self.program = boot(0)
+        env.process(self._run())
+
+    def wake(self) -> None:
+        """End the running wakeable sleep, or the next one at once."""
+        if not self._wake.triggered:
+            self._wake.succeed()
+
+    def _run(self) -> Steps:
+        while True:
+            yield self._env.timeout(self._boot_us * PS_PER_US)
+            yield from self._execute(self.program)
+            self.resets += 1
+            self._meter.take()
+            self.program = self._boot(self.resets)
+
+    def _execute(self, program: Program) -> Steps:
+        routine = program.main()
+        answer: object = None
+        while True:
+            request = routine.send(answer)
+            yield from self._pay()
+            if isinstance(request, Reset):
+                routine.close()
+                return
+            answer = yield from self._perform(request)
+
+    def _pay(self) -> Steps:
+        """Be busy for the charged cycles, and for those that interrupts charge meanwhile."""
+        while cycles := self._meter.take():
+            yield self._env.timeout(self._clock.elapse(cycles))
+
+    def _perform(self, request: Request) -> Steps:
+        match request:
+            case Pay():
+                return None
+            case ReadTimer():
+                return self._env.now // PS_PER_US
+            case SetPin(pin, level):
+                self._engine.run(self._env.now)
+                self._engine.set_pin(pin, level)
+                self._on_pin(pin, level)
+                return None
+            case AwaitPin():
+                return (yield from self._await_pin(request))
+            case Sleep():
+                return (yield from self._sleep(request))
+            case StrobeRead():
+                return (yield from self._strobe_read(request))
+            case CameraTransfer():
+                yield self._env.timeout(self._camera_bus.transfer_ps(request))
+                self._engine.run(self._env.now)
+                return self._camera_bus.transfer(request, self._env.now)
+            case _:
+                raise TypeError(f"a program can not request {request!r}")
+
+    def _horizon(self) -> int:
+        """Nothing else happens before this time, so the FPGA may run ahead up to it."""
+        peek = self._env.peek()
+        return int(peek) if peek != float("inf") else self._env.now + PS_PER_S
+
+    def _await_pin(self, request: AwaitPin) -> Steps:
+        start = self._env.now
+        deadline = start + request.timeout_us * PS_PER_US
+        self._engine.run(start)
+        reached = start
+        while self._engine.get_pin(request.pin) != request.level:
+            if self._env.now >= deadline:
+                return False
+            reached = self._engine.run(
+                min(deadline, self._horizon()), (request.pin, request.level)
+            )
+            yield self._env.timeout(reached - self._env.now)
+        poll = request.poll_cycles * PS_PER_S
+        polls = -(-(reached - start) * self._clock.hz // poll)
+        yield self._env.timeout(start + polls * poll // self._clock.hz - self._env.now)
+        return True
+
+    def _sleep(self, request: Sleep) -> Steps:
+        deadline = None if request.deadline_us is None else request.deadline_us * PS_PER_US
+        if deadline is not None and deadline <= self._env.now:
+            return False
+        alternatives: list[simpy.Event] = [self._wake] if request.wakeable else []
+        if deadline is not None:
+            alternatives.append(self._env.timeout(deadline - self._env.now))
+        yield simpy.AnyOf(self._env, alternatives)
+        if request.wakeable and self._wake.triggered:
+            self._wake = self._env.event()
+            return True
+        return False
+
+    def _strobe_read(self, request: StrobeRead) -> Steps:
+        period = Fraction(request.cycles * PS_PER_S, self._clock.hz)
+        done = 0
+        while done < len(request.target):
+            yield from self._pay()
+            # At least one cycle: an event inside it is an interrupt in the middle of the loop.
+            limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
+            done += self._engine.strobe_read(request.target[done:], period, limit)
+            yield self._env.timeout(self._engine.now_ps - self._env.now)
+        return None

@@ -1,0 +1,27 @@
+"""Virtual time: an integer number of picoseconds, and clocks that convert cycles exactly."""
+
+__all__ = ["PS_PER_MS", "PS_PER_S", "PS_PER_US", "CycleClock"]
+
+PS_PER_S = 10**12
+PS_PER_MS = 10**9
+PS_PER_US = 10**6
+
+
+class CycleClock:
+    """Turns cycle counts into picoseconds; what one conversion rounds off, the next one pays.
+
+    Attributes:
+        hz: clock frequency.
+    """
+
+    def __init__(self, hz: int) -> None:
+        """Make a clock of ``hz`` cycles a second (positive, else ValueError)."""
+        if hz <= 0:
+            raise ValueError(f"a clock needs a positive frequency, not {hz} Hz")
+        self.hz = hz
+        self._remainder = 0
+
+    def elapse(self, cycles: int) -> int:
+        """Picoseconds that the next ``cycles`` take; summed over calls, exact to one ps."""
+        ps, self._remainder = divmod(cycles * PS_PER_S + self._remainder, self.hz)
+        return ps

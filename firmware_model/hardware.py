@@ -1,0 +1,162 @@
+"""What a firmware program sees of the hardware around it.
+
+A program is a generator. Whatever takes time it *yields* as a request; whoever runs the program
+(the emulated board, or a test) performs the request in virtual time and sends the answer back.
+Before any request is performed, the processor is busy for the cycles that the program's ``Meter``
+was charged with since the last one. Interrupt handlers are plain methods that the hardware calls
+at the instant of their cause; the cycles that they charge are paid by the running program.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "AwaitPin",
+    "CameraTransfer",
+    "FlashStore",
+    "Hardware",
+    "Pay",
+    "ReadTimer",
+    "Request",
+    "Reset",
+    "Routine",
+    "SetPin",
+    "Sleep",
+    "StrobeRead",
+]
+
+
+@dataclass(frozen=True)
+class Pay:
+    """Only spend the cycles charged so far."""
+
+
+@dataclass(frozen=True)
+class ReadTimer:
+    """Read the free-running timer; the answer is an int, microseconds since power-up."""
+
+
+@dataclass(frozen=True)
+class SetPin:
+    """Drive the output pin ``pin`` to ``level`` (0 or 1)."""
+
+    pin: str
+    level: int
+
+
+@dataclass(frozen=True)
+class AwaitPin:
+    """Poll the input pin ``pin`` until it has ``level``; the answer is False after ``timeout_us``.
+
+    One poll takes ``poll_cycles`` processor cycles, so the program goes on at the end of a poll.
+    """
+
+    pin: str
+    level: int
+    timeout_us: int
+    poll_cycles: int
+
+
+@dataclass(frozen=True)
+class Sleep:
+    """Sleep until ``Hardware.wake`` is called, or at most until ``deadline_us`` (None: for ever).
+
+    The answer is True if it was woken. A wake-up that came before the request is not lost.
+    With ``wakeable`` False only the deadline ends the sleep.
+    """
+
+    deadline_us: int | None
+    wakeable: bool = True
+
+
+@dataclass(frozen=True)
+class StrobeRead:
+    """Read bytes from the FPGA into ``target``: one data-clock cycle each, ``cycles`` long."""
+
+    target: NDArray[np.uint8]
+    cycles: int
+
+
+@dataclass(frozen=True)
+class CameraTransfer:
+    """One message on the camera's control bus: write ``data``, then read ``read`` bytes.
+
+    The answer is the bytes read, or None when the camera did not acknowledge.
+    """
+
+    data: bytes
+    read: int = 0
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Software reset: the program ends here and starts anew; RAM is lost."""
+
+
+Request = Pay | ReadTimer | SetPin | AwaitPin | Sleep | StrobeRead | CameraTransfer | Reset
+
+T = TypeVar("T")
+Routine = Generator[Request, Any, T]
+"""Part of a firmware program that takes time; used with ``yield from``."""
+
+
+class FlashStore:
+    """Flash pages by name: survives resets and power cycles.
+
+    Attributes:
+        pages: contents by page name.
+        writes: how often each page was written, for the wear report.
+    """
+
+    def __init__(self) -> None:
+        """Make an erased store."""
+        self.pages: dict[str, bytes] = {}
+        self.writes: dict[str, int] = {}
+
+    def write(self, page: str, data: bytes) -> None:
+        """Erase and program ``page``."""
+        self.pages[page] = bytes(data)
+        self.writes[page] = self.writes.get(page, 0) + 1
+
+    def erase(self, page: str) -> None:
+        """Erase ``page``; reading it then gives None."""
+        self.pages.pop(page, None)
+
+    def read(self, page: str) -> bytes | None:
+        """Contents of ``page``, or None when it is erased."""
+        return self.pages.get(page)
+
+
+class Hardware(Protocol):
+    """Peripherals that a program uses without waiting for them.
+
+    Attributes:
+        external_ram: SRAM on the external bus, shape (bytes,), uint8.
+        retention: battery-domain registers, kept over software resets, not over power-off.
+        flash: non-volatile store.
+        reset_cause: why the processor started, the bit number in its reset-cause register.
+    """
+
+    external_ram: NDArray[np.uint8]
+    retention: bytearray
+    flash: FlashStore
+    reset_cause: int
+
+    def uart_send(self, data: bytes) -> None:
+        """Queue ``data`` for the satellite's UART; the peripheral sends at its own pace."""
+
+    def wake(self) -> None:
+        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
+
+    def switch_supply(self, channel: str, on: bool) -> None:
+        """Turn the load switch of supply ``channel`` on or off."""
+
+    def supply_current_ma(self, channel: str) -> float:
+        """Current that the monitor of supply ``channel`` shows, in mA."""
+
+    def temperature_c(self) -> float:
+        """On-chip temperature sensor, in degrees Celsius."""
