@@ -153,9 +153,7 @@ class Processor:
         while self._engine.get_pin(request.pin) != request.level:
             if self._env.now >= deadline:
                 return False
-            reached = self._engine.run(
-                min(deadline, self._horizon()), (request.pin, request.level)
-            )
+            reached = self._engine.run(min(deadline, self._horizon()), (request.pin, request.level))
             yield self._env.timeout(reached - self._env.now)
         poll = request.poll_cycles * PS_PER_S
         polls = -(-(reached - start) * self._clock.hz // poll)

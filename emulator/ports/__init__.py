@@ -1,1 +1,1 @@
-"""emulator/ports."""
+"""Where the outside world plugs in: in-process links, pseudo-terminals, TCP sockets."""

@@ -1,0 +1,39 @@
+# `make run` and `make test` set up everything they need; see README.md.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: help venv run test lint bench clean
+
+help:
+	@echo "make run    set up, then boot an emulated CubeStar and measure its attitude over the serial port"
+	@echo "make test   set up, then run all tests"
+	@echo "make lint   ruff and mypy"
+	@echo "make bench  measure the cost of the hot paths"
+	@echo "make clean  remove .venv, out and caches"
+
+venv: .venv/ready-run
+
+.venv/ready-run: pyproject.toml setup.sh
+	@PYTHON=$(PYTHON) ./setup.sh run
+	@touch $@
+
+.venv/ready-dev: pyproject.toml setup.sh
+	@PYTHON=$(PYTHON) ./setup.sh dev
+	@touch $@ .venv/ready-run
+
+run: .venv/ready-run
+	@$(BIN)/cubestack demo --out out
+
+test: .venv/ready-dev
+	@$(BIN)/pytest -n auto
+
+lint: .venv/ready-dev
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@./typecheck.sh
+
+bench: .venv/ready-run
+	@$(BIN)/cubestack bench
+
+clean:
+	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

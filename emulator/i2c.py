@@ -1,0 +1,102 @@
+"""The satellite's I2C bus: messages with their time on the wire, and targets that answer.
+
+Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import simpy
+
+from cubestack.emulator.virtual_time import PS_PER_S
+
+__all__ = ["I2cBus", "I2cMessage", "I2cNackError", "I2cTarget"]
+
+BITS_PER_BYTE = 9  # eight data bits and the acknowledge
+
+
+@dataclass
+class I2cMessage:
+    """A message to a 7-bit ``address``: ``data`` to write, or ``read`` bytes to fetch into it."""
+
+    address: int
+    data: bytearray = field(default_factory=bytearray)
+    read: int = 0
+
+
+class I2cNackError(OSError):
+    """Nobody, or not the addressed target, acknowledged."""
+
+
+class I2cTarget(Protocol):
+    """A device on the bus; called byte by byte, like the interrupts of a slave peripheral."""
+
+    def i2c_start(self, read: bool) -> None:
+        """A (repeated) start addressed this target."""
+
+    def i2c_write(self, byte: int) -> bool:
+        """A byte came; returns whether it is acknowledged."""
+
+    def i2c_read(self) -> int:
+        """The next byte to send, 0..255."""
+
+    def i2c_stop(self) -> None:
+        """The transfer that addressed this target ended."""
+
+
+class I2cBus:
+    """One bus with any number of targets.
+
+    Attributes:
+        bit_ps: time of one bit.
+    """
+
+    def __init__(self, env: simpy.Environment, hz: int = 100_000) -> None:
+        """Make an idle bus at ``hz`` bits a second."""
+        self._env = env
+        self._targets: dict[int, I2cTarget] = {}
+        self._wire = simpy.Resource(env)
+        self.bit_ps = PS_PER_S // hz
+
+    def attach(self, address: int, target: I2cTarget) -> None:
+        """Put ``target`` on the bus at a free 7-bit ``address`` (else ValueError)."""
+        if not 0x08 <= address <= 0x77:
+            raise ValueError(f"I2C address {address:#04x} is not in 0x08..0x77")
+        if address in self._targets:
+            raise ValueError(f"I2C address {address:#04x} is taken already")
+        self._targets[address] = target
+
+    def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
+        """Perform one transfer; read data lands in the messages. Raises I2cNackError."""
+        with self._wire.request() as granted:
+            yield granted
+            open_target: I2cTarget | None = None
+            try:
+                for message in messages:
+                    yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
+                    target = self._targets.get(message.address)
+                    if target is None:
+                        raise I2cNackError(f"no I2C device answers at {message.address:#04x}")
+                    if open_target is not None and open_target is not target:
+                        open_target.i2c_stop()
+                    open_target = target
+                    target.i2c_start(message.read > 0)
+                    yield from self._bytes(target, message)
+            finally:
+                if open_target is not None:
+                    open_target.i2c_stop()
+            yield self._env.timeout(self.bit_ps)
+
+    def _bytes(self, target: I2cTarget, message: I2cMessage) -> Generator[simpy.Event, Any, None]:
+        if message.read:
+            message.data = bytearray()
+            for _ in range(message.read):
+                byte = target.i2c_read()
+                yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+                message.data.append(byte)
+            return
+        for byte in message.data:
+            yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+            if not target.i2c_write(byte):
+                raise I2cNackError(f"I2C device {message.address:#04x} refused byte {byte:#04x}")

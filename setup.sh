@@ -1,0 +1,50 @@
+#!/bin/sh
+# Makes .venv with what `make run` (argument "run") or `make test` (argument "dev") needs.
+# Missing system packages are installed when we are root; else one line says what to install.
+set -eu
+cd "$(dirname "$0")"
+kind=$1
+PYTHON=${PYTHON:-python3}
+
+say() { printf 'setup: %s\n' "$*"; }
+fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
+
+# need WHAT PACKAGES...: installs Debian packages, or says what to install.
+need() {
+    what=$1
+    shift
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
+        say "installing $* ($what)"
+        log=$(mktemp)
+        if ! { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$@"; } >"$log" 2>&1; then
+            tail -n 5 "$log" >&2
+            fail "could not install $*; $what is needed"
+        fi
+    else
+        fail "$what is needed: install it with: sudo apt-get install $*"
+    fi
+}
+
+command -v "$PYTHON" >/dev/null 2>&1 || need "Python 3.11 or newer" python3 python3-venv
+"$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+    fail "Python 3.11 or newer is needed, $PYTHON is $("$PYTHON" -V 2>&1); try: make PYTHON=python3.11 $kind"
+"$PYTHON" -c 'import ensurepip, venv' 2>/dev/null || need "Python's venv module" python3-venv
+
+extras=""
+if [ "$kind" = dev ]; then
+    extras="dev"
+    command -v iverilog >/dev/null 2>&1 || need "Icarus Verilog, for the HDL tests" iverilog
+fi
+if ! command -v "${CXX:-c++}" >/dev/null 2>&1 && ! command -v g++ >/dev/null 2>&1 &&
+    ! command -v clang++ >/dev/null 2>&1; then
+    say "no C++ compiler found: using the one in the ziglang wheel"
+    extras="${extras:+$extras,}compiler"
+fi
+
+[ -x .venv/bin/python ] || { say "making .venv"; "$PYTHON" -m venv .venv; }
+say "installing Python packages"
+log=.venv/pip.log
+if ! .venv/bin/python -m pip install --disable-pip-version-check -e ".${extras:+[$extras]}" >"$log" 2>&1; then
+    tail -n 5 "$log" >&2
+    fail "pip failed; the whole log is in $log"
+fi
