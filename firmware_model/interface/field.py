@@ -1,0 +1,199 @@
+"""One field of a telecommand or telemetry frame: its bits, scale, limits and meaning.
+
+Byte order, rounding and saturation are part of the declaration (CubeSpace family of nodes,
+interface version 3; the order is published, rounding and saturation are ours):
+
+- Fields are little-endian: bit 0 of a message is the lowest bit of its first byte.
+- ``scale`` is what the printed tables divide by: value = raw / scale.
+- Rounding is to the nearest count, half away from zero.
+- Telemetry saturates at the ends of its type, and not-a-number becomes 0 in an integer: what the
+  conversion routines of a Cortex-M3 do. A telecommand parameter that its type cannot carry is an
+  error of the sender instead.
+"""
+
+import math
+import re
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from enum import IntEnum
+from typing import SupportsFloat
+
+__all__ = ["Field", "InterfaceError", "Value", "suggestion"]
+
+#: A field's value: bool for bool1, bytes for bytesN, a number for all others.
+Value = int | float | bool | bytes
+
+_WIDTHS = {"bool1": 1, "u8": 8, "enum8": 8, "u16": 16, "i16": 16, "u32": 32, "f32": 32}
+_BYTES = re.compile(r"bytes([1-9][0-9]*)")
+
+
+class InterfaceError(ValueError):
+    """A message, field or value that the interface does not have; the text is one line."""
+
+
+def suggestion(word: str, known: list[str]) -> str:
+    """One phrase that names the nearest of ``known``, or all of them when none is near."""
+    lower = {name.lower(): name for name in known}
+    near = get_close_matches(word.lower(), lower, n=1)
+    return f"did you mean {lower[near[0]]}?" if near else "known: " + ", ".join(known)
+
+
+def _nearest_f32(value: float) -> float:
+    """``value`` as float32 carries it; beyond its range, infinity."""
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def _round_half_away(value: float) -> int:
+    """Nearest integer, halves away from zero."""
+    magnitude = abs(value)
+    whole = math.floor(magnitude)
+    return int(math.copysign(whole + (magnitude - whole >= 0.5), value))
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a message.
+
+    Attributes:
+        name: printed name.
+        type: bool1, u8, u16, u32, i16, f32, enum8, or bytesN (N bytes).
+        bit_offset: first bit; a multiple of 8 except for bool1.
+        meaning: one phrase for a reader.
+        unit: unit of the value, empty for pure numbers.
+        scale: raw counts for one unit.
+        choices: the allowed values and their names, or None.
+        minimum: smallest allowed value, in ``unit``.
+        maximum: largest allowed value, in ``unit``.
+        maximum_by: (other field, {its value: largest allowed value here}), or None.
+        range_flag: error flag that a value outside these limits raises, or empty.
+        flag: for a bool1 that shows an error flag: that flag's name.
+        reset: value after power-up; None takes zero.
+    """
+
+    name: str
+    type: str
+    bit_offset: int
+    meaning: str
+    unit: str = ""
+    scale: float = 1.0
+    choices: type[IntEnum] | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    maximum_by: tuple[str, Mapping[int, float]] | None = None
+    range_flag: str = ""
+    flag: str = ""
+    reset: Value | None = None
+
+    def __post_init__(self) -> None:
+        """Check the declaration; raises InterfaceError."""
+        if self.type not in _WIDTHS and not _BYTES.fullmatch(self.type):
+            raise InterfaceError(f"field {self.name}: no type {self.type!r}; {_known_types()}")
+        if self.bit_offset < 0 or (self.type != "bool1" and self.bit_offset % 8):
+            raise InterfaceError(f"field {self.name}: bit offset {self.bit_offset} is no byte's")
+        if not self.scale > 0:
+            raise InterfaceError(f"field {self.name}: scale must be positive, not {self.scale}")
+        if self.reset is None:
+            object.__setattr__(self, "reset", self.decode(0))
+
+    @property
+    def bits(self) -> int:
+        """Width in bits."""
+        match = _BYTES.fullmatch(self.type)
+        return 8 * int(match[1]) if match else _WIDTHS[self.type]
+
+    @property
+    def raw_range(self) -> tuple[int, int]:
+        """Smallest and largest raw count of an integer type."""
+        if self.type == "i16":
+            return -(1 << 15), (1 << 15) - 1
+        return 0, (1 << self.bits) - 1
+
+    def encode(self, value: object, *, saturate: bool) -> int:
+        """Bits of ``value``: a number, a bool, bytes, or the name of a choice.
+
+        With ``saturate``, numbers beyond the type become its ends and not-a-number becomes 0 in
+        an integer; without, they raise InterfaceError. A value of a wrong kind always does.
+        """
+        if self.type.startswith("bytes"):
+            return self._encode_bytes(value)
+        number = self._number(value)
+        if self.type == "f32":
+            nearest = _nearest_f32(number)
+            if math.isinf(nearest) and not math.isinf(number) and not saturate:
+                raise InterfaceError(f"field {self.name}: {value!r} is too large for a float32")
+            return int.from_bytes(struct.pack("<f", nearest), "little")
+        counts = number * self.scale
+        low, high = self.raw_range
+        if not saturate and not low - 0.5 < counts < high + 0.5:
+            raise InterfaceError(
+                f"field {self.name}: {value!r} does not fit; {self.type} carries "
+                f"{low / self.scale:g} to {high / self.scale:g} {self.unit}".rstrip()
+            )
+        raw = 0 if math.isnan(counts) else _round_half_away(min(max(counts, low), high))
+        return raw & ((1 << self.bits) - 1)
+
+    def decode(self, raw: int) -> Value:
+        """Value of the field's bits ``raw``."""
+        if self.type.startswith("bytes"):
+            return raw.to_bytes(self.bits // 8, "little")
+        if self.type == "bool1":
+            return bool(raw)
+        if self.type == "f32":
+            return float(struct.unpack("<f", raw.to_bytes(4, "little"))[0])
+        if raw > self.raw_range[1]:
+            raw -= 1 << self.bits
+        return raw if self.scale == 1.0 else raw / self.scale
+
+    def allows(self, value: Value, others: Mapping[str, Value]) -> bool:
+        """Whether a decoded ``value`` is within the limits; ``others`` are its message's values."""
+        if isinstance(value, bytes):
+            return True
+        if self.choices is not None and value not in {int(choice) for choice in self.choices}:
+            return False
+        maximum = self.maximum
+        if self.maximum_by is not None:
+            other, limits = self.maximum_by
+            maximum = limits.get(int(others[other]), maximum)  # an unlisted one is that field's
+        low = -math.inf if self.minimum is None else self.minimum
+        high = math.inf if maximum is None else maximum
+        if self.type == "f32":  # the limits as the wire carries them: pi / 2 is allowed
+            low, high = _nearest_f32(low), _nearest_f32(high)
+        return math.isfinite(value) and low <= value <= high
+
+    def label(self, value: Value) -> str:
+        """``value`` for a reader: the choice's name, hexadecimal bytes, or number and unit."""
+        if isinstance(value, bytes):
+            return value.hex()
+        if self.choices is not None and value in {int(choice) for choice in self.choices}:
+            return self.choices(int(value)).name
+        text = f"{value:.7g}" if isinstance(value, float) else str(value)
+        return f"{text} {self.unit}".rstrip()
+
+    def _number(self, value: object) -> float:
+        if isinstance(value, str) and self.choices is not None:
+            names = {choice.name.lower(): choice for choice in self.choices}
+            if value.lower() in names:
+                return float(names[value.lower()])
+            hint = suggestion(value, [choice.name for choice in self.choices])
+            raise InterfaceError(f"field {self.name}: no choice {value!r}; {hint}")
+        if isinstance(value, SupportsFloat):
+            return float(value)
+        raise InterfaceError(f"field {self.name}: {value!r} is not a number ({self.type})")
+
+    def _encode_bytes(self, value: object) -> int:
+        if not isinstance(value, bytes | bytearray | memoryview):
+            raise InterfaceError(f"field {self.name}: {value!r} is not bytes")
+        if len(value) != self.bits // 8:
+            raise InterfaceError(
+                f"field {self.name}: has {len(value)} bytes, must have {self.bits // 8}"
+            )
+        return int.from_bytes(value, "little")
+
+
+def _known_types() -> str:
+    return "known: " + ", ".join(_WIDTHS) + ", bytesN"

@@ -1,0 +1,117 @@
+"""Frames on the UART of the CubeSpace family of nodes.
+
+A frame is 1F 7F, the payload, 1F FF; a payload byte 1F is sent twice. In a request the payload is
+the ID byte and its data; in the node dialect an answer is data alone, or one error byte.
+"""
+
+from enum import Enum, auto
+
+__all__ = ["END", "ESCAPE", "START", "FrameDecoder", "FrameEvent", "encode_frame"]
+
+ESCAPE = 0x1F
+START = 0x7F
+END = 0xFF
+
+
+def encode_frame(payload: bytes) -> bytes:
+    """The frame that carries ``payload`` (any length, 0 included)."""
+    escaped = payload.replace(bytes((ESCAPE,)), bytes((ESCAPE, ESCAPE)))
+    return bytes((ESCAPE, START)) + escaped + bytes((ESCAPE, END))
+
+
+class FrameEvent(Enum):
+    """What a byte brought about."""
+
+    FRAME = auto()
+    """A whole frame: its payload is in ``FrameDecoder.payload``."""
+    TOO_LONG = auto()
+    """The end of a frame whose payload exceeds the limit; it is dropped."""
+    INCOMPLETE = auto()
+    """A start inside a frame: the unfinished one is dropped, the new one has begun."""
+    PROTOCOL_ERROR = auto()
+    """A byte outside of a frame, or an escape that means nothing; an open frame is dropped."""
+
+
+class _State(Enum):
+    OUTSIDE = auto()
+    OUTSIDE_ESCAPED = auto()
+    INSIDE = auto()
+    INSIDE_ESCAPED = auto()
+
+
+class FrameDecoder:
+    """Finds frames in a stream of bytes, one byte at a time; no byte sequence raises.
+
+    After anything, the next good frame is found, with one exception that the format itself makes:
+    when noise has opened a frame (it holds 1F 7F) and ends in an odd number of 1F, the good
+    frame's first 1F completes a doubled data byte, so that frame is swallowed and only the one
+    after it is found. A silence on the line (``reset``) ends such a state too.
+
+    Attributes:
+        payload: payload of the last whole frame.
+    """
+
+    def __init__(self, max_length: int) -> None:
+        """Accept payloads of at most ``max_length`` bytes; memory is bounded by it."""
+        self._max_length = max_length
+        self._state = _State.OUTSIDE
+        self._buffer = bytearray()
+        self._too_long = False
+        self.payload = b""
+
+    def feed(self, byte: int) -> FrameEvent | None:
+        """Take the next ``byte``; returns what it completed or broke, None while all is well."""
+        match self._state:
+            case _State.OUTSIDE:
+                if byte == ESCAPE:
+                    self._state = _State.OUTSIDE_ESCAPED
+                    return None
+                return FrameEvent.PROTOCOL_ERROR
+            case _State.OUTSIDE_ESCAPED:
+                if byte == START:
+                    self._begin()
+                    return None
+                if byte != ESCAPE:  # after 1F 1F the second one may still begin a frame
+                    self._state = _State.OUTSIDE
+                return FrameEvent.PROTOCOL_ERROR
+            case _State.INSIDE:
+                if byte == ESCAPE:
+                    self._state = _State.INSIDE_ESCAPED
+                else:
+                    self._store(byte)
+                return None
+            case _State.INSIDE_ESCAPED:
+                return self._escaped(byte)
+
+    def reset(self) -> bool:
+        """Forget an unfinished frame, as after a silence; returns whether there was one."""
+        unfinished = self._state is not _State.OUTSIDE
+        self._state = _State.OUTSIDE
+        return unfinished
+
+    def _begin(self) -> None:
+        self._state = _State.INSIDE
+        self._buffer.clear()
+        self._too_long = False
+
+    def _store(self, byte: int) -> None:
+        self._state = _State.INSIDE
+        if len(self._buffer) < self._max_length:
+            self._buffer.append(byte)
+        else:
+            self._too_long = True
+
+    def _escaped(self, byte: int) -> FrameEvent | None:
+        if byte == ESCAPE:
+            self._store(byte)
+            return None
+        if byte == START:
+            self._begin()
+            return FrameEvent.INCOMPLETE
+        self._state = _State.OUTSIDE
+        if byte != END:
+            return FrameEvent.PROTOCOL_ERROR
+        if self._too_long:
+            return FrameEvent.TOO_LONG
+        self.payload = bytes(self._buffer)
+        return FrameEvent.FRAME
