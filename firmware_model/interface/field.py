@@ -29,6 +29,10 @@ _WIDTHS = {"bool1": 1, "u8": 8, "enum8": 8, "u16": 16, "i16": 16, "u32": 32, "f3
 _BYTES = re.compile(r"bytes([1-9][0-9]*)")
 
 
+#: The allowed values of a field, with their names.
+Choices = type[IntEnum]
+
+
 class InterfaceError(ValueError):
     """A message, field or value that the interface does not have; the text is one line."""
 
@@ -81,7 +85,7 @@ class Field:
     meaning: str
     unit: str = ""
     scale: float = 1.0
-    choices: type[IntEnum] | None = None
+    choices: Choices | None = None
     minimum: float | None = None
     maximum: float | None = None
     maximum_by: tuple[str, Mapping[int, float]] | None = None
