@@ -1,0 +1,143 @@
+"""Builds the compiled engine's library once, and keeps it in the user's cache folder.
+
+The key covers everything that the result depends on: the design, the driver, the CXXRTL runtime,
+the compiler and its flags. A library's file name carries the hash of its own bytes, so that a
+damaged one is noticed, and it appears by renaming, so that two processes may build at once.
+"""
+
+import hashlib
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from amaranth.lib.wiring import Component
+
+from cubestack.hdl.generate import cxxrtl_headers, cxxrtl_text, design_hash
+
+__all__ = [
+    "Compiler",
+    "CompilerError",
+    "NoCompilerError",
+    "cache_folder",
+    "find_compiler",
+    "library_for",
+]
+
+SOURCES = ("driver.cpp", "sram_model.h")
+FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-shared")
+
+
+class CompilerError(RuntimeError):
+    """The library could not be built."""
+
+
+class NoCompilerError(CompilerError):
+    """There is no C++ compiler."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C++ compiler: how it is called, and what tells it from every other one."""
+
+    command: tuple[str, ...]
+    identity: str
+
+
+def find_compiler() -> Compiler | None:
+    """Take ``$CXX``, else one on the PATH, else the one of the ziglang wheel, else None."""
+    candidates = [shlex.split(os.environ.get("CXX", "")), ["c++"], ["g++"], ["clang++"]]
+    for candidate in candidates:
+        program = shutil.which(candidate[0]) if candidate else None
+        if program is None:
+            continue
+        command = (program, *candidate[1:])
+        answer = subprocess.run([*command, "--version"], capture_output=True, text=True)
+        if answer.returncode == 0:
+            return Compiler(command, f"{shlex.join(command)}\n{answer.stdout}")
+    if importlib.util.find_spec("ziglang") is not None:
+        return Compiler((sys.executable, "-m", "ziglang", "c++"), f"ziglang {version('ziglang')}")
+    return None
+
+
+def cache_folder() -> Path:
+    """Folder of the libraries: ``$XDG_CACHE_HOME/cubestack``, by default below ``~/.cache``."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "cubestack"
+
+
+def library_for(component: Component) -> Path:
+    """Shared library of the driver with ``component``, from the cache or built now.
+
+    Raises:
+        NoCompilerError: there is no C++ compiler.
+        CompilerError: it failed; the message names the log.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
+    folder = cache_folder()
+    key = _key(component, compiler)
+    try:
+        for candidate in folder.glob(f"{key}-*.so"):
+            if candidate.name == _library_name(key, candidate.read_bytes()):
+                return candidate
+            candidate.unlink(missing_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            built = _compile(component, compiler, Path(scratch), folder / f"{key}.log")
+            library = folder / _library_name(key, built.read_bytes())
+            built.replace(library)
+    except OSError as error:
+        raise CompilerError(
+            f"can not use the cache folder {folder} ({error.strerror}); "
+            "XDG_CACHE_HOME names another one"
+        ) from error
+    return library
+
+
+def _key(component: Component, compiler: Compiler) -> str:
+    digest = hashlib.sha256()
+    for text in (design_hash(component), compiler.identity, platform.machine(), *FLAGS):
+        digest.update(text.encode() + b"\0")
+    for source in SOURCES:
+        digest.update(_source(source).read_bytes())
+    for header in sorted(cxxrtl_headers().glob("**/*.h")):
+        digest.update(header.read_bytes())
+    return digest.hexdigest()[:24]
+
+
+def _library_name(key: str, content: bytes) -> str:
+    return f"{key}-{hashlib.sha256(content).hexdigest()[:24]}.so"
+
+
+def _source(name: str) -> Path:
+    return Path(__file__).parent / name
+
+
+def _compile(component: Component, compiler: Compiler, scratch: Path, log: Path) -> Path:
+    (scratch / "design.cpp").write_text(cxxrtl_text(component))
+    library = scratch / "library.so"
+    command = [
+        *compiler.command,
+        *FLAGS,
+        f"-I{scratch}",
+        f"-I{cxxrtl_headers()}",
+        str(_source("driver.cpp")),
+        "-o",
+        str(library),
+    ]
+    with log.open("w") as output:
+        output.write(shlex.join(command) + "\n")
+        output.flush()
+        done = subprocess.run(command, stdout=output, stderr=subprocess.STDOUT)
+    if done.returncode != 0 or not library.exists():
+        raise CompilerError(f"{shlex.join(compiler.command)} failed; its log is {log}")
+    return library

@@ -1,0 +1,198 @@
+"""The compiled engine: CXXRTL's C++ of the design with driver.cpp around it, through ctypes."""
+
+import ctypes
+from dataclasses import astuple, fields
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.rtl.build import library_for
+from cubestack.emulator.rtl.engine import CAMERA_PINS, MCU_PINS, OUTPUT_PINS
+from cubestack.emulator.rtl.pixel_clock import LoadedSegment
+from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
+from cubestack.emulator.sram import (
+    MAX_VIOLATIONS,
+    RULES,
+    SramTiming,
+    Violation,
+    ViolationLog,
+)
+from cubestack.hdl.cubestar_top import CubeStarTop
+
+__all__ = ["CompiledEngine"]
+
+_KINDS = tuple(RULES)
+_OUTCOMES = tuple(Outcome)  # declared in the driver's order
+
+
+class _Segment(ctypes.Structure):
+    _fields_ = [  # noqa: RUF012
+        (name, ctypes.c_int64)
+        for name in (
+            "start",
+            "half_numerator",
+            "half_denominator",
+            "edges",
+            "rows",
+            "line_clocks",
+            "active_columns",
+            "vsync",
+        )
+    ]
+
+
+class _Timing(ctypes.Structure):
+    _fields_ = [(field.name, ctypes.c_int64) for field in fields(SramTiming)]  # noqa: RUF012
+
+
+class _Violation(ctypes.Structure):
+    _fields_ = [  # noqa: RUF012
+        (name, ctypes.c_int64) for name in ("kind", "time", "address", "found", "needed")
+    ]
+
+
+_INT, _LONG, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
+_FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "driver_new": (_POINTER, (_POINTER, ctypes.POINTER(_Timing), _LONG, _INT)),
+    "driver_delete": (None, (_POINTER,)),
+    "driver_pin": (_INT, (ctypes.c_char_p,)),
+    "driver_set": (None, (_POINTER, _INT, ctypes.c_uint32, _LONG)),
+    "driver_get": (ctypes.c_uint32, (_POINTER, _INT)),
+    "driver_load": (None, (_POINTER, ctypes.POINTER(_Segment), _LONG)),
+    "driver_use_pixels": (None, (_POINTER, _POINTER)),
+    "driver_burst": (_INT, (_POINTER, _LONG, _INT, ctypes.POINTER(_LONG))),
+    "driver_strobe": (None, (_POINTER, _POINTER, _LONG, _LONG, _LONG, _LONG, _LONG)),
+    "driver_violations": (_LONG, (_POINTER, _LONG, _POINTER)),
+    "driver_violation_count": (_LONG, (_POINTER, _INT)),
+}
+
+
+def load_library(path: Path) -> ctypes.CDLL:
+    """Open a library of :func:`~cubestack.emulator.rtl.build.library_for`, its types declared."""
+    library = ctypes.CDLL(str(path))
+    for name, (result, arguments) in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments
+    return library
+
+
+class CompiledEngine(SteppingEngine):
+    """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` at tens of millions of clocks a second.
+
+    With ``skipping``, a clock in the low part of HSYNC that changed no register is not repeated.
+    """
+
+    def __init__(
+        self, top: CubeStarTop, sram_timing: SramTiming | None = None, *, skipping: bool = True
+    ) -> None:
+        """Load the library of ``top``, building it first where the cache has none.
+
+        Raises:
+            CompilerError: there is no C++ compiler, or it failed.
+        """
+        super().__init__(1 << len(top.SRAM_A), skipping=skipping)
+        self._driver: int | None = None
+        self._library = load_library(library_for(top))
+        self._driver = self._library.driver_new(
+            self.sram.ctypes.data,
+            _Timing(*astuple(sram_timing or SramTiming())),
+            MAX_VIOLATIONS,
+            skipping,
+        )
+        self._pins = {
+            name: self._library.driver_pin(name.encode())
+            for name in (*CAMERA_PINS, *MCU_PINS, *OUTPUT_PINS)
+        }
+        self._log = ViolationLog()
+        self._reached = ctypes.c_int64()
+
+    def close(self) -> None:
+        """Release the driver."""
+        if self._driver is not None:
+            self._library.driver_delete(self._driver)
+            self._driver = None
+
+    def __del__(self) -> None:
+        """Release the driver."""
+        self.close()
+
+    @property
+    def violation_log(self) -> ViolationLog:
+        """What the SRAM model recorded."""
+        for number, kind in enumerate(_KINDS):
+            count = self._library.driver_violation_count(self._driver, number)
+            if count:
+                self._log.counts[kind] = count
+        return self._log
+
+    def _set(self, name: str, value: int) -> None:
+        self._library.driver_set(self._driver, self._pins[name], value, self.now_ps)
+        self._collect_violations()
+
+    def _get(self, name: str) -> int:
+        return int(self._library.driver_get(self._driver, self._pins[name]))
+
+    def _load(self, loaded: LoadedSegment | None, edge: int) -> None:
+        if loaded is None:
+            for name in CAMERA_PINS:
+                self._set(name, 0)
+            return
+        segment = loaded.segment
+        self._library.driver_load(
+            self._driver,
+            _Segment(
+                segment.start_ps,
+                loaded.half_period.numerator,
+                loaded.half_period.denominator,
+                loaded.edges,
+                segment.rows,
+                loaded.line_clocks,
+                loaded.active_columns,
+                segment.vsync,
+            ),
+            edge,
+        )
+
+    def _use_pixels(self, pixels: NDArray[np.uint8]) -> None:
+        # The loaded segment keeps the array alive while the driver reads it.
+        self._library.driver_use_pixels(self._driver, pixels.ctypes.data)
+
+    def _burst(self, until_ps: int, stop_level: int | None) -> tuple[int, Outcome]:
+        self._reached.value = self.now_ps
+        outcome = self._library.driver_burst(
+            self._driver, until_ps, -1 if stop_level is None else stop_level, self._reached
+        )
+        self._collect_violations()
+        return max(self.now_ps, self._reached.value), _OUTCOMES[outcome]
+
+    def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
+        if not out.flags.c_contiguous or out.dtype != np.uint8:
+            raise ValueError("the target of a transfer must be contiguous uint8")
+        half = period / 2
+        self._library.driver_strobe(
+            self._driver,
+            out.ctypes.data,
+            len(out),
+            self.now_ps,
+            half.numerator,
+            half.denominator,
+            int(fraction * half.denominator),
+        )
+        self._collect_violations()
+
+    def _collect_violations(self) -> None:
+        known = len(self._log.kept)
+        kept = self._library.driver_violations(self._driver, known, None)
+        if kept == known:
+            return
+        new = (_Violation * (kept - known))()
+        self._library.driver_violations(self._driver, known, new)
+        for item in new:
+            kind = _KINDS[item.kind]
+            self._log.add(
+                Violation.measured(kind, item.time, item.address, item.found, item.needed)
+            )

@@ -1,0 +1,95 @@
+"""Edges of the camera's pixel clock inside one segment of its stream.
+
+Edge k of a segment is at floor(start + k * period / 2): even edges rise, odd ones fall. Rising
+edge 2n takes sample n, which stands on the lines since the falling edge before.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.rtl.engine import PixelSource, StreamSegment
+
+__all__ = ["LoadedSegment"]
+
+
+@dataclass
+class LoadedSegment:
+    """A segment together with what its source says about clock and lines.
+
+    Attributes:
+        segment: as the source gave it.
+        half_period: ps between a rising and a falling edge.
+        line_clocks: as in the source.
+        active_columns: as in the source.
+        pixels: the lines once rendered, else None.
+    """
+
+    segment: StreamSegment
+    half_period: Fraction
+    line_clocks: int
+    active_columns: int
+    pixels: NDArray[np.uint8] | None = None
+
+    @classmethod
+    def of(cls, source: PixelSource, segment: StreamSegment) -> "LoadedSegment":
+        """Check ``segment`` of ``source``; ValueError names what does not fit."""
+        if segment.rows and segment.clocks != segment.rows * source.line_clocks:
+            raise ValueError(
+                f"a segment of {segment.rows} rows of {source.line_clocks} clocks has "
+                f"{segment.rows * source.line_clocks} clocks, not {segment.clocks}"
+            )
+        if segment.clocks <= 0:
+            raise ValueError(f"a segment needs at least one clock, not {segment.clocks}")
+        return cls(segment, source.period / 2, source.line_clocks, source.active_columns)
+
+    @property
+    def edges(self) -> int:
+        """Number of edges."""
+        return 2 * self.segment.clocks
+
+    @property
+    def end_ps(self) -> int:
+        """Where the first rising edge of a segment that follows without a gap is."""
+        return self.time_of(self.edges)
+
+    def time_of(self, edge: int) -> int:
+        """Time of ``edge`` in ps."""
+        return self.segment.start_ps + (edge * self.half_period.numerator) // (
+            self.half_period.denominator
+        )
+
+    def first_edge(self, time_ps: int) -> int:
+        """First edge at ``time_ps`` or later; ``edges`` when all are over."""
+        # floor(k * h) >= d exactly when k * h >= d, because d is an integer.
+        distance = (time_ps - self.segment.start_ps) / self.half_period
+        return min(max(-(-distance.numerator // distance.denominator), 0), self.edges)
+
+    def sample(self, n: int) -> tuple[int, int]:
+        """HSYNC and PIXDATA of sample ``n``; pixels that were never rendered are 0."""
+        row, column = divmod(n, self.line_clocks)
+        if not self.segment.rows or column >= self.active_columns:
+            return 0, 0
+        return 1, 0 if self.pixels is None else int(self.pixels[row, column])
+
+    def low_until(self, n: int) -> int:
+        """Sample after the run of low HSYNC that sample ``n`` is in."""
+        if not self.segment.rows:
+            return self.segment.clocks
+        return (n // self.line_clocks + 1) * self.line_clocks
+
+    def render(self) -> NDArray[np.uint8]:
+        """Have the lines rendered, and keep them; ValueError when they are not as declared."""
+        shape = (self.segment.rows, self.active_columns)
+        if self.segment.pixels is None:
+            raise ValueError(f"a segment of {self.segment.rows} rows needs pixels")
+        pixels = self.segment.pixels()
+        if pixels.dtype != np.uint8 or pixels.shape != shape or not pixels.flags.c_contiguous:
+            raise ValueError(
+                f"pixels must be C-contiguous uint8 of shape {shape}, "
+                f"not {pixels.dtype} of shape {pixels.shape}"
+            )
+        self.pixels = pixels
+        return pixels

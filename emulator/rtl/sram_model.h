@@ -1,0 +1,132 @@
+// The asynchronous SRAM with its timing checked: the rules of emulator/sram.py, which says more,
+// at the speed that a compiled frame needs. A test drives both with the same pins.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+// Fields in the order of SramTiming, in ps.
+struct SramTiming {
+    int64_t access;
+    int64_t output_enable;
+    int64_t output_disable;
+    int64_t write_pulse;
+    int64_t data_setup;
+};
+
+// In the order of RULES.
+enum ViolationKind : int64_t {
+    SHORT_WRITE_PULSE,
+    ADDRESS_CHANGED_DURING_WRITE,
+    DATA_SETUP,
+    READ_ACCESS,
+    BUS_CONTENTION,
+    TURNAROUND,
+    VIOLATION_KINDS,
+};
+
+struct Violation {
+    int64_t kind;
+    int64_t time;
+    int64_t address;
+    int64_t found;
+    int64_t needed;
+};
+
+struct SramPins {
+    uint32_t address = 0;
+    bool ce_n = true;
+    bool oe_n = true;
+    bool we_n = true;
+    bool driven = false;  // the FPGA drives the data bus, with `data`
+    uint8_t data = 0;     // 0 when not driven
+
+    bool writes() const { return !ce_n && !we_n; }
+    bool reads() const { return !ce_n && !oe_n && we_n; }
+};
+
+class Sram {
+public:
+    // Of each kind of violation, the first `keep` are kept.
+    Sram(uint8_t *memory, const SramTiming &timing, int64_t keep)
+        : memory(memory), timing(timing), keep(keep) {}
+
+    std::vector<Violation> kept;
+    int64_t counts[VIOLATION_KINDS] = {};
+
+    uint8_t bus() const { return pins.reads() ? memory[pins.address] : pins.data; }
+
+    void drive(int64_t time, const SramPins &next) {
+        const SramPins old = pins;
+        pins = next;
+        const bool moved = pins.address != old.address;
+        if (old.writes() && (moved || !pins.writes())) {
+            if (pins.writes())
+                report(ADDRESS_CHANGED_DURING_WRITE, time, old.address, time - write_since, 0);
+            end_write(time, old);
+        }
+        if (pins.writes() && (moved || !old.writes()))
+            write_since = time;
+        check_bus(time, old);
+        if (moved)
+            address_since = time;
+        if (old.ce_n && !pins.ce_n)
+            selected_since = time;
+        if (pins.driven != old.driven || pins.data != old.data)
+            data_since = time;
+    }
+
+    // The FPGA takes the bus at `time`.
+    void sample(int64_t time) {
+        if (!pins.reads())
+            return;
+        if (time - address_since < timing.access)
+            report(READ_ACCESS, time, pins.address, time - address_since, timing.access);
+        else if (time - selected_since < timing.access)
+            report(READ_ACCESS, time, pins.address, time - selected_since, timing.access);
+        else if (time - reads_since < timing.output_enable)
+            report(READ_ACCESS, time, pins.address, time - reads_since, timing.output_enable);
+    }
+
+private:
+    static constexpr int64_t LONG_AGO = -1'000'000'000'000;
+
+    uint8_t *const memory;
+    const SramTiming timing;
+    const int64_t keep;
+    SramPins pins;
+    int64_t write_since = LONG_AGO;
+    int64_t data_since = LONG_AGO;
+    int64_t address_since = LONG_AGO;
+    int64_t selected_since = LONG_AGO;
+    int64_t reads_since = LONG_AGO;
+    int64_t released_at = LONG_AGO;
+
+    void end_write(int64_t time, const SramPins &old) {
+        const int64_t width = time - write_since;
+        if (width < timing.write_pulse)
+            report(SHORT_WRITE_PULSE, time, old.address, width, timing.write_pulse);
+        const int64_t setup = old.driven ? time - data_since : 0;
+        if (setup < timing.data_setup)
+            report(DATA_SETUP, time, old.address, setup, timing.data_setup);
+        memory[old.address] = old.data;
+    }
+
+    void check_bus(int64_t time, const SramPins &old) {
+        if (pins.reads() && !old.reads())
+            reads_since = time;
+        if (old.reads() && !pins.reads())
+            released_at = time;
+        if (pins.driven && pins.reads() && !(old.driven && old.reads()))
+            report(BUS_CONTENTION, time, pins.address, 0, 0);
+        const int64_t free_for = time - released_at;
+        if (pins.driven && !old.driven && !pins.reads() && free_for < timing.output_disable)
+            report(TURNAROUND, time, pins.address, free_for, timing.output_disable);
+    }
+
+    void report(ViolationKind kind, int64_t time, uint32_t address, int64_t found, int64_t needed) {
+        counts[kind]++;
+        if (counts[kind] <= keep)
+            kept.push_back({kind, time, address, found, needed});
+    }
+};

@@ -1,0 +1,225 @@
+"""Reference model of the asynchronous SRAM beside the FPGA, with its timing checked.
+
+The part is Alliance Semiconductor's of the 12 ns class: AS7C34096A-12 gives 12 ns access and 6 ns
+output enable. The CubeStar thesis (section 5.2.2) names only the maker and the size, 1024 kB.
+"""
+
+import logging
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "MAX_VIOLATIONS",
+    "RULES",
+    "Sram",
+    "SramPins",
+    "SramTiming",
+    "Violation",
+    "ViolationLog",
+    "ViolationKind",
+]
+
+_log = logging.getLogger(__name__)
+
+ViolationKind = Literal[
+    "short-write-pulse",
+    "address-changed-during-write",
+    "data-setup",
+    "read-access",
+    "bus-contention",
+    "turnaround",
+]
+
+#: Each violation with what its measured time means; the order is that of the C++ model's enum.
+RULES: dict[ViolationKind, str] = {
+    "short-write-pulse": "write pulse of {} ps, at least {} ps needed",
+    "address-changed-during-write": "address moved {} ps into the write pulse",
+    "data-setup": "data stable for {} ps at the end of the write, at least {} ps needed",
+    "read-access": "data used {} ps after its cause, valid after {} ps",
+    "bus-contention": "memory and FPGA both drive the data bus",
+    "turnaround": "FPGA drives the bus {} ps after the memory let go, {} ps needed",
+}
+
+MAX_VIOLATIONS = 64  # of each kind are kept; all are counted
+
+
+@dataclass(frozen=True)
+class SramTiming:
+    """Limits of the part in ps. Address set-up and all hold times are 0, as in this class.
+
+    Attributes:
+        access_ps: address or chip enable to valid data, at most (AS7C34096A-12).
+        output_enable_ps: output enable to valid data, at most (AS7C34096A-12).
+        output_disable_ps: output disable to a free bus, at most (assumed, as output enable).
+        write_pulse_ps: width of the write pulse, at least (assumed, usual for a 12 ns part).
+        data_setup_ps: data valid before the end of the write, at least (assumed, likewise).
+    """
+
+    access_ps: int = 12_000
+    output_enable_ps: int = 6_000
+    output_disable_ps: int = 6_000
+    write_pulse_ps: int = 8_000
+    data_setup_ps: int = 6_000
+
+
+class Violation(NamedTuple):
+    """One broken rule of the memory's data sheet.
+
+    The model goes on as a good part at room temperature might; a real part may not.
+    """
+
+    kind: ViolationKind
+    time_ps: int
+    address: int
+    detail: str
+
+    @classmethod
+    def measured(
+        cls, kind: ViolationKind, time_ps: int, address: int, found_ps: int, needed_ps: int
+    ) -> "Violation":
+        """Make one whose detail tells the time found and the time needed."""
+        return cls(kind, time_ps, address, RULES[kind].format(found_ps, needed_ps))
+
+
+class ViolationLog:
+    """The first ``MAX_VIOLATIONS`` of each kind in the order of time, and how many there were.
+
+    The first of each kind also goes to the Python log as a warning.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.kept: list[Violation] = []
+        self.counts: Counter[ViolationKind] = Counter()
+
+    def add(self, violation: Violation) -> None:
+        """Record one violation."""
+        if not self.counts[violation.kind]:
+            _log.warning(
+                "SRAM %s at %d ps, address 0x%05X: %s",
+                violation.kind,
+                violation.time_ps,
+                violation.address,
+                violation.detail,
+            )
+        self.counts[violation.kind] += 1
+        if self.counts[violation.kind] <= MAX_VIOLATIONS:
+            self.kept.append(violation)
+
+
+class SramPins(NamedTuple):
+    """Settled levels at the memory's pins; ``data`` is what the FPGA drives, None when it does not."""
+
+    address: int = 0
+    ce_n: int = 1
+    oe_n: int = 1
+    we_n: int = 1
+    data: int | None = None
+
+    @property
+    def writes(self) -> bool:
+        """Whether the memory is taking data."""
+        return not self.ce_n and not self.we_n
+
+    @property
+    def reads(self) -> bool:
+        """Whether the memory drives the bus."""
+        return not self.ce_n and not self.oe_n and bool(self.we_n)
+
+
+class Sram:
+    """The memory, told about every change of its pins.
+
+    A write takes effect when its pulse ends, with the address and data from just before that
+    instant: hold times are 0, so address and data may change together with the pulse's end.
+
+    Attributes:
+        memory: the stored bytes, shape (size,); a live view.
+        timing: the limits that are checked.
+        violations: what was broken so far.
+    """
+
+    def __init__(self, memory: NDArray[np.uint8], timing: SramTiming | None = None) -> None:
+        """Make a memory on top of ``memory``; all pins are inactive since long ago."""
+        self.memory = memory
+        self.timing = timing or SramTiming()
+        self.violations = ViolationLog()
+        self._pins = SramPins()
+        long_ago = -(10**12)
+        self._write_since = long_ago
+        self._data_since = long_ago
+        self._address_since = long_ago
+        self._selected_since = long_ago
+        self._reads_since = long_ago
+        self._released_at = long_ago
+
+    @property
+    def bus(self) -> int:
+        """Level of the data bus: the memory's byte, else the FPGA's, else 0 on a floating bus."""
+        if self._pins.reads:
+            return int(self.memory[self._pins.address])
+        return self._pins.data or 0
+
+    def drive(self, time_ps: int, pins: SramPins) -> None:
+        """Settled pin levels from ``time_ps`` on, which is not before the previous call's."""
+        old, self._pins = self._pins, pins
+        moved = pins.address != old.address
+        if old.writes and (moved or not pins.writes):
+            if pins.writes:
+                into = time_ps - self._write_since
+                self._report("address-changed-during-write", time_ps, old.address, into)
+            self._end_write(time_ps, old)
+        if pins.writes and (moved or not old.writes):
+            self._write_since = time_ps
+        self._check_bus(time_ps, old, pins)
+        if moved:
+            self._address_since = time_ps
+        if old.ce_n and not pins.ce_n:
+            self._selected_since = time_ps
+        if pins.data != old.data:
+            self._data_since = time_ps
+
+    def sample(self, time_ps: int) -> int:
+        """The FPGA takes the bus at ``time_ps``: returns its level, checks that it was valid."""
+        if self._pins.reads:
+            for since, needed in (
+                (self._address_since, self.timing.access_ps),
+                (self._selected_since, self.timing.access_ps),
+                (self._reads_since, self.timing.output_enable_ps),
+            ):
+                if time_ps - since < needed:
+                    address = self._pins.address
+                    self._report("read-access", time_ps, address, time_ps - since, needed)
+                    break
+        return self.bus
+
+    def _end_write(self, time_ps: int, old: SramPins) -> None:
+        width, needed = time_ps - self._write_since, self.timing.write_pulse_ps
+        if width < needed:
+            self._report("short-write-pulse", time_ps, old.address, width, needed)
+        setup = 0 if old.data is None else time_ps - self._data_since
+        needed = self.timing.data_setup_ps
+        if setup < needed:
+            self._report("data-setup", time_ps, old.address, setup, needed)
+        self.memory[old.address] = old.data or 0
+
+    def _check_bus(self, time_ps: int, old: SramPins, pins: SramPins) -> None:
+        if pins.reads and not old.reads:
+            self._reads_since = time_ps
+        if old.reads and not pins.reads:
+            self._released_at = time_ps
+        drives, drove = pins.data is not None, old.data is not None
+        if drives and pins.reads and not (drove and old.reads):
+            self._report("bus-contention", time_ps, pins.address)
+        free, needed = time_ps - self._released_at, self.timing.output_disable_ps
+        if drives and not drove and not pins.reads and free < needed:
+            self._report("turnaround", time_ps, pins.address, free, needed)
+
+    def _report(
+        self, kind: ViolationKind, time_ps: int, address: int, found_ps: int = 0, needed_ps: int = 0
+    ) -> None:
+        self.violations.add(Violation.measured(kind, time_ps, address, found_ps, needed_ps))
