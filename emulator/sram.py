@@ -19,8 +19,8 @@ __all__ = [
     "SramPins",
     "SramTiming",
     "Violation",
-    "ViolationLog",
     "ViolationKind",
+    "ViolationLog",
 ]
 
 _log = logging.getLogger(__name__)
@@ -112,7 +112,10 @@ class ViolationLog:
 
 
 class SramPins(NamedTuple):
-    """Settled levels at the memory's pins; ``data`` is what the FPGA drives, None when it does not."""
+    """Settled levels at the memory's pins.
+
+    ``data`` is the byte that the FPGA drives, None when it leaves the bus alone.
+    """
 
     address: int = 0
     ce_n: int = 1

@@ -29,7 +29,7 @@ _OUTCOMES = tuple(Outcome)  # declared in the driver's order
 
 
 class _Segment(ctypes.Structure):
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         (name, ctypes.c_int64)
         for name in (
             "start",
@@ -45,13 +45,11 @@ class _Segment(ctypes.Structure):
 
 
 class _Timing(ctypes.Structure):
-    _fields_ = [(field.name, ctypes.c_int64) for field in fields(SramTiming)]  # noqa: RUF012
+    _fields_ = [(field.name, ctypes.c_int64) for field in fields(SramTiming)]
 
 
 class _Violation(ctypes.Structure):
-    _fields_ = [  # noqa: RUF012
-        (name, ctypes.c_int64) for name in ("kind", "time", "address", "found", "needed")
-    ]
+    _fields_ = [(name, ctypes.c_int64) for name in ("kind", "time", "address", "found", "needed")]
 
 
 _INT, _LONG, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p

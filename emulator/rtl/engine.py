@@ -45,49 +45,53 @@ OUTPUT_PINS = (
 
 
 class StreamSegment(Protocol):
-    """A stretch of the camera's output with an unbroken pixel clock: blanking, or whole lines.
-
-    Attributes:
-        start_ps: first rising edge of PIXCLK; rising edge n is at floor(start_ps + n * period).
-        clocks: number of pixel clocks.
-        vsync: level of VSYNC throughout.
-        rows: number of lines; 0 is blanking, HSYNC low throughout. Otherwise ``clocks`` is
-            ``rows * line_clocks``, and HSYNC is high in the first ``active_columns`` of each line.
-        pixels: renders the lines, shape (rows, active_columns), uint8, C-contiguous. Called only
-            when the FPGA may store them, at most once for each time the segment is handed out.
-    """
+    """A stretch of the camera's output with an unbroken pixel clock: blanking, or whole lines."""
 
     @property
-    def start_ps(self) -> int: ...
+    def start_ps(self) -> int:
+        """First rising edge of PIXCLK; rising edge n is at floor(start_ps + n * period)."""
+
     @property
-    def clocks(self) -> int: ...
+    def clocks(self) -> int:
+        """Number of pixel clocks."""
+
     @property
-    def vsync(self) -> int: ...
+    def vsync(self) -> int:
+        """Level of VSYNC throughout."""
+
     @property
-    def rows(self) -> int: ...
+    def rows(self) -> int:
+        """Number of lines; 0 is blanking, with HSYNC low throughout.
+
+        Otherwise ``clocks`` is ``rows * line_clocks``, and HSYNC is high in the first
+        ``active_columns`` clocks of each line.
+        """
+
     @property
-    def pixels(self) -> Callable[[], NDArray[np.uint8]] | None: ...
+    def pixels(self) -> Callable[[], NDArray[np.uint8]] | None:
+        """Renders the lines: shape (rows, active_columns), uint8, C-contiguous.
+
+        Called only when the FPGA may store them, and once for each time the segment is given out.
+        """
 
 
 class PixelSource(Protocol):
-    """The camera's parallel output. Data and syncs change with the falling edge of PIXCLK.
-
-    Attributes:
-        period: ps for each PIXCLK.
-        line_clocks: PIXCLKs for each line, with the low part of HSYNC.
-        active_columns: PIXCLKs for each line with HSYNC high.
-    """
+    """The camera's parallel output. Data and syncs change with the falling edge of PIXCLK."""
 
     @property
-    def period(self) -> Fraction: ...
+    def period(self) -> Fraction:
+        """Time of one PIXCLK in ps."""
+
     @property
-    def line_clocks(self) -> int: ...
+    def line_clocks(self) -> int:
+        """PIXCLKs of a line, those with HSYNC low included."""
+
     @property
-    def active_columns(self) -> int: ...
+    def active_columns(self) -> int:
+        """PIXCLKs of a line with HSYNC high."""
 
     def segment_at(self, time_ps: int) -> StreamSegment | None:
         """Segment whose clocks contain ``time_ps``; None when there is no pixel clock then."""
-        ...
 
 
 class PinEvent(NamedTuple):
@@ -103,34 +107,32 @@ class RtlEngine(Protocol):
 
     Time only moves in ``run``, ``apply`` and ``strobe_read``. At one instant, edges of the pixel
     clock come first, then what the caller does to the microcontroller's pins.
-
-    Attributes:
-        sram: the memory's bytes, a live view, shape (2 ** width of SRAM_A,).
-        now_ps: virtual time.
-        violations: the first broken rules of the SRAM; see :mod:`cubestack.emulator.sram`.
-        violation_counts: how many there were of each kind.
     """
 
     @property
-    def sram(self) -> NDArray[np.uint8]: ...
+    def sram(self) -> NDArray[np.uint8]:
+        """The memory's bytes, a live view, shape (2 ** width of SRAM_A,)."""
+
     @property
-    def now_ps(self) -> int: ...
+    def now_ps(self) -> int:
+        """Virtual time."""
+
     @property
-    def violations(self) -> list[Violation]: ...
+    def violations(self) -> list[Violation]:
+        """The first broken rules of each kind; see :mod:`cubestack.emulator.sram`."""
+
     @property
-    def violation_counts(self) -> Counter[ViolationKind]: ...
+    def violation_counts(self) -> Counter[ViolationKind]:
+        """How often each rule was broken."""
 
     def attach(self, source: PixelSource | None) -> None:
         """Connect a camera at ``now_ps``. None disconnects it: PIXCLK, syncs and data go low."""
-        ...
 
     def stream_changed(self) -> None:
         """Ask the source again: what it does from ``now_ps`` on is not what it said before."""
-        ...
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive one of ``MCU_PINS`` from ``now_ps`` on; ValueError for any other pin."""
-        ...
 
     def get_pin(self, name: str) -> int:
         """Settled level at ``now_ps`` of any input or output pin.
@@ -138,7 +140,6 @@ class RtlEngine(Protocol):
         Clocks that change nothing may have been skipped. The one trace that leaves is in SRAM_D_O
         while SRAM_D_OE is low.
         """
-        ...
 
     def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
         """Advance to ``until_ps``, pixel clock edges at that very instant included.
@@ -146,7 +147,6 @@ class RtlEngine(Protocol):
         ``stop_on`` is ("ACK", level): stop right after the edge that brings ACK to that level, or
         at once when it is there already. Returns ``now_ps``; ValueError for a time in the past.
         """
-        ...
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
         """Run the microcontroller's transfer loop from ``now_ps``.
@@ -156,7 +156,6 @@ class RtlEngine(Protocol):
         ``now_ps`` advances by floor(n * period). The fraction cut off there is kept for a burst
         of the same period that follows at once, so that bursts do not drift.
         """
-        ...
 
     def apply(self, events: Sequence[PinEvent]) -> NDArray[np.int64]:
         """Drive any input pin at any time, for tests of one engine against another.
@@ -165,11 +164,9 @@ class RtlEngine(Protocol):
         instant. PIXCLK and the camera's other pins can be driven only while no source is
         attached. Returns the settled levels after each event, shape (events, OUTPUT_PINS).
         """
-        ...
 
     def close(self) -> None:
         """Release what the engine holds; it can not be used afterwards."""
-        ...
 
 
 def make_engine(
@@ -191,6 +188,7 @@ def make_engine(
     Raises:
         CompilerError: "compiled" without a C++ compiler, or the compiler failed.
     """
+    # Here because the engines import this module for the contract above.
     from cubestack.emulator.rtl.build import NoCompilerError
     from cubestack.emulator.rtl.compiled import CompiledEngine
     from cubestack.emulator.rtl.simulated import SimulatedEngine
