@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 SOURCES = ("driver.cpp", "sram_model.h")
-FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-shared")
+FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-fno-semantic-interposition", "-shared")
 
 
 class CompilerError(RuntimeError):

@@ -14,14 +14,13 @@ namespace {
 
 using Top = cxxrtl_design::p_top;
 
-// A fraction's multiples, rounded down, without a division for each: floor(k * numerator /
-// denominator) for one k after the other.
+// The times of evenly spaced edges, one after the other without a division for each:
+// value() = floor((numerator * k + offset) / denominator).
 class Steps {
 public:
-    Steps() : Steps(0, 1, 0) {}
-    // Multiples start at `offset` / denominator instead of 0.
     Steps(int64_t numerator, int64_t denominator, int64_t offset)
-        : numerator(numerator), denominator(denominator), offset(offset) { go_to(0); }
+        : numerator(numerator), denominator(denominator), offset(offset),
+          step(numerator / denominator), step_rest(numerator % denominator) { go_to(0); }
 
     int64_t value() const { return whole; }
 
@@ -32,21 +31,22 @@ public:
     }
 
     void next() {
-        whole += numerator / denominator;
-        rest += numerator % denominator;
+        whole += step;
+        rest += step_rest;
         if (rest >= denominator) {
             rest -= denominator;
             whole++;
         }
     }
 
-    // Largest k with value <= limit, where limit is at least the value at k = 0.
+    // Largest k whose value is at most `limit`.
     int64_t last_within(int64_t limit) const {
         return (int64_t)((((__int128)limit + 1) * denominator - 1 - offset) / numerator);
     }
 
 private:
     int64_t numerator, denominator, offset;
+    int64_t step, step_rest;
     int64_t whole, rest;
 };
 
@@ -141,7 +141,7 @@ public:
             }
             reached = time;
             if (edge % 2 == 0) {
-                const bool wrote = pins.writes();
+                const bool wrote = sram.writes();
                 top.p_PIXCLK.set<bool>(true);
                 const bool changed = settle(time);
                 next_edge();
@@ -179,35 +179,27 @@ public:
 
 private:
     const bool skipping;
-    SramPins pins;
 
     Segment segment = {};
     const uint8_t *pixels = nullptr;  // rows x active_columns, or null: all 0
     int64_t edge = 0;                 // the next one to be made
-    Steps times;                      // of that edge, from the segment's start
+    Steps times{1, 1, 0};             // of that edge, from the segment's start
     int64_t row = 0, column = 0;      // of the sample on the lines
 
     // Lets everything follow the inputs, as of `time`; tells whether any register changed.
     bool settle(int64_t time) {
         bool changed = false;
-        for (;;) {
+        top.Top::eval(nullptr);
+        while (top.Top::commit()) {
+            changed = true;
             top.Top::eval(nullptr);
-            while (top.Top::commit()) {
-                changed = true;
-                top.Top::eval(nullptr);
-            }
-            pins.address = top.p_SRAM__A.get<uint32_t>();
-            pins.ce_n = top.p_SRAM__CE__N.get<bool>();
-            pins.oe_n = top.p_SRAM__OE__N.get<bool>();
-            pins.we_n = top.p_SRAM__WE__N.get<bool>();
-            pins.driven = top.p_SRAM__D__OE.get<bool>();
-            pins.data = pins.driven ? top.p_SRAM__D__O.get<uint8_t>() : 0;
-            sram.drive(time, pins);
-            const uint8_t bus = sram.bus();
-            if (top.p_SRAM__D__I.get<uint8_t>() == bus)
-                return changed;
-            top.p_SRAM__D__I.set<uint8_t>(bus);
         }
+        sram.drive(time, SramPins(top.p_SRAM__A.get<uint32_t>(), top.p_SRAM__CE__N.get<bool>(),
+                                  top.p_SRAM__OE__N.get<bool>(), top.p_SRAM__WE__N.get<bool>(),
+                                  top.p_SRAM__D__OE.get<bool>(), top.p_SRAM__D__O.get<uint8_t>()));
+        // Only a register listens to the bus, so nothing else has to follow it.
+        top.p_SRAM__D__I.set<uint8_t>(sram.bus());
+        return changed;
     }
 
     void next_edge() {

@@ -33,16 +33,26 @@ struct Violation {
     int64_t needed;
 };
 
-struct SramPins {
-    uint32_t address = 0;
-    bool ce_n = true;
-    bool oe_n = true;
-    bool we_n = true;
-    bool driven = false;  // the FPGA drives the data bus, with `data`
-    uint8_t data = 0;     // 0 when not driven
+// Settled levels at the memory's pins. One word, because a structure of small fields that is
+// written one by one and copied as a whole costs the processor a stall in every half clock.
+class SramPins {
+public:
+    SramPins() : SramPins(0, true, true, true, false, 0) {}
+    // `driven`: the FPGA drives the data bus, with `data`.
+    SramPins(uint32_t address, bool ce_n, bool oe_n, bool we_n, bool driven, uint8_t data)
+        : word((uint64_t)address << 16 | (uint64_t)(driven ? data : 0) << 8 |
+               (uint64_t)(driven << 3 | ce_n << 2 | oe_n << 1 | we_n << 0)) {}
 
-    bool writes() const { return !ce_n && !we_n; }
-    bool reads() const { return !ce_n && !oe_n && we_n; }
+    uint32_t address() const { return (uint32_t)(word >> 16); }
+    uint8_t data() const { return (uint8_t)(word >> 8); }  // 0 when not driven
+    bool driven() const { return word & 8; }
+    bool selected() const { return !(word & 4); }
+    bool writes() const { return (word & 5) == 0; }
+    bool reads() const { return (word & 7) == 1; }
+    bool same_data(const SramPins &other) const { return ((word ^ other.word) & 0xFF08) == 0; }
+
+private:
+    uint64_t word;
 };
 
 class Sram {
@@ -54,15 +64,17 @@ public:
     std::vector<Violation> kept;
     int64_t counts[VIOLATION_KINDS] = {};
 
-    uint8_t bus() const { return pins.reads() ? memory[pins.address] : pins.data; }
+    uint8_t bus() const { return pins.reads() ? memory[pins.address()] : pins.data(); }
 
-    void drive(int64_t time, const SramPins &next) {
+    bool writes() const { return pins.writes(); }
+
+    void drive(int64_t time, SramPins next) {
         const SramPins old = pins;
         pins = next;
-        const bool moved = pins.address != old.address;
+        const bool moved = pins.address() != old.address();
         if (old.writes() && (moved || !pins.writes())) {
             if (pins.writes())
-                report(ADDRESS_CHANGED_DURING_WRITE, time, old.address, time - write_since, 0);
+                report(ADDRESS_CHANGED_DURING_WRITE, time, old.address(), time - write_since, 0);
             end_write(time, old);
         }
         if (pins.writes() && (moved || !old.writes()))
@@ -70,9 +82,9 @@ public:
         check_bus(time, old);
         if (moved)
             address_since = time;
-        if (old.ce_n && !pins.ce_n)
+        if (pins.selected() && !old.selected())
             selected_since = time;
-        if (pins.driven != old.driven || pins.data != old.data)
+        if (!pins.same_data(old))
             data_since = time;
     }
 
@@ -81,11 +93,11 @@ public:
         if (!pins.reads())
             return;
         if (time - address_since < timing.access)
-            report(READ_ACCESS, time, pins.address, time - address_since, timing.access);
+            report(READ_ACCESS, time, pins.address(), time - address_since, timing.access);
         else if (time - selected_since < timing.access)
-            report(READ_ACCESS, time, pins.address, time - selected_since, timing.access);
+            report(READ_ACCESS, time, pins.address(), time - selected_since, timing.access);
         else if (time - reads_since < timing.output_enable)
-            report(READ_ACCESS, time, pins.address, time - reads_since, timing.output_enable);
+            report(READ_ACCESS, time, pins.address(), time - reads_since, timing.output_enable);
     }
 
 private:
@@ -105,11 +117,11 @@ private:
     void end_write(int64_t time, const SramPins &old) {
         const int64_t width = time - write_since;
         if (width < timing.write_pulse)
-            report(SHORT_WRITE_PULSE, time, old.address, width, timing.write_pulse);
-        const int64_t setup = old.driven ? time - data_since : 0;
+            report(SHORT_WRITE_PULSE, time, old.address(), width, timing.write_pulse);
+        const int64_t setup = old.driven() ? time - data_since : 0;
         if (setup < timing.data_setup)
-            report(DATA_SETUP, time, old.address, setup, timing.data_setup);
-        memory[old.address] = old.data;
+            report(DATA_SETUP, time, old.address(), setup, timing.data_setup);
+        memory[old.address()] = old.data();
     }
 
     void check_bus(int64_t time, const SramPins &old) {
@@ -117,11 +129,11 @@ private:
             reads_since = time;
         if (old.reads() && !pins.reads())
             released_at = time;
-        if (pins.driven && pins.reads() && !(old.driven && old.reads()))
-            report(BUS_CONTENTION, time, pins.address, 0, 0);
+        if (pins.driven() && pins.reads() && !(old.driven() && old.reads()))
+            report(BUS_CONTENTION, time, pins.address(), 0, 0);
         const int64_t free_for = time - released_at;
-        if (pins.driven && !old.driven && !pins.reads() && free_for < timing.output_disable)
-            report(TURNAROUND, time, pins.address, free_for, timing.output_disable);
+        if (pins.driven() && !old.driven() && !pins.reads() && free_for < timing.output_disable)
+            report(TURNAROUND, time, pins.address(), free_for, timing.output_disable);
     }
 
     void report(ViolationKind kind, int64_t time, uint32_t address, int64_t found, int64_t needed) {
