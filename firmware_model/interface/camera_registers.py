@@ -1,0 +1,164 @@
+"""Camera control registers: addresses, widths, bit fields, and what of them is modelled.
+
+Pure data: the firmware finds a register's address and bits by name, the camera model decodes from
+it, documents list it. Values of more than one byte stand with the most significant byte at the
+lowest address.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+__all__ = [
+    "BitField",
+    "CameraRegister",
+    "CameraRegisterMap",
+    "RegisterAccess",
+    "UnknownRegisterError",
+]
+
+
+class UnknownRegisterError(ValueError):
+    """No register or bit field has that name."""
+
+
+class RegisterAccess(Enum):
+    """What the control bus may do with a register."""
+
+    READ_WRITE = "rw"
+    READ_ONLY = "ro"
+    WRITE_ONLY = "wo"
+
+
+@dataclass(frozen=True)
+class BitField:
+    """Some adjacent bits of a register.
+
+    Attributes:
+        name: unique within the register.
+        lsb: position of the lowest bit.
+        width: number of bits.
+        meaning: what the value does.
+        modelled: False when the camera model stores the bits and does nothing with them.
+    """
+
+    name: str
+    lsb: int
+    width: int
+    meaning: str
+    modelled: bool = True
+
+    @property
+    def mask(self) -> int:
+        """The field's bits within the register."""
+        return ((1 << self.width) - 1) << self.lsb
+
+    def of(self, register_value: int) -> int:
+        """Value of the field in the register's value."""
+        return (register_value & self.mask) >> self.lsb
+
+
+@dataclass(frozen=True)
+class CameraRegister:
+    """One register.
+
+    Attributes:
+        address: of its first, most significant byte.
+        name: unique within the map.
+        width: number of bytes.
+        access: what the control bus may do.
+        reset: value after power-up and reset, ``width`` bytes, unsigned.
+        meaning: what the value does.
+        fields: declared bits; none when the value is one number.
+        needs_sync: a written value waits for the sync register before it takes effect.
+        modelled: False when the camera model stores the value and does nothing with it.
+        assumed: what here is our choice because nothing is published; empty when all is published.
+    """
+
+    address: int
+    name: str
+    width: int
+    access: RegisterAccess
+    reset: int
+    meaning: str
+    fields: tuple[BitField, ...] = ()
+    needs_sync: bool = False
+    modelled: bool = True
+    assumed: str = ""
+
+    @property
+    def addresses(self) -> range:
+        """Addresses of its bytes."""
+        return range(self.address, self.address + self.width)
+
+    @property
+    def bits(self) -> int:
+        """Mask of the declared bits: the whole register when it has no fields."""
+        if not self.fields:
+            return (1 << (8 * self.width)) - 1
+        return sum(field.mask for field in self.fields)
+
+    def field(self, name: str) -> BitField:
+        """The bit field ``name``; UnknownRegisterError when there is none."""
+        for field in self.fields:
+            if field.name == name:
+                return field
+        raise UnknownRegisterError(
+            f"register {self.name} has no bit field {name!r}, "
+            f"only {', '.join(field.name for field in self.fields) or 'none'}"
+        )
+
+
+class CameraRegisterMap:
+    """All registers of a camera.
+
+    Attributes:
+        camera: the part's name.
+        i2c_address: 7-bit address on the control bus.
+        address_bytes: bytes of a register address on that bus, most significant first.
+    """
+
+    def __init__(
+        self,
+        camera: str,
+        i2c_address: int,
+        address_bytes: int,
+        registers: tuple[CameraRegister, ...],
+    ) -> None:
+        """Make the map; ValueError when registers share a name or an address."""
+        self.camera = camera
+        self.i2c_address = i2c_address
+        self.address_bytes = address_bytes
+        self._by_name: dict[str, CameraRegister] = {}
+        self._by_address: dict[int, CameraRegister] = {}
+        for register in sorted(registers, key=lambda r: r.address):
+            if register.name in self._by_name:
+                raise ValueError(f"{camera} declares register {register.name} twice")
+            self._by_name[register.name] = register
+            for address in register.addresses:
+                if address in self._by_address:
+                    raise ValueError(
+                        f"{camera} registers {self._by_address[address].name} and "
+                        f"{register.name} both have address {address:#06x}"
+                    )
+                self._by_address[address] = register
+
+    def __getitem__(self, name: str) -> CameraRegister:
+        """The register ``name``; UnknownRegisterError when there is none."""
+        if name not in self._by_name:
+            raise UnknownRegisterError(
+                f"{self.camera} has no register {name!r}, only {', '.join(self._by_name)}"
+            )
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[CameraRegister]:
+        """Registers in the order of their addresses."""
+        return iter(self._by_name.values())
+
+    def __len__(self) -> int:
+        """Number of registers."""
+        return len(self._by_name)
+
+    def at(self, address: int) -> CameraRegister | None:
+        """The register that owns the byte at ``address``, or None."""
+        return self._by_address.get(address)
