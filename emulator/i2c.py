@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import simpy
 
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
 __all__ = ["I2cBus", "I2cMessage", "I2cNackError", "I2cTarget"]
 
@@ -52,7 +52,7 @@ class I2cBus:
         bit_ps: time of one bit.
     """
 
-    def __init__(self, env: simpy.Environment, hz: int = 100_000) -> None:
+    def __init__(self, env: Kernel, hz: int = 100_000) -> None:
         """Make an idle bus at ``hz`` bits a second."""
         self._env = env
         self._targets: dict[int, I2cTarget] = {}

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import simpy
 
-from cubestack.emulator.virtual_time import PS_PER_S, PS_PER_US
+from cubestack.emulator.virtual_time import PS_PER_S, PS_PER_US, Kernel
 
 __all__ = ["CHANNELS", "PARTS", "SUPPLY_VOLTS", "PowerModel"]
 
@@ -40,7 +40,7 @@ class PowerModel:
         on_switch: told (channel, on) when a load switch changed.
     """
 
-    def __init__(self, env: simpy.Environment) -> None:
+    def __init__(self, env: Kernel) -> None:
         """Start with every part in its first state and both switches on."""
         self._env = env
         self._states = {part: next(iter(states)) for part, (_, states) in PARTS.items()}

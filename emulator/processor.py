@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import simpy
 
 from cubestack.emulator.rtl.engine import RtlEngine
-from cubestack.emulator.virtual_time import PS_PER_S, PS_PER_US, CycleClock
+from cubestack.emulator.virtual_time import PS_PER_S, PS_PER_US, CycleClock, Kernel
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.hardware import (
     AwaitPin,
@@ -54,12 +54,13 @@ class Processor:
 
     def __init__(
         self,
-        env: simpy.Environment,
+        env: Kernel,
         meter: Meter,
         engine: RtlEngine,
         camera_bus: CameraBus,
         boot: Callable[[int], Program],
         *,
+        power_on_cause: int,
         boot_us: int,
         on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
     ) -> None:
@@ -70,7 +71,8 @@ class Processor:
             meter: what the program charges its cycles to; its table gives the clock.
             engine: the FPGA board.
             camera_bus: the camera's control bus.
-            boot: makes the program; its argument counts the software resets so far.
+            boot: makes the program after a reset; its argument is the cause (see ``Reset``).
+            power_on_cause: cause of the first start.
             boot_us: time from reset to the first instruction of ``main``.
             on_pin: told about every output pin change, after it happened.
         """
@@ -84,7 +86,7 @@ class Processor:
         self._clock = CycleClock(meter.table.clock_hz)
         self._wake = env.event()
         self.resets = 0
-        self.program = boot(0)
+        self.program = boot(power_on_cause)
         env.process(self._run())
 
     def wake(self) -> None:
@@ -95,10 +97,9 @@ class Processor:
     def _run(self) -> Steps:
         while True:
             yield self._env.timeout(self._boot_us * PS_PER_US)
-            yield from self._execute(self.program)
+            cause = yield from self._execute(self.program)
             self.resets += 1
-            self._meter.take()
-            self.program = self._boot(self.resets)
+            self.program = self._boot(cause)
 
     def _execute(self, program: Program) -> Steps:
         routine = program.main()
@@ -108,7 +109,7 @@ class Processor:
             yield from self._pay()
             if isinstance(request, Reset):
                 routine.close()
-                return
+                return request.cause
             answer = yield from self._perform(request)
 
     def _pay(self) -> Steps:
@@ -142,8 +143,8 @@ class Processor:
 
     def _horizon(self) -> int:
         """Nothing else happens before this time, so the FPGA may run ahead up to it."""
-        peek = self._env.peek()
-        return int(peek) if peek != float("inf") else self._env.now + PS_PER_S
+        horizon = self._env.horizon()
+        return self._env.now + PS_PER_S if horizon is None else horizon
 
     def _await_pin(self, request: AwaitPin) -> Steps:
         start = self._env.now

@@ -6,7 +6,7 @@ from typing import Any
 
 import simpy
 
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
 __all__ = ["BITS_PER_BYTE", "Uart"]
 
@@ -26,7 +26,7 @@ class Uart:
 
     def __init__(
         self,
-        env: simpy.Environment,
+        env: Kernel,
         baud: int,
         on_byte: Callable[[int], None],
         on_silence: Callable[[], None],
@@ -58,6 +58,11 @@ class Uart:
         self._incoming.extend(data)
         if self._incoming and not self._arrival.triggered:
             self._arrival.succeed()
+
+    @property
+    def backlog(self) -> int:
+        """Bytes that are still to be sent, the one on the line included."""
+        return -(-max(0, self._sending_until - self._env.now) // self.byte_ps)
 
     @property
     def busy(self) -> bool:

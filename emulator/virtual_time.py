@@ -1,10 +1,26 @@
-"""Virtual time: an integer number of picoseconds, and clocks that convert cycles exactly."""
+"""Virtual time: an integer number of picoseconds, its kernel, and clocks that convert exactly."""
 
-__all__ = ["PS_PER_MS", "PS_PER_S", "PS_PER_US", "CycleClock"]
+import simpy
+
+__all__ = ["PS_PER_MS", "PS_PER_S", "PS_PER_US", "CycleClock", "Kernel"]
 
 PS_PER_S = 10**12
 PS_PER_MS = 10**9
 PS_PER_US = 10**6
+
+
+class Kernel(simpy.Environment):
+    """SimPy's environment with an integer clock in ps."""
+
+    @property
+    def now(self) -> int:
+        """Virtual time in ps."""
+        return int(super().now)
+
+    def horizon(self) -> int | None:
+        """Time of the next scheduled event in ps; None when there is none."""
+        peek = self.peek()
+        return None if peek == float("inf") else int(peek)
 
 
 class CycleClock:

@@ -94,7 +94,13 @@ class CameraTransfer:
 
 @dataclass(frozen=True)
 class Reset:
-    """Software reset: the program ends here and starts anew; RAM is lost."""
+    """The program ends here and starts anew; RAM is lost.
+
+    Attributes:
+        cause: number of the bit in the reset-cause register, counted from 1.
+    """
+
+    cause: int
 
 
 Request = Pay | ReadTimer | SetPin | AwaitPin | Sleep | StrobeRead | CameraTransfer | Reset
@@ -138,7 +144,7 @@ class Hardware(Protocol):
         external_ram: SRAM on the external bus, shape (bytes,), uint8.
         retention: battery-domain registers, kept over software resets, not over power-off.
         flash: non-volatile store.
-        reset_cause: why the processor started, the bit number in its reset-cause register.
+        reset_cause: why the processor started, as in ``Reset``.
     """
 
     external_ram: NDArray[np.uint8]
@@ -149,6 +155,9 @@ class Hardware(Protocol):
     def uart_send(self, data: bytes) -> None:
         """Queue ``data`` for the satellite's UART; the peripheral sends at its own pace."""
 
+    def uart_backlog(self) -> int:
+        """Bytes that the UART still has to send."""
+
     def wake(self) -> None:
         """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
 
@@ -157,6 +166,9 @@ class Hardware(Protocol):
 
     def supply_current_ma(self, channel: str) -> float:
         """Current that the monitor of supply ``channel`` shows, in mA."""
+
+    def uptime_ms(self) -> int:
+        """Time since power-up in ms, read in an interrupt."""
 
     def temperature_c(self) -> float:
         """On-chip temperature sensor, in degrees Celsius."""

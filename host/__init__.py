@@ -1,1 +1,1 @@
-"""host."""
+"""Host side: transports, clients generated from the interface tables, and the command."""

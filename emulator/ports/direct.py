@@ -8,11 +8,9 @@ for an answer runs the simulation; nothing else does, so a run is repeatable to 
 from collections import deque
 from typing import Any
 
-import simpy
-
 from cubestack.emulator.i2c import I2cBus, I2cMessage
 from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
 __all__ = ["DirectI2c", "DirectSerial"]
 
@@ -20,7 +18,7 @@ __all__ = ["DirectI2c", "DirectSerial"]
 class DirectSerial:
     """The host's end of a UART line."""
 
-    def __init__(self, env: simpy.Environment, uart: Uart) -> None:
+    def __init__(self, env: Kernel, uart: Uart) -> None:
         """Plug into ``uart``; what was sent before is lost, as on a wire."""
         self._env = env
         self._uart = uart
@@ -67,7 +65,7 @@ class DirectSerial:
 class DirectI2c:
     """The host's end of an I2C bus, with smbus2's ``i2c_rdwr``."""
 
-    def __init__(self, env: simpy.Environment, bus: I2cBus) -> None:
+    def __init__(self, env: Kernel, bus: I2cBus) -> None:
         """Become a master of ``bus``."""
         self._env = env
         self._bus = bus

@@ -9,10 +9,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Literal
 
-import simpy
-
 from cubestack.emulator.ports.endpoint import Endpoint, wait_readable
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
 __all__ = ["Pump"]
 
@@ -27,7 +25,7 @@ class Pump:
 
     def __init__(
         self,
-        env: simpy.Environment,
+        env: Kernel,
         endpoints: Sequence[Endpoint],
         busy: Callable[[], bool],
         *,
@@ -105,8 +103,9 @@ class Pump:
     def _until_next_s(self, offset_ps: int) -> float:
         """Wall time until something is due, at most ``IDLE_S``."""
         due = [t for t in (e.next_release_ps() for e in self._endpoints) if t is not None]
-        if self._env.peek() != float("inf"):
-            due.append(int(self._env.peek()))
+        horizon = self._env.horizon()
+        if horizon is not None:
+            due.append(horizon)
         if not due:
             return IDLE_S
         wall_ps = int(time.monotonic() * PS_PER_S) + offset_ps

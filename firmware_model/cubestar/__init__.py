@@ -1,1 +1,1 @@
-"""firmware_model/cubestar."""
+"""CubeStar's firmware program for the EFM32GG280F1024."""

@@ -1,1 +1,1 @@
-"""host/cli."""
+"""The ``cubestack`` command: one module for each subcommand."""

@@ -1,0 +1,125 @@
+"""Image capture: discarding the first frame, FPGA store and transfer.
+
+CubeStar thesis, section 5.3.1 and appendix D: getImage calls imagerEnable, waits, calls
+fpgaWriteToRam and imageTransfer. The previous image is processed while the FPGA waits for the new
+frame (section 5.3.6).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
+from cubestack.firmware_model.cubestar.phases import Phases
+from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.hardware import (
+    AwaitPin,
+    Hardware,
+    ReadTimer,
+    Routine,
+    SetPin,
+    Sleep,
+    StrobeRead,
+)
+from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
+from cubestack.firmware_model.interface.cubestar_codes import TaskStatus
+
+__all__ = ["COLUMNS", "ROWS", "ImageCapture"]
+
+COLUMNS = 1024
+ROWS = 512
+
+ACK_POLL_CYCLES = 8
+"""Port read (3) and loop step (5) of the cost table."""
+
+ACK_TIMEOUT_US = 2_000_000
+"""More than two frames at the lowest frame rate; the sources give no limit."""
+
+
+class ImageCapture:
+    """The capture functions; the newest picture lies at the start of the external RAM.
+
+    Attributes:
+        sensor: the image sensor.
+    """
+
+    def __init__(self, hardware: Hardware, state: State, phases: Phases, meter: Meter) -> None:
+        """Use ``hardware`` as the settings in ``state`` say."""
+        self._hardware = hardware
+        self._state = state
+        self._phases = phases
+        self._transfer_cycles = meter.table.operations["transfer_byte"].cycles
+        self.sensor = ImageSensor(state, phases)
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """The newest picture, shape (512, 1024), a live view of the external RAM."""
+        return self._hardware.external_ram[:IMAGE_BYTES].reshape(ROWS, COLUMNS)
+
+    def get_image(self, meanwhile: Routine[bool] | None = None) -> Routine[bool]:
+        """Capture a picture into the external RAM; False, with a flag raised, when it failed.
+
+        ``meanwhile`` runs while the FPGA waits for the frame, or at once when there will be none.
+        """
+        self._state.task_status = TaskStatus.CAPTURING
+        failure = yield from self._enable_sensor()
+        if failure is None:
+            failure = yield from self._store_frame(meanwhile)
+        elif meanwhile is not None:
+            yield from meanwhile
+        if failure is not None:
+            self._state.raise_flag(failure)
+            self._state.task_status = TaskStatus.CAPTURE_FAILED
+            return False
+        started_us: int = yield ReadTimer()
+        yield from self._image_transfer()
+        yield from self._phases.end("transfer_us", started_us)
+        self._state.retained.image_present = 1
+        self._state.retained.frame += 1
+        self._state.task_status = TaskStatus.CAPTURED
+        return True
+
+    def replaced(self) -> Routine[None]:
+        """The picture in the external RAM was made by other means than a capture."""
+        now_us: int = yield ReadTimer()
+        self._state.retained.image_ms = now_us // 1000
+        self._state.retained.image_present = 1
+        self._state.retained.frame += 1
+
+    def _enable_sensor(self) -> Routine[str | None]:
+        """Start the sensor and let its first, invalid frame pass; returns a failure's flag."""
+        if not (yield from self.sensor.configure()):
+            return "ISSetupError"
+        if not (yield from self.sensor.enable(True)):
+            return "ISEnableError"
+        self._phases.begin_capture()
+        enabled_us: int = yield ReadTimer()
+        delay_us = 1000 * self._state.settings.get("SetDiscardDelay", "Delay")
+        yield Sleep(enabled_us + delay_us, wakeable=False)
+        yield from self._phases.end("discard_us", enabled_us)
+        return None
+
+    def _store_frame(self, meanwhile: Routine[bool] | None) -> Routine[str | None]:
+        """Get a frame into the FPGA's SRAM (fpgaWriteToRam); returns a failure's flag."""
+        started_us: int = yield ReadTimer()
+        yield SetPin("BANK", self._state.settings.get("SelectImageBank", "Bank"))
+        yield SetPin("RNW", 0)
+        yield SetPin("ENABLE", 1)
+        if meanwhile is not None:
+            yield from meanwhile
+        stored: bool = yield AwaitPin("ACK", 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
+        yield SetPin("ENABLE", 0)
+        yield from self._phases.end("capture_us", started_us)
+        ended_us: int = yield ReadTimer()
+        self._state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
+        if not (yield from self.sensor.enable(False)):
+            self._state.raise_flag("ISDisableError")  # the picture is good all the same
+        return None if stored else "ImageCaptureError"
+
+    def _image_transfer(self) -> Routine[None]:
+        """Copy the frame from the FPGA's SRAM to the external RAM (imageTransfer)."""
+        yield SetPin("RNW", 1)
+        yield SetPin("ENABLE", 1)
+        yield StrobeRead(self._hardware.external_ram[:IMAGE_BYTES], self._transfer_cycles)
+        yield SetPin("ENABLE", 0)
+        yield SetPin("RNW", 0)

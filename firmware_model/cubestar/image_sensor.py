@@ -1,0 +1,116 @@
+"""The image sensor as the firmware uses it: set-up for stars, enable, single registers.
+
+CubeStar thesis, appendix D; register names and addresses are those of the sensor's own table.
+"""
+
+from cubestack.firmware_model.cubestar.phases import Phases
+from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.hardware import CameraTransfer, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.interface.mlx75412 import LONGEST_EXPOSURE, REGISTERS, SYNC_APPLY
+
+__all__ = ["ImageSensor"]
+
+SETTLE_US = 2_000
+"""From power-up to the first register access; assumed."""
+
+CRYSTAL_HZ = 10_000_000
+LINE_CLOCKS = 1322
+ROWS = 512
+
+
+def _bits(register: str, **fields: int) -> int:
+    """Value of ``register`` with the named bit fields set and all others 0."""
+    return sum(value << REGISTERS[register].field(name).lsb for name, value in fields.items())
+
+
+_REST = _bits("MODE_SELECT", OUTPUT_DEPTH=1)
+_GATHER = _REST | _bits("MODE_SELECT", ENABLE=1)
+_ALL_BUT_SHARPENING = _bits(
+    "HARDWARE_FEATURES",
+    DEFECT_CORRECTION=1,
+    FPN_CORRECTION=1,
+    DARK_SUBTRACTION=1,
+    HISTOGRAM_REMAP=1,
+)
+_AUTOVIEW_ONLY = _bits("FIRMWARE_FEATURES", AUTOVIEW=1)
+
+
+class ImageSensor:
+    """Register access over the camera's own control bus.
+
+    Attributes:
+        selected_register: address and value of the register read last; None: no answer.
+    """
+
+    def __init__(self, state: State, phases: Phases) -> None:
+        """Set the sensor up as the settings in ``state`` say."""
+        self._state = state
+        self._phases = phases
+        self.selected_register: tuple[int, int | None] = (0, None)
+
+    def power_up(self) -> Routine[None]:
+        """Wait after power-up; the registers are at their reset values."""
+        now_us: int = yield ReadTimer()
+        yield Sleep(now_us + SETTLE_US, wakeable=False)
+        self._state.retained.camera_setup = 0
+
+    def configure(self) -> Routine[bool]:
+        """Set up for stars, unless that is done already; False when the sensor does not answer."""
+        rate = self._state.settings.get("SetFrameRate", "FrameRate")
+        exposure = self._state.settings.get("Exposure", "exposure")
+        wanted = rate << 16 | exposure
+        if self._state.retained.camera_setup == wanted:
+            return True
+        started_us: int = yield ReadTimer()
+        steps = {
+            "MODE_SELECT": _REST,
+            "HARDWARE_FEATURES": _ALL_BUT_SHARPENING,
+            "LINEARITY": 0,
+            "FRAMES_PER_SECOND": rate,
+            "FIRMWARE_FEATURES": _AUTOVIEW_ONLY,
+            "EXPOSURE_RULE": 0 if exposure else LONGEST_EXPOSURE,
+            "EXPOSURE": exposure,
+            "SYNC": SYNC_APPLY,
+        }
+        for register, value in steps.items():
+            if not (yield from self._write(register, value)):
+                return False
+        self._state.retained.camera_setup = wanted
+        yield from self._phases.end("camera_setup_us", started_us)
+        return True
+
+    def enable(self, on: bool) -> Routine[bool]:
+        """Let the sensor gather images, or rest; False when it does not answer."""
+        return (yield from self._write("MODE_SELECT", _GATHER if on else _REST))
+
+    def _write(self, register: str, value: int) -> Routine[bool]:
+        declared = REGISTERS[register]
+        return (yield from self._transfer(declared.address, value.to_bytes(declared.width, "big")))
+
+    def write_byte(self, address: int, value: int) -> Routine[None]:
+        """Write any byte; an unanswered write raises ConfigChangeError.
+
+        The next capture sets the sensor up again only when a setting changed.
+        """
+        if not (yield from self._transfer(address, bytes([value]))):
+            self._state.raise_flag("ConfigChangeError")
+
+    def _transfer(self, address: int, data: bytes) -> Routine[bool]:
+        head = address.to_bytes(REGISTERS.address_bytes, "big")
+        return (yield CameraTransfer(head + data)) is not None
+
+    def select_register(self, address: int) -> Routine[None]:
+        """Read any byte into ``selected_register``; an unanswered read raises ISSetupError."""
+        head = address.to_bytes(REGISTERS.address_bytes, "big")
+        answer: bytes | None = yield CameraTransfer(head, read=1)
+        self.selected_register = (address, None if answer is None else answer[0])
+        if answer is None:
+            self._state.raise_flag("ISSetupError")
+
+    def age_at_frame_end_us(self) -> int:
+        """From the mid-exposure of the middle row to the end of a frame's read-out, in us."""
+        rate = self._state.settings.get("SetFrameRate", "FrameRate")
+        exposure = self._state.settings.get("Exposure", "exposure")
+        longest = REGISTERS["CLOCKS_PER_SECOND"].reset // (rate * LINE_CLOCKS) - 1
+        lines = ROWS / 2 + min(exposure or longest, longest) / 2
+        return int(lines * LINE_CLOCKS * 1_000_000 / CRYSTAL_HZ)

@@ -1,0 +1,294 @@
+"""From picture to attitude: detection, matching and QUEST, with the time of each step.
+
+CubeStar thesis, sections 5.3.3 to 5.3.5. What the mode flag selects is published; how it changes
+is not, so it is ours: an attitude leads to tracking, a failure leads one step back (tracking,
+assisted, lost in space).
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.algorithms.assisted import identify_assisted
+from cubestack.firmware_model.algorithms.detection import (
+    Detection,
+    DetectionConfig,
+    SearchEnd,
+    detect_stars,
+)
+from cubestack.firmware_model.algorithms.geometry import (
+    CameraParameters,
+    direction_of,
+    undistort,
+    unit_vectors,
+)
+from cubestack.firmware_model.algorithms.identification import Identification, Outcome
+from cubestack.firmware_model.algorithms.quest import AttitudeError, dcm, quest
+from cubestack.firmware_model.algorithms.tracking import track
+from cubestack.firmware_model.algorithms.voting import identify
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubestar.capture import ImageCapture
+from cubestack.firmware_model.cubestar.phases import Phases
+from cubestack.firmware_model.cubestar.state import Attitude, State
+from cubestack.firmware_model.hardware import ReadTimer, Routine
+from cubestack.firmware_model.interface.cubestar_codes import IdMode, MatchMode, TaskStatus
+from cubestack.firmware_model.star_catalogue import StarCatalogue
+
+__all__ = ["Processing", "Results"]
+
+_SEARCH_FLAGS = {
+    SearchEnd.STARS: "MaxStarsDetection",
+    SearchEnd.INVALID: "MaxInvalidStarsDetectionError",
+    SearchEnd.NOISE: "MaxNoiseDetected",
+}
+_OUTCOME_FLAGS = {
+    Outcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
+    Outcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
+    Outcome.MIRRORED: "IDError",
+    Outcome.CHANCE: "IDError",
+}
+
+
+@dataclass
+class Results:
+    """Results of the latest picture; each is None until its step succeeded.
+
+    Attributes:
+        detection: centroids and counts.
+        points: undistorted centroids (n, 2) in px.
+        vectors: camera unit vectors (n, 3).
+        identification: identity of each centroid.
+        mode: MatchMode that identified it.
+        best: indices of the selected stars, at most three.
+        solved: the latest picture gave an attitude.
+    """
+
+    detection: Detection | None = None
+    points: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 2), np.float32))
+    vectors: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    identification: Identification | None = None
+    mode: MatchMode = MatchMode.LOST_IN_SPACE
+    best: list[int] = field(default_factory=list)
+    solved: bool = False
+
+
+class Processing:
+    """The processing functions, and what they found.
+
+    Attributes:
+        results: of the latest picture.
+        latest_ms, longest_ms: time of each step by name, since the last reset.
+        catalogue: star list and pair list in flash.
+    """
+
+    def __init__(
+        self,
+        meter: Meter,
+        state: State,
+        capture: ImageCapture,
+        phases: Phases,
+        catalogue: StarCatalogue,
+    ) -> None:
+        """Work on the picture of ``capture`` with ``catalogue``."""
+        self._meter = meter
+        self._state = state
+        self._capture = capture
+        self._phases = phases
+        self.catalogue = catalogue
+        self.results = Results()
+        self.latest_ms: dict[str, float] = {}
+        self.longest_ms: dict[str, float] = {}
+
+    def process(self) -> Routine[bool]:
+        """Detect, identify and estimate; False when a step failed."""
+        if not (yield from self.detect()):
+            return False
+        if not (yield from self.identify()):
+            return False
+        return (yield from self.estimate())
+
+    @contextmanager
+    def _cycles(self) -> Iterator[None]:
+        """Record the cycle counter's difference for every phase that the block charges."""
+        before = dict(self._meter.phases)
+        yield
+        for name, cycles in self._meter.phases.items():
+            if spent := cycles - before.get(name, 0):
+                self._record(name, 1_000_000 * spent // self._meter.table.clock_hz)
+
+    def _record(self, name: str, duration_us: int) -> None:
+        self.latest_ms[name] = duration_us / 1000
+        self.longest_ms[name] = max(self.longest_ms.get(name, 0.0), duration_us / 1000)
+
+    def _fail(self, status: TaskStatus, flag: str) -> bool:
+        self._state.task_status = status
+        self._state.raise_flag(flag)
+        return False
+
+    def discard_results(self) -> None:
+        """The latest capture failed: there is nothing to report."""
+        self.results = Results()
+
+    # --- detection ----------------------------------------------------------------------------
+
+    def detect(self) -> Routine[bool]:
+        """Find the stars of the picture and their camera unit vectors."""
+        self.results = Results()
+        if not self._state.retained.image_present:
+            return self._fail(TaskStatus.DETECTION_FAILED, "StatusError")
+        self._state.task_status = TaskStatus.DETECTING
+        started_us: int = yield ReadTimer()
+        with self._cycles():
+            detection = detect_stars(self._capture.image, self._config(), self._meter)
+            camera = self._camera()
+            with self._meter.phase("correction"):
+                points = undistort(detection.centroids, camera, self._meter)
+            with self._meter.phase("vectors"):
+                vectors = unit_vectors(points, camera, self._meter)
+        self._record("detection", (yield from self._phases.end("detect_us", started_us)))
+        if detection.end in _SEARCH_FLAGS:
+            self._state.raise_flag(_SEARCH_FLAGS[detection.end])
+        self.results = Results(detection, points, vectors)
+        if not len(vectors):
+            return self._fail(TaskStatus.DETECTION_FAILED, "LessThanThreeStarsDetected")
+        self._state.task_status = TaskStatus.DETECTED
+        return True
+
+    def _config(self) -> DetectionConfig:
+        settings = self._state.settings
+        region = settings.all("setDetectionRegion")
+        thresholds = settings.all("setDetectionThresholds")
+        pixels = settings.all("setStarPixels")
+        limits = settings.all("setDetectionVariables")
+        return DetectionConfig(
+            step=region["StepSize"],
+            x_start=region["Xstart"],
+            x_end=region["Xend"] + 1,
+            y_start=region["Ystart"],
+            y_end=region["Yend"] + 1,
+            detection_threshold=thresholds["DetectionThreshold"],
+            star_threshold=thresholds["StarThreshold"],
+            min_pixels=pixels["MinPixels"],
+            max_pixels=pixels["MaxPixels"],
+            grid_size=limits["GridSize"],
+            max_stars=limits["MaxStars"],
+            max_invalid=limits["MaxInvalidStars"],
+            max_noise=limits["MaxNoise"],
+        )
+
+    def _camera(self) -> CameraParameters:
+        settings = self._state.settings
+        radial = settings.all("setRadialDistortionGains")
+        tangential = settings.all("setTangentalDistortionGains")
+        return CameraParameters(
+            focal_length_mm=settings.get("setFocalLength", "FocalLength"),
+            fx=settings.get("setFocalLengthComponents", "Fx"),
+            fy=settings.get("setFocalLengthComponents", "Fy"),
+            cx=settings.get("setPrincipalPoint", "Cx"),
+            cy=settings.get("setPrincipalPoint", "Cy"),
+            k1=radial["K1"],
+            k2=radial["K2"],
+            p1=tangential["P1"],
+            p2=tangential["P2"],
+        )
+
+    # --- identification -----------------------------------------------------------------------
+
+    def identify(self) -> Routine[bool]:
+        """Find the catalogue star of each detected one."""
+        results = self.results
+        results.identification, results.best, results.solved = None, [], False
+        if results.detection is None:
+            return self._fail(TaskStatus.IDENTIFICATION_FAILED, "StatusError")
+        self._state.task_status = TaskStatus.IDENTIFYING
+        started_us: int = yield ReadTimer()
+        with self._cycles():
+            results.mode = self._choose_mode()
+            identification = self._match(results.mode, results.vectors)
+        self._record("identification", (yield from self._phases.end("match_us", started_us)))
+        if identification.outcome is not Outcome.IDENTIFIED:
+            self._step_back()
+            if results.mode is MatchMode.TRACKING:
+                self._state.raise_flag("RateExceeded")
+            return self._fail(
+                TaskStatus.IDENTIFICATION_FAILED, _OUTCOME_FLAGS[identification.outcome]
+            )
+        results.identification = identification
+        self._state.task_status = TaskStatus.IDENTIFIED
+        return True
+
+    def _choose_mode(self) -> MatchMode:
+        if self._state.settings.get("setIDMode", "IdMode") == IdMode.LOST_IN_SPACE:
+            return MatchMode.LOST_IN_SPACE
+        mode = self._state.mode
+        known = self._state.attitude is not None
+        if mode is MatchMode.LOST_IN_SPACE and not known:
+            self._state.raise_flag("IDModeError")
+        return mode
+
+    def _match(self, mode: MatchMode, vectors: NDArray[np.float32]) -> Identification:
+        margin = float(self._state.settings.get("setIDMargin", "Margin"))
+        meter, catalogue, attitude = self._meter, self.catalogue, self._state.attitude
+        if mode is MatchMode.LOST_IN_SPACE:
+            return identify(vectors, catalogue, meter, margin_rad=margin)
+        rotation = None if attitude is None else dcm(attitude.quaternion, meter)
+        if mode is MatchMode.TRACKING and rotation is not None:
+            return track(vectors, catalogue, rotation, meter, margin_rad=margin)
+        if self._state.retained.hint_present or rotation is None:
+            hint = self._state.settings.all("setTrackingMode")
+            boresight = direction_of(hint["RightAscension"], hint["Declination"], meter)
+        else:
+            boresight = rotation[2]
+        return identify_assisted(vectors, catalogue, boresight, meter, margin_rad=margin)
+
+    def _step_back(self) -> None:
+        self._state.mode = MatchMode(min(self.results.mode + 1, MatchMode.LOST_IN_SPACE))
+
+    # --- attitude -----------------------------------------------------------------------------
+
+    def select_best(self) -> Routine[bool]:
+        """Select the three identified stars with the most votes, brighter ones first in a tie."""
+        results = self.results
+        if results.identification is None or results.detection is None:
+            self._state.raise_flag("StatusError")
+            return False
+        started_us: int = yield ReadTimer()
+        votes, intensity = results.identification.votes, results.detection.intensities
+        identified = results.identification.matched
+        order = np.lexsort((-intensity[identified].astype(int), -votes[identified].astype(int)))
+        results.best = [int(star) for star in identified[order[:3]]]
+        looked_at = 3 * len(identified)  # one pass for each of the three
+        self._meter.charge(ram_read=2 * looked_at, i32_add=2 * looked_at, loop=looked_at)
+        ended_us: int = yield ReadTimer()
+        self._record("best", ended_us - started_us)
+        return True
+
+    def estimate(self) -> Routine[bool]:
+        """Estimate the attitude from the identified stars, weighted with their votes."""
+        results = self.results
+        identification = results.identification
+        if identification is None:
+            return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
+        self._state.task_status = TaskStatus.CALCULATING
+        started_us: int = yield ReadTimer()
+        kept = identification.matched
+        inertial = self.catalogue.vectors[identification.stars[kept]]
+        weights = identification.votes[kept].astype(np.float32)
+        try:
+            quaternion = quest(results.vectors[kept], inertial, weights, self._meter)
+        except AttitudeError:
+            self._step_back()
+            return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
+        self._record("attitude", (yield from self._phases.end("attitude_us", started_us)))
+        retained = self._state.retained
+        self._state.attitude = Attitude(
+            quaternion, retained.frame, retained.image_ms, len(kept), results.mode
+        )
+        self._state.mode = MatchMode.TRACKING
+        retained.hint_present = 0
+        results.solved = True
+        self._state.task_status = TaskStatus.CALCULATED
+        return True

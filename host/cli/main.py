@@ -1,0 +1,66 @@
+"""Entry point of the ``cubestack`` command.
+
+Exit codes: 0 done, 1 the run failed, 2 the call was wrong. An error is one line: what, where, and
+what would be right.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+__all__ = ["main"]
+
+DONE, FAILED, WRONG_CALL = 0, 1, 2
+
+#: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).
+COMMANDS = {
+    "demo": "capture and solve a sky end to end, with pictures (what `make run` does)",
+    "emulate": "serve an emulated device on serial ports until Ctrl-C",
+    "measure": "scene in, attitude out: each frame's result beside the truth",
+    "registers": "list a device's telecommands and telemetry",
+    "catalogue": "compile the onboard star catalogue and say what is in it",
+    "bench": "measure the cost of the hot paths on this machine",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Parser with every subcommand."""
+    parser = argparse.ArgumentParser(
+        prog="cubestack",
+        description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
+        epilog="Try: cubestack measure cubestar --frames 3    |    cubestack COMMAND --help",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, summary in COMMANDS.items():
+        module = import_module(f"cubestack.host.cli.{name}")
+        command = commands.add_parser(
+            name,
+            help=summary,
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line ``arguments`` (default: the process's own); returns the exit code."""
+    args = make_parser().parse_args(arguments)
+    try:
+        return int(args.run(args) or DONE)
+    except KeyboardInterrupt:
+        return FAILED
+    except BrokenPipeError:
+        return FAILED
+    except ValueError as error:  # every bad input of ours is a ValueError with a full sentence
+        print(f"cubestack {args.command}: {error}", file=sys.stderr)
+        return WRONG_CALL
+    except OSError as error:
+        print(f"cubestack {args.command}: {error}", file=sys.stderr)
+        return FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(main())
