@@ -59,4 +59,5 @@ INTERFACE = Interface(
     telemetries=tuple(
         sorted(NODE_TELEMETRY + STAR_TELEMETRY + EXTENSION_TELEMETRY, key=lambda m: m.id)
     ),
+    ack_errors=AckError,
 )

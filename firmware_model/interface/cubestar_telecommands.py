@@ -202,7 +202,12 @@ _IMAGE = (
         ),
     ),
     Message(16, "CaptureImage", 0, "capture a picture and transfer it to the processor"),
-    Message(17, "UploadImage", 0, "begin an upload: UploadBlock then fills the picture memory"),
+    Message(
+        17,
+        "UploadImage",
+        0,
+        "begin an upload: clear the picture memory, which UploadBlock then fills",
+    ),
     Message(
         18,
         "ImageBlockSet",

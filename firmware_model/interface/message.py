@@ -7,7 +7,7 @@ with them, and documentation is generated from them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 from functools import cached_property
 from itertools import pairwise
 
@@ -152,6 +152,7 @@ class Interface:
         baud: default baud rate of its serial line.
         telecommands: by ascending ID.
         telemetries: by ascending ID.
+        ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
     """
 
     name: str
@@ -160,6 +161,7 @@ class Interface:
     baud: int
     telecommands: tuple[Message, ...]
     telemetries: tuple[Message, ...]
+    ack_errors: type[IntEnum]
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""

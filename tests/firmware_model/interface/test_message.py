@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cubestack.firmware_model.interface.cubestar_codes import AckError
 from cubestack.firmware_model.interface.message import (
     Field,
     Interface,
@@ -123,7 +124,7 @@ def test_wrong_declarations_are_refused(arguments: tuple[object, ...], message: 
         Message(*arguments)  # type: ignore[arg-type]
 
 
-NODE = Interface("Node", 1, 0x1A, 57_600, (WINDOW,), (MIXED,))
+NODE = Interface("Node", 1, 0x1A, 57_600, (WINDOW,), (MIXED,), AckError)
 
 
 def test_messages_are_found_by_name_in_any_case_and_by_identifier() -> None:
@@ -141,7 +142,7 @@ def test_unknown_messages_get_a_suggestion() -> None:
 
 def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
     later = Message(201, "Later", 0, "", supported=False)
-    node = Interface("Node", 1, 0x1A, 57_600, (), (later,))
+    node = Interface("Node", 1, 0x1A, 57_600, (), (later,), AckError)
     assert node.telemetry("Later") is later
     assert node.find(201) is None
 
@@ -159,4 +160,4 @@ def test_wrong_interfaces_are_refused(
     telecommands: tuple[Message, ...], telemetries: tuple[Message, ...], message: str
 ) -> None:
     with pytest.raises(InterfaceError, match=message):
-        Interface("Node", 1, 0x1A, 57_600, telecommands, telemetries)
+        Interface("Node", 1, 0x1A, 57_600, telecommands, telemetries, AckError)

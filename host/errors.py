@@ -1,0 +1,91 @@
+"""What can go wrong between a host program and a node; every text is one line.
+
+::
+
+    ValueError
+     +-- TargetError              the text that names a target makes no sense
+     +-- CameraFileError          a camera file lacks something
+    OSError
+     +-- HostError
+          +-- TransportError
+          |    +-- PortOpenError        the port does not open
+          |    +-- PortClosedError      the other side has gone
+          +-- NodeError
+               +-- NoAnswerError        also a TimeoutError
+               +-- BadAnswerError       an answer that the interface does not allow
+               +-- CommandRefusedError  the acknowledge carries an error code
+               +-- StepFailedError      the node tried and failed
+
+Values that a message can not carry raise ``InterfaceError`` of the interface tables (a ValueError)
+before anything is sent.
+"""
+
+from enum import IntEnum
+
+__all__ = [
+    "BadAnswerError",
+    "CameraFileError",
+    "CommandRefusedError",
+    "HostError",
+    "NoAnswerError",
+    "NodeError",
+    "PortClosedError",
+    "PortOpenError",
+    "StepFailedError",
+    "TargetError",
+    "TransportError",
+]
+
+
+class TargetError(ValueError):
+    """The text that names a target makes no sense."""
+
+
+class CameraFileError(ValueError):
+    """A camera file is missing, unreadable, or lacks something."""
+
+
+class HostError(OSError):
+    """Base of everything that fails while talking to a node."""
+
+
+class TransportError(HostError):
+    """The connection failed."""
+
+
+class PortOpenError(TransportError):
+    """The port does not open."""
+
+
+class PortClosedError(TransportError):
+    """The other side has gone."""
+
+
+class NodeError(HostError):
+    """The node did not do what was asked."""
+
+
+class NoAnswerError(NodeError, TimeoutError):
+    """Nothing, or nothing whole, came back in time."""
+
+
+class BadAnswerError(NodeError):
+    """An answer came that the interface does not allow."""
+
+
+class StepFailedError(NodeError):
+    """The node tried and failed."""
+
+
+class CommandRefusedError(NodeError):
+    """A telecommand was refused.
+
+    Attributes:
+        code: the acknowledge's error code; a plain int when the interface does not know it.
+    """
+
+    def __init__(self, command: str, code: IntEnum | int, reason: str = "") -> None:
+        """Say that ``command`` was refused with ``code``."""
+        name = code.name if isinstance(code, IntEnum) else "unknown code"
+        super().__init__(f"telecommand {command} refused: {name} ({int(code)}){reason}")
+        self.code = code

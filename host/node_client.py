@@ -1,0 +1,106 @@
+"""Client of a node on a UART, node dialect of the CubeSpace family.
+
+A telemetry answer is data alone, with no ID; a telecommand is answered by one error byte. So an
+answer belongs to the request before it, and only one request is under way at a time.
+"""
+
+from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.message import Interface, Value
+from cubestack.host.client import Client
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError
+from cubestack.host.transport import Transport
+
+__all__ = ["NodeClient"]
+
+READ_BYTES = 4096
+
+#: Reads without a whole frame after which a babbling line counts as no answer.
+MAX_READS = 1000
+
+
+class NodeClient(Client):
+    """Client on a byte transport."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        interface: Interface,
+        *,
+        timeout_s: float = 1.0,
+        retries: int = 2,
+    ) -> None:
+        """Talk to the node of ``interface`` over ``transport``.
+
+        ``timeout_s`` is the longest silence before or within an answer. Telemetry is asked for
+        again up to ``retries`` times; a telecommand never is, as it may have been executed.
+        """
+        self.interface = interface
+        self._transport = transport
+        self._timeout_s = timeout_s
+        self._retries = retries
+        longest = max(message.length for message in interface.telemetries)
+        self._decoder = FrameDecoder(longest)
+
+    def command(self, name: str, **parameters: object) -> None:
+        """See Client."""
+        message = self.interface.telecommand(name)
+        answer = self.request(bytes([message.id]) + message.pack(**parameters))
+        if answer is None:
+            raise NoAnswerError(
+                f"no acknowledge of telecommand {message.name} within {self._timeout_s:g} s"
+            )
+        if len(answer) != 1:
+            raise BadAnswerError(
+                f"acknowledge of telecommand {message.name} has {len(answer)} bytes, not 1"
+            )
+        known = {int(error): error for error in self.interface.ack_errors}
+        code = known.get(answer[0], answer[0])
+        if code != 0:
+            raise CommandRefusedError(message.name, code)
+
+    def telemetry(self, name: str) -> dict[str, Value]:
+        """See Client. A frame that steps may skip a record when an answer was lost."""
+        message = self.interface.telemetry(name)
+        answer = None
+        for _ in range(1 + self._retries):
+            answer = self.request(bytes([message.id]))
+            if answer is not None and len(answer) == message.length:
+                return message.unpack(answer)
+        attempts = f"in {1 + self._retries} attempts"
+        if answer is None:
+            raise NoAnswerError(
+                f"no answer to telemetry {message.name} within {self._timeout_s:g} s {attempts}"
+            )
+        raise BadAnswerError(
+            f"telemetry {message.name} has {len(answer)} bytes, not {message.length}, {attempts}"
+        )
+
+    def request(self, payload: bytes) -> bytes | None:
+        """Send a frame with any ``payload``; returns the next frame's payload, None without one.
+
+        What came before is dropped, so a late answer is not taken for this one's.
+        """
+        self._drop_input()
+        self._transport.write(encode_frame(payload))
+        for _ in range(MAX_READS):
+            data = self._transport.read(READ_BYTES, self._timeout_s)
+            if not data:
+                break
+            for byte in data:
+                if self._decoder.feed(byte) is FrameEvent.FRAME:
+                    return self._decoder.payload
+        return None
+
+    def pause(self, seconds: float) -> None:
+        """See Client. Ends early when the node sends something."""
+        self._transport.read(READ_BYTES, seconds)
+
+    def close(self) -> None:
+        """See Client."""
+        self._transport.close()
+
+    def _drop_input(self) -> None:
+        self._decoder.reset()
+        for _ in range(MAX_READS):
+            if not self._transport.read(READ_BYTES, 0.0):
+                return

@@ -1,0 +1,149 @@
+"""Byte transports: a serial port through pyserial, a TCP socket; both look the same.
+
+A transport is what the client needs of a line: anything with these three methods will do, as the
+emulator's in-process link does.
+"""
+
+import select
+import socket
+from collections.abc import Callable
+from typing import Protocol
+from urllib.parse import urlsplit
+
+import serial
+
+from cubestack.host.errors import PortClosedError, PortOpenError, TargetError
+
+__all__ = ["SerialTransport", "TcpTransport", "Transport", "open_transport"]
+
+CONNECT_TIMEOUT_S = 5.0
+
+
+class Transport(Protocol):
+    """A line to a node."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data``; raises TransportError."""
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        """Wait for a byte, then return what is there, at most ``max_bytes``.
+
+        Empty when nothing came within ``timeout_s``; 0 does not wait. Raises TransportError.
+        """
+
+    def close(self) -> None:
+        """Release the line."""
+
+
+class SerialTransport:
+    """A serial port, or any URL that pyserial knows."""
+
+    def __init__(self, port: str, baud: int) -> None:
+        """Open ``port`` at ``baud``, 8N1; raises PortOpenError."""
+        self.name = port
+        try:
+            self._port = serial.serial_for_url(port, baudrate=baud, timeout=0)
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise PortOpenError(f"can not open {port}: {_reason(error)}") from error
+
+    def write(self, data: bytes) -> None:
+        """See Transport."""
+        try:
+            self._port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        """See Transport."""
+        try:
+            if self._port.timeout != timeout_s:  # setting it touches the port
+                self._port.timeout = timeout_s
+            first: bytes = self._port.read(1)
+            if not first:
+                return b""
+            rest: bytes = self._port.read(min(max_bytes - 1, self._port.in_waiting))
+        except (serial.SerialException, OSError) as error:
+            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
+        return first + rest
+
+    def close(self) -> None:
+        """See Transport."""
+        self._port.close()
+
+
+class TcpTransport:
+    """A TCP connection that carries the bytes of a serial line.
+
+    Not pyserial's ``socket://``: that one never says that more than one byte is waiting, so an
+    answer would come byte by byte.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        """Connect; raises PortOpenError."""
+        self.name = f"tcp://{host}:{port}"
+        try:
+            self._socket = socket.create_connection((host, port), CONNECT_TIMEOUT_S)
+        except OSError as error:
+            raise PortOpenError(f"can not open {self.name}: {_reason(error)}") from error
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def write(self, data: bytes) -> None:
+        """See Transport."""
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        """See Transport."""
+        try:
+            if not select.select([self._socket], [], [], timeout_s)[0]:
+                return b""
+            data = self._socket.recv(max_bytes)
+        except OSError as error:
+            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
+        if not data:
+            raise PortClosedError(f"{self.name}: the other side closed the connection")
+        return data
+
+    def close(self) -> None:
+        """See Transport."""
+        self._socket.close()
+
+
+def _open_tcp(target: str, _baud: int) -> Transport:
+    try:
+        parts = urlsplit(target)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if not host or not port:
+        raise TargetError(f"{target}: must be tcp://HOST:PORT, as in tcp://localhost:4000")
+    return TcpTransport(host, port)
+
+
+_OPENERS: dict[str, Callable[[str, int], Transport]] = {"tcp": _open_tcp}
+
+
+def open_transport(target: str, baud: int) -> Transport:
+    """Open ``target``: a serial port's path (/dev/ttyUSB0, ./ttyCUBESTAR), or tcp://HOST:PORT.
+
+    ``baud`` is for serial ports. Raises TargetError (a ValueError) for a text that names nothing,
+    TransportError when it does not open.
+    """
+    if not target:
+        raise TargetError("no target given: name a serial port, or tcp://HOST:PORT")
+    scheme, separator, _ = target.partition("://")
+    if not separator:
+        return SerialTransport(target, baud)
+    if scheme not in _OPENERS:
+        known = ", ".join(f"{name}://" for name in _OPENERS)
+        raise TargetError(f"{target}: no transport {scheme}://; known: {known} or a port's path")
+    return _OPENERS[scheme](target, baud)
+
+
+def _reason(error: Exception) -> str:
+    """The plain reason of a failure, without pyserial's wrapping."""
+    inner = error.__context__ if isinstance(error, serial.SerialException) else error
+    text = inner.strerror if isinstance(inner, OSError) and inner.strerror else str(error)
+    return " ".join(text.split())
