@@ -49,7 +49,8 @@ class Processor:
 
     Attributes:
         program: the running program, for the interrupt lines of the peripherals.
-        resets: number of software resets since power-up.
+        resets: number of resets since power-up.
+        waiting: asleep until an interrupt, with no deadline.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Processor:
         power_on_cause: int,
         boot_us: int,
         on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
+        on_activity: Callable[[bool], None] = lambda _busy: None,
     ) -> None:
         """Power up.
 
@@ -75,6 +77,7 @@ class Processor:
             power_on_cause: cause of the first start.
             boot_us: time from reset to the first instruction of ``main``.
             on_pin: told about every output pin change, after it happened.
+            on_activity: told when the processor falls asleep (False) and awakes (True).
         """
         self._env = env
         self._meter = meter
@@ -83,9 +86,11 @@ class Processor:
         self._boot = boot
         self._boot_us = boot_us
         self._on_pin = on_pin
+        self._on_activity = on_activity
         self._clock = CycleClock(meter.table.clock_hz)
         self._wake = env.event()
         self.resets = 0
+        self.waiting = False
         self.program = boot(power_on_cause)
         env.process(self._run())
 
@@ -168,7 +173,11 @@ class Processor:
         alternatives: list[simpy.Event] = [self._wake] if request.wakeable else []
         if deadline is not None:
             alternatives.append(self._env.timeout(deadline - self._env.now))
+        self.waiting = deadline is None
+        self._on_activity(False)
         yield simpy.AnyOf(self._env, alternatives)
+        self._on_activity(True)
+        self.waiting = False
         if request.wakeable and self._wake.triggered:
             self._wake = self._env.event()
             return True

@@ -191,14 +191,13 @@ EXTENSION_TELEMETRY = (
     Message(
         204,
         "SupplyReport",
-        10,
+        8,
         "supply monitoring",
         (
-            Field("SramCurrent", "u16", 0, "current of the frame buffer's SRAM", "mA", 10),
+            Field("SramCurrent", "u16", 0, "current of the processor's SRAM", "mA", 10),
             Field("ImagerCurrent", "u16", 16, "current of FPGA and imager", "mA", 10),
-            Field("MeanPower", "u16", 32, "mean power of the node", "mW", 10),
-            Field("LatchUps", "u16", 48, "over-currents that opened the switch"),
-            Field("PowerCycles", "u16", 64, "times that the switch was closed again"),
+            Field("LatchUps", "u16", 32, "over-currents that opened the switch"),
+            Field("PowerCycles", "u16", 48, "times that the switch was closed again"),
         ),
         ours=True,
     ),

@@ -1,0 +1,239 @@
+"""The CubeStar stack: which pin goes where.
+
+CubeStar thesis, section 5.2 and tables C.1 to C.4. Camera to FPGA and SRAM, FPGA to processor,
+processor to the satellite's UART and I2C, and the supplies of all three boards.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.mlx75412 import Mlx75412
+from cubestack.emulator.i2c import I2cBus
+from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+from cubestack.emulator.power import SUPPLY_VOLTS, PowerModel
+from cubestack.emulator.processor import Processor
+from cubestack.emulator.rtl.engine import make_engine
+from cubestack.emulator.sky.scene import Scene
+from cubestack.emulator.uart import Uart
+from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_S, Kernel
+from cubestack.firmware_model.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.cubestar.program import CubeStarProgram
+from cubestack.firmware_model.hardware import CameraTransfer, FlashStore
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cubestar_codes import ResetCause
+from cubestack.firmware_model.interface.mlx75412 import REGISTERS
+from cubestack.firmware_model.star_catalogue import StarCatalogue
+
+__all__ = ["CubeStarBoard"]
+
+EXTERNAL_RAM_BYTES = 1 << 20
+RETENTION_BYTES = 512
+BOOT_US = 3_000
+"""Reset to main: "a few milliseconds" (section 5.3.6)."""
+
+CAMERA_BUS_HZ = 100_000
+"""Standard mode; the sources give no rate."""
+
+SILENCE_BYTES = 100
+"""Byte times of silence after which the UART gives up a half frame; ours."""
+
+
+class CubeStarBoard:
+    """One emulated CubeStar.
+
+    Attributes:
+        kernel: virtual time.
+        engine: FPGA and its SRAM.
+        camera: image sensor, which looks at the scene.
+        power: supplies; the place for latch-ups.
+        processor: EFM32GG with the running program.
+        uart: the satellite's serial line.
+        i2c_bus: the satellite's I2C bus.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        catalogue: StarCatalogue,
+        *,
+        seed: int = 0,
+        engine: Literal["auto", "compiled", "python"] = "auto",
+        baud: int = INTERFACE.baud,
+        i2c_address: int = INTERFACE.i2c_address,
+    ) -> None:
+        """Power up.
+
+        Args:
+            scene: what the camera sees.
+            catalogue: star catalogue in the processor's flash.
+            seed: of everything random but the scene: memories at power-up, undefined frames.
+            engine: see ``make_engine``.
+            baud: of the satellite's UART.
+            i2c_address: 7-bit address on the satellite's bus.
+        """
+        self.kernel = Kernel()
+        self._rng = np.random.default_rng(seed)
+        self.engine = make_engine(kind=engine)
+        self.camera = Mlx75412(scene, seed=seed)
+        self.power = PowerModel(self.kernel)
+        self.uart = Uart(
+            self.kernel,
+            baud,
+            lambda byte: self.program.link.uart_byte(byte),
+            lambda: self.program.link.uart_silence(),
+            silence_bytes=SILENCE_BYTES,
+        )
+        self._hardware = _Efm32gg(self)
+        self._scramble(self._hardware.external_ram)
+        self._scramble(self.engine.sram)
+        self.engine.attach(self.camera)
+        meter = Meter(CORTEX_M3)
+
+        def boot(cause: int) -> CubeStarProgram:
+            self._hardware.reset_cause = cause
+            return CubeStarProgram(self._hardware, meter, catalogue)
+
+        self.processor = Processor(
+            self.kernel,
+            meter,
+            self.engine,
+            _CameraBus(self),
+            boot,
+            power_on_cause=ResetCause.POWER_ON,
+            boot_us=BOOT_US,
+            on_pin=self._pin_changed,
+            on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
+        )
+        self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
+        self.power.on_switch = self._supply_switched
+        self.i2c_bus = I2cBus(self.kernel)
+        self.i2c_bus.attach(i2c_address, _SatelliteTarget(self))
+        self._pins = {"ENABLE": 0, "RNW": 0}
+
+    @property
+    def program(self) -> CubeStarProgram:
+        """The firmware program that runs now."""
+        program = self.processor.program
+        assert isinstance(program, CubeStarProgram)
+        return program
+
+    def serial(self) -> DirectSerial:
+        """Host's end of the UART, in this process."""
+        return DirectSerial(self.kernel, self.uart)
+
+    def i2c(self) -> DirectI2c:
+        """Host's end of the I2C bus, in this process."""
+        return DirectI2c(self.kernel, self.i2c_bus)
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+        return self.uart.busy or not self.processor.waiting
+
+    def mean_power_mw(self) -> float:
+        """Mean power of the stack since power-up, in mW, as a meter in its supply line shows."""
+        return self.power.charge_mas() * SUPPLY_VOLTS * PS_PER_S / max(1, self.kernel.now)
+
+    def close(self) -> None:
+        """Release the engine."""
+        self.engine.close()
+
+    def camera_changed(self) -> None:
+        """The camera's output from now on is not what it was going to be."""
+        self.engine.stream_changed()
+        self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")
+
+    def _scramble(self, memory: NDArray[np.uint8]) -> None:
+        """What a static RAM holds after power-up."""
+        memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
+
+    def _pin_changed(self, pin: str, level: int) -> None:
+        self._pins[pin] = level
+        state = "standby"
+        if self._pins["ENABLE"]:
+            state = "reading" if self._pins["RNW"] else "storing"
+        self.power.set_state("fpga", state)
+        self.power.set_state("memory", "transfer" if state == "reading" else "standby")
+
+    def _supply_switched(self, channel: str, on: bool) -> None:
+        self.engine.run(self.kernel.now)
+        if channel == "memory":
+            if not on:
+                self._scramble(self._hardware.external_ram)
+            return
+        self.camera.power(on, self.kernel.now)
+        if not on:
+            self._scramble(self.engine.sram)
+        self.camera_changed()
+
+
+class _Efm32gg:
+    """The processor's peripherals, as its program sees them."""
+
+    def __init__(self, board: CubeStarBoard) -> None:
+        self._board = board
+        self.external_ram = np.zeros(EXTERNAL_RAM_BYTES, np.uint8)
+        self.retention = bytearray(RETENTION_BYTES)
+        self.flash = FlashStore()
+        self.reset_cause = int(ResetCause.POWER_ON)
+
+    def uart_send(self, data: bytes) -> None:
+        self._board.uart.send(data)
+
+    def uart_backlog(self) -> int:
+        return self._board.uart.backlog
+
+    def wake(self) -> None:
+        self._board.processor.wake()
+
+    def switch_supply(self, channel: str, on: bool) -> None:
+        self._board.power.switch(channel, on)
+
+    def supply_current_ma(self, channel: str) -> float:
+        return self._board.power.current_ma(channel)
+
+    def uptime_ms(self) -> int:
+        return self._board.kernel.now // PS_PER_MS
+
+    def temperature_c(self) -> float:
+        return self._board.camera.temperature_c
+
+
+class _CameraBus:
+    """The camera's control bus, which nobody else uses."""
+
+    def __init__(self, board: CubeStarBoard) -> None:
+        self._board = board
+
+    def transfer_ps(self, request: CameraTransfer) -> int:
+        bytes_on_wire = 1 + len(request.data) + (1 + request.read if request.read else 0)
+        starts_and_stop = 3 if request.read else 2
+        return (9 * bytes_on_wire + starts_and_stop) * PS_PER_S // CAMERA_BUS_HZ
+
+    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
+        camera = self._board.camera
+        if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
+            return None
+        answer = camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)
+        self._board.camera_changed()
+        return answer
+
+
+class _SatelliteTarget:
+    """The program that runs now, on the satellite's I2C bus."""
+
+    def __init__(self, board: CubeStarBoard) -> None:
+        self._board = board
+
+    def i2c_start(self, read: bool) -> None:
+        self._board.program.link.i2c_start(read)
+
+    def i2c_write(self, byte: int) -> bool:
+        return self._board.program.link.i2c_write(byte)
+
+    def i2c_read(self) -> int:
+        return self._board.program.link.i2c_read()
+
+    def i2c_stop(self) -> None:
+        self._board.program.link.i2c_stop()

@@ -1,0 +1,40 @@
+"""The star catalogue that goes into CubeStar's flash, compiled from the sky.
+
+CubeStar thesis, section 4.3.2. The pair limit is ours to choose: the published number of pairs is
+that of 42.1 degrees, while the camera's own diagonal holds more of them; see docs/fidelity.md.
+
+Alpha Centauri B is left out, which makes the published 405 stars of 406: it is 0.0001 rad from A,
+and the two pairs that the thesis names as its closest are 0.0017 and 0.0067 rad apart.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from cubestack.emulator.sky.hipparcos import load_sky
+from cubestack.firmware_model.star_catalogue import StarCatalogue
+
+__all__ = ["EPOCH", "MAG_LIMIT", "PAIR_LIMIT_DEG", "onboard_catalogue"]
+
+EPOCH = 2026.0
+MAG_LIMIT = 3.8
+PAIR_LIMIT_DEG = 42.1
+ALPHA_CENTAURI_B = 71681
+
+
+@lru_cache(maxsize=4)
+def onboard_catalogue(
+    mag_limit: float = MAG_LIMIT,
+    pair_limit_deg: float = PAIR_LIMIT_DEG,
+    epoch: float = EPOCH,
+) -> StarCatalogue:
+    """Stars brighter than ``mag_limit`` (V) and their pairs, at the Julian year ``epoch``."""
+    sky = load_sky(epoch, mag_limit)
+    kept = np.flatnonzero(sky.hip != ALPHA_CENTAURI_B)
+    return StarCatalogue.build(
+        sky.hip[kept].astype(np.int64),
+        sky.vectors[kept],
+        sky.v_mag[kept],
+        mag_limit,
+        pair_limit_deg,
+    )
