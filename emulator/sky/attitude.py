@@ -1,0 +1,127 @@
+"""Attitudes: quaternions, rotation matrices, pointing angles, motion and errors.
+
+Conventions: camera axes are x right, y down, z out of the lens. A quaternion (x, y, z, w), scalar
+last, turns inertial (ICRS) into camera coordinates, v_camera = A(q) v_inertial, with CubeStar
+thesis, equation 5.3.1: A = (w^2 - |v|^2) I + 2 v v^T - 2 w [v]x. All arrays are float64.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "attitude_error_deg",
+    "matrix_from_pointing",
+    "matrix_from_quaternion",
+    "pointing_from_matrix",
+    "propagate",
+    "quaternion_from_matrix",
+    "quaternion_from_pointing",
+    "random_quaternion",
+    "unit_quaternion",
+]
+
+
+def unit_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
+    """``quaternion`` scaled to length 1, shape (4,); ValueError when that is not possible."""
+    q = np.asarray(quaternion, np.float64)
+    if q.shape != (4,):
+        raise ValueError(f"a quaternion has 4 numbers (x, y, z, w), not shape {q.shape}")
+    norm = float(np.linalg.norm(q))
+    if not 0 < norm < np.inf:
+        raise ValueError(f"a quaternion needs a finite length above 0, not {norm}")
+    return q / norm
+
+
+def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
+    """Rotation matrix A (3, 3), inertial to camera."""
+    x, y, z, w = unit_quaternion(quaternion)
+    v = np.array([x, y, z])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix: NDArray[np.float64] = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) - 2 * w * cross
+    return matrix
+
+
+def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
+    """Unit quaternion (4,) of a rotation matrix, scalar part not negative."""
+    a = np.asarray(matrix, np.float64)
+    # 4 q q^T, all of it sums of elements of A. The row of the largest component is the quaternion,
+    # scaled, without cancellation.
+    xy, xz, yz = a[0, 1] + a[1, 0], a[0, 2] + a[2, 0], a[1, 2] + a[2, 1]
+    xw, yw, zw = a[1, 2] - a[2, 1], a[2, 0] - a[0, 2], a[0, 1] - a[1, 0]
+    products = np.array(
+        [
+            [1 + a[0, 0] - a[1, 1] - a[2, 2], xy, xz, xw],
+            [xy, 1 - a[0, 0] + a[1, 1] - a[2, 2], yz, yw],
+            [xz, yz, 1 - a[0, 0] - a[1, 1] + a[2, 2], zw],
+            [xw, yw, zw, 1 + a[0, 0] + a[1, 1] + a[2, 2]],
+        ]
+    )
+    q = unit_quaternion(products[np.argmax(np.diag(products))])
+    return -q if q[3] < 0 else q
+
+
+def matrix_from_pointing(ra_deg: float, dec_deg: float, roll_deg: float) -> NDArray[np.float64]:
+    """Rotation matrix of a boresight and the angle of the picture's up direction, east of north.
+
+    East is to the left of north, as the sky shows it to someone inside.
+    """
+    ra, dec, roll = np.radians([ra_deg, dec_deg, roll_deg])
+    boresight = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
+    north = np.array([-np.sin(dec) * np.cos(ra), -np.sin(dec) * np.sin(ra), np.cos(dec)])
+    east = np.array([-np.sin(ra), np.cos(ra), 0])
+    up = np.cos(roll) * north + np.sin(roll) * east
+    down = -up
+    return np.array([np.cross(down, boresight), down, boresight])
+
+
+def quaternion_from_pointing(ra_deg: float, dec_deg: float, roll_deg: float) -> NDArray[np.float64]:
+    """Quaternion of a boresight and a roll angle; see `matrix_from_pointing`."""
+    return quaternion_from_matrix(matrix_from_pointing(ra_deg, dec_deg, roll_deg))
+
+
+def pointing_from_matrix(matrix: ArrayLike) -> tuple[float, float, float]:
+    """Right ascension (0..360), declination and roll (-180..180) in degrees.
+
+    At a pole of the sky, right ascension and roll are not told apart; right ascension is then
+    whatever rounding makes of it, and roll fits to it.
+    """
+    a = np.asarray(matrix, np.float64)
+    ra = np.arctan2(a[2, 1], a[2, 0])
+    dec = np.arctan2(a[2, 2], np.hypot(a[2, 0], a[2, 1]))
+    up = -a[1]
+    north = np.array([-np.sin(dec) * np.cos(ra), -np.sin(dec) * np.sin(ra), np.cos(dec)])
+    east = np.array([-np.sin(ra), np.cos(ra), 0])
+    roll = np.arctan2(up @ east, up @ north)
+    return float(np.degrees(ra) % 360), float(np.degrees(dec)), float(np.degrees(roll))
+
+
+def propagate(quaternion: ArrayLike, rate_deg_s: ArrayLike, seconds: float) -> NDArray[np.float64]:
+    """The attitude after ``seconds`` of a constant body rate, (3,) in deg/s in camera axes.
+
+    The camera turns by the right-hand rule about the rate vector, so the stars turn the other way.
+    """
+    angle = np.radians(np.asarray(rate_deg_s, np.float64)) * seconds
+    size = float(np.linalg.norm(angle))
+    # np.sinc(t) is sin(pi t) / (pi t): finite at rest.
+    turn = matrix_from_quaternion([*(0.5 * np.sinc(size / 2 / np.pi) * angle), np.cos(size / 2)])
+    return quaternion_from_matrix(turn @ matrix_from_quaternion(quaternion))
+
+
+def attitude_error_deg(q_measured: ArrayLike, q_truth: ArrayLike) -> tuple[float, float]:
+    """Errors across and about the boresight in degrees: cross is not negative, roll is signed.
+
+    With D = A_measured A_truth^T: cross is the angle between the boresights, roll is
+    atan2(D01 - D10, D00 + D11).
+    """
+    measured, truth = matrix_from_quaternion(q_measured), matrix_from_quaternion(q_truth)
+    d = measured @ truth.T
+    # The cross product keeps its digits where the cosine of a small angle loses them.
+    cross = np.arctan2(np.linalg.norm(np.cross(measured[2], truth[2])), d[2, 2])
+    roll = np.arctan2(d[0, 1] - d[1, 0], d[0, 0] + d[1, 1])
+    return float(np.degrees(cross)), float(np.degrees(roll))
+
+
+def random_quaternion(generator: np.random.Generator) -> NDArray[np.float64]:
+    """A uniformly random attitude (4,), scalar part not negative."""
+    q = unit_quaternion(generator.standard_normal(4))
+    return -q if q[3] < 0 else q
