@@ -57,7 +57,7 @@ def test_declared_bits() -> None:
 def test_unknown_names_are_named_with_the_known_ones() -> None:
     with pytest.raises(UnknownRegisterError, match=r"TEST1 has no register 'GAIM', only GAIN"):
         registers(GAIN)["GAIM"]
-    with pytest.raises(UnknownRegisterError, match="no bit field .OF., only ON, DEPTH"):
+    with pytest.raises(UnknownRegisterError, match=r"no bit field .OF., only ON, DEPTH"):
         CONTROL.field("OF")
     with pytest.raises(UnknownRegisterError, match=r"only none"):
         GAIN.field("ON")
