@@ -118,16 +118,13 @@ public:
         times = Steps(segment.half_numerator, segment.half_denominator, 0);
         times.go_to(edge);
         top.p_VSYNC.set<bool>(segment.vsync);
-        if (edge < segment.edges) {
-            find_sample(edge / 2);
-            put_sample();
-        }
+        find_sample(edge / 2);
+        put_sample();
     }
 
     void use_pixels(const uint8_t *rendered) {
         pixels = rendered;
-        if (edge < segment.edges)
-            put_sample();
+        put_sample();
     }
 
     // Makes the segment's edges up to `until`, or up to the rising edge that brings ACK to
@@ -166,7 +163,8 @@ public:
     __attribute__((flatten)) void strobe(uint8_t *out, int64_t count, int64_t start, Steps halves) {
         for (int64_t i = 0; i < count; i++) {
             const int64_t rise = start + halves.value();
-            sram.sample(rise);
+            if (!top.p_DCLK.get<bool>())
+                sram.sample(rise);
             top.p_DCLK.set<bool>(true);
             settle(rise);
             halves.next();

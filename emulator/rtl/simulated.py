@@ -81,8 +81,7 @@ class SimulatedEngine(SteppingEngine):
             self._context.set(self._top.VSYNC, 0)
             return
         self._context.set(self._top.VSYNC, loaded.segment.vsync)
-        if edge < loaded.edges:
-            self._put_lines(*loaded.sample(edge // 2))
+        self._put_lines(*loaded.sample(edge // 2))
 
     def _put_lines(self, hsync: int, pixel: int) -> None:
         # Registers' inputs only: nothing but the next rising edge can show them.
@@ -90,7 +89,7 @@ class SimulatedEngine(SteppingEngine):
         self._context.set(self._top.PIXDATA, pixel)
 
     def _use_pixels(self, pixels: NDArray[np.uint8]) -> None:
-        if self._loaded is not None and self._edge < self._loaded.edges:
+        if self._loaded is not None:
             self._put_lines(*self._loaded.sample(self._edge // 2))
 
     def _burst(self, until_ps: int, stop_level: int | None) -> tuple[int, Outcome]:

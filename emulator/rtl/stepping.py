@@ -50,7 +50,7 @@ class SteppingEngine(ABC):
         self._skipping = skipping
         self._source: PixelSource | None = None
         self._loaded: LoadedSegment | None = None
-        self._first_edge = 0  # of the loaded segment that was or will be made
+        self._entered = (0, 0)  # start of the loaded segment, and its edge that was made first
         self._clocks_skipped = False  # the pixel clock stands at an earlier time
         self._next_strobe: tuple[int, Fraction, Fraction] | None = None  # time, period, fraction
 
@@ -131,7 +131,7 @@ class SteppingEngine(ABC):
             if self._get("ACK") == stop_level:
                 return self.now_ps
         while True:
-            if self._loaded is None or (self._skipping and self._idle()):
+            if self._source is None or self._loaded is None or self._may_skip():
                 self._clocks_skipped = self._loaded is not None
                 self.now_ps = until_ps
                 return self.now_ps
@@ -140,7 +140,7 @@ class SteppingEngine(ABC):
             # A frame stored is where idle time begins, so it ends the burst in any case.
             self.now_ps, outcome = self._burst(until_ps, 1 if self._skipping else stop_level)
             if outcome is Outcome.SEGMENT_OVER:
-                self._follow_segment(self._loaded)
+                self._follow_segment(self._source, self._loaded)
             elif outcome is Outcome.TIME_REACHED or self._get("ACK") == stop_level:
                 return self.now_ps
 
@@ -155,7 +155,7 @@ class SteppingEngine(ABC):
         # Cycle n ends at floor(fraction + n * period): the largest n that keeps it within reach.
         reach = (until_ps - self.now_ps + 1 - fraction) / period
         cycles = max(0, min(len(out), -(-reach.numerator // reach.denominator) - 1))
-        if self._loaded is None or (self._skipping and self._idle()):
+        if self._loaded is None or self._may_skip():
             self._strobe(out[:cycles], period, fraction)
         else:
             self._strobe_beside_pixels(out[:cycles], period, fraction)
@@ -176,6 +176,9 @@ class SteppingEngine(ABC):
             outputs[row] = [self._get(name) for name in OUTPUT_PINS]
         return outputs
 
+    def _may_skip(self) -> bool:
+        return self._skipping and self._idle()
+
     def _idle(self) -> bool:
         storing = self._get("ENABLE") and not self._get("RNW")
         return not storing or bool(self._get("ACK"))
@@ -184,9 +187,10 @@ class SteppingEngine(ABC):
         """Put the pixel clock where it would be, had no clock been skipped."""
         if self._clocks_skipped:
             self._clocks_skipped = False
+            entered = self._entered
             # The edges up to now, now included, are those that were skipped.
             self._follow_source(self.now_ps + 1)
-            if self._first_edge % 2 == 1:
+            if self._entered != entered and self._entered[1] % 2 == 1:
                 self._set("PIXCLK", 1)
 
     def _follow_source(self, first_ps: int) -> None:
@@ -203,12 +207,14 @@ class SteppingEngine(ABC):
                 edge += 1  # that very edge has been made already
             else:
                 self._set("PIXCLK", 0)
-        self._go_to(loaded, edge)
+        if edge == loaded.edges:
+            self._follow_segment(self._source, loaded)
+        else:
+            self._go_to(loaded, edge)
 
-    def _follow_segment(self, over: LoadedSegment) -> None:
+    def _follow_segment(self, source: PixelSource, over: LoadedSegment) -> None:
         """Continue with what comes after a segment whose edges are all made."""
-        assert self._source is not None
-        segment = self._source.segment_at(over.end_ps)
+        segment = source.segment_at(over.end_ps)
         if segment is None:
             self._go_to(None, 0)
             return
@@ -217,11 +223,11 @@ class SteppingEngine(ABC):
                 f"the source's next segment starts at {segment.start_ps} ps, "
                 f"before the last one's end at {over.end_ps} ps"
             )
-        self._go_to(LoadedSegment.of(self._source, segment), 0)
+        self._go_to(LoadedSegment.of(source, segment), 0)
 
     def _go_to(self, loaded: LoadedSegment | None, edge: int) -> None:
         self._loaded = loaded
-        self._first_edge = edge
+        self._entered = (loaded.segment.start_ps if loaded else self.now_ps, edge)
         if loaded is None and self._get("PIXCLK"):
             self._set("PIXCLK", 0)
         self._load(loaded, edge)

@@ -1,0 +1,107 @@
+"""A camera that plays a list of segments, and random cameras made of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+
+
+@dataclass
+class Segment:
+    start_ps: int
+    clocks: int
+    vsync: int
+    rows: int
+    pixels: Callable[[], Image] | None
+
+
+@dataclass
+class ListCamera:
+    """Plays blanking and images one after the other, then has no clock any more."""
+
+    period: Fraction
+    line_clocks: int
+    active_columns: int
+    next_ps: int = 0
+    segments: list[Segment] = field(default_factory=list)
+    images: list[Image] = field(default_factory=list)
+    rendered: list[int] = field(default_factory=list)
+
+    def segment_at(self, time_ps: int) -> Segment | None:
+        for segment in self.segments:
+            if segment.start_ps <= time_ps < self.end_of(segment):
+                return segment
+        return None
+
+    def end_of(self, segment: Segment) -> int:
+        return segment.start_ps + int(segment.clocks * self.period)
+
+    def add_blank(self, clocks: int, vsync: int = 0) -> None:
+        self._add(Segment(self.next_ps, clocks, vsync, 0, None))
+
+    def add_image(self, image: Image, vsync: int = 1) -> None:
+        number = len(self.images)
+        self.images.append(image)
+
+        def render() -> Image:
+            self.rendered.append(number)
+            return image
+
+        self._add(Segment(self.next_ps, len(image) * self.line_clocks, vsync, len(image), render))
+
+    def _add(self, segment: Segment) -> None:
+        self.segments.append(segment)
+        self.next_ps = self.end_of(segment)
+
+
+def plain_camera(
+    columns: int = 8,
+    rows: int = 4,
+    frames: int = 3,
+    *,
+    period: Fraction | int = 100_000,
+    line_clocks: int | None = None,
+    blank: int = 30,
+    seed: int = 1,
+) -> ListCamera:
+    """Whole frames, with VSYNC low in the ``blank`` clocks before each."""
+    rng = np.random.default_rng(seed)
+    camera = ListCamera(Fraction(period), line_clocks or columns + 4, columns)
+    for _ in range(frames):
+        camera.add_blank(blank)
+        camera.add_image(rng.integers(0, 256, (rows, columns), dtype=np.uint8))
+    camera.add_blank(blank)
+    return camera
+
+
+def random_camera(rng: np.random.Generator, columns: int, rows: int) -> ListCamera:
+    """Frames of all kinds: whole, cut, too large, without VSYNC between; lines too short or long.
+
+    The period is seldom a whole number of picoseconds.
+    """
+    active = int(rng.choice([columns, columns, columns, columns - 1, columns + 2]))
+    period = Fraction(10**12, int(rng.integers(9_000_000, 24_000_000)))
+    camera = ListCamera(period, active + int(rng.integers(1, 30)), active)
+    for _ in range(6):
+        if rng.random() < 0.8:
+            camera.add_blank(int(rng.integers(1, 60)), vsync=int(rng.random() < 0.3))
+        height = rows if rng.random() < 0.6 else int(rng.integers(1, 2 * rows))
+        image = rng.integers(0, 256, (height, active), dtype=np.uint8)
+        camera.add_image(image, vsync=int(rng.random() < 0.95))
+    camera.add_blank(20)
+    return camera
+
+
+@pytest.fixture
+def make_camera() -> Callable[..., ListCamera]:
+    return plain_camera
+
+
+@pytest.fixture
+def make_random_camera() -> Callable[[np.random.Generator, int, int], ListCamera]:
+    return random_camera

@@ -1,0 +1,187 @@
+"""Compiled engine against Amaranth's simulator, skipping against not skipping: all the same."""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.rtl.engine import (
+    CAMERA_PINS,
+    MCU_PINS,
+    OUTPUT_PINS,
+    PinEvent,
+    RtlEngine,
+    make_engine,
+)
+from cubestack.emulator.sram import SramTiming
+from cubestack.hdl.cubestar_top import CubeStarTop
+
+SIZES = [(8, 4), (5, 3)]
+Step = Callable[[RtlEngine], object]
+
+
+def engines(size: tuple[int, int]) -> list[RtlEngine]:
+    """One of each sort; the last is the reference."""
+    return [
+        make_engine(CubeStarTop(*size), kind, skipping=skipping)
+        for kind, skipping in (
+            ("compiled", True),
+            ("compiled", False),
+            ("python", True),
+            ("python", False),
+        )
+    ]
+
+
+def state(engine: RtlEngine) -> dict[str, object]:
+    """All that can be seen of an engine. Data that is not driven onto the bus is no data."""
+    levels = {name: engine.get_pin(name) for name in (*OUTPUT_PINS, *CAMERA_PINS, *MCU_PINS)}
+    if not levels["SRAM_D_OE"]:
+        del levels["SRAM_D_O"]
+    # Rendered only for those who store.
+    del levels["PIXDATA"]
+    return {
+        **levels,
+        "now": engine.now_ps,
+        "sram": engine.sram.tobytes(),
+        "violations": engine.violations,
+        "counts": engine.violation_counts,
+    }
+
+
+def assert_same(all_engines: Sequence[RtlEngine], step: Step, what: object) -> None:
+    *others, reference = all_engines
+    expected = {"answer": step(reference), **state(reference)}
+    for number, engine in enumerate(others):
+        found = {"answer": step(engine), **state(engine)}
+        differences = {k: (found[k], expected[k]) for k in expected if found.get(k) != expected[k]}
+        assert not differences, (number, what)
+
+
+def read(engine: RtlEngine, count: int, period: Fraction, reach: int) -> bytes:
+    out = np.zeros(count, np.uint8)
+    made = engine.strobe_read(out, period, engine.now_ps + reach)
+    return out[:made].tobytes()
+
+
+def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
+    """What a board might do, or the outside world to it, at any moment."""
+    kind = rng.choice(
+        ["run", "pins", "await", "read", "camera", "burst"], p=[0.25, 0.35, 0.2, 0.1, 0.05, 0.05]
+    )
+    wait = int(rng.integers(0, span_ps))
+    match kind:
+        case "run":
+            return lambda engine: engine.run(engine.now_ps + wait)
+        case "pins":
+            pin = str(rng.choice(MCU_PINS, p=[0.45, 0.3, 0.15, 0.1]))
+            level = int(rng.random() < (0.7 if pin == "ENABLE" else 0.35))
+            return lambda engine: engine.set_pin(pin, level)
+        case "await":
+            return lambda engine: engine.run(engine.now_ps + 4 * wait, ("ACK", 1))
+        case "read":
+            count, period = int(rng.integers(1, 80)), Fraction(int(rng.integers(10, 2_000_000)), 7)
+            period = max(period, Fraction(5_000))
+            return lambda engine: read(engine, count, period, 4 * wait)
+        case "camera":
+            attached = camera if rng.random() < 0.7 else None
+            return lambda engine: engine.attach(attached)
+        case _:
+            # Just a moment: near a write pulse, or at an edge itself.
+            nudge = int(rng.integers(0, 40_000))
+            return lambda engine: engine.run(engine.now_ps + nudge)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("seed", range(25))
+def test_random_life_of_a_board(size, seed, make_random_camera):
+    rng = np.random.default_rng([seed, *size])
+    camera = make_random_camera(rng, *size)
+    line_ps = int(camera.line_clocks * camera.period)
+    all_engines = engines(size)
+    assert_same(all_engines, lambda engine: engine.attach(camera), "attach")
+    for _ in range(60):
+        step = random_step(rng, camera, 2 * line_ps)
+        assert_same(all_engines, step, step.__qualname__)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_captures_and_reads_back(seed, make_random_camera):
+    """Long enough for whole frames to be stored, in either bank, with ENABLE at any moment."""
+    size = SIZES[seed % len(SIZES)]
+    rng = np.random.default_rng(seed)
+    camera = make_random_camera(rng, *size)
+    all_engines = engines(size)
+    wait, bank, late = int(rng.integers(0, 40 * camera.period)), seed & 1, 3_000_000
+    steps: list[Step] = [
+        lambda engine: engine.attach(camera),
+        lambda engine: engine.run(wait),
+        lambda engine: engine.set_pin("BANK", bank),
+        lambda engine: engine.set_pin("ENABLE", 1),
+        lambda engine: engine.run(camera.next_ps, ("ACK", 1)),
+        lambda engine: engine.run(engine.now_ps + late),
+        lambda engine: engine.set_pin("RNW", 1),
+        lambda engine: engine.run(engine.now_ps + 12_000),
+        lambda engine: read(engine, 2 * size[0] * size[1], Fraction(10**6, 3), 10**12),
+        lambda engine: engine.set_pin("ENABLE", 0),
+    ]
+    for number, step in enumerate(steps):
+        assert_same(all_engines, step, number)
+
+
+def random_events(rng: np.random.Generator, count: int) -> list[PinEvent]:
+    """Levels on any pin, at most one event at an instant; ENABLE and RNW settle now and then."""
+    events, time_ps = [], 0
+    pins = (*CAMERA_PINS, *MCU_PINS)
+    weights = np.array([10, 3, 1, 0.15, 0.1, 0.1, 0.1, 8])
+    level = dict.fromkeys(pins, 0)
+    for _ in range(count):
+        time_ps += int(rng.integers(1, 20_000))
+        pin = str(rng.choice(pins, p=weights / weights.sum()))
+        if pin == "PIXDATA":
+            level[pin] = int(rng.integers(0, 256))
+        elif pin in ("PIXCLK", "DCLK"):
+            level[pin] ^= 1
+        else:
+            mostly_high = {"ENABLE": 0.85, "HSYNC": 0.75, "VSYNC": 0.9}
+            level[pin] = int(rng.random() < mostly_high.get(pin, 0.4))
+        events.append(PinEvent(time_ps, pin, level[pin]))
+    return events
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pin_by_pin(seed):
+    """Every output after every event, and the memory and all violations in the end."""
+    size = SIZES[seed % len(SIZES)]
+    events = random_events(np.random.default_rng(seed), 3000)
+    *others, reference = engines(size)
+    expected = reference.apply(events)
+    assert len(np.unique(expected[:, OUTPUT_PINS.index("SRAM_A")])) > 10
+    for engine in others:
+        np.testing.assert_array_equal(engine.apply(events), expected)
+        assert state(engine) == state(reference)
+    assert reference.violations
+
+
+def test_low_lines_are_really_skipped(make_camera):
+    """An hour of blanking costs nothing, and the frame behind it is stored all the same."""
+    camera = make_camera(blank=36_000_000_000)
+    engine = make_engine(CubeStarTop(*SIZES[0]), "compiled")
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    start = camera.segments[1].start_ps
+    assert engine.run(2 * start, ("ACK", 1)) == start + (3 * 12 + 8) * 100_000
+    assert (engine.sram[:32] == camera.images[0].ravel()).all()
+
+
+def test_other_limits_reach_the_model(make_camera):
+    slow = SramTiming(write_pulse_ps=60_000, data_setup_ps=110_000)
+    counts = []
+    for kind in ("compiled", "python"):
+        engine = make_engine(CubeStarTop(*SIZES[0]), kind, slow)
+        engine.attach(make_camera(frames=1))
+        engine.set_pin("ENABLE", 1)
+        engine.run(10**10)
+        counts.append(dict(engine.violation_counts))
+    assert counts == [{"short-write-pulse": 32, "data-setup": 32}] * 2
