@@ -183,6 +183,12 @@ class Interface:
         """Telecommands, then telemetry."""
         return self.telecommands + self.telemetries
 
+    @property
+    def choices(self) -> tuple[type[IntEnum], ...]:
+        """The sets of named numbers that fields use, in order of their first use."""
+        used = (field.choices for message in self.messages for field in message.fields)
+        return tuple(dict.fromkeys(choices for choices in used if choices is not None))
+
     def telecommand(self, key: str | int) -> Message:
         """The telecommand of this name (in any case) or ID; else InterfaceError."""
         return self._lookup(self.telecommands, "telecommand", key)
