@@ -1,0 +1,58 @@
+"""The example that knows the published protocol and nothing of this project."""
+
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "plain_pyserial.py"
+
+
+def run_against(uart: Any) -> "subprocess.CompletedProcess[str]":
+    """Run the example on a socket that ``uart`` answers."""
+
+    def serve(server: socket.socket) -> None:
+        connection = server.accept()[0]
+        with connection:
+            while data := connection.recv(1000):
+                uart.write(data)
+                connection.sendall(uart.read(1000, 0.0))
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=serve, args=(server,))
+        thread.start()
+        target = f"socket://127.0.0.1:{server.getsockname()[1]}"
+        result = subprocess.run(
+            [sys.executable, str(EXAMPLE), target], capture_output=True, text=True, timeout=60
+        )
+        thread.join()
+    return result
+
+
+@pytest.mark.parametrize("qbar0", [0.1, 0.7967])  # the second is 1F 1F on the wire
+def test_it_prints_the_attitude(uart: Any, node: Any, qbar0: float) -> None:
+    node.values["TaskStatus"] = {"taskStatus": 29}
+    node.values["AttitudeData"] = {
+        "Qbar0": qbar0,
+        "Qbar3": -0.6044,
+        "RightAscension": -3.1,
+        "Declination": 1.5,
+        "BSVZ": 0.7967,  # ends in 1F 1F, right before the frame's end
+    }
+    result = run_against(uart)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == (
+        f"quaternion {qbar0:+.4f} +0.0000 +0.0000 -0.6044\n"
+        "right ascension -3.1000 rad, declination +1.5000 rad\n"
+    )
+    assert [name for name, _ in node.log] == ["CaptureAndProcess"]
+
+
+def test_it_tells_a_picture_without_attitude(uart: Any, node: Any) -> None:
+    node.values["TaskStatus"] = {"taskStatus": 25}
+    result = run_against(uart)
+    assert (result.returncode, result.stderr) == (1, "no attitude in this picture\n")
