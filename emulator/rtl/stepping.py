@@ -215,6 +215,9 @@ class SteppingEngine(ABC):
     def _follow_segment(self, source: PixelSource, over: LoadedSegment) -> None:
         """Continue with what comes after a segment whose edges are all made."""
         segment = source.segment_at(over.end_ps)
+        if segment is not None and segment.start_ps == over.segment.start_ps:
+            # Where both starts are rounded down, the gap between them may be one longer.
+            segment = source.segment_at(over.end_ps + 1)
         if segment is None:
             self._go_to(None, 0)
             return

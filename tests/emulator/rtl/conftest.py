@@ -22,27 +22,29 @@ class Segment:
 
 @dataclass
 class ListCamera:
-    """Plays blanking and images one after the other, then has no clock any more."""
+    """Plays blanking and images one after the other, then has no clock any more.
+
+    The clock runs through: edge k of the whole stream is at floor(k * period).
+    """
 
     period: Fraction
     line_clocks: int
     active_columns: int
-    next_ps: int = 0
+    clocks: int = 0
     segments: list[Segment] = field(default_factory=list)
     images: list[Image] = field(default_factory=list)
     rendered: list[int] = field(default_factory=list)
 
-    def segment_at(self, time_ps: int) -> Segment | None:
-        for segment in self.segments:
-            if segment.start_ps <= time_ps < self.end_of(segment):
-                return segment
-        return None
+    @property
+    def end_ps(self) -> int:
+        return int(self.clocks * self.period)
 
-    def end_of(self, segment: Segment) -> int:
-        return segment.start_ps + int(segment.clocks * self.period)
+    def segment_at(self, time_ps: int) -> Segment | None:
+        begun = [segment for segment in self.segments if segment.start_ps <= time_ps]
+        return begun[-1] if begun and time_ps < self.end_ps else None
 
     def add_blank(self, clocks: int, vsync: int = 0) -> None:
-        self._add(Segment(self.next_ps, clocks, vsync, 0, None))
+        self._add(Segment(self.end_ps, clocks, vsync, 0, None))
 
     def add_image(self, image: Image, vsync: int = 1) -> None:
         number = len(self.images)
@@ -52,11 +54,11 @@ class ListCamera:
             self.rendered.append(number)
             return image
 
-        self._add(Segment(self.next_ps, len(image) * self.line_clocks, vsync, len(image), render))
+        self._add(Segment(self.end_ps, len(image) * self.line_clocks, vsync, len(image), render))
 
     def _add(self, segment: Segment) -> None:
         self.segments.append(segment)
-        self.next_ps = self.end_of(segment)
+        self.clocks += segment.clocks
 
 
 def plain_camera(

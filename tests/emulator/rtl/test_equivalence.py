@@ -119,7 +119,7 @@ def test_captures_and_reads_back(seed, make_random_camera):
         lambda engine: engine.run(wait),
         lambda engine: engine.set_pin("BANK", bank),
         lambda engine: engine.set_pin("ENABLE", 1),
-        lambda engine: engine.run(camera.next_ps, ("ACK", 1)),
+        lambda engine: engine.run(camera.end_ps, ("ACK", 1)),
         lambda engine: engine.run(engine.now_ps + late),
         lambda engine: engine.set_pin("RNW", 1),
         lambda engine: engine.run(engine.now_ps + 12_000),
