@@ -106,6 +106,17 @@ def test_limits_of_floats_are_taken_as_the_wire_carries_them(value: float) -> No
     assert field.allows(value, {}) == (math.isfinite(value) and abs(value) <= edge)
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_float_without_limits_must_still_be_finite(value: float) -> None:
+    assert not Field("x", "f32", 0, "").allows(value, {})
+
+
+def test_counts_without_a_scale_stay_integers() -> None:
+    assert isinstance(Field("x", "u16", 0, "").decode(5), int)
+    assert isinstance(Field("x", "u16", 0, "", scale=10).decode(50), float)
+    assert Field("x", "bool1", 0, "").decode(1) is True
+
+
 def test_a_limit_may_hang_on_another_field() -> None:
     field = Field("x", "u16", 0, "", maximum=100, maximum_by=("size", {0: 100, 1: 50}))
     assert field.allows(100, {"size": 0})

@@ -82,6 +82,7 @@ def test_a_long_frame_is_reported_once_at_its_end() -> None:
     decoder = FrameDecoder(LIMIT)
     assert events(decoder, encode_frame(bytes(LIMIT + 50))) == [FrameEvent.TOO_LONG]
     assert events(decoder, encode_frame(bytes(LIMIT))) == [bytes(LIMIT)]
+    assert events(decoder, encode_frame(bytes(LIMIT + 1))) == [FrameEvent.TOO_LONG]
 
 
 def test_a_start_inside_a_frame_is_incomplete_and_begins_anew() -> None:
