@@ -1,6 +1,8 @@
 # `make run` and `make test` set up everything they need; see README.md.
 PYTHON ?= python3
 BIN := .venv/bin
+# Real photographs of the sky with their truth.json, when there are any.
+PHOTOGRAPHS ?= ../shared/data/sky
 
 .PHONY: help venv run test lint bench clean
 
@@ -22,7 +24,7 @@ venv: .venv/ready-run
 	@touch $@ .venv/ready-run
 
 run: .venv/ready-run
-	@$(BIN)/cubestack demo --out out
+	@$(BIN)/cubestack demo --out out --photographs "$(PHOTOGRAPHS)"
 
 test: .venv/ready-dev
 	@$(BIN)/pytest -n auto

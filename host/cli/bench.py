@@ -1,0 +1,87 @@
+"""Measure the cost of the hot paths on this machine, on one core.
+
+rtl_clocks_per_s  pixel clocks a second through the compiled FPGA, nothing skipped
+capture_wall_ms   wall time of one capture: exposure, read-out, FPGA store
+readout_wall_ms   wall time of one transfer from the FPGA's SRAM to the processor
+realtime_ratio    simulated seconds per wall second of the full 1 Hz loop
+cold_build_s      translating and compiling the FPGA with an empty cache
+"""
+
+import argparse
+import json
+import time
+from typing import TYPE_CHECKING, Any
+
+from cubestack.host.cli.session import open_session
+from cubestack.host.cli.terminal import console
+
+if TYPE_CHECKING:
+    from cubestack.host.cli.session import Session
+
+__all__ = ["add_arguments", "run"]
+
+LOOP_ITERATIONS = 10
+CAPTURES = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and report."""
+    from cubestack.emulator.rtl.benchmark import cold_build_s, rtl_clocks_per_s
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.scene import SkyScene
+
+    figures = {"rtl_clocks_per_s": round(rtl_clocks_per_s())}
+    scene = SkyScene(quaternion=quaternion_from_pointing(84.0, -1.0, 0.0))
+    with open_session(scene, engine="compiled") as session:
+        figures |= _capture(session)
+        figures["realtime_ratio"] = round(_realtime_ratio(session), 2)
+    figures["cold_build_s"] = round(cold_build_s(), 1)
+    if args.json:
+        print(json.dumps(figures))
+        return 0
+    for name, value in figures.items():
+        console.print(f"{name:>18}  {value:,}")
+    return 0
+
+
+def _capture(session: "Session") -> dict[str, float]:
+    """Wall times of capture and transfer: best of several, as the rest is the machine's noise."""
+    engine = session.board.engine
+    strobe_read = engine.strobe_read
+    transfer_s = 0.0
+
+    def timed(out: Any, period: Any, until_ps: int) -> int:
+        nonlocal transfer_s
+        started = time.perf_counter()
+        count = strobe_read(out, period, until_ps)
+        transfer_s += time.perf_counter() - started
+        return count
+
+    engine.strobe_read = timed  # type: ignore[method-assign]
+    captures: list[tuple[float, float]] = []
+    for _ in range(CAPTURES):
+        transfer_s = 0.0
+        started = time.perf_counter()
+        session.cubestar.capture()
+        captures.append((time.perf_counter() - started - transfer_s, transfer_s))
+    engine.strobe_read = strobe_read  # type: ignore[method-assign]
+    return {
+        "capture_wall_ms": round(1000 * min(capture for capture, _ in captures), 1),
+        "readout_wall_ms": round(1000 * min(transfer for _, transfer in captures), 1),
+    }
+
+
+def _realtime_ratio(session: "Session") -> float:
+    client, kernel = session.cubestar.client, session.board.kernel
+    client.command("Trigger")
+    client.pause(1.0)
+    virtual, wall = kernel.now, time.perf_counter()
+    client.pause(float(LOOP_ITERATIONS))
+    ratio = (kernel.now - virtual) / 1e12 / (time.perf_counter() - wall)
+    client.command("StopLoop")
+    return ratio

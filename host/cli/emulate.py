@@ -1,0 +1,89 @@
+"""Serve an emulated device until Ctrl-C; any program can open its ports.
+
+examples:
+  cubestack emulate cubestar --pty ./ttyCUBESTAR            then, in a second terminal:
+      python examples/plain_pyserial.py ./ttyCUBESTAR
+  cubestack emulate cubestar --scene sky.toml --tcp 4000 --pace fast
+"""
+
+import argparse
+import signal
+from pathlib import Path
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.cli.session import DEVICES
+from cubestack.host.cli.terminal import say
+
+__all__ = ["add_arguments", "run"]
+
+LOOPBACK = "127.0.0.1"
+DEFAULT_POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("device", choices=DEVICES, help="device to emulate")
+    parser.add_argument("--scene", type=Path, metavar="FILE", help="TOML scene; default: Orion")
+    parser.add_argument(
+        "--pty",
+        type=Path,
+        metavar="PATH",
+        help="link to a pseudo-terminal; default without --tcp: ./ttyCUBESTAR",
+    )
+    parser.add_argument("--tcp", type=int, metavar="PORT", help="serial line on a local TCP port")
+    parser.add_argument("--baud", type=int, default=INTERFACE.baud, help="default 57600")
+    parser.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "compiled", "python"),
+        default="auto",
+        help="how the FPGA is run (default: compiled where there is a compiler)",
+    )
+    parser.add_argument(
+        "--layout",
+        type=int,
+        choices=(1,),
+        default=1,
+        help="memory layout of the FPGA board; 1 is the published one",
+    )
+    parser.add_argument(
+        "--pace",
+        choices=("real", "fast"),
+        default="real",
+        help="real: virtual time is wall time; fast: ahead while there is work",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until SIGINT or SIGTERM."""
+    from cubestack.emulator.cubestar import CubeStarBoard
+    from cubestack.emulator.onboard_catalogue import onboard_catalogue
+    from cubestack.emulator.ports.endpoint import Endpoint, PtyEndpoint, TcpEndpoint
+    from cubestack.emulator.ports.pump import Pump
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.scene import SkyScene, load_scene
+
+    if args.scene is None:
+        scene = SkyScene(quaternion=quaternion_from_pointing(*DEFAULT_POINTING_DEG))
+    else:
+        scene = load_scene(args.scene)
+    if args.pty is not None and args.tcp is not None:
+        raise ValueError("the device has one serial line: give --pty or --tcp, not both")
+    board = CubeStarBoard(
+        scene, onboard_catalogue(), seed=args.seed, engine=args.engine, baud=args.baud
+    )
+    endpoint: Endpoint
+    if args.tcp is not None:
+        endpoint = TcpEndpoint(LOOPBACK, args.tcp, board.uart)
+    else:
+        endpoint = PtyEndpoint(args.pty or Path("ttyCUBESTAR"), board.uart)
+    pump = Pump(board.kernel, [endpoint], board.busy, pace=args.pace, report=say)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: pump.stop())
+    say(f"CubeStar serves on {endpoint.name} at {args.baud} baud; Ctrl-C ends it")
+    try:
+        pump.run()
+    finally:
+        endpoint.close()
+        board.close()
+    return 0
