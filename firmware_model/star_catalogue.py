@@ -2,18 +2,24 @@
 
 CubeStar thesis, sections 4.3.2 (Algorithm 1), 4.3.4 (reduced catalogue) and 5.3.2 (constant arrays
 in flash: 405 stars in 5.54 kB, 11 484 pairs in 89.7 kB). Two pairs are closer than the camera can
-split; the thesis leaves them in, and so do we. Magnitudes and Hipparcos numbers are not in flash
-(the published size leaves no room for them): they are kept here for the ground's reports.
+split; the thesis leaves them in, and so do we. Ours: a companion within `COMPANION_RAD` of a
+brighter star is left out, because the two would tie in every vote. With Hipparcos and V below 3.8
+that is alpha Centauri B alone, without which the published 405 stars remain. Magnitudes and
+Hipparcos numbers are not in flash (the published size leaves no room for them): they are kept here
+for the ground's reports.
 """
 
 import hashlib
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
+
+#: Angle in rad, half a pixel, below which the fainter of two stars is not listed.
+COMPANION_RAD = 0.0005
 
 
 class CatalogueError(ValueError):
@@ -77,7 +83,7 @@ class StarCatalogue:
     @classmethod
     def build(
         cls,
-        hip: NDArray[np.int64],
+        hip: NDArray[np.integer[Any]],
         unit_vectors: NDArray[np.float64],
         v_mag: NDArray[np.float64],
         mag_limit: float,
@@ -112,6 +118,7 @@ class StarCatalogue:
                 f"magnitude limit {mag_limit} leaves {len(taken)} stars, not 2 to 65 535"
             )
         taken = taken[np.argsort(hip[taken], kind="stable")]
+        taken = taken[~_companions(unit_vectors[taken], v_mag[taken])]
         return cls(
             vectors=unit_vectors[taken].astype(np.float32),
             pairs=_list_pairs(unit_vectors[taken], np.radians(pair_limit_deg)),
@@ -185,6 +192,18 @@ class StarCatalogue:
                      ram_write=3 * copies)
         pairs = PairList(self.pairs.first[kept], self.pairs.second[kept], self.pairs.angle[kept])
         return ReducedCatalogue(stars, pairs, radius_deg)
+
+
+def _companions(vectors: NDArray[np.float64], v_mag: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which stars (n,) stand within `COMPANION_RAD` of a brighter one."""
+    first, second = np.triu_indices(len(vectors), k=1)
+    close = np.abs(vectors[first] - vectors[second]).max(axis=1) < COMPANION_RAD
+    first, second = first[close], second[close]
+    close = np.linalg.norm(vectors[first] - vectors[second], axis=1) < COMPANION_RAD
+    first, second = first[close], second[close]
+    fainter = np.zeros(len(vectors), dtype=bool)
+    fainter[np.where(v_mag[first] > v_mag[second], first, second)] = True
+    return fainter
 
 
 def _list_pairs(vectors: NDArray[np.float64], limit_rad: float) -> PairList:

@@ -3,8 +3,7 @@
 CubeStar thesis, section 4.3.3 (verification round, stars within one vote of the maximum) and
 section 5.3.4 (the weights are the verification votes). The text leaves open what happens when the
 kept stars contradict each other; here they are thinned until every pair of them agrees. Two
-centroids with one identity contradict each other by themselves, for the distance between their
-identities is zero.
+centroids never share an identity: they count as a contradiction, however close they are.
 """
 
 from dataclasses import dataclass
@@ -126,12 +125,13 @@ def verify(
     first, second = pairs.first[named], pairs.second[named]
     catalogue = angles_between(vectors[identities[first]], vectors[identities[second]], meter)
     agree = np.abs(catalogue - pairs.angle[named]) <= np.float32(margin_rad)
+    agree &= identities[first] != identities[second]
     agreement = np.zeros((pairs.count, pairs.count), dtype=bool)
     agreement[first[agree], second[agree]] = True
     agreement |= agreement.T
     votes = agreement.sum(axis=1).astype(np.uint8)
     meter.charge(loop=len(named), flash_read=6 * len(first), f32_add=len(first),
-                 f32_compare=len(first), i32_add=2 * int(agree.sum()),
+                 f32_compare=len(first), i32_add=len(first) + 2 * int(agree.sum()),
                  ram_write=3 * int(agree.sum()))
     kept = (votes > 0) & (votes + 1 >= votes.max(initial=0))
     return votes, np.where(_consistent(agreement, kept, meter), identities, NONE).astype(np.int32)

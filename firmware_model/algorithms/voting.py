@@ -11,7 +11,8 @@ What the text leaves open, or leaves to chance, is completed here:
   vote then counts only between identities that are still standing, that is, that had a fixed part
   of the most votes anywhere in the round before. False identities back each other less and less,
   true ones go on. This decides most ties and finds the stars among many false ones.
-- A tie that remains goes to the lower index; verification will drop it when it is wrong.
+- A centroid whose best identities still tie gets none. Three lone stars may fit two places in the
+  sky, and any rule that picked one of them would be arbitrary.
 - Stars whose three-dimensional order is that of the mirror image are refused.
 - So few stars may agree that mere chance explains them. The number of entries that were looked
   up, the density of the catalogue and the margin give the number of such coincidences to be
@@ -179,10 +180,11 @@ def _search(
 
 
 def _best(votes: NDArray[np.intp], meter: Meter) -> NDArray[np.int32]:
-    """Star with the most votes for each centroid, the lower index in a tie, -1 without votes."""
-    meter.charge(table_byte=votes.size, i32_add=votes.size, loop=votes.size)
-    identities: NDArray[np.int32] = np.where(votes.max(axis=1) > 0, votes.argmax(axis=1), NONE)
-    return identities.astype(np.int32)
+    """Star with the most votes for each centroid, -1 for a tie or without votes."""
+    meter.charge(table_byte=votes.size, i32_add=2 * votes.size, loop=votes.size)
+    most = votes.max(axis=1)
+    unique = (votes == most[:, None]).sum(axis=1) == 1
+    return np.where((most > 0) & unique, votes.argmax(axis=1), NONE).astype(np.int32)
 
 
 def _judge(

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cubestack.emulator.sky.hipparcos import load_sky
 from cubestack.firmware_model.costs import CORTEX_M3, Meter
 from cubestack.firmware_model.star_catalogue import CatalogueError, StarCatalogue
 
@@ -84,6 +85,27 @@ def test_published_sizes_follow_from_the_published_counts() -> None:
     catalogue = StarCatalogue.build(hip, vectors, v_mag, 9.0, 42.1)
     assert catalogue.star_bytes / 1024 == pytest.approx(5.54, abs=0.005)
     assert catalogue.pair_bytes / len(catalogue.pairs) * 11_484 / 1024 == pytest.approx(89.7, 1e-3)
+
+
+def test_the_fainter_of_two_stars_too_close_to_tell_apart_is_left_out() -> None:
+    def beside(angle: float) -> NDArray[np.float64]:
+        return np.array([math.sin(angle), 0.0, math.cos(angle)])
+
+    vectors = np.array([beside(0), beside(0.0004), beside(1.0), beside(1.0017)])
+    catalogue = StarCatalogue.build(
+        np.array([4, 3, 2, 1], dtype=np.int64), vectors, np.array([1.0, 0.5, 2.0, 1.0]), 3.8, 90
+    )
+    assert catalogue.hip.tolist() == [1, 2, 3]
+
+
+def test_hipparcos_gives_the_published_lists() -> None:
+    sky = load_sky(2026.0, 3.8)
+    catalogue = StarCatalogue.build(sky.hip, sky.vectors, sky.v_mag, 3.8, 42.105)
+    assert len(catalogue) == 405
+    assert set(sky.hip.tolist()) - set(catalogue.hip.tolist()) == {71681}  # alpha Centauri B
+    assert 11_484 <= len(catalogue.pairs) <= 11_486
+    assert catalogue.pairs.angle[:2] == pytest.approx([0.0017, 0.0067], abs=5e-5)
+    assert catalogue.pairs.angle[2] > 0.01
 
 
 @pytest.mark.parametrize("radius_deg", [5.0, 35.0, 120.0])
