@@ -112,6 +112,7 @@ class _Catalogue:
     v_mag: NDArray[np.float64]
 
 
+@lru_cache(maxsize=8)
 def load_sky(epoch: float = 2026.0, mag_limit: float | None = None) -> Sky:
     """The sky at the Julian year ``epoch``, stars with V strictly below ``mag_limit`` only.
 
