@@ -58,6 +58,20 @@ def test_lost_in_space_is_solved_and_never_wrong(
     assert sum(wrong for _, wrong in results) <= 1
 
 
+def test_repeated_voting_finds_few_stars_among_many_false_ones(
+    catalogue: StarCatalogue, shoot: Shoot
+) -> None:
+    rng = np.random.default_rng(99)
+    results: list[tuple[bool, int]] = []
+    while len(results) < 120:
+        shot = shoot(rng, false_stars=14)
+        if 6 <= np.count_nonzero(shot.stars >= 0) <= 8:
+            found = identify(shot.directions, catalogue, Meter(CORTEX_M3))
+            results.append(check(found, shot.stars))
+    assert np.mean([solved for solved, _ in results]) >= 0.85  # one round alone solves half
+    assert sum(wrong for _, wrong in results) <= 1
+
+
 @pytest.mark.parametrize(("false_stars", "least"), [(0, 0.98), (10, 0.93)])
 def test_a_rough_boresight_helps(
     catalogue: StarCatalogue, shoot: Shoot, false_stars: int, least: float
@@ -166,6 +180,16 @@ def test_tracking_needs_two_stars_only(catalogue: StarCatalogue, shoot: Shoot) -
     assert found.votes.tolist() == [1, 1]
     one = track(shot.directions[:1], catalogue, shot.attitude.astype(np.float32), Meter(CORTEX_M3))
     assert one.outcome is Outcome.TOO_FEW_CENTROIDS
+
+
+def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:
+    places = np.radians([[0.0, 0.0], [0.2, 0.0], [9.0, 3.0], [-8.0, -4.0]])
+    stars = np.column_stack([np.tan(places), np.ones(4)])
+    stars /= np.linalg.norm(stars, axis=1, keepdims=True)
+    sky = StarCatalogue.build(np.arange(4), stars, np.ones(4), 3.8, 57.3)
+    seen = stars[[1, 2, 3]].astype(np.float32)
+    found = track(seen, sky, np.eye(3, dtype=np.float32), Meter(CORTEX_M3))
+    assert found.stars.tolist() == [1, 2, 3]
 
 
 def test_verification_keeps_a_set_in_which_all_agree(
