@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.mlx75412 import Mlx75412
+from cubestack.emulator.camera.optics import ROWS
+from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.i2c import I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import SUPPLY_VOLTS, PowerModel
@@ -89,6 +91,7 @@ class CubeStarBoard:
         self._scramble(self._hardware.external_ram)
         self._scramble(self.engine.sram)
         self.engine.attach(self.camera)
+        self.camera.on_change = self._camera_changed
         meter = Meter(CORTEX_M3)
 
         def boot(cause: int) -> CubeStarProgram:
@@ -111,6 +114,7 @@ class CubeStarBoard:
         self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, _SatelliteTarget(self))
         self._pins = {"ENABLE": 0, "RNW": 0}
+        self._stored: RollingShutter | None = None
 
     @property
     def program(self) -> CubeStarProgram:
@@ -139,8 +143,7 @@ class CubeStarBoard:
         """Release the engine."""
         self.engine.close()
 
-    def camera_changed(self) -> None:
-        """The camera's output from now on is not what it was going to be."""
+    def _camera_changed(self) -> None:
         self.engine.stream_changed()
         self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")
 
@@ -148,7 +151,18 @@ class CubeStarBoard:
         """What a static RAM holds after power-up."""
         memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
 
+    def truth(self) -> NDArray[np.float64] | None:
+        """Attitude (4,) at the mid-exposure of the middle row of the frame stored last.
+
+        For whoever compares results; None when nothing was stored or the scene has no attitude.
+        """
+        if self._stored is None:
+            return None
+        return self.camera.scene.truth(self._stored.mid_exposure_ps((ROWS - 1) / 2))
+
     def _pin_changed(self, pin: str, level: int) -> None:
+        if pin == "ENABLE" and not level and not self._pins["RNW"]:
+            self._stored = self.camera.frame_at(self.kernel.now)
         self._pins[pin] = level
         state = "standby"
         if self._pins["ENABLE"]:
@@ -165,7 +179,6 @@ class CubeStarBoard:
         self.camera.power(on, self.kernel.now)
         if not on:
             self._scramble(self.engine.sram)
-        self.camera_changed()
 
 
 class _Efm32gg:
@@ -215,9 +228,7 @@ class _CameraBus:
         camera = self._board.camera
         if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
             return None
-        answer = camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)
-        self._board.camera_changed()
-        return answer
+        return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)
 
 
 class _SatelliteTarget:

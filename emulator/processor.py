@@ -131,6 +131,7 @@ class Processor:
             case SetPin(pin, level):
                 self._engine.run(self._env.now)
                 self._engine.set_pin(pin, level)
+                self._meter.charge(port_write=1)
                 self._on_pin(pin, level)
                 return None
             case AwaitPin():
