@@ -73,18 +73,22 @@ def cache_folder() -> Path:
     return (Path(base) if base else Path.home() / ".cache") / "cubestack"
 
 
-def library_for(component: Component) -> Path:
+def library_for(component: Component, folder: Path | None = None) -> Path:
     """Shared library of the driver with ``component``, from the cache or built now.
+
+    ``folder`` replaces :func:`cache_folder`.
 
     Raises:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
+    design = design_hash(component)
     compiler = find_compiler()
     if compiler is None:
         raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
-    folder = cache_folder()
-    key = _key(component, compiler)
+    if folder is None:
+        folder = cache_folder()
+    key = _key(design, compiler)
     try:
         for candidate in folder.glob(f"{key}-*.so"):
             if candidate.name == _library_name(key, candidate.read_bytes()):
@@ -103,9 +107,9 @@ def library_for(component: Component) -> Path:
     return library
 
 
-def _key(component: Component, compiler: Compiler) -> str:
+def _key(design: str, compiler: Compiler) -> str:
     digest = hashlib.sha256()
-    for text in (design_hash(component), compiler.identity, platform.machine(), *FLAGS):
+    for text in (design, compiler.identity, platform.machine(), *FLAGS):
         digest.update(text.encode() + b"\0")
     for source in SOURCES:
         digest.update(_source(source).read_bytes())

@@ -1,0 +1,91 @@
+"""Generated text is the same everywhere, and holds the whole header."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from amaranth.hdl import Module, Signal
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.hdl import generate
+from cubestack.hdl.cubestar_top import CubeStarTop
+
+TEXTS = [generate.rtlil_text, generate.verilog_text, generate.cxxrtl_text]
+
+
+class Inverter(Component):
+    """The least design there is; ``late`` makes another one of it."""
+
+    a: In(1)
+    y: Out(1)
+
+    def __init__(self, late: bool = False) -> None:
+        self._late = late
+        super().__init__()
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        if self._late:
+            between = Signal()
+            m.d.comb += between.eq(~self.a)
+            m.d.comb += self.y.eq(between)
+        else:
+            m.d.comb += self.y.eq(~self.a)
+        return m
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_same_text_again_and_in_another_process(text):
+    program = (
+        "import sys\nfrom cubestack.hdl import generate\n"
+        "from cubestack.hdl.cubestar_top import CubeStarTop\n"
+        f"sys.stdout.write(generate.{text.__name__}(CubeStarTop(8, 4)))"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "7"}
+    other = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
+    ).stdout
+    assert text(CubeStarTop(8, 4)) == text(CubeStarTop(8, 4)) == other
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_no_trace_of_where_it_was_made(text):
+    assert str(Path(generate.__file__).parent.parent) not in text(CubeStarTop(8, 4))
+
+
+def test_verilog_has_the_pins_by_name():
+    verilog = generate.verilog_text(CubeStarTop(8, 4), name="cubestar")
+    header = verilog[verilog.index("module cubestar(") :].partition(";")[0]
+    ports = {port.strip() for port in header.partition("(")[2].rstrip(")").split(",")}
+    top = CubeStarTop(2, 2)
+    generate.rtlil_text(top)  # a design must be used, Amaranth says
+    assert ports == set(top.signature.members)
+
+
+def test_cxxrtl_class_is_named_and_its_headers_are_there():
+    assert "struct p_inverter : public module" in generate.cxxrtl_text(Inverter(), "inverter")
+    assert (generate.cxxrtl_headers() / "cxxrtl" / "cxxrtl.h").is_file()
+
+
+def test_hash_tells_designs_apart():
+    assert generate.design_hash(Inverter()) == generate.design_hash(Inverter())
+    hashes = {
+        generate.design_hash(Inverter()),
+        generate.design_hash(Inverter(late=True)),
+        generate.design_hash(Inverter(), "other"),
+    }
+    assert len(hashes) == 3
+
+
+def test_hash_changes_with_the_tool(monkeypatch):
+    before = generate.design_hash(Inverter())
+    monkeypatch.setattr(generate, "version", lambda _: "999")
+    assert generate.design_hash(Inverter()) != before
+
+
+def test_builtin_yosys_whatever_the_user_set(monkeypatch):
+    monkeypatch.setenv("AMARANTH_USE_YOSYS", "system")
+    monkeypatch.setenv("YOSYS", "no-such-yosys")
+    assert "module top" in generate.verilog_text(Inverter())
