@@ -6,8 +6,8 @@ does, not sampled at its centre.
 
 Motion is a sum over instants of the exposure, closer together than one sigma of the spot. A star
 is taken at the instants of the row that it then falls on, so a rolling shutter shifts, bends
-and stretches its streak. Within one spot all rows share that row's instants: neglected is a shear
-by the motion during one line time, a hundredth of a pixel per row at 4 deg/s.
+and stretches its streak. Within one spot all rows share that row's instants: what is neglected is
+a shear of the spot by the motion in one line time, a hundredth of a pixel a row at 4 deg/s.
 """
 
 import math
@@ -40,20 +40,19 @@ _PHI = np.array([0.5 * (1 + math.erf(z / math.sqrt(2))) for z in _Z])
 
 def star_light(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float32]:
     """Mean number of electrons that starlight frees in each pixel, shape (512, 1024)."""
-    optics = scene.optics
     vectors, rates = _stars(scene, shutter)
     phases = _phases(scene, shutter)
     pixels, light = [], []
     for phase in phases:
-        field_angles = vectors @ _matrix(scene, shutter, phase).T
-        pixels.append(_instant(scene, shutter, vectors, phase))
-        light.append(rates * optics.transmission(field_angles) / len(phases))
+        places, weights = _instant(scene, shutter, vectors, phase)
+        pixels.append(places)
+        light.append(rates * weights / len(phases))
     if scene.false_stars:
         false_pixels, false_rates = _false_stars(scene)
         pixels.append(false_pixels)
         light.append(false_rates)
     electrons = np.concatenate(light) * shutter.exposure_s
-    return _spots(np.concatenate(pixels), electrons, optics.psf_sigma_px)
+    return _spots(np.concatenate(pixels), electrons, scene.optics.psf_sigma_px)
 
 
 def star_pixels(
@@ -65,7 +64,7 @@ def star_pixels(
         Hipparcos numbers (n,) and pixel coordinates (n, 2) of the stars on the sensor.
     """
     sky = load_sky(scene.epoch, _limit(scene))
-    pixels = _instant(scene, shutter, sky.vectors, 0.5)
+    pixels, _ = _instant(scene, shutter, sky.vectors, 0.5)
     x, y = pixels.T
     seen = (np.abs(x - (COLUMNS - 1) / 2) <= COLUMNS / 2) & (np.abs(y - MIDDLE_ROW) <= ROWS / 2)
     return sky.hip[seen], pixels[seen]
@@ -82,7 +81,7 @@ def _stars(
     sky = load_sky(scene.epoch, _limit(scene))
     seconds = shutter.exposure_s + ROWS * shutter.line_s
     reach = scene.optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
-    boresight = _matrix(scene, shutter, 0.5)[2]
+    boresight = matrix_from_quaternion(scene.truth(_time_ps(shutter, 0.5)))[2]
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
     return sky.vectors[near], electrons_per_second(sky.v_mag[near])
 
@@ -110,26 +109,29 @@ def _time_ps(shutter: RollingShutter, phase: float) -> int:
     return shutter.mid_exposure_ps(MIDDLE_ROW) + round((phase - 0.5) * exposure_ps)
 
 
-def _matrix(scene: SkyScene, shutter: RollingShutter, phase: float) -> NDArray[np.float64]:
-    return matrix_from_quaternion(scene.truth(_time_ps(shutter, phase)))
-
-
 def _instant(
     scene: SkyScene, shutter: RollingShutter, vectors: NDArray[np.float64], phase: float
-) -> NDArray[np.float64]:
-    """Pixels (n, 2) of stars, each at the instant ``phase`` of the exposure of its own row."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stars at the instant ``phase`` of the exposures of their own rows.
+
+    Returns:
+        Pixels (n, 2), and weights (n,) of the light there: a star that moves down with the
+        read-out is exposed by more rows, each for the full time.
+    """
     now = _time_ps(shutter, phase)
-    project = scene.optics.project
-    pixels = project(vectors @ matrix_from_quaternion(scene.truth(now)).T)
+    optics = scene.optics
+    in_camera = vectors @ matrix_from_quaternion(scene.truth(now)).T
+    pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
     if not scene.speed_deg_s:
-        return pixels
+        return pixels, weights
     # The pose that holds now, even where the next one begins: its velocity is wanted.
     later = scene.pose_at(now).at(now / PS_PER_S + VELOCITY_STEP_S)
-    moved = project(vectors @ matrix_from_quaternion(later).T)
+    moved = optics.project(vectors @ matrix_from_quaternion(later).T)
     per_line = (moved - pixels) * (shutter.line_s / VELOCITY_STEP_S)
     # y + vy * (row - middle) = row, solved for the row, counted from the middle one.
-    lines = (pixels[:, 1] - MIDDLE_ROW) / (1 - per_line[:, 1])
-    return pixels + per_line * lines[:, None]
+    stretch = 1 / (1 - per_line[:, 1])
+    lines = (pixels[:, 1] - MIDDLE_ROW) * stretch
+    return pixels + per_line * lines[:, None], weights * stretch
 
 
 def _spots(

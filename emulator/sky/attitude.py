@@ -1,8 +1,10 @@
 """Attitudes: quaternions, rotation matrices, pointing angles, motion and errors.
 
 Conventions: camera axes are x right, y down, z out of the lens. A quaternion (x, y, z, w), scalar
-last, turns inertial (ICRS) into camera coordinates, v_camera = A(q) v_inertial, with CubeStar
-thesis, equation 5.3.1: A = (w^2 - |v|^2) I + 2 v v^T - 2 w [v]x. All arrays are float64.
+last, turns inertial (ICRS) vectors into camera vectors, v_camera = q v_inertial q*, so that
+v_camera = A(q) v_inertial with A = (w^2 - |v|^2) I + 2 v v^T + 2 w [v]x. That is the rotation of
+scipy's Rotation.from_quat; CubeStar thesis, equation 5.3.1 reads its quaternion as the conjugate.
+All arrays are float64.
 """
 
 import numpy as np
@@ -37,7 +39,7 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
     x, y, z, w = unit_quaternion(quaternion)
     v = np.array([x, y, z])
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    matrix: NDArray[np.float64] = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) - 2 * w * cross
+    matrix: NDArray[np.float64] = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
     return matrix
 
 
@@ -47,7 +49,7 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     # 4 q q^T, all of it sums of elements of A. The row of the largest component is the quaternion,
     # scaled, without cancellation.
     xy, xz, yz = a[0, 1] + a[1, 0], a[0, 2] + a[2, 0], a[1, 2] + a[2, 1]
-    xw, yw, zw = a[1, 2] - a[2, 1], a[2, 0] - a[0, 2], a[0, 1] - a[1, 0]
+    xw, yw, zw = a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]
     products = np.array(
         [
             [1 + a[0, 0] - a[1, 1] - a[2, 2], xy, xz, xw],
@@ -102,8 +104,8 @@ def propagate(quaternion: ArrayLike, rate_deg_s: ArrayLike, seconds: float) -> N
     """
     angle = np.radians(np.asarray(rate_deg_s, np.float64)) * seconds
     size = float(np.linalg.norm(angle))
-    # np.sinc(t) is sin(pi t) / (pi t): finite at rest.
-    turn = matrix_from_quaternion([*(0.5 * np.sinc(size / 2 / np.pi) * angle), np.cos(size / 2)])
+    # Minus: the stars turn the other way. np.sinc(t) is sin(pi t) / (pi t): finite at rest.
+    turn = matrix_from_quaternion([*(-0.5 * np.sinc(size / 2 / np.pi) * angle), np.cos(size / 2)])
     return quaternion_from_matrix(turn @ matrix_from_quaternion(quaternion))
 
 
