@@ -189,6 +189,7 @@ class Processor:
         done = 0
         while done < len(request.target):
             yield from self._pay()
+            self._engine.run(self._env.now)
             # At least one cycle: an event inside it is an interrupt in the middle of the loop.
             limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
             done += self._engine.strobe_read(request.target[done:], period, limit)

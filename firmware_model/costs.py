@@ -87,8 +87,9 @@ class Meter:
             cost = self.table.operations.get(name)
             if cost is None:
                 known = ", ".join(sorted(self.table.operations))
-                raise CostError(f"operation {name!r} is not in the table of {self.table.name} "
-                                f"(it has {known})")
+                raise CostError(
+                    f"operation {name!r} is not in the table of {self.table.name} (it has {known})"
+                )
             if count < 0:
                 raise CostError(f"operation {name!r} cannot happen {count} times")
             self.counts[name] += count

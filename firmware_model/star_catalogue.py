@@ -169,8 +169,14 @@ class StarCatalogue:
         cosine = x * direction[0] + y * direction[1] + z * direction[2]
         inside = cosine >= np.float32(np.cos(np.radians(radius_deg)))
         count = len(self)
-        meter.charge(flash_read=3 * count, f32_mul=3 * count, f32_add=2 * count,
-                     f32_compare=count, ram_write=count, loop=count)
+        meter.charge(
+            flash_read=3 * count,
+            f32_mul=3 * count,
+            f32_add=2 * count,
+            f32_compare=count,
+            ram_write=count,
+            loop=count,
+        )
         return np.flatnonzero(inside).astype(np.uint16)
 
     def reduced(
@@ -188,8 +194,12 @@ class StarCatalogue:
         kept = first_in & marked[self.pairs.second]
         firsts, copies = int(first_in.sum()), int(kept.sum())
         count = len(self.pairs)
-        meter.charge(flash_read=count + firsts + copies, table_byte=count + firsts, loop=count,
-                     ram_write=3 * copies)
+        meter.charge(
+            flash_read=count + firsts + copies,
+            table_byte=count + firsts,
+            loop=count,
+            ram_write=3 * copies,
+        )
         pairs = PairList(self.pairs.first[kept], self.pairs.second[kept], self.pairs.angle[kept])
         return ReducedCatalogue(stars, pairs, radius_deg)
 
@@ -214,9 +224,7 @@ def _list_pairs(vectors: NDArray[np.float64], limit_rad: float) -> PairList:
     """
     first, second = np.triu_indices(len(vectors), k=1)
     difference = vectors[first] - vectors[second]
-    chord = np.sqrt(
-        difference[:, 0] ** 2 + difference[:, 1] ** 2 + difference[:, 2] ** 2
-    )
+    chord = np.sqrt(difference[:, 0] ** 2 + difference[:, 1] ** 2 + difference[:, 2] ** 2)
     angle = 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0))
     close = angle < limit_rad
     stored = angle[close].astype(np.float32)

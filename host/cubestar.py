@@ -1,8 +1,8 @@
 """CubeStar as a program uses it: pictures, attitude, stars and times through any client.
 
 Interface of the CubeSpace family, version 3, with this project's extensions. Axes: x right, y
-down, z out of the lens. Quaternions are scalar last, inertial to camera; pixel coordinates count
-from the middle of the first pixel.
+down, z out of the lens. Quaternions are scalar last and turn inertial vectors into camera vectors,
+v_camera = q v_inertial q*; pixel coordinates count from the middle of the first pixel.
 """
 
 import math
@@ -60,7 +60,7 @@ class Attitude:
     def boresight(self) -> NDArray[np.float64]:
         """Inertial unit vector (3,) of the direction that the camera looks in."""
         x, y, z, w = self.quaternion
-        return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z])
+        return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z])
 
     @property
     def ra_deg(self) -> float:

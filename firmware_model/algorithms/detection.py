@@ -243,9 +243,7 @@ class _Samples:
         return (total + count // 2) // count if count else 0
 
 
-def _grow(
-    pixels: bytearray, seed: int, columns: int, rows: int, config: DetectionConfig
-) -> _Area:
+def _grow(pixels: bytearray, seed: int, columns: int, rows: int, config: DetectionConfig) -> _Area:
     """Collect the seed's area depth first and zero its pixels.
 
     The stack holds for each pixel of the recursion which neighbour comes next.
@@ -285,9 +283,14 @@ def _grow(
 def _charge_growing(area: _Area, meter: Meter) -> None:
     """Per pixel: a call, zeroing, its list entry and its brightness; per neighbour: a test."""
     count = len(area.offsets)
-    meter.charge(call=count, ebi_write=count, ram_write=2 * count,
-                 ebi_read=area.looked_at, loop=area.looked_at,
-                 i32_add=5 * count + 3 * area.looked_at)
+    meter.charge(
+        call=count,
+        ebi_write=count,
+        ram_write=2 * count,
+        ebi_read=area.looked_at,
+        loop=area.looked_at,
+        i32_add=5 * count + 3 * area.looked_at,
+    )
 
 
 def _centroid(
@@ -308,8 +311,16 @@ def _centroid(
             sum_y += above * (y - middle_y)
             weight += above
     count = len(places)
-    meter.charge(ram_read=4 * count, i32_add=12 * count, i32_mul=2 * count, loop=2 * count,
-                 i32_div=2, f32_convert=5, f32_div=2, f32_add=2)
+    meter.charge(
+        ram_read=4 * count,
+        i32_add=12 * count,
+        i32_mul=2 * count,
+        loop=2 * count,
+        i32_div=2,
+        f32_convert=5,
+        f32_div=2,
+        f32_add=2,
+    )
     total = np.float32(weight)
     return (
         np.float32(middle_x) + np.float32(sum_x) / total,

@@ -92,14 +92,13 @@ def unit_vectors(
     y = (points[:, 1] - np.float32(camera.cy)) * scale
     z = _ONE / np.sqrt(_ONE + x * x + y * y)
     count = len(points)
-    meter.charge(f32_add=4 * count, f32_mul=6 * count, f32_div=count + 1, f32_sqrt=count,
-                 loop=count)
+    meter.charge(
+        f32_add=4 * count, f32_mul=6 * count, f32_div=count + 1, f32_sqrt=count, loop=count
+    )
     return np.stack([x * z, y * z, z], axis=1)
 
 
-def direction_of(
-    right_ascension: float, declination: float, meter: Meter
-) -> NDArray[np.float32]:
+def direction_of(right_ascension: float, declination: float, meter: Meter) -> NDArray[np.float32]:
     """Unit vector (3,) of a right ascension and a declination in rad."""
     ra, dec = np.float32(right_ascension), np.float32(declination)
     along = np.cos(dec)

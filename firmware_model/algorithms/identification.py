@@ -130,9 +130,14 @@ def verify(
     agreement[first[agree], second[agree]] = True
     agreement |= agreement.T
     votes = agreement.sum(axis=1).astype(np.uint8)
-    meter.charge(loop=len(named), flash_read=6 * len(first), f32_add=len(first),
-                 f32_compare=len(first), i32_add=len(first) + 2 * int(agree.sum()),
-                 ram_write=3 * int(agree.sum()))
+    meter.charge(
+        loop=len(named),
+        flash_read=6 * len(first),
+        f32_add=len(first),
+        f32_compare=len(first),
+        i32_add=len(first) + 2 * int(agree.sum()),
+        ram_write=3 * int(agree.sum()),
+    )
     kept = (votes > 0) & (votes + 1 >= votes.max(initial=0))
     return votes, np.where(_consistent(agreement, kept, meter), identities, NONE).astype(np.int32)
 
@@ -145,8 +150,9 @@ def _consistent(
     while True:
         members = np.flatnonzero(kept)
         inside = agreement[np.ix_(members, members)].sum(axis=1)
-        meter.charge(table_byte=len(members) ** 2, i32_add=len(members) ** 2,
-                     loop=len(members) ** 2)
+        meter.charge(
+            table_byte=len(members) ** 2, i32_add=len(members) ** 2, loop=len(members) ** 2
+        )
         if len(members) == 0 or inside.min() == len(members) - 1:
             return kept
         kept[members[np.argmin(inside)]] = False

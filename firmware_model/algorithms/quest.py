@@ -3,6 +3,9 @@
 CubeStar thesis, section 4.4 (equations 4.4.8 to 4.4.10) and section 5.3.5 (Gaussian elimination,
 equation 5.3.1), in single precision and in the order of operations of the C program.
 
+The thesis reads its quaternion as one that turns the axes. Ours is the conjugate, which turns the
+vectors: v_camera = q v_inertial q*.
+
 The Rodrigues vector grows without bound near rotations of 180 deg. The method of sequential
 rotations avoids that: turning the reference axes by 180 deg about x, y or z only changes signs of
 the columns of the profile matrix. The determinant of equation 4.4.9 grows with the square of the
@@ -68,21 +71,22 @@ def quest(
     quaternion = np.append(rodrigues * scale, scale)
     meter.charge(f32_mul=6, f32_add=3, f32_sqrt=1, f32_div=1)
     quaternion = _turn_back(quaternion, turn)
-    meter.charge(f32_compare=1, i32_add=8)
+    quaternion[:3] = -quaternion[:3]
+    meter.charge(f32_compare=1, i32_add=11)
     return -quaternion if quaternion[3] < 0 else quaternion
 
 
 def dcm(quaternion: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
-    """Direction cosine matrix (3, 3), inertial to camera, of a unit quaternion (4,)."""
+    """Direction cosine matrix (3, 3), inertial to camera (equation 5.3.1 of the conjugate)."""
     x, y, z, w = quaternion.astype(np.float32)
     two = np.float32(2)
     diagonal = w * w - (x * x + y * y + z * z)
     xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
     meter.charge(f32_mul=4 + 6 + 3 + 6, f32_add=3 + 3 + 6)
     return np.array([
-        [diagonal + two * x * x, two * (xy + wz), two * (xz - wy)],
-        [two * (xy - wz), diagonal + two * y * y, two * (yz + wx)],
-        [two * (xz + wy), two * (yz - wx), diagonal + two * z * z],
+        [diagonal + two * x * x, two * (xy - wz), two * (xz + wy)],
+        [two * (xy + wz), diagonal + two * y * y, two * (yz - wx)],
+        [two * (xz - wy), two * (yz + wx), diagonal + two * z * z],
     ], dtype=np.float32)  # fmt: skip
 
 
@@ -94,8 +98,12 @@ def _profile(
 ) -> NDArray[np.float32]:
     """B = sum of w * measured * reference^T, (3, 3), added up star by star."""
     profile = np.zeros((3, 3), dtype=np.float32)
-    for body, inertial, weight in zip(measured.astype(np.float32), reference.astype(np.float32),
-                                      weights.astype(np.float32), strict=True):
+    for body, inertial, weight in zip(
+        measured.astype(np.float32),
+        reference.astype(np.float32),
+        weights.astype(np.float32),
+        strict=True,
+    ):
         profile += np.outer(weight * body, inertial)
     count = len(weights)
     meter.charge(f32_mul=12 * count, f32_add=9 * count, ram_read=7 * count, loop=13 * count)
@@ -108,8 +116,14 @@ def _system(
     """Matrix (3, 3) and right side (3,) of equation 4.4.9, for weights that add up to 1."""
     sigma = profile[0, 0] + profile[1, 1] + profile[2, 2]
     matrix = (np.float32(1) + sigma) * np.eye(3, dtype=np.float32) - (profile + profile.T)
-    right = np.array([profile[1, 2] - profile[2, 1], profile[2, 0] - profile[0, 2],
-                      profile[0, 1] - profile[1, 0]], dtype=np.float32)
+    right = np.array(
+        [
+            profile[1, 2] - profile[2, 1],
+            profile[2, 0] - profile[0, 2],
+            profile[0, 1] - profile[1, 0],
+        ],
+        dtype=np.float32,
+    )
     meter.charge(f32_add=2 + 1 + 6 + 3 + 3, ram_read=9, ram_write=12)
     return matrix, right
 
@@ -141,8 +155,15 @@ def _eliminate(
         for column in range(row + 1, 3):
             rest -= rows[row, column] * solution[column]
         solution[row] = rest / rows[row, row]
-    meter.charge(f32_div=3 + 3, f32_mul=11 + 3, f32_add=11 + 3, f32_compare=6, loop=30,
-                 ram_read=60, ram_write=30)
+    meter.charge(
+        f32_div=3 + 3,
+        f32_mul=11 + 3,
+        f32_add=11 + 3,
+        f32_compare=6,
+        loop=30,
+        ram_read=60,
+        ram_write=30,
+    )
     return solution
 
 

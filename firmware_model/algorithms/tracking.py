@@ -83,9 +83,13 @@ def _nearest(
     """
     count, candidates = len(directions), len(stars)
     compared = count * candidates
-    meter.charge(flash_read=3 * candidates, f32_mul=9 * candidates + 3 * compared,
-                 f32_add=6 * candidates + 5 * compared, f32_compare=compared,
-                 loop=candidates + compared)
+    meter.charge(
+        flash_read=3 * candidates,
+        f32_mul=9 * candidates + 3 * compared,
+        f32_add=6 * candidates + 5 * compared,
+        f32_compare=compared,
+        loop=candidates + compared,
+    )
     if candidates == 0:
         return np.full(count, NONE, dtype=np.int32)
     inertial, turn = vectors[stars], attitude.astype(np.float32)

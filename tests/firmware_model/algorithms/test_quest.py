@@ -17,14 +17,19 @@ def wahba(body: Matrix, inertial: Matrix, weights: Matrix) -> Matrix:
 
 
 def in_field(rng: np.random.Generator, count: int) -> Matrix:
-    body = np.column_stack([rng.uniform(-0.45, 0.45, count), rng.uniform(-0.23, 0.23, count),
-                            np.ones(count)])
+    body = np.column_stack(
+        [rng.uniform(-0.45, 0.45, count), rng.uniform(-0.23, 0.23, count), np.ones(count)]
+    )
     return np.asarray(body / np.linalg.norm(body, axis=1, keepdims=True))
 
 
 def solve(body: Matrix, inertial: Matrix, weights: Matrix) -> NDArray[np.float32]:
-    return quest(body.astype(np.float32), inertial.astype(np.float32),
-                 weights.astype(np.float32), Meter(CORTEX_M3))
+    return quest(
+        body.astype(np.float32),
+        inertial.astype(np.float32),
+        weights.astype(np.float32),
+        Meter(CORTEX_M3),
+    )
 
 
 def angle_deg(a: Matrix, b: Matrix) -> float:
@@ -32,8 +37,8 @@ def angle_deg(a: Matrix, b: Matrix) -> float:
 
 
 def attitude_of(quaternion: NDArray[np.float32]) -> Matrix:
-    """The convention of equation 5.3.1, by way of scipy: the passive rotation."""
-    return np.asarray(Rotation.from_quat(quaternion.astype(np.float64)).as_matrix().T)
+    """Our convention is scipy's: the quaternion turns vectors."""
+    return np.asarray(Rotation.from_quat(quaternion.astype(np.float64)).as_matrix())
 
 
 @pytest.mark.parametrize("seed", range(200))
