@@ -201,11 +201,16 @@ def test_disabling_cuts_the_output_at_once(camera: Mlx75412) -> None:
     rest = camera.segment_at(now)
     assert rest is not None
     assert (rest.start_ps, rest.rows, rest.vsync) == (30 * MS + 100_000, 0, 0)
-    enable(camera, 40 * MS)
-    again = camera.segment_at(40 * MS)
+    shutter = camera.frame_at(35 * MS)
+    assert shutter is not None
+    assert shutter.readout_ps == 0
+    ahead = camera.frame_at(800 * MS)  # the frames that were looked up will never be
+    assert ahead == shutter
+    enable(camera, 900 * MS)
+    again = camera.segment_at(900 * MS)
     assert again is not None
-    assert (again.start_ps, again.rows, again.vsync) == (40 * MS, 512, 1)
-    following = segments(camera, 40 * MS, 2)[1]
+    assert (again.start_ps, again.rows, again.vsync) == (900 * MS, 512, 1)
+    following = segments(camera, 900 * MS, 2)[1]
     assert following.vsync == 1  # it starts with an undefined frame again
 
 
