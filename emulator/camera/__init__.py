@@ -1,1 +1,1 @@
-"""emulator/camera."""
+"""CubeStar's camera: lens, exposure, pixels, and the MLX75412 with its registers and pixel stream."""

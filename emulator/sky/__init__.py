@@ -1,1 +1,1 @@
-"""emulator/sky."""
+"""What the camera looks at: stars, attitudes, scenes."""
