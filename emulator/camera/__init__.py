@@ -1,1 +1,1 @@
-"""CubeStar's camera: lens, exposure, pixels, and the MLX75412 with its registers and pixel stream."""
+"""CubeStar's camera: lens, exposure, pixels, and the MLX75412 sensor."""
