@@ -1,7 +1,7 @@
 """CubeStar's lens: directions to pixels and back.
 
 CubeStar thesis, section 4.1.4 (Brown's model, equations 4.1.3 to 4.1.5), section 4.1.5 (equation
-4.1.6) and section 5.3.2 (calibration, figure 5.12; focal length by star pairs).
+4.1.6) and section 5.4 (calibration, figure 5.12; focal length by star pairs).
 
 The calibration toolbox fits coefficients that map undistorted points to distorted ones. The
 firmware uses them with inverted signs in equations that map distorted points to undistorted ones,

@@ -57,11 +57,11 @@ class AbsentStar(NamedTuple):
 
 
 ABSENT = (
-    # xi UMa, an astrometric and quadruple binary. V of I/239; position and motion of SIMBAD.
+    # xi UMa, a quadruple star. V and position of I/239, motion as SIMBAD lists it.
     AbsentStar(55203, 169.545425, 31.529161, 2000.0, -453.7, -591.4, 3.79),
-    # xi Sco AB, combined. V of I/239; position and motion of SIMBAD.
+    # xi Sco AB, combined. V of I/239, position and motion as SIMBAD lists them.
     AbsentStar(78727, 241.092463, -11.372944, 2000.0, -63.2, -27.0, 4.16),
-    # 94 Aqr B. V and position of SIMBAD; the motion is that of 94 Aqr A, HIP 115126.
+    # 94 Aqr B. V and position as SIMBAD lists them; the motion is that of A, HIP 115126.
     AbsentStar(115125, 349.777750, -13.455222, 2000.0, 267.23, -46.21, 6.97),
 )
 

@@ -55,7 +55,7 @@ def test_without_distortion_it_is_a_pinhole() -> None:
 
 
 def test_published_field_without_distortion() -> None:
-    # 49.1 x 25.7 deg at 6.28 mm (facts of section 5.3.2), for a centred principal point.
+    # 49.1 x 25.7 deg at 6.28 mm, for a centred principal point.
     lens = Optics(k1=0, k2=0, p1=0, p2=0, cx=511.5, cy=255.5)
     left, right, top, bottom = lens.unproject(
         np.array([[-0.5, 255.5], [1023.5, 255.5], [511.5, -0.5], [511.5, 511.5]])
