@@ -23,6 +23,7 @@ from cubestack.firmware_model.interface.cubestar import (
 from cubestack.firmware_model.interface.message import Value
 from cubestack.host.client import Client
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+from cubestack.host.node_client import NodeClient
 
 __all__ = ["COLUMNS", "ROWS", "Attitude", "CubeStar", "Progress", "Star"]
 
@@ -151,6 +152,23 @@ class CubeStar:
             if progress is not None:
                 progress(number + 1, len(image))
         return image.reshape(ROWS, COLUMNS)
+
+    def stream_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
+        """The picture in memory, (512, 1024), as one stream of blocks: quicker, over a UART only.
+
+        A lost block can not be asked for again; raises BadAnswerError or NoAnswerError then.
+        """
+        if not isinstance(self.client, NodeClient):
+            raise TypeError("a picture can be streamed over a UART only: use download_image")
+        length = ImageBlockSize.BYTES_128.length
+        blocks = []
+        for block in self.client.stream("StreamDownImage", IMAGE_BYTES // length):
+            if len(block) != length:
+                raise BadAnswerError(f"picture stream: a block has {len(block)} bytes, not {length}")
+            blocks.append(block)
+            if progress is not None:
+                progress(len(blocks), IMAGE_BYTES // length)
+        return np.frombuffer(b"".join(blocks), np.uint8).reshape(ROWS, COLUMNS)
 
     def upload_image(self, image: NDArray[np.uint8], progress: Progress | None = None) -> None:
         """Put ``image``, uint8 (512, 1024), in the picture memory.

@@ -4,6 +4,8 @@ A telemetry answer is data alone, with no ID; a telecommand is answered by one e
 answer belongs to the request before it, and only one request is under way at a time.
 """
 
+from collections.abc import Iterator
+
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.message import Interface, Value
 from cubestack.host.client import Client
@@ -40,6 +42,7 @@ class NodeClient(Client):
         self._retries = retries
         longest = max(message.length for message in interface.telemetries)
         self._decoder = FrameDecoder(longest)
+        self._unread: Iterator[int] = iter(b"")
 
     def command(self, name: str, **parameters: object) -> None:
         """See Client."""
@@ -82,13 +85,30 @@ class NodeClient(Client):
         """
         self._drop_input()
         self._transport.write(encode_frame(payload))
+        return self._next_frame()
+
+    def stream(self, name: str, count: int) -> Iterator[bytes]:
+        """Send telecommand ``name``, then yield the payloads of ``count`` frames without requests.
+
+        Raises NoAnswerError when the stream ends early.
+        """
+        self.command(name)
+        for number in range(count):
+            payload = self._next_frame()
+            if payload is None:
+                raise NoAnswerError(f"{name}: the stream ended after {number} of {count} frames")
+            yield payload
+
+    def _next_frame(self) -> bytes | None:
+        """Payload of the next whole frame; None when the line stays silent."""
         for _ in range(MAX_READS):
-            data = self._transport.read(READ_BYTES, self._timeout_s)
-            if not data:
-                break
-            for byte in data:
+            for byte in self._unread:
                 if self._decoder.feed(byte) is FrameEvent.FRAME:
                     return self._decoder.payload
+            data = self._transport.read(READ_BYTES, self._timeout_s)
+            if not data:
+                return None
+            self._unread = iter(data)
         return None
 
     def pause(self, seconds: float) -> None:
@@ -101,6 +121,7 @@ class NodeClient(Client):
 
     def _drop_input(self) -> None:
         self._decoder.reset()
+        self._unread = iter(b"")
         for _ in range(MAX_READS):
             if not self._transport.read(READ_BYTES, 0.0):
                 return

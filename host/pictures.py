@@ -13,6 +13,7 @@ from cubestack.host.star_names import star_name
 __all__ = ["annotate", "save_picture"]
 
 RADIUS_PX = 9
+TEXT_PX = 12
 IDENTIFIED = (120, 255, 120)
 UNKNOWN = (255, 140, 90)
 
@@ -38,5 +39,6 @@ def annotate(picture: NDArray[np.uint8], stars: Sequence[Star], path: Path) -> N
         left = x + RADIUS_PX + 3
         if left + draw.textlength(label) > image.width:
             left = x - RADIUS_PX - 3 - draw.textlength(label)
-        draw.text((left, y - 6), label, fill=colour)
+        top = min(max(y - TEXT_PX / 2, 0), image.height - TEXT_PX)
+        draw.text((left, top), label, fill=colour)
     image.save(path)

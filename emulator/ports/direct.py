@@ -5,14 +5,18 @@ line, and the one method of smbus2 that carries any transfer (i2c_rdwr) for the 
 for an answer runs the simulation; nothing else does, so a run is repeatable to the byte.
 """
 
-from collections import deque
+import errno
 from typing import Any
 
 from cubestack.emulator.i2c import I2cBus, I2cMessage
+from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
 __all__ = ["DirectI2c", "DirectSerial"]
+
+I2C_M_RD = 0x0001
+"""Flag of a message that reads, as in linux/i2c.h; no other flag is supported."""
 
 
 class DirectSerial:
@@ -21,45 +25,29 @@ class DirectSerial:
     def __init__(self, env: Kernel, uart: Uart) -> None:
         """Plug into ``uart``; what was sent before is lost, as on a wire."""
         self._env = env
-        self._uart = uart
-        self._blocks: deque[tuple[bytes, int, int]] = deque()
-        uart.line = self._deliver
-
-    def _deliver(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        self._blocks.append((data, first_ps, byte_ps))
+        self._line = HostLine(uart)
 
     def write(self, data: bytes) -> None:
         """Start sending ``data`` now."""
-        self._uart.host_writes(data)
+        self._line.write(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """Wait at most ``timeout_s`` of virtual time for a byte; return those that have arrived."""
         deadline = self._env.now + int(timeout_s * PS_PER_S)
-        while not self._blocks or self._blocks[0][1] > self._env.now:
-            target = min(deadline, self._blocks[0][1]) if self._blocks else deadline
+        while (arrival := self._line.next_arrival_ps) is None or arrival > self._env.now:
+            target = deadline if arrival is None else min(deadline, arrival)
             if self._env.now >= target:
                 return b""
-            if self._env.peek() < target:
+            horizon = self._env.horizon()
+            if horizon is not None and horizon < target:
                 self._env.step()
             else:
-                self._env.run(until=target)
-        received = bytearray()
-        while self._blocks and len(received) < max_bytes:
-            data, first_ps, byte_ps = self._blocks[0]
-            arrived = min(len(data), (self._env.now - first_ps) // byte_ps + 1)
-            if arrived <= 0:
-                break
-            taken = min(arrived, max_bytes - len(received))
-            received += data[:taken]
-            self._blocks.popleft()
-            if taken < len(data):
-                self._blocks.appendleft((data[taken:], first_ps + taken * byte_ps, byte_ps))
-                break
-        return bytes(received)
+                self._env.advance_to(target)
+        return self._line.take(self._env.now, max_bytes)
 
     def close(self) -> None:
         """Unplug; later output is lost."""
-        self._uart.line = lambda _data, _first, _step: None
+        self._line.unplug()
 
 
 class DirectI2c:
@@ -73,12 +61,10 @@ class DirectI2c:
     def i2c_rdwr(self, *messages: Any) -> None:
         """Perform one combined transfer of smbus2 ``i2c_msg`` objects.
 
-        Raises OSError (I2cNackError) when a message is not acknowledged.
+        Raises OSError: I2cNackError when something is not acknowledged, EOPNOTSUPP for a message
+        with other flags than that for reading.
         """
-        plain = [
-            I2cMessage(m.addr, bytearray() if m.flags & 1 else bytearray(m), m.len * (m.flags & 1))
-            for m in messages
-        ]
+        plain = [_to_plain(message) for message in messages]
         self._env.run(until=self._env.process(self._bus.transfer(plain)))
         for message, done in zip(messages, plain, strict=True):
             if done.read:
@@ -87,4 +73,14 @@ class DirectI2c:
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of virtual time pass."""
-        self._env.run(until=self._env.now + max(1, int(seconds * PS_PER_S)))
+        self._env.advance_to(self._env.now + int(seconds * PS_PER_S))
+
+
+def _to_plain(message: Any) -> I2cMessage:
+    if message.flags & ~I2C_M_RD:
+        raise OSError(
+            errno.EOPNOTSUPP, f"I2C message flags {message.flags:#06x}: only reading is supported"
+        )
+    if message.flags & I2C_M_RD:
+        return I2cMessage(message.addr, read=message.len)
+    return I2cMessage(message.addr, bytearray(message))

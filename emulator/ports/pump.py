@@ -81,13 +81,14 @@ class Pump:
         """Run for a slice of wall time, or until everything waits for the host."""
         end = time.monotonic() + SLICE_S
         while time.monotonic() < end:
-            if self._busy():
+            releases = [endpoint.next_release_ps() for endpoint in self._endpoints]
+            release = min((t for t in releases if t is not None), default=None)
+            horizon = self._env.horizon()
+            if self._busy() and horizon is not None and (release is None or horizon <= release):
                 self._env.step()
                 continue
-            releases = [endpoint.next_release_ps() for endpoint in self._endpoints]
-            later = [t for t in releases if t is not None and t > self._env.now]
-            if later:
-                self._advance(min(later))
+            if release is not None:
+                self._advance(release)
             return
 
     def _advance(self, target_ps: int) -> None:

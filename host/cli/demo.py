@@ -129,8 +129,8 @@ def _show(subject: _Subject, out: Path) -> bool:
             fit = calibrate(load_camera(subject.camera).cropped(*CROP))
             cubestar.configure(fit.settings)
             console.print(f"camera parameters loaded; the fit is good to {fit.rms_px:.2f} px rms")
-            threshold = find_threshold(cubestar)
-            console.print(f"detection threshold found by trying: {threshold} DN")
+        threshold = find_threshold(cubestar)
+        console.print(f"detection threshold found by trying: {threshold} DN")
         cubestar.capture_and_process()
         attitude = cubestar.attitude()
         _report_attitude(attitude.valid, attitude.quaternion, attitude.matched, subject.truth)
@@ -138,7 +138,7 @@ def _show(subject: _Subject, out: Path) -> bool:
         stars = cubestar.stars()
         with progress_bar() as bar:
             task = bar.add_task("downloading the picture over the serial line", total=None)
-            picture = cubestar.download_image(
+            picture = cubestar.stream_image(
                 lambda done, total: bar.update(task, completed=done, total=total)
             )
         uptime = cubestar.client.telemetry("Identification")
@@ -182,13 +182,13 @@ def _report_attitude(
         console.print("no attitude found in this picture")
         return
     table = Table(title=f"attitude from {matched} stars")
-    for column in ("", "RA", "Dec", "roll", "quaternion (x, y, z, w), inertial to camera"):
-        table.add_column(column)
+    for column in ("", "RA", "Dec", "roll", "x", "y", "z", "w"):
+        table.add_column(column, justify="right")
     if quaternion @ truth < 0:
         truth = -truth
     for name, q in (("measured", quaternion), ("truth", truth)):
         angles = pointing_from_matrix(matrix_from_quaternion(q))
-        table.add_row(name, *(f"{a:.4f}°" for a in angles), " ".join(f"{c:+.6f}" for c in q))
+        table.add_row(name, *(f"{a:.4f}°" for a in angles), *(f"{part:+.5f}" for part in q))
     console.print(table)
     cross, roll = compare(quaternion, truth)
     assert cross is not None
