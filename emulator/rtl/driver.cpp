@@ -8,7 +8,9 @@
 #include "design.cpp"
 #include "sram_model.h"
 
+#include <algorithm>
 #include <cstring>
+#include <vector>
 
 namespace {
 

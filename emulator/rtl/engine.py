@@ -91,7 +91,10 @@ class PixelSource(Protocol):
         """PIXCLKs of a line with HSYNC high."""
 
     def segment_at(self, time_ps: int) -> StreamSegment | None:
-        """Segment whose clocks contain ``time_ps``; None when there is no pixel clock then."""
+        """Segment whose clocks contain ``time_ps``; None when there is no pixel clock then.
+
+        After None the engine asks again only when told to, by ``stream_changed``.
+        """
 
 
 class PinEvent(NamedTuple):

@@ -100,7 +100,6 @@ class SteppingEngine(ABC):
 
     def stream_changed(self) -> None:
         """Ask the source again from ``now_ps`` on, an edge at this very instant included."""
-        self._clocks_skipped = False
         self._follow_source(self.now_ps)
 
     def set_pin(self, name: str, value: int) -> None:
@@ -201,12 +200,10 @@ class SteppingEngine(ABC):
             return
         loaded = LoadedSegment.of(self._source, segment)
         edge = loaded.first_edge(first_ps)
-        rising = edge % 2 == 0
-        if rising and self._get("PIXCLK"):
-            if edge < loaded.edges and loaded.time_of(edge) == self.now_ps:
-                edge += 1  # that very edge has been made already
-            else:
-                self._set("PIXCLK", 0)
+        # A rising edge at this instant was made already if PIXCLK is high; again it does nothing.
+        at_rise = edge < loaded.edges and loaded.time_of(edge) == self.now_ps
+        if edge % 2 == 0 and self._get("PIXCLK") and not at_rise:
+            self._set("PIXCLK", 0)
         if edge == loaded.edges:
             self._follow_segment(self._source, loaded)
         else:

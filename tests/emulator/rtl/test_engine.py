@@ -76,6 +76,24 @@ def test_enabled_in_mid_frame_stores_the_next_whole_frame(engine, make_camera):
     assert (engine.sram[: ROWS * COLUMNS] == camera.images[1].ravel()).all()
 
 
+@pytest.mark.parametrize(("early_ps", "frame"), [(0, 1), (1, 0)])
+def test_pixel_clock_comes_first_at_one_instant(engine, make_camera, early_ps, frame):
+    """Two edges release the reset, a third must see HSYNC low: this one comes just too late."""
+    camera = make_camera()
+    engine.run((BLANK - 3) * PERIOD - early_ps)
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + frame * FRAME
+
+
+def test_pixel_clock_level_while_blank(engine, make_camera):
+    engine.attach(make_camera())
+    engine.set_pin("ENABLE", 1)
+    for offset_ps, level in [(-1, 0), (0, 1), (PERIOD // 2 - 1, 1), (PERIOD // 2, 0)]:
+        engine.run(25 * PERIOD + offset_ps)
+        assert engine.get_pin("PIXCLK") == level
+
+
 def test_run_that_meets_no_stop_ends_on_time(engine, make_camera):
     engine.attach(make_camera())
     engine.set_pin("ENABLE", 1)
@@ -143,6 +161,27 @@ def test_changed_stream_is_followed_from_now_on(engine, make_camera):
     assert (engine.sram[: ROWS * COLUMNS] == other.images[0].ravel()).all()
 
 
+@pytest.mark.parametrize("offset_ps", [-1, 0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD // 2 + 1])
+def test_asking_the_source_again_makes_no_clock_more_or_less(engine, make_camera, offset_ps):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    engine.run((BLANK + LINE + 3) * PERIOD + offset_ps)
+    engine.stream_changed()
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
+    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+    assert not engine.violations
+
+
+def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine, make_camera):
+    engine.run(5 * PERIOD + 10)
+    engine.attach(make_camera())
+    engine.run(5 * PERIOD + 20)
+    assert engine.get_pin("PIXCLK") == 0
+    engine.run(6 * PERIOD)
+    assert engine.get_pin("PIXCLK") == 1
+
+
 def test_stream_that_stops_and_comes_back(engine, make_camera):
     camera = make_camera()
     segments, camera.segments = camera.segments, []
@@ -161,6 +200,16 @@ def test_strobes_keep_their_rate_over_bursts(engine):
     made = sum(engine.strobe_read(out, period, 10**12) for _ in range(11))
     assert made == 77
     assert engine.now_ps == int(77 * period)
+
+
+def test_every_rising_data_clock_is_on_the_grid(engine):
+    """Told by the violations of reading too fast."""
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    period = Fraction(22_001, 3)
+    for count in (3, 1, 2, 5, 4):
+        engine.strobe_read(np.zeros(count, np.uint8), period, 10**9)
+    assert [v.time_ps for v in engine.violations] == [int(i * period) for i in range(15)]
 
 
 def test_burst_after_a_pause_starts_its_own_count(engine):
