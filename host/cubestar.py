@@ -164,7 +164,7 @@ class CubeStar:
         blocks = []
         for block in self.client.stream("StreamDownImage", IMAGE_BYTES // length):
             if len(block) != length:
-                raise BadAnswerError(f"picture stream: a block has {len(block)} bytes, not {length}")
+                raise BadAnswerError(f"picture stream: block of {len(block)} bytes, not {length}")
             blocks.append(block)
             if progress is not None:
                 progress(len(blocks), IMAGE_BYTES // length)
