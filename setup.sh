@@ -35,10 +35,14 @@ if [ "$kind" = dev ]; then
     extras="dev"
     command -v iverilog >/dev/null 2>&1 || need "Icarus Verilog, for the HDL tests" iverilog
 fi
-if ! command -v "${CXX:-c++}" >/dev/null 2>&1 && ! command -v g++ >/dev/null 2>&1 &&
-    ! command -v clang++ >/dev/null 2>&1; then
-    say "no C++ compiler found: using the one in the ziglang wheel"
-    extras="${extras:+$extras,}compiler"
+compiler() { command -v "${CXX:-c++}" || command -v g++ || command -v clang++; }
+if ! compiler >/dev/null 2>&1; then
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
+        need "a C++ compiler, for the compiled FPGA" g++
+    else
+        say "no C++ compiler: using the one in the ziglang wheel (its first build takes a minute)"
+        extras="${extras:+$extras,}compiler"
+    fi
 fi
 
 [ -x .venv/bin/python ] || { say "making .venv"; "$PYTHON" -m venv .venv; }
