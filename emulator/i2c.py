@@ -1,8 +1,10 @@
 """The satellite's I2C bus: messages with their time on the wire, and targets that answer.
 
-Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR.
+Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR. Not modelled: clock
+stretching, and the acknowledge of a byte that the host reads.
 """
 
+import errno
 from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -18,7 +20,10 @@ BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
 @dataclass
 class I2cMessage:
-    """A message to a 7-bit ``address``: ``data`` to write, or ``read`` bytes to fetch into it."""
+    """A message to a 7-bit ``address``: ``data`` to write, or ``read`` bytes to fetch into it.
+
+    With neither, only the address goes out, for writing: a probe.
+    """
 
     address: int
     data: bytearray = field(default_factory=bytearray)
@@ -26,7 +31,7 @@ class I2cMessage:
 
 
 class I2cNackError(OSError):
-    """Nobody, or not the addressed target, acknowledged."""
+    """No acknowledge; errno is ENXIO for an address and EIO for a byte, as on Linux."""
 
 
 class I2cTarget(Protocol):
@@ -42,7 +47,7 @@ class I2cTarget(Protocol):
         """The next byte to send, 0..255."""
 
     def i2c_stop(self) -> None:
-        """The transfer that addressed this target ended."""
+        """The transfer ended, or went on with another target."""
 
 
 class I2cBus:
@@ -53,7 +58,9 @@ class I2cBus:
     """
 
     def __init__(self, env: Kernel, hz: int = 100_000) -> None:
-        """Make an idle bus at ``hz`` bits a second."""
+        """Make an idle bus at ``hz`` bits a second (positive, else ValueError)."""
+        if hz <= 0:
+            raise ValueError(f"an I2C bus needs a positive bit rate, not {hz} Hz")
         self._env = env
         self._targets: dict[int, I2cTarget] = {}
         self._wire = simpy.Resource(env)
@@ -68,25 +75,36 @@ class I2cBus:
         self._targets[address] = target
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
-        """Perform one transfer; read data lands in the messages. Raises I2cNackError."""
+        """Perform one transfer, behind those already under way.
+
+        Read data lands in the messages. Raises I2cNackError, after the stop condition.
+        """
         with self._wire.request() as granted:
             yield granted
-            open_target: I2cTarget | None = None
+            addressed: I2cTarget | None = None
+            failure: I2cNackError | None = None
             try:
                 for message in messages:
                     yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
-                    target = self._targets.get(message.address)
-                    if target is None:
-                        raise I2cNackError(f"no I2C device answers at {message.address:#04x}")
-                    if open_target is not None and open_target is not target:
-                        open_target.i2c_stop()
-                    open_target = target
+                    target = self._find(message.address)
+                    if addressed is not None and addressed is not target:
+                        addressed.i2c_stop()
+                    addressed = target
                     target.i2c_start(message.read > 0)
                     yield from self._bytes(target, message)
-            finally:
-                if open_target is not None:
-                    open_target.i2c_stop()
+            except I2cNackError as error:
+                failure = error
             yield self._env.timeout(self.bit_ps)
+            if addressed is not None:
+                addressed.i2c_stop()
+            if failure is not None:
+                raise failure
+
+    def _find(self, address: int) -> I2cTarget:
+        target = self._targets.get(address)
+        if target is None:
+            raise I2cNackError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
+        return target
 
     def _bytes(self, target: I2cTarget, message: I2cMessage) -> Generator[simpy.Event, Any, None]:
         if message.read:
@@ -99,4 +117,6 @@ class I2cBus:
         for byte in message.data:
             yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
             if not target.i2c_write(byte):
-                raise I2cNackError(f"I2C device {message.address:#04x} refused byte {byte:#04x}")
+                raise I2cNackError(
+                    errno.EIO, f"I2C device {message.address:#04x} refused byte {byte:#04x}"
+                )

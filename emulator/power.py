@@ -28,7 +28,8 @@ PARTS: dict[str, tuple[str | None, dict[str, float]]] = {
     "fpga": ("imager", {"standby": 10.0, "storing": 58.9, "reading": 12.41}),
 }
 
-#: Trip current of each channel's comparator in mA: assumed, a third above the highest regular one.
+#: Trip current of each channel's comparator in mA, assumed: a third above the highest regular one
+#: for the boards with imager and FPGA, ten times it for the memory, which draws little.
 CHANNELS = {"memory": 30.0, "imager": 200.0}
 
 
@@ -53,38 +54,41 @@ class PowerModel:
         self.on_switch: Callable[[str, bool], None] = lambda _channel, _on: None
 
     def set_state(self, part: str, state: str) -> None:
-        """Part ``part`` is in ``state`` from now on (names of ``PARTS``)."""
-        if self._states[part] != state:
-            self._integrate()
-            if state not in PARTS[part][1]:
-                raise ValueError(f"{part} has no state {state!r}, only {sorted(PARTS[part][1])}")
-            self._states[part] = state
-            self._compare()
+        """Part ``part`` is in ``state`` from now on (names of ``PARTS``, else ValueError)."""
+        if part not in PARTS:
+            raise ValueError(f"no supplied part {part!r}, only {sorted(PARTS)}")
+        if state not in PARTS[part][1]:
+            raise ValueError(f"{part} has no state {state!r}, only {sorted(PARTS[part][1])}")
+        self._integrate()
+        self._states[part] = state
+        self._compare()
 
     def switch(self, channel: str, on: bool) -> None:
         """Turn a load switch; turning it off also ends a latch-up behind it."""
-        if channel not in CHANNELS:
-            raise ValueError(f"no supply channel {channel!r}, only {sorted(CHANNELS)}")
+        _check_channel(channel)
         if self._on[channel] == on:
             return
         self._integrate()
         self._on[channel] = on
-        if not on:
-            self._latch_up_ma[channel] = 0.0
-            self._tripped[channel] = False
+        self._latch_up_ma[channel] = 0.0
+        self._compare()
         self.on_switch(channel, on)
 
     def latch_up(self, channel: str, extra_ma: float = 300.0) -> None:
-        """A particle strike: ``channel`` draws ``extra_ma`` more until it is switched off."""
-        if channel not in CHANNELS:
-            raise ValueError(f"no supply channel {channel!r}, only {sorted(CHANNELS)}")
-        self._integrate()
+        """A particle strike: ``channel`` draws ``extra_ma`` more until it is switched off.
+
+        Nothing happens to a channel that is off.
+        """
+        _check_channel(channel)
         if self._on[channel]:
+            self._integrate()
             self._latch_up_ma[channel] = extra_ma
             self._compare()
 
     def current_ma(self, channel: str | None = None) -> float:
         """Current of ``channel``, or of the whole stack, in mA."""
+        if channel is not None:
+            _check_channel(channel)
         total = 0.0
         for part, (supply, states) in PARTS.items():
             if channel in (None, supply) and (supply is None or self._on[supply]):
@@ -104,11 +108,17 @@ class PowerModel:
 
     def _compare(self) -> None:
         for channel, limit in CHANNELS.items():
-            if self.current_ma(channel) > limit and not self._tripped[channel]:
-                self._tripped[channel] = True
+            above = self.current_ma(channel) > limit
+            if above and not self._tripped[channel]:
                 self._env.process(self._interrupt(channel))
+            self._tripped[channel] = above
 
     def _interrupt(self, channel: str) -> simpy.events.ProcessGenerator:
         yield self._env.timeout(COMPARATOR_US * PS_PER_US)
         if self._tripped[channel]:
             self.on_overcurrent(channel)
+
+
+def _check_channel(channel: str) -> None:
+    if channel not in CHANNELS:
+        raise ValueError(f"no supply channel {channel!r}, only {sorted(CHANNELS)}")

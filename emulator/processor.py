@@ -1,4 +1,9 @@
-"""Runs a firmware program in virtual time: spends its cycles and performs its requests."""
+"""Runs a firmware program in virtual time: spends its cycles and performs its requests.
+
+While the processor waits for the FPGA, the FPGA runs ahead of the kernel, in bursts that end at
+the next scheduled event and within ``LOOK_AHEAD_PS``. What is scheduled from outside in between
+(a host that starts to write) can only be late for the FPGA, by no more than that.
+"""
 
 from collections.abc import Callable, Generator
 from fractions import Fraction
@@ -7,7 +12,7 @@ from typing import Any, Protocol
 import simpy
 
 from cubestack.emulator.rtl.engine import RtlEngine
-from cubestack.emulator.virtual_time import PS_PER_S, PS_PER_US, CycleClock, Kernel
+from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.hardware import (
     AwaitPin,
@@ -22,7 +27,9 @@ from cubestack.firmware_model.hardware import (
     StrobeRead,
 )
 
-__all__ = ["CameraBus", "Processor", "Program"]
+__all__ = ["LOOK_AHEAD_PS", "CameraBus", "Processor", "Program"]
+
+LOOK_AHEAD_PS = 10 * PS_PER_MS
 
 Steps = Generator[simpy.Event, Any, Any]
 
@@ -77,7 +84,7 @@ class Processor:
             power_on_cause: cause of the first start.
             boot_us: time from reset to the first instruction of ``main``.
             on_pin: told about every output pin change, after it happened.
-            on_activity: told when the processor falls asleep (False) and awakes (True).
+            on_activity: told when the processor falls asleep (False), starts or awakes (True).
         """
         self._env = env
         self._meter = meter
@@ -100,17 +107,24 @@ class Processor:
             self._wake.succeed()
 
     def _run(self) -> Steps:
+        self._on_activity(True)
         while True:
             yield self._env.timeout(self._boot_us * PS_PER_US)
             cause = yield from self._execute(self.program)
             self.resets += 1
+            self._wake = self._env.event()  # a reset clears pending interrupts
             self.program = self._boot(cause)
 
     def _execute(self, program: Program) -> Steps:
         routine = program.main()
         answer: object = None
         while True:
-            request = routine.send(answer)
+            try:
+                request = routine.send(answer)
+            except StopIteration:
+                raise RuntimeError(
+                    f"{program!r} returned from main: it must end in Reset"
+                ) from None
             yield from self._pay()
             if isinstance(request, Reset):
                 routine.close()
@@ -149,8 +163,9 @@ class Processor:
 
     def _horizon(self) -> int:
         """Nothing else happens before this time, so the FPGA may run ahead up to it."""
+        limit = self._env.now + LOOK_AHEAD_PS
         horizon = self._env.horizon()
-        return self._env.now + PS_PER_S if horizon is None else horizon
+        return limit if horizon is None else min(limit, horizon)
 
     def _await_pin(self, request: AwaitPin) -> Steps:
         start = self._env.now
@@ -163,11 +178,13 @@ class Processor:
             reached = self._engine.run(min(deadline, self._horizon()), (request.pin, request.level))
             yield self._env.timeout(reached - self._env.now)
         poll = request.poll_cycles * PS_PER_S
-        polls = -(-(reached - start) * self._clock.hz // poll)
+        polls = max(1, -(-(reached - start) * self._clock.hz // poll))
         yield self._env.timeout(start + polls * poll // self._clock.hz - self._env.now)
         return True
 
     def _sleep(self, request: Sleep) -> Steps:
+        if request.deadline_us is None and not request.wakeable:
+            raise ValueError(f"nothing can end {request!r}: give a deadline or make it wakeable")
         deadline = None if request.deadline_us is None else request.deadline_us * PS_PER_US
         if deadline is not None and deadline <= self._env.now:
             return False

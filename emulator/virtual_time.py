@@ -22,6 +22,11 @@ class Kernel(simpy.Environment):
         peek = self.peek()
         return None if peek == float("inf") else int(peek)
 
+    def advance_to(self, time_ps: int) -> None:
+        """Let everything before ``time_ps`` happen, then stand there; a past time does nothing."""
+        if time_ps > self.now:
+            self.run(until=time_ps)
+
 
 class CycleClock:
     """Turns cycle counts into picoseconds; what one conversion rounds off, the next one pays.

@@ -1,14 +1,4 @@
-"""Serial ports that other programs can open: a pseudo-terminal with a stable name, a TCP socket.
-
-A port moves bytes between a client's descriptor and a UART line, and neither side can flood it:
-
-- What comes from the device is released when the wire would have delivered it, and goes to the
-  client that is there then. Of what a client leaves unread the newest ``MAX_UNREAD`` bytes wait
-  here, after what the operating system keeps for it. A client never gets what was meant for the
-  one before.
-- What a client writes waits in the operating system while ``MAX_UNSENT`` bytes wait for the wire,
-  so a client that writes faster than the baud rate is slowed down, as by a real port.
-"""
+"""The serial ports that other programs can open: a pseudo-terminal, and a TCP socket."""
 
 import contextlib
 import errno
@@ -20,115 +10,20 @@ import select
 import socket
 import termios
 import tty
-from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Protocol
 
-from cubestack.emulator.ports.line import HostLine
+from cubestack.emulator.ports.serial_port import Endpoint, PortError, SerialPort, poll_now
 from cubestack.emulator.uart import Uart
 
-__all__ = ["MAX_UNREAD", "MAX_UNSENT", "Endpoint", "PortError", "PtyEndpoint", "TcpEndpoint"]
-
-MAX_UNREAD = 1 << 16
-"""Bytes that wait for a slow client before the oldest are dropped."""
-
-MAX_UNSENT = 4096
-"""Bytes that wait for the wire to the device: the size of Linux's own buffer of a serial port."""
+__all__ = ["Endpoint", "PortError", "PtyEndpoint", "TcpEndpoint"]
 
 TCP_RECEIVE_BUFFER = 4096
 """Bytes. Small, so that little of a client that floods the port and dies is still delivered."""
 
-
-class PortError(OSError):
-    """A port can not be opened; the text names it and what would be right."""
+REFUSAL = b"cubestack: this port has a client already\r\n"
 
 
-class Endpoint(Protocol):
-    """A port that the pump serves."""
-
-    name: str
-
-    @property
-    def congested(self) -> bool:
-        """Whether the client reads more slowly than the device's output is released."""
-
-    def watched(self) -> list[tuple[int, int]]:
-        """Descriptors and the events of ``select.poll`` that should wake the pump."""
-
-    def exchange(self, now_ps: int) -> None:
-        """Move what can be moved at virtual time ``now_ps``, without blocking."""
-
-    def next_release_ps(self) -> int | None:
-        """When the next byte from the device arrives at the host; None without one."""
-
-    def last_release_ps(self) -> int | None:
-        """When the last byte that the device has sent so far arrives; None without one."""
-
-    def close(self) -> None:
-        """Release the port."""
-
-
-class _SerialPort(ABC):
-    """What the ports have in common: buffers, and the order of an exchange."""
-
-    name: str
-
-    def __init__(self, uart: Uart) -> None:
-        self._line = HostLine(uart)
-        self._unread = bytearray()
-
-    @property
-    def congested(self) -> bool:
-        """See Endpoint."""
-        return bool(self._unread)
-
-    def exchange(self, now_ps: int) -> None:
-        """See Endpoint."""
-        while (room := self._room()) > 0 and (data := self._read(room)):
-            self._line.write(data)
-        if not self._client_present():
-            self._unread.clear()
-            self._line.take(now_ps)
-            return
-        self._unread += self._line.take(now_ps)
-        del self._unread[:-MAX_UNREAD]
-        if self._unread:
-            del self._unread[: self._write(self._unread)]
-
-    def next_release_ps(self) -> int | None:
-        """See Endpoint."""
-        return self._line.next_arrival_ps
-
-    def last_release_ps(self) -> int | None:
-        """See Endpoint."""
-        return self._line.last_arrival_ps
-
-    def close(self) -> None:
-        """See Endpoint."""
-        self._line.unplug()
-
-    def _room(self) -> int:
-        return MAX_UNSENT - self._line.write_backlog
-
-    def _events(self, *, reading: bool) -> int:
-        """Events to wait for on the client's descriptor."""
-        events = select.POLLIN if reading and self._room() > 0 else 0
-        return events | (select.POLLOUT if self._unread else 0)
-
-    @abstractmethod
-    def _client_present(self) -> bool:
-        """Notice clients that came and went; whether there is one now."""
-
-    @abstractmethod
-    def _read(self, max_bytes: int) -> bytes:
-        """What the client wrote, as far as it is there; also a client that has gone since."""
-
-    @abstractmethod
-    def _write(self, data: bytearray) -> int:
-        """Hand ``data`` to the client; returns how many bytes it could take."""
-
-
-class PtyEndpoint(_SerialPort):
+class PtyEndpoint(SerialPort):
     """A pseudo-terminal whose slave is reachable under a symbolic link.
 
     A client is there while any program has the slave open. When the last one closes, what was not
@@ -168,13 +63,13 @@ class PtyEndpoint(_SerialPort):
                 self._path.unlink()
         os.close(self._master)
 
-    def _client_present(self) -> bool:
-        hung_up = _poll(self._master, 0) & select.POLLHUP
+    def _look(self) -> object | None:
+        hung_up = poll_now(self._master, 0) & select.POLLHUP
         # A client may come and go between two looks, and leave other settings.
         if hung_up and (self._connected or termios.tcgetattr(self._master) != self._raw):
             self._renew()
         self._connected = not hung_up
-        return self._connected
+        return self._master if self._connected else None
 
     def _read(self, max_bytes: int) -> bytes:
         try:
@@ -201,7 +96,7 @@ class PtyEndpoint(_SerialPort):
             self._replace()
             return
         fcntl.ioctl(slave, termios.TIOCNXCL)
-        tty.setraw(slave)
+        termios.tcsetattr(slave, termios.TCSANOW, self._raw)
         termios.tcflush(slave, termios.TCIFLUSH)
         os.close(slave)
 
@@ -211,11 +106,12 @@ class PtyEndpoint(_SerialPort):
         os.dup2(master, self._master, inheritable=False)
         os.close(master)
         new_link = self._path.with_name(f".{self._path.name}.new")
+        new_link.unlink(missing_ok=True)
         new_link.symlink_to(self._terminal)
         new_link.replace(self._path)
 
 
-class TcpEndpoint(_SerialPort):
+class TcpEndpoint(SerialPort):
     """A listening socket that serves one client at a time; a second one is refused with a line.
 
     A client that has shut down or closed its side still gets the device's output while it takes
@@ -258,25 +154,25 @@ class TcpEndpoint(_SerialPort):
         self._drop()
         self._server.close()
 
-    def _client_present(self) -> bool:
+    def _look(self) -> object | None:
         try:
             newcomer = self._server.accept()[0]
         except OSError:  # nobody, or gone again
-            return self._client is not None
+            return self._client
         newcomer.setblocking(False)
         if self._client is not None and not self._leaving(self._client):
             with contextlib.suppress(OSError):
-                newcomer.send(b"cubestack: this port has a client already\r\n")
+                newcomer.send(REFUSAL)
             newcomer.close()
-            return True
+            return self._client
         self._drop()
         newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = newcomer
-        return True
+        return self._client
 
     def _leaving(self, client: socket.socket) -> bool:
         gone = select.POLLRDHUP | select.POLLHUP | select.POLLERR
-        return bool(_poll(client.fileno(), select.POLLRDHUP) & gone)
+        return bool(poll_now(client.fileno(), select.POLLRDHUP) & gone)
 
     def _read(self, max_bytes: int) -> bytes:
         if self._client is None or self._input_ended:
@@ -324,25 +220,16 @@ def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
         raise PortError(f"TCP port {port} is not in 0..65535")
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        if not allow_remote and not ipaddress.ip_address(address[0]).is_loopback:
-            raise PortError(
-                f"{host} can be reached from other machines: listen on 127.0.0.1 or allow it"
-            )
-        server = socket.create_server((address[0], port), family=family)
-    except PortError:
-        raise
+    except (socket.gaierror, UnicodeError) as error:
+        raise PortError(f"no address of this machine is called {host!r}; try 127.0.0.1") from error
+    if not allow_remote and not ipaddress.ip_address(address[0]).is_loopback:
+        raise PortError(f"{host} is open to other machines: listen on 127.0.0.1 or allow that")
+    try:
+        server = socket.create_server((str(address[0]), port), family=family)
     except OSError as error:
         raise PortError(
-            f"can not listen on {host}:{port}: {error.strerror}; choose another --tcp port"
+            f"can not listen on {host}:{port}: {error.strerror}; choose another port"
         ) from error
     server.setblocking(False)
     server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
     return server
-
-
-def _poll(fileno: int, events: int) -> int:
-    """Events of one descriptor now, POLLHUP and POLLERR always among them."""
-    poller = select.poll()
-    poller.register(fileno, events)
-    ready = poller.poll(0)
-    return ready[0][1] if ready else 0

@@ -2,22 +2,44 @@
 
 Paced "real", virtual time follows wall time; when the machine can not keep up, the pump says by
 how much. Paced "fast", virtual time runs ahead as long as the device has work or bytes are on a
-wire, and follows wall time while everything waits for the host.
+wire, and follows wall time while everything waits for the host, or a client reads too slowly.
 """
 
+import select
 import time
 from collections.abc import Callable, Sequence
 from typing import Literal
 
-from cubestack.emulator.ports.endpoint import Endpoint, wait_readable
+from cubestack.emulator.ports.serial_port import Endpoint
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["Pump"]
+__all__ = ["IDLE_S", "LAG_REPORT_S", "LAG_WORTH_SAYING_S", "SLICE_S", "Pump", "wait_ready"]
 
-SLICE_S = 0.005  # wall time between two looks at the ports while time runs ahead
-IDLE_S = 0.05  # longest sleep; Ctrl-C and stop() are noticed within it
-LAG_REPORT_S = 5.0
+SLICE_S = 0.005
+"""Wall time between two looks at the ports while events are worked off."""
+
+IDLE_S = 0.02
+"""Longest wait: a client that opens a pseudo-terminal and ``stop`` are noticed within it."""
+
 LAG_WORTH_SAYING_S = 0.5
+LAG_REPORT_S = 5.0
+"""Wall time between two reports of a lag."""
+
+PS_PER_NS = 1000
+NS_PER_S = 10**9
+
+Watched = Sequence[tuple[int, int]]
+
+
+def wait_ready(watched: Watched, timeout_s: float) -> None:
+    """Wait until one of the ``watched`` (descriptor, events) is ready, at most ``timeout_s``.
+
+    Rounded up to a millisecond, which keeps a line at work from costing a wake-up per byte.
+    """
+    poller = select.poll()
+    for fileno, events in watched:
+        poller.register(fileno, events)
+    poller.poll(timeout_s * 1000)
 
 
 class Pump:
@@ -31,6 +53,8 @@ class Pump:
         *,
         pace: Literal["real", "fast"],
         report: Callable[[str], None] = lambda _text: None,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+        wait: Callable[[Watched, float], None] = wait_ready,
     ) -> None:
         """Prepare to serve.
 
@@ -40,74 +64,94 @@ class Pump:
             busy: whether the device has work, or bytes are on a wire.
             pace: see the module's text.
             report: receives a line when pace "real" can not be kept.
+            clock_ns: wall time in ns from any origin; never runs back.
+            wait: see ``wait_ready``.
         """
         self._env = env
         self._endpoints = endpoints
         self._busy = busy
         self._fast = pace == "fast"
         self._report = report
+        self._clock_ns = clock_ns
+        self._wait = wait
         self._stopped = False
+        self._offset_ps = 0  # virtual less wall time
+        self._reported_ns = clock_ns()
 
     def stop(self) -> None:
-        """Make ``run`` return soon; may be called from another thread."""
+        """Make ``run`` return soon; for other threads, and for signal handlers."""
         self._stopped = True
 
     def run(self) -> None:
         """Serve until ``stop``."""
-        offset_ps = self._env.now - int(time.monotonic() * PS_PER_S)
-        reported = time.monotonic()
+        self._align()
         while not self._stopped:
+            ahead = self._fast and self._run_ahead()
+            if ahead:
+                self._align()
+            else:
+                self._follow()
             for endpoint in self._endpoints:
                 endpoint.exchange(self._env.now)
-            if self._fast and (self._busy() or self._pending()):
-                self._run_ahead()
-                offset_ps = self._env.now - int(time.monotonic() * PS_PER_S)
-                continue
-            target = int(time.monotonic() * PS_PER_S) + offset_ps
-            self._advance(target)
-            lag_s = (int(time.monotonic() * PS_PER_S) + offset_ps - self._env.now) / PS_PER_S
-            if lag_s > LAG_WORTH_SAYING_S and time.monotonic() - reported > LAG_REPORT_S:
-                reported = time.monotonic()
-                self._report(f"can not keep real time: {lag_s:.1f} s behind")
-            for endpoint in self._endpoints:
-                endpoint.exchange(self._env.now)
-            filenos = [fd for endpoint in self._endpoints for fd in endpoint.filenos()]
-            wait_readable(filenos, self._until_next_s(offset_ps))
+            if not ahead:
+                watched = [item for endpoint in self._endpoints for item in endpoint.watched()]
+                self._wait(watched, self._until_next_s())
 
-    def _pending(self) -> bool:
-        return any(endpoint.next_release_ps() is not None for endpoint in self._endpoints)
+    def _wall_ps(self) -> int:
+        """Wall time on the scale of virtual time."""
+        return self._clock_ns() * PS_PER_NS + self._offset_ps
 
-    def _run_ahead(self) -> None:
-        """Run for a slice of wall time, or until everything waits for the host."""
-        end = time.monotonic() + SLICE_S
-        while time.monotonic() < end:
-            releases = [endpoint.next_release_ps() for endpoint in self._endpoints]
-            release = min((t for t in releases if t is not None), default=None)
+    def _align(self) -> None:
+        self._offset_ps = self._env.now - self._clock_ns() * PS_PER_NS
+
+    def _slice_end_ns(self) -> int:
+        return self._clock_ns() + int(SLICE_S * NS_PER_S)
+
+    def _run_ahead(self) -> bool:
+        """Work for a slice of wall time, or until everything waits for the host.
+
+        Returns False when there was nothing to do, or no client to take the output in time.
+        """
+        if any(endpoint.congested for endpoint in self._endpoints):
+            return False
+        progress = False
+        end_ns = self._slice_end_ns()
+        while self._clock_ns() < end_ns:
             horizon = self._env.horizon()
-            if self._busy() and horizon is not None and (release is None or horizon <= release):
+            releases = [endpoint.last_release_ps() for endpoint in self._endpoints]
+            on_wire = [ps for ps in releases if ps is not None and ps > self._env.now]
+            if on_wire and (horizon is None or horizon > min(on_wire)):
+                self._env.advance_to(min(on_wire))
+            elif horizon is not None and (on_wire or self._busy()):
                 self._env.step()
-                continue
-            if release is not None:
-                self._advance(release)
-            return
+            else:
+                break
+            progress = True
+        return progress
 
-    def _advance(self, target_ps: int) -> None:
-        """Run to ``target_ps``, but not for longer than a slice of wall time."""
-        end = time.monotonic() + SLICE_S
-        while self._env.peek() <= target_ps:
+    def _follow(self) -> None:
+        """Bring virtual time up to wall time, as far as a slice of wall time allows."""
+        target_ps = self._wall_ps()
+        end_ns = self._slice_end_ns()
+        while (horizon := self._env.horizon()) is not None and horizon <= target_ps:
             self._env.step()
-            if time.monotonic() > end:
-                return
-        if target_ps > self._env.now:
-            self._env.run(until=target_ps)
+            if self._clock_ns() >= end_ns:
+                break
+        else:
+            self._env.advance_to(target_ps)
+        self._report_lag((self._wall_ps() - self._env.now) / PS_PER_S)
 
-    def _until_next_s(self, offset_ps: int) -> float:
+    def _report_lag(self, lag_s: float) -> None:
+        now_ns = self._clock_ns()
+        due_ns = self._reported_ns + int(LAG_REPORT_S * NS_PER_S)
+        if lag_s > LAG_WORTH_SAYING_S and now_ns >= due_ns:
+            self._reported_ns = now_ns
+            self._report(f"can not keep real time: {lag_s:.1f} s behind")
+
+    def _until_next_s(self) -> float:
         """Wall time until something is due, at most ``IDLE_S``."""
-        due = [t for t in (e.next_release_ps() for e in self._endpoints) if t is not None]
-        horizon = self._env.horizon()
-        if horizon is not None:
-            due.append(horizon)
-        if not due:
+        due = [endpoint.next_release_ps() for endpoint in self._endpoints]
+        times = [ps for ps in (*due, self._env.horizon()) if ps is not None]
+        if not times:
             return IDLE_S
-        wall_ps = int(time.monotonic() * PS_PER_S) + offset_ps
-        return min(IDLE_S, max(0.0, (min(due) - wall_ps) / PS_PER_S))
+        return min(IDLE_S, max(0.0, (min(times) - self._wall_ps()) / PS_PER_S))

@@ -1,0 +1,127 @@
+"""What a port is that other programs can open, and what all serial ports have in common.
+
+A serial port moves bytes between a client's descriptor and a UART line; neither side can flood it:
+
+- What comes from the device is released when the wire would have delivered it, and goes to the
+  client that is there then. Of what a client leaves unread, the newest ``MAX_UNREAD`` bytes wait
+  here, behind what the operating system keeps for it. A client never gets what was released for
+  the one before.
+- What a client writes waits in the operating system while ``MAX_UNSENT`` bytes wait for the wire,
+  so a client that writes faster than the baud rate is slowed down, as by a real port.
+"""
+
+import select
+from abc import ABC, abstractmethod
+from typing import Protocol
+
+from cubestack.emulator.ports.line import HostLine
+from cubestack.emulator.uart import Uart
+
+__all__ = ["MAX_UNREAD", "MAX_UNSENT", "Endpoint", "PortError", "SerialPort", "poll_now"]
+
+MAX_UNREAD = 1 << 16
+"""Bytes that wait for a slow client before the oldest are dropped."""
+
+MAX_UNSENT = 4096
+"""Bytes that wait for the wire to the device: the size of Linux's own buffer of a serial port."""
+
+
+class PortError(OSError):
+    """A port can not be opened; the text names it and what would be right."""
+
+
+class Endpoint(Protocol):
+    """A port that the pump serves."""
+
+    name: str
+
+    @property
+    def congested(self) -> bool:
+        """Whether the client reads more slowly than the device's output is released."""
+
+    def watched(self) -> list[tuple[int, int]]:
+        """Descriptors and the events of ``select.poll`` that should wake the pump."""
+
+    def exchange(self, now_ps: int) -> None:
+        """Move what can be moved at virtual time ``now_ps``, without blocking."""
+
+    def next_release_ps(self) -> int | None:
+        """When the next byte from the device arrives at the host; None without one."""
+
+    def last_release_ps(self) -> int | None:
+        """When the last byte that the device has sent so far arrives; None without one."""
+
+    def close(self) -> None:
+        """Release the port."""
+
+
+class SerialPort(ABC):
+    """The buffers, and the order of an exchange; a subclass knows the descriptors."""
+
+    name: str
+
+    def __init__(self, uart: Uart) -> None:
+        """Plug into ``uart``."""
+        self._line = HostLine(uart)
+        self._unread = bytearray()
+        self._served: object = None
+
+    @property
+    def congested(self) -> bool:
+        """See Endpoint."""
+        return bool(self._unread)
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+        while (room := self._room()) > 0 and (data := self._read(room)):
+            self._line.write(data)
+        arrived = self._line.take(now_ps)
+        client = self._look()
+        if client is None or client is not self._served:
+            self._served = client
+            self._unread.clear()
+            return
+        self._unread += arrived
+        del self._unread[:-MAX_UNREAD]
+        if self._unread:
+            del self._unread[: self._write(self._unread)]
+
+    def next_release_ps(self) -> int | None:
+        """See Endpoint."""
+        return self._line.next_arrival_ps
+
+    def last_release_ps(self) -> int | None:
+        """See Endpoint."""
+        return self._line.last_arrival_ps
+
+    def close(self) -> None:
+        """See Endpoint."""
+        self._line.unplug()
+
+    def _room(self) -> int:
+        return MAX_UNSENT - self._line.write_backlog
+
+    def _events(self, *, reading: bool) -> int:
+        """Events to wait for on the client's descriptor."""
+        events = select.POLLIN if reading and self._room() > 0 else 0
+        return events | (select.POLLOUT if self._unread else 0)
+
+    @abstractmethod
+    def _look(self) -> object | None:
+        """Notice clients that came and went; the one that is there now, None without one."""
+
+    @abstractmethod
+    def _read(self, max_bytes: int) -> bytes:
+        """What the client wrote, as far as it is there; also a client that has gone since."""
+
+    @abstractmethod
+    def _write(self, data: bytearray) -> int:
+        """Hand ``data`` to the client; returns how many bytes it could take."""
+
+
+def poll_now(fileno: int, events: int) -> int:
+    """Events of one descriptor now, POLLHUP and POLLERR always among them."""
+    poller = select.poll()
+    poller.register(fileno, events)
+    ready = poller.poll(0)
+    return ready[0][1] if ready else 0
