@@ -23,7 +23,7 @@ from cubestack.host.calibration import calibrate, load_camera
 from cubestack.host.cli.frames import compare
 from cubestack.host.cli.terminal import console, progress_bar, say
 from cubestack.host.cubestar import CubeStar
-from cubestack.host.errors import PortOpenError
+from cubestack.host.errors import PortClosedError, PortOpenError
 from cubestack.host.node_client import NodeClient
 from cubestack.host.operator import find_threshold
 from cubestack.host.pictures import annotate, save_picture
@@ -148,7 +148,8 @@ def _show(subject: _Subject, out: Path) -> bool:
     virtual_s = int(uptime["RuntimeSeconds"]) + int(uptime["RuntimeMilliseconds"]) / 1000
     console.print(
         f"{virtual_s:.1f} s of virtual time in {time.monotonic() - started:.1f} s of wall time; "
-        f"pictures: {out / subject.name}-raw.png, {out / subject.name}-stars.png"
+        f"pictures: {out / subject.name}-raw.png, {out / subject.name}-stars.png",
+        soft_wrap=True,
     )
     return attitude.valid
 
@@ -166,6 +167,10 @@ def _served(scene: Path, port: Path) -> Iterator[Path]:
             raise PortOpenError(line or "the emulator did not start")
         say(line)
         yield port
+    except PortClosedError:
+        emulator.kill()
+        say(f"the emulator ended: {emulator.communicate()[1].strip().splitlines()[-1]}")
+        raise
     finally:
         emulator.terminate()
         emulator.communicate(timeout=BOOT_TIMEOUT_S)
@@ -174,22 +179,21 @@ def _served(scene: Path, port: Path) -> Iterator[Path]:
 def _report_attitude(
     valid: bool, quaternion: NDArray[np.float64], matched: int, truth: NDArray[np.float64]
 ) -> None:
-    from rich.table import Table
-
     from cubestack.emulator.sky.attitude import matrix_from_quaternion, pointing_from_matrix
 
     if not valid:
         console.print("no attitude found in this picture")
         return
-    table = Table(title=f"attitude from {matched} stars")
-    for column in ("", "RA", "Dec", "roll", "x", "y", "z", "w"):
-        table.add_column(column, justify="right")
     if quaternion @ truth < 0:
-        truth = -truth
+        truth = -truth  # the same attitude
+    console.print(f"attitude from {matched} stars, measured beside the truth:")
     for name, q in (("measured", quaternion), ("truth", truth)):
-        angles = pointing_from_matrix(matrix_from_quaternion(q))
-        table.add_row(name, *(f"{a:.4f}°" for a in angles), *(f"{part:+.5f}" for part in q))
-    console.print(table)
+        ra, dec, roll = pointing_from_matrix(matrix_from_quaternion(q))
+        parts = " ".join(f"{part:+.5f}" for part in q)
+        console.print(
+            f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]",
+            soft_wrap=True,
+        )
     cross, roll = compare(quaternion, truth)
     assert cross is not None
     assert roll is not None
@@ -200,4 +204,5 @@ def _report_attitude(
 
 def _report_phases(phases: dict[str, float]) -> None:
     shown = ("discard", "capture", "transfer", "detect", "match", "attitude")
-    console.print("virtual time: " + ", ".join(f"{n} {phases[n]:.1f} ms" for n in shown))
+    times = ", ".join(f"{name} {phases[name]:.1f} ms" for name in shown)
+    console.print(f"virtual time: {times}", soft_wrap=True)

@@ -129,10 +129,10 @@ def run(args: argparse.Namespace) -> int:
 def _report(results: list[FrameResult], wall_s: float) -> None:
     from rich.table import Table
 
-    table = Table(title="attitude over the serial line, beside the truth")
-    columns = ("frame", "solved", "right", "stars", "matched", "wrong", "cross", "roll", "status")
-    for column in columns:
+    table = Table(title="attitude over the serial line, beside the truth; errors in arcsec")
+    for column in ("frame", "right", "stars", "matched", "wrong", "cross", "roll"):
         table.add_column(column, justify="right")
+    table.add_column("status and error flags")
     for number, result in enumerate(results[:40]):
         table.add_row(*_row(number, result))
     console.print(table)
@@ -142,8 +142,9 @@ def _report(results: list[FrameResult], wall_s: float) -> None:
     console.print(
         f"{summary['frames']} frames: {summary['solved_percent']:.1f} % solved, "
         f"{summary['right_percent']:.1f} % right; 95th percentile of the right ones "
-        f"{_angle(summary['cross_p95_deg'])} across, {_angle(summary['roll_p95_deg'])} about the "
-        f"boresight; {wall_s:.1f} s wall time"
+        f"{_arcsec(summary['cross_p95_deg'])} arcsec across, {_arcsec(summary['roll_p95_deg'])} "
+        f"arcsec about the boresight; {wall_s:.1f} s wall time",
+        soft_wrap=True,
     )
 
 
@@ -151,19 +152,18 @@ def _row(number: int, result: FrameResult) -> list[str]:
     yes_no = {True: "yes", False: "no", None: "-"}
     return [
         str(number),
-        yes_no[result.solved],
-        yes_no[result.right],
+        yes_no[result.right] if result.solved else "no fix",
         str(result.centroids),
         str(result.matched),
         "-" if result.wrong is None else str(result.wrong),
-        _angle(result.error_cross_deg),
-        _angle(result.error_roll_deg),
+        _arcsec(result.error_cross_deg),
+        _arcsec(result.error_roll_deg),
         result.status,
     ]
 
 
-def _angle(degrees: float | None) -> str:
-    return "-" if degrees is None else f"{3600 * degrees:.1f} arcsec"
+def _arcsec(degrees: float | None) -> str:
+    return "-" if degrees is None else f"{3600 * degrees:.1f}"
 
 
 def summarise(results: list[FrameResult]) -> dict[str, Any]:
