@@ -16,6 +16,7 @@ __all__ = ["EXTENSION_TELECOMMANDS", "EXTENSION_TELEMETRY", "UPLOAD_BLOCK_BYTES"
 UPLOAD_BLOCK_BYTES = 128
 
 DEFAULT_FRAME_RATE = 7
+LARGEST_FRAME_RATE = 39  # of 27 MHz / 1322 clocks a line: a frame outlasts its 512 lines
 DEFAULT_DISCARD_MS = 70
 DEFAULT_REGISTER_PAGE = 0x85
 
@@ -58,7 +59,7 @@ EXTENSION_TELECOMMANDS = (
                 0,
                 "the sensor's register; frames a second = register x crystal / 27 MHz",
                 minimum=6,
-                maximum=60,
+                maximum=LARGEST_FRAME_RATE,
                 range_flag="ConfigChangeError",
                 reset=DEFAULT_FRAME_RATE,
             ),
@@ -150,14 +151,14 @@ EXTENSION_TELEMETRY = (
             Field(name, "u32", 32 * index, meaning, "us")
             for index, (name, meaning) in enumerate(
                 (
-                    ("Idle", "waiting, imager off"),
+                    ("Idle", "waiting or restarting, imager off"),
                     ("Discard", "imager on, undefined frame"),
                     ("Capture", "frame buffer stores the picture"),
                     ("Transfer", "frame buffer to processor memory"),
                     ("Detect", "detection, distortion and unit vectors"),
                     ("Match", "identification"),
                     ("Attitude", "attitude estimate"),
-                    ("LoopTotal", "whole iteration"),
+                    ("LoopTotal", "whole iteration without the wait for the next"),
                 )
             )
         ),

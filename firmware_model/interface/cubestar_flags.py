@@ -2,14 +2,14 @@
 
 CubeSpace family of nodes, interface version 3. The two frames show the same ten bytes of flags; a
 few names are printed differently in the second. The causes are ours to word: the published tables
-give names only.
+give names only. Some belong to hardware that this node does not have, or that does not fail here.
 """
 
 from dataclasses import dataclass
 
 from cubestack.firmware_model.interface.field import Field
 
-__all__ = ["FLAG_BYTES", "ErrorFlag", "flag_fields"]
+__all__ = ["FLAG_BYTES", "NEVER_RAISED", "ErrorFlag", "flag_fields"]
 
 #: Length of the block of flags.
 FLAG_BYTES = 10
@@ -17,17 +17,26 @@ FLAG_BYTES = 10
 
 @dataclass(frozen=True)
 class ErrorFlag:
-    """An error flag: bit in the block, printed name, cause, and the name in LogStatus if other."""
+    """An error flag.
+
+    Attributes:
+        bit: position in the block.
+        name: printed name.
+        cause: what raises it.
+        log_name: name in LogStatus, if other.
+        never: why this node does not raise it; empty when it does.
+    """
 
     bit: int
     name: str
     cause: str
     log_name: str = ""
+    never: str = ""
 
 
 _FLAGS = (
     ErrorFlag(0, "OverCurrent", "a supply current was above its limit and the switch was opened"),
-    ErrorFlag(1, "UnderCurrent", "a switched-on supply drew no current"),
+    ErrorFlag(1, "UnderCurrent", "a switched-on supply drew next to no current"),
     ErrorFlag(8, "UART_ProtocolError", "byte outside of a frame, or an unknown escape"),
     ErrorFlag(9, "UART_TcmdBufOfError", "telecommand while the command buffer was full"),
     ErrorFlag(10, "UART_Tcmd_TooManyParm", "telecommand with too many parameter bytes"),
@@ -38,7 +47,7 @@ _FLAGS = (
     ErrorFlag(17, "I2C_TcmdBufOFError", "telecommand while the command buffer was full"),
     ErrorFlag(18, "I2C_TCMD_TooFewParm", "telecommand with too few parameter bytes"),
     ErrorFlag(19, "I2C_TCMD_TooManyparm", "telecommand with too many parameter bytes"),
-    ErrorFlag(24, "SPICommsError", "error on an SPI bus"),
+    ErrorFlag(24, "SPICommsError", "error on an SPI bus", never="there is no SPI bus"),
     ErrorFlag(25, "StatusError", "a step was asked for whose input does not exist yet"),
     ErrorFlag(
         26,
@@ -75,20 +84,47 @@ _FLAGS = (
     ErrorFlag(56, "SetIDModeError", "unknown identification mode"),
     ErrorFlag(57, "IDModeError", "tracking asked for, but there is neither an attitude nor a hint"),
     ErrorFlag(58, "ReducedIDListSizeError", "no catalogue star near the rough boresight"),
-    ErrorFlag(59, "LessThanThreeStarsInFoV", "fewer than three catalogue stars in the field"),
+    ErrorFlag(
+        59,
+        "LessThanThreeStarsInFoV",
+        "fewer than three catalogue stars near the expected boresight",
+    ),
     ErrorFlag(60, "LessThanThreeStarsDetected", "fewer than three stars detected"),
     ErrorFlag(61, "LessThanThreeStarsID", "fewer than three stars identified"),
     ErrorFlag(62, "IDError", "identification found no consistent set of stars"),
-    ErrorFlag(63, "IDSearchError", "no catalogue pair within the margin of any measured pair"),
+    ErrorFlag(63, "IDSearchError", "no two detected stars confirmed each other's identity"),
     ErrorFlag(64, "DeclinationSetError", "declination out of range"),
     ErrorFlag(65, "RightAscensionSetError", "right ascension out of range"),
     ErrorFlag(66, "QuestindexError", "attitude asked for with too few identified stars"),
     ErrorFlag(67, "RateExceeded", "tracking lost the stars: they moved further than its radius"),
-    ErrorFlag(72, "FlashInvalidAreaError", "flash access outside of its area"),
-    ErrorFlag(73, "FlashLockedError", "flash write while it was locked"),
-    ErrorFlag(74, "FlashTimeoutError", "flash write did not end in time"),
-    ErrorFlag(75, "FlashUnalignedError", "flash write at an unaligned address"),
+    ErrorFlag(
+        72,
+        "FlashInvalidAreaError",
+        "flash access outside of its area",
+        never="the pages have fixed places",
+    ),
+    ErrorFlag(
+        73,
+        "FlashLockedError",
+        "flash write while it was locked",
+        never="the program never locks it",
+    ),
+    ErrorFlag(
+        74,
+        "FlashTimeoutError",
+        "flash write did not end in time",
+        never="the modelled flash does not fail",
+    ),
+    ErrorFlag(
+        75,
+        "FlashUnalignedError",
+        "flash write at an unaligned address",
+        never="whole pages are written",
+    ),
 )
+
+#: Flags that this node does not raise, and why.
+NEVER_RAISED = {flag.name: flag.never for flag in _FLAGS if flag.never}
 
 
 def flag_fields(first_bit: int = 0, *, log_names: bool = False) -> tuple[Field, ...]:
@@ -98,7 +134,7 @@ def flag_fields(first_bit: int = 0, *, log_names: bool = False) -> tuple[Field, 
             (flag.log_name or flag.name) if log_names else flag.name,
             "bool1",
             first_bit + flag.bit,
-            flag.cause,
+            f"{flag.cause} (not on this node: {flag.never})" if flag.never else flag.cause,
             flag=flag.name,
         )
         for flag in _FLAGS

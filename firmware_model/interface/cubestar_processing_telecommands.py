@@ -27,6 +27,9 @@ def _edge(name: str, offset: int, meaning: str, maximum: int, reset: int) -> Fie
     )
 
 
+LARGEST_AREA = 240
+"""The list of visited pixels must fit the free half of the external SRAM at every setting."""
+
 _DETECTION = (
     Message(
         20,
@@ -85,6 +88,7 @@ _DETECTION = (
                 "more are an invalid star",
                 "px",
                 minimum=1,
+                maximum=LARGEST_AREA,
                 range_flag="StarPixSetError",
                 reset=60,
             ),
@@ -122,7 +126,7 @@ _DETECTION = (
                 "MaxNoise",
                 "u8",
                 24,
-                "more areas than this were too small; 255: no limit",
+                "more areas than this were too small",
                 minimum=1,
                 range_flag="MaxNoiseSetError",
                 reset=255,

@@ -160,7 +160,7 @@ _DETECTION = (
         153,
         "DetectionTimingOne",
         8,
-        "longest times of the detection's steps",
+        "longest times of the detection's steps since the last reset",
         times(
             ("MaxStarSearchTime", "search and growing"),
             ("MaxCentroidFindTime", "centroids"),
@@ -172,7 +172,7 @@ _DETECTION = (
         154,
         "DetectionTimingTwo",
         4,
-        "times of the whole detection",
+        "times of the whole detection since the last reset",
         times(("StarDetectionTime", "latest"), ("MaxStarDetectionTime", "longest")),
     ),
 )
@@ -229,7 +229,7 @@ _IDENTIFICATION = (
         160,
         "IDTimingOne",
         8,
-        "longest times of the identification's first steps",
+        "longest times of the identification's first steps since the last reset",
         times(
             ("MaxModeSelectionTime", "choice of mode and star list"),
             ("MaxDistanceCalTime", "distances of the measured pairs"),
@@ -241,7 +241,7 @@ _IDENTIFICATION = (
         161,
         "IDTimingTwo",
         6,
-        "longest times of the identification's last steps",
+        "longest times of the identification's last steps since the last reset",
         times(
             ("MaxVoteRoundTwoTime", "verification votes"),
             ("MaxSelectID", "choice of the stars to keep"),
@@ -252,14 +252,14 @@ _IDENTIFICATION = (
         162,
         "IDTimingThree",
         4,
-        "times of the whole identification",
+        "times of the whole identification since the last reset",
         times(("StarIdentificationTime", "latest"), ("MaxStarIdentificationTime", "longest")),
     ),
     Message(
         163,
         "BestStarSelectionTime",
         4,
-        "times of SelectBestStars",
+        "times of SelectBestStars since the last reset",
         times(("LatestTime", "latest"), ("MaxTime", "longest")),
     ),
 )
@@ -280,7 +280,7 @@ _ATTITUDE = (
         166,
         "AttitudeTiming",
         4,
-        "times of the attitude estimate",
+        "times of the attitude estimate since the last reset",
         times(("LatestTime", "latest"), ("MaxTime", "longest")),
     ),
     Message(

@@ -58,7 +58,7 @@ _NODE = (
             Field("FirmwareVersionMajor", "u8", 16, "firmware version, major"),
             Field("FirmwareVersionMinor", "u8", 24, "firmware version, minor"),
             Field("RuntimeMilliseconds", "u16", 32, "uptime, part below one second", "ms"),
-            Field("RuntimeSeconds", "u16", 48, "uptime, whole seconds", "s"),
+            Field("RuntimeSeconds", "u16", 48, "uptime, whole seconds, modulo 65536", "s"),
         ),
     ),
     Message(
@@ -71,8 +71,8 @@ _NODE = (
             _temperature("Temperature", 16),
             Field("ResetCause", "enum8", 32, "why the processor started", choices=ResetCause),
             Field("WDGResetCount", "u16", 40, "resets by the watchdog"),
-            Field("TcmdCount", "u16", 56, "telecommands received"),
-            Field("TlmCount", "u16", 72, "telemetry requests received"),
+            Field("TcmdCount", "u16", 56, "telecommands accepted, modulo 65536"),
+            Field("TlmCount", "u16", 72, "telemetry requests answered, modulo 65536"),
         ),
     ),
     Message(
@@ -97,7 +97,7 @@ _NODE = (
         "times of the main loop",
         times(
             ("StartupTime", "from reset to the main loop"),
-            ("LoopTime", "latest iteration"),
+            ("LoopTime", "latest iteration without the wait for the next"),
             ("MaxLoopTime", "longest iteration"),
         ),
     ),

@@ -83,9 +83,14 @@ class FrameDecoder:
             case _State.INSIDE_ESCAPED:
                 return self._escaped(byte)
 
+    @property
+    def unfinished(self) -> bool:
+        """Whether a frame has begun and not ended."""
+        return self._state is not _State.OUTSIDE
+
     def reset(self) -> bool:
         """Forget an unfinished frame, as after a silence; returns whether there was one."""
-        unfinished = self._state is not _State.OUTSIDE
+        unfinished = self.unfinished
         self._state = _State.OUTSIDE
         return unfinished
 
