@@ -6,6 +6,8 @@ is marked so.
 
 from enum import IntEnum
 
+from cubestack.firmware_model.interface.node_codes import AckError
+
 __all__ = [
     "AckError",
     "GridSize",
@@ -18,16 +20,6 @@ __all__ = [
     "TaskStatus",
     "TestPattern",
 ]
-
-
-class AckError(IntEnum):
-    """Error byte of a telecommand's acknowledge."""
-
-    OK = 0
-    INVALID_ID = 1
-    WRONG_LENGTH = 2
-    BAD_PARAMETER = 3
-    BUFFER_FULL = 4  # ours: the published list ends at 3
 
 
 class TaskStatus(IntEnum):

@@ -11,9 +11,26 @@ from enum import Enum, IntEnum
 from functools import cached_property
 from itertools import pairwise
 
-from cubestack.firmware_model.interface.field import Field, InterfaceError, Value, suggestion
+from cubestack.firmware_model.interface.bench_letters import BenchProtocol
+from cubestack.firmware_model.interface.field import (
+    Choices,
+    Field,
+    InterfaceError,
+    Value,
+    suggestion,
+)
+from cubestack.firmware_model.interface.register_pointer import PointerMap
 
-__all__ = ["TELEMETRY_BIT", "Field", "Interface", "InterfaceError", "Kind", "Message", "Value"]
+__all__ = [
+    "TELEMETRY_BIT",
+    "Confidence",
+    "Field",
+    "Interface",
+    "InterfaceError",
+    "Kind",
+    "Message",
+    "Value",
+]
 
 #: Set in the IDs of telemetry, clear in those of telecommands.
 TELEMETRY_BIT = 0x80
@@ -24,6 +41,14 @@ class Kind(Enum):
 
     TELECOMMAND = "telecommand"
     TELEMETRY = "telemetry"
+
+
+class Confidence(Enum):
+    """How well the layout of a message is known."""
+
+    HIGH = "layout seen working with a real host"
+    MEDIUM = "layout read in a real host"
+    LOW = "layout only declared somewhere"
 
 
 @dataclass(frozen=True)
@@ -40,6 +65,7 @@ class Message:
         ours: an extension of this project.
         steps: each read returns the next of several records, and wraps.
         supported: False when the node treats the ID as unknown.
+        confidence: how well the layout is known; None when it is printed, or ours.
     """
 
     id: int
@@ -51,6 +77,7 @@ class Message:
     ours: bool = False
     steps: bool = False
     supported: bool = True
+    confidence: Confidence | None = None
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""
@@ -143,7 +170,7 @@ class Message:
 
 @dataclass(frozen=True)
 class Interface:
-    """All messages of a node.
+    """All messages of a node, and what else the device speaks.
 
     Attributes:
         name: name of the device.
@@ -153,6 +180,8 @@ class Interface:
         telecommands: by ascending ID.
         telemetries: by ascending ID.
         ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
+        registers: registers behind another I2C address, or None.
+        bench: one-letter protocol on another serial port, or None.
     """
 
     name: str
@@ -162,6 +191,8 @@ class Interface:
     telecommands: tuple[Message, ...]
     telemetries: tuple[Message, ...]
     ack_errors: type[IntEnum]
+    registers: PointerMap | None = None
+    bench: BenchProtocol | None = None
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""
@@ -184,10 +215,13 @@ class Interface:
         return self.telecommands + self.telemetries
 
     @property
-    def choices(self) -> tuple[type[IntEnum], ...]:
-        """The sets of named numbers that fields use, in order of their first use."""
-        used = (field.choices for message in self.messages for field in message.fields)
-        return tuple(dict.fromkeys(choices for choices in used if choices is not None))
+    def choices(self) -> tuple[Choices, ...]:
+        """The sets of named numbers that fields use beside ``ack_errors``, by their first use."""
+        fields = [field for message in self.messages for field in message.fields]
+        if self.registers is not None:
+            fields += [register.field for register in self.registers]
+        used = dict.fromkeys(field.choices for field in fields)
+        return tuple(choices for choices in used if choices not in (None, self.ack_errors))
 
     def telecommand(self, key: str | int) -> Message:
         """The telecommand of this name (in any case) or ID; else InterfaceError."""

@@ -1,9 +1,11 @@
 from collections.abc import Callable
+from enum import IntEnum
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cubestack.firmware_model.interface.camera_registers import RegisterAccess
 from cubestack.firmware_model.interface.cubestar_codes import AckError
 from cubestack.firmware_model.interface.message import (
     Field,
@@ -12,6 +14,7 @@ from cubestack.firmware_model.interface.message import (
     Kind,
     Message,
 )
+from cubestack.firmware_model.interface.register_pointer import PointerMap, PointerRegister
 
 MIXED = Message(
     200,
@@ -161,3 +164,25 @@ def test_wrong_interfaces_are_refused(
 ) -> None:
     with pytest.raises(InterfaceError, match=message):
         Interface("Node", 1, 0x1A, 57_600, telecommands, telemetries, AckError)
+
+
+def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -> None:
+    class Level(IntEnum):
+        LOW = 0
+
+    error = Message(201, "Last", 1, "", (Field("error", "u8", 0, "", choices=AckError),))
+    register = PointerRegister(
+        0, RegisterAccess.READ_WRITE, Field("level", "u8", 0, "", choices=Level)
+    )
+    node = Interface(
+        "Node",
+        1,
+        0x1A,
+        57_600,
+        (),
+        (error,),
+        AckError,
+        registers=PointerMap(0x1C, (register,)),
+    )
+    assert node.choices == (Level,)
+    assert Interface("Node", 1, 0x1A, 57_600, (), (error,), AckError).choices == ()

@@ -1,0 +1,80 @@
+"""One-letter bench protocols as data: each letter is a request, each answer has a fixed length.
+
+A host sends one byte and waits for the whole answer; there are no frames and no error codes. What
+is no letter of the protocol gets no answer.
+"""
+
+from dataclasses import dataclass
+
+__all__ = ["BenchProtocol", "Letter"]
+
+
+@dataclass(frozen=True)
+class Letter:
+    """One request.
+
+    Attributes:
+        letter: the byte on the wire, one ASCII character.
+        name: unique within the protocol.
+        meaning: one phrase for a reader.
+        length: bytes of the answer.
+        answer: the answer when it is always the same, else None.
+    """
+
+    letter: str
+    name: str
+    meaning: str
+    length: int
+    answer: bytes | None = None
+
+    def __post_init__(self) -> None:
+        """Check the declaration; raises ValueError."""
+        if len(self.letter) != 1 or not self.letter.isascii():
+            raise ValueError(f"letter {self.name}: {self.letter!r} is not one ASCII character")
+        if self.answer is not None and len(self.answer) != self.length:
+            raise ValueError(
+                f"letter {self.name}: its answer has {len(self.answer)} bytes, not {self.length}"
+            )
+
+    @property
+    def request(self) -> bytes:
+        """The byte to send."""
+        return self.letter.encode("ascii")
+
+
+@dataclass(frozen=True)
+class BenchProtocol:
+    """All letters of a port.
+
+    Attributes:
+        baud: default baud rate, 8N1.
+        letters: in the order of a listing.
+    """
+
+    baud: int
+    letters: tuple[Letter, ...]
+
+    def __post_init__(self) -> None:
+        """Check the declaration; raises ValueError."""
+        for index, letter in enumerate(self.letters):
+            for other in self.letters[:index]:
+                if letter.letter == other.letter or letter.name == other.name:
+                    raise ValueError(
+                        f"letters {other.name} ({other.letter!r}) and {letter.name} "
+                        f"({letter.letter!r}) must differ in both"
+                    )
+
+    def find(self, byte: int) -> Letter | None:
+        """The letter that ``byte`` is, or None."""
+        for letter in self.letters:
+            if letter.request[0] == byte:
+                return letter
+        return None
+
+    def __getitem__(self, name: str) -> Letter:
+        """The letter ``name``; ValueError when there is none."""
+        for letter in self.letters:
+            if letter.name == name:
+                return letter
+        known = ", ".join(letter.name for letter in self.letters)
+        raise ValueError(f"no letter {name!r}; known: {known}")
