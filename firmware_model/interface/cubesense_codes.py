@@ -1,0 +1,210 @@
+"""Numbers with names in CubeSense's interface, the picture's geometry, and values of two bytes.
+
+CubeSpace family of nodes with two cameras, interface generation 2; geometry and scales from the
+CubeSense thesis, sections 2.3 to 5.2 and 6.1. What the public material leaves open is ours and is
+marked so.
+"""
+
+import math
+from enum import IntEnum
+from functools import reduce
+from operator import xor
+
+__all__ = [
+    "COLUMNS",
+    "EMPTY_FRAME",
+    "FRAME_BYTES",
+    "IMAGE_BYTES",
+    "MASK_AREAS",
+    "PIXELS_PER_DEGREE",
+    "ROWS",
+    "Camera",
+    "CaptureResult",
+    "DetectResult",
+    "ImageLocation",
+    "ImageSize",
+    "Measurement",
+    "NadirSearch",
+    "ResetTarget",
+    "Sram",
+    "SramSelection",
+    "checksum",
+    "coefficient",
+    "split_coefficient",
+]
+
+COLUMNS = 640
+ROWS = 480
+
+#: Bytes of a picture, row after row.
+IMAGE_BYTES = COLUMNS * ROWS
+
+#: Bytes of one frame of a download.
+FRAME_BYTES = 128
+
+#: Frame number of telemetry ImageFrameInfo while no frame is ready; ours.
+EMPTY_FRAME = 0xFFFF
+
+#: Areas of a camera's mask.
+MASK_AREAS = 5
+
+#: Undistorted pixels for one degree of field angle.
+PIXELS_PER_DEGREE = 2.9
+
+
+class Camera(IntEnum):
+    """Camera; the tables' camera 1 is number 0, camera 2 is number 1."""
+
+    SUN = 0
+    NADIR = 1
+
+
+class Sram(IntEnum):
+    """Picture memory; a camera's own one has the camera's number."""
+
+    SRAM1 = 0
+    SRAM2 = 1
+
+
+class SramSelection(IntEnum):
+    """Which memories' over-current flags are cleared."""
+
+    SRAM1 = 0
+    SRAM2 = 1
+    BOTH = 2
+
+
+class ResetTarget(IntEnum):
+    """What telecommand Reset restarts."""
+
+    COMMUNICATION = 1
+    CAMERAS = 2
+    MCU = 3
+
+
+class ImageLocation(IntEnum):
+    """Half of a memory; a 512 kB memory holds one picture, so only TOP is accepted."""
+
+    TOP = 0
+    BOTTOM = 1
+
+
+class CaptureResult(IntEnum):
+    """What became of the latest capture of a camera."""
+
+    START_UP = 0
+    PENDING = 1
+    STORED_OWN_SRAM = 2
+    STORED_OTHER_SRAM = 3
+    CAMERA_TIMEOUT = 4
+    SRAM_OVER_CURRENT = 5
+
+    @property
+    def stored(self) -> bool:
+        """Whether the picture is in a memory."""
+        return self in (CaptureResult.STORED_OWN_SRAM, CaptureResult.STORED_OTHER_SRAM)
+
+
+class DetectResult(IntEnum):
+    """What became of the latest detection of a camera."""
+
+    START_UP = 0
+    NONE_SCHEDULED = 1
+    PENDING = 2
+    TOO_MANY_EDGES = 3
+    TOO_FEW_EDGES = 4
+    BAD_FIT = 5
+    SUN_NOT_FOUND = 6
+    SUCCESS = 7
+
+
+class Measurement(IntEnum):
+    """Camera and memory in one number, for the register protocol; ours."""
+
+    SUN_SRAM1 = 0
+    SUN_SRAM2 = 1
+    NADIR_SRAM1 = 2
+    NADIR_SRAM2 = 3
+
+    @property
+    def camera(self) -> Camera:
+        """Camera that takes the picture."""
+        return Camera(self >> 1)
+
+    @property
+    def sram(self) -> Sram:
+        """Memory that stores it."""
+        return Sram(self & 1)
+
+
+class NadirSearch(IntEnum):
+    """How the nadir camera's edges are looked for (CubeSense thesis, 6.5.1 and 9.2.2); ours."""
+
+    LINES = 0
+    AROUND_SAMPLES = 1
+
+
+class ImageSize(IntEnum):
+    """Side of a downloaded square; the square of 1024 holds the picture in its middle.
+
+    Where the picture lies, and that a smaller square takes every n-th pixel of every n-th row from
+    the first on, is ours.
+    """
+
+    SIDE_1024 = 0
+    SIDE_512 = 1
+    SIDE_256 = 2
+    SIDE_128 = 3
+    SIDE_64 = 4
+
+    @property
+    def step(self) -> int:
+        """Every step-th pixel of every step-th row of the large square is sent."""
+        return 1 << self
+
+    @property
+    def side(self) -> int:
+        """Columns and rows."""
+        return 1024 // self.step
+
+    @property
+    def frames(self) -> int:
+        """Frames of a download."""
+        return self.side * self.side // FRAME_BYTES
+
+    @property
+    def left(self) -> int:
+        """Column of the square where the picture begins."""
+        return (1024 - COLUMNS) // 2 // self.step
+
+    @property
+    def top(self) -> int:
+        """Row of the square where the picture begins."""
+        return (1024 - ROWS) // 2 // self.step
+
+
+def checksum(frame: bytes) -> int:
+    """Checksum of a downloaded frame: the exclusive or of its bytes; the algorithm is ours."""
+    return reduce(xor, frame, 0)
+
+
+def coefficient(mantissa: int, exponent: int) -> float:
+    """Value of a distortion coefficient: mantissa (i16) / 10^exponent (0 to 255); ours."""
+    return float(mantissa) / 10.0**exponent
+
+
+def split_coefficient(value: float) -> tuple[int, int]:
+    """Mantissa and exponent that carry ``value`` best, to 1.6e-4 of it or better.
+
+    Raises ValueError for a value beyond the mantissa's range (32767) and for not-a-number.
+    """
+    if not abs(value) <= 32767:
+        raise ValueError(f"a distortion coefficient is within +-32767, not {value}")
+    if value == 0:
+        return 0, 0
+    exponent = min(max(4 - math.floor(math.log10(abs(value))), 0), 255)
+    mantissa = round(value * 10.0**exponent)
+    if abs(mantissa) > 32767:
+        exponent -= 1
+        mantissa = round(value * 10.0**exponent)
+    return mantissa, exponent
