@@ -1,0 +1,1 @@
+"""CubeSense's firmware program for the PIC18F45K20."""
