@@ -18,8 +18,7 @@ Only the undefined first frame of the camera differs, in proportion to its expos
 ``exposure_ms``, the exposure that the picture was taken with, it scales with any exposure.
 """
 
-import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +30,16 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.camera.optics import Distortion, Optics
 from cubestack.emulator.sky.attitude import propagate, quaternion_from_pointing, unit_quaternion
 from cubestack.emulator.sky.picture import SceneError, load_picture
+from cubestack.emulator.sky.scene_file import (
+    Readers,
+    flag,
+    load_toml,
+    number,
+    read_table,
+    several,
+    text,
+    whole,
+)
 from cubestack.emulator.virtual_time import PS_PER_S
 
 __all__ = ["PictureScene", "Pose", "Scene", "SceneError", "SkyScene", "load_scene"]
@@ -183,12 +192,7 @@ Scene = SkyScene | PictureScene
 
 def load_scene(path: Path) -> Scene:
     """The scene that a TOML file describes; SceneError names the key that is wrong."""
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"{path} can not be read: {error.strerror or error}") from None
-    except ValueError as error:
-        raise SceneError(f"{path} is no TOML file: {error}") from None
+    table = load_toml(path)
     try:
         kind = table.pop("kind", None)
         if kind == "sky":
@@ -200,43 +204,10 @@ def load_scene(path: Path) -> Scene:
         raise SceneError(f"{path}: {error}") from None
 
 
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SceneError(f"must be a number, not {value!r}")
-    return float(value)
-
-
-def _whole(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise SceneError(f"must be a whole number, not {value!r}")
-    return value
-
-
-def _flag(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise SceneError(f"must be true or false, not {value!r}")
-    return value
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise SceneError(f"must be text, not {value!r}")
-    return value
-
-
-def _several(count: int, of: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]:
-    def read(value: Any) -> tuple[Any, ...]:
-        if not isinstance(value, list) or len(value) != count:
-            raise SceneError(f"must be a list of {count} numbers, not {value!r}")
-        return tuple(of(item) for item in value)
-
-    return read
-
-
 def _optics(value: Any) -> Optics:
     if not isinstance(value, dict):
         raise SceneError(f"must be a table, not {value!r}")
-    return Optics(**_read(value, _OPTICS))
+    return Optics(**read_table(value, _OPTICS))
 
 
 def _distortion(value: Any) -> Distortion:
@@ -246,60 +217,43 @@ def _distortion(value: Any) -> Distortion:
         raise SceneError(f"must be one of {[d.value for d in Distortion]}, not {value!r}") from None
 
 
-Readers = dict[str, Callable[[Any], Any]]
-
 _OPTICS: Readers = {
-    f.name: _distortion if f.name == "distortion" else _number for f in fields(Optics)
+    f.name: _distortion if f.name == "distortion" else number for f in fields(Optics)
 }
 _POSE: Readers = {
-    "ra_deg": _number,
-    "dec_deg": _number,
-    "roll_deg": _number,
-    "quaternion": _several(4, _number),
-    "rate_deg_s": _several(3, _number),
+    "ra_deg": number,
+    "dec_deg": number,
+    "roll_deg": number,
+    "quaternion": several(4, number),
+    "rate_deg_s": several(3, number),
 }
 _SKY: Readers = _POSE | {
     "poses": lambda value: value,
-    "epoch": _number,
-    "mag_limit": _number,
-    "false_stars": _whole,
-    "false_star_mag": _several(2, _number),
-    "noise": _flag,
-    "seed": _whole,
-    "temperature_c": _number,
-    "hot_pixels": _whole,
+    "epoch": number,
+    "mag_limit": number,
+    "false_stars": whole,
+    "false_star_mag": several(2, number),
+    "noise": flag,
+    "seed": whole,
+    "temperature_c": number,
+    "hot_pixels": whole,
     "optics": _optics,
 }
 _PICTURE: Readers = {
-    "file": _text,
-    "crop": _several(2, _whole),
-    "exposure_ms": _number,
-    "quaternion": _several(4, _number),
-    "temperature_c": _number,
+    "file": text,
+    "crop": several(2, whole),
+    "exposure_ms": number,
+    "quaternion": several(4, number),
+    "temperature_c": number,
 }
 
 
-def _read(table: Mapping[str, Any], readers: Readers) -> dict[str, Any]:
-    """Checked values of ``table``; SceneError for keys and values that ``readers`` do not take."""
-    values = {}
-    for key, value in table.items():
-        if key not in readers:
-            raise SceneError(f"unknown key {key!r}; allowed are {', '.join(readers)}")
-        try:
-            values[key] = readers[key](value)
-        except ValueError as error:
-            raise SceneError(
-                f"{key}: {error}" if isinstance(value, dict) else f"{key} {error}"
-            ) from None
-    return values
-
-
 def _sky(table: Mapping[str, Any]) -> SkyScene:
-    values = _read(table, _SKY)
+    values = read_table(table, _SKY)
     later = values.pop("poses", [])
     if not isinstance(later, list) or not all(isinstance(pose, dict) for pose in later):
         raise SceneError("poses must be tables, each under [[poses]]")
-    poses = [_pose(_read(pose, _POSE | {"start_s": _number})) for pose in later]
+    poses = [_pose(read_table(pose, _POSE | {"start_s": number})) for pose in later]
     first = _pose({key: values.pop(key) for key in _POSE if key in values})
     return SkyScene(first.quaternion, first.rate_deg_s, tuple(poses), **values)
 
@@ -317,7 +271,7 @@ def _pose(values: dict[str, Any]) -> Pose:
 
 
 def _picture(table: Mapping[str, Any], folder: Path) -> PictureScene:
-    values = _read(table, _PICTURE)
+    values = read_table(table, _PICTURE)
     if "file" not in values:
         raise SceneError("a picture needs the key file")
     return PictureScene(folder / values.pop("file"), **values)
