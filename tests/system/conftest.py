@@ -1,0 +1,116 @@
+"""What the tests of the whole stack share: emulated boards, the command, and served ports.
+
+Everything runs on the compiled FPGA, which is built once and cached; without a C++ compiler these
+tests are skipped, as full-size pictures take minutes in the reference simulator.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.host.cli.main import main
+from cubestack.host.cli.session import Session, open_session
+
+ROOT = Path(__file__).parents[2]
+COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
+START_TIMEOUT_S = 120
+
+Frames = list[dict[str, Any]]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiler() -> None:
+    if find_compiler() is None:
+        pytest.skip("no C++ compiler: the whole stack is tested on the compiled FPGA")
+
+
+@pytest.fixture
+def root() -> Path:
+    """The repository."""
+    return ROOT
+
+
+@pytest.fixture
+def photographs() -> Path:
+    """Folder with photographs of the sky and their truth, which are no part of the project."""
+    folder = ROOT.parent / "shared" / "data" / "sky"
+    if not (folder / "truth.json").is_file():
+        pytest.skip(f"no photographs of the sky in {folder}")
+    return folder
+
+
+@pytest.fixture
+def measure(capsys: pytest.CaptureFixture[str]) -> Callable[..., Frames]:
+    """`cubestack measure cubestar --json` with more arguments; the frames that it prints."""
+
+    def run(*arguments: object) -> Frames:
+        capsys.readouterr()
+        code = main(["measure", "cubestar", "--json", *map(str, arguments)])
+        output = capsys.readouterr()
+        assert (code, output.err) == (0, "")
+        return [json.loads(line) for line in output.out.splitlines()]
+
+    return run
+
+
+@pytest.fixture
+def session() -> Callable[..., AbstractContextManager[Session]]:
+    """Opens a board that looks at a scene, with a client on its serial line."""
+    return open_session
+
+
+@pytest.fixture
+def emulate(tmp_path: Path) -> Callable[..., AbstractContextManager["Served"]]:
+    """Runs `cubestack emulate cubestar` with more arguments as a process of its own."""
+
+    @contextmanager
+    def run(*arguments: object, folder: Path = tmp_path) -> Iterator[Served]:
+        served = Served([*COMMAND, "emulate", "cubestar", *map(str, arguments)], folder)
+        try:
+            yield served
+        finally:
+            served.end()
+
+    return run
+
+
+class Served:
+    """An emulator process that serves.
+
+    Attributes:
+        process: the process.
+        port: what it says that it serves on.
+    """
+
+    def __init__(self, command: list[str], folder: Path) -> None:
+        self.process = subprocess.Popen(
+            command,
+            cwd=folder,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"COLUMNS": "200"},  # its message on one line
+        )
+        assert self.process.stderr is not None
+        line = self.process.stderr.readline()
+        assert " serves on " in line, line
+        self.port = line.split(" serves on ")[1].split()[0]
+
+    def end(self) -> int:
+        """Terminate it if it still runs; its exit code."""
+        self.process.terminate()
+        self.process.communicate(timeout=START_TIMEOUT_S)
+        return self.process.returncode
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(2013)

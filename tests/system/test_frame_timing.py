@@ -1,0 +1,79 @@
+"""Frame rate and discard delay, set by telecommand and seen in what comes back.
+
+CubeStar thesis, sections 5.3.6 and appendix D (table D.2).
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cubestack.emulator.sky.scene import PictureScene, SkyScene
+
+ROWS = 512
+LINE_MS = 1322 / 10_000.0  # clocks a line at 10 MHz
+READ_OUT_MS = ROWS * LINE_MS
+
+
+def enable_to_ack_ms(cubestar: Any, delay_ms: int) -> float:
+    """From enabling the sensor to ACK, as telemetry tells it."""
+    cubestar.client.command("SetDiscardDelay", Delay=delay_ms)
+    cubestar.capture()
+    phases = cubestar.phase_times()
+    return float(phases["discard"] + phases["capture"])
+
+
+@pytest.mark.parametrize(
+    ("register", "published_fps"),
+    [(30, 11.110), (9, 3.333), (8, 2.966), (7, 2.593), (6, 2.224)],
+)
+def test_frame_rate_register(session: Any, register: int, published_fps: float) -> None:
+    with session(SkyScene.pointing(0, 0)) as opened:
+        opened.cubestar.client.command("SetFrameRate", FrameRate=register)
+        period_ms = 1000 / published_fps
+        first = enable_to_ack_ms(opened.cubestar, 70)
+        # Enabled just after that frame began: it is dropped, and the next one is stored.
+        second = enable_to_ack_ms(opened.cubestar, round(period_ms) + 5)
+    assert second - first == pytest.approx(period_ms, rel=2e-3)
+    assert first == pytest.approx(period_ms + READ_OUT_MS, abs=2)  # line-rounded, and set-up
+
+
+@pytest.fixture
+def striped(tmp_path: Path) -> PictureScene:
+    """Row r of this picture has the grey value 20 + r // 4, and a light that scales."""
+    rows = np.repeat(20 + np.arange(ROWS, dtype=np.uint8) // 4, 1024).reshape(ROWS, 1024)
+    Image.fromarray(rows).save(tmp_path / "striped.png")
+    return PictureScene(tmp_path / "striped.png", exposure_ms=385.6)
+
+
+def stored_rows(session: Any, scene: PictureScene, delay_ms: int) -> Any:
+    """One column of the picture that a capture with this discard delay stores, from telemetry."""
+    with session(scene) as opened:
+        opened.cubestar.client.command("SetDiscardDelay", Delay=delay_ms)
+        opened.cubestar.capture()
+        return opened.cubestar.stream_image()[:, 500].astype(float)
+
+
+@pytest.mark.parametrize("delay_ms", [10, 66])
+def test_too_short_a_delay_splits_the_picture(
+    session: Any, striped: PictureScene, delay_ms: int
+) -> None:
+    rows = stored_rows(session, striped, delay_ms)
+    # The rows of the undefined frame that were still to come, then the first of the good one.
+    rest = ROWS - 1 - int(delay_ms / LINE_MS)
+    seams = [at for at in range(rest - 2, rest + 2) if abs(rows[at] - rows[at - 1]) > 5]
+    assert len(seams) == 1
+    seam = seams[0]
+    light = striped.pixels[:, 500].astype(float)
+    upper, lower = light[ROWS - seam :], light[: ROWS - seam]
+    assert np.abs(rows[seam:] - lower).max() <= 1
+    factor = rows[:seam].sum() / upper.sum()
+    assert abs(factor - 1) > 0.02  # another exposure
+    assert np.abs(rows[:seam] - factor * upper).max() <= 2
+
+
+def test_the_published_delay_does_not(session: Any, striped: PictureScene) -> None:
+    rows = stored_rows(session, striped, 70)
+    assert np.abs(rows - striped.pixels[:, 500]).max() <= 1
