@@ -1,0 +1,201 @@
+"""CubeSense's FPGAs as the microcontroller sees them: commands, read-out order, Sun coordinates.
+
+CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), section 6.5.1 and figure
+6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+__all__ = [
+    "COMMANDS",
+    "FULL_SIZE",
+    "SUN_NOT_FOUND",
+    "SUN_RUN",
+    "SUN_THRESHOLD",
+    "Action",
+    "Actions",
+    "Command",
+    "ReadOut",
+    "actions",
+    "link_shows_enables",
+]
+
+
+class Action(Enum):
+    """What one of the two FPGAs does. "Other" is the other FPGA, its camera or its sensor."""
+
+    STANDBY = "standby"
+    STORE = "own camera's picture to own memory"
+    READ = "picture in own memory to the microcontroller"
+    EDGE = "edge data in own memory to the microcontroller"
+    SEND_PICTURE = "own camera's picture to the other FPGA"
+    STORE_OTHER = "other camera's picture to own memory"
+    SEND_EDGE = "other sensor's edge data in own memory to the other FPGA"
+    PASS_EDGE = "edge data from the other FPGA to the microcontroller"
+
+
+class Actions(NamedTuple):
+    """What both FPGAs do."""
+
+    sun: Action
+    nadir: Action
+
+
+@dataclass(frozen=True)
+class Command:
+    """One row of the command table: levels of the control lines, None for either level.
+
+    The two enables are low active.
+    """
+
+    shift: int | None
+    edge: int | None
+    rnw: int | None
+    sunen: int
+    naden: int
+    actions: Actions
+
+    def fits(self, shift: int, edge: int, rnw: int, sunen: int, naden: int) -> bool:
+        """Whether these levels are this row's."""
+        row = (self.shift, self.edge, self.rnw, self.sunen, self.naden)
+        levels = (shift, edge, rnw, sunen, naden)
+        return all(wanted in (None, level) for wanted, level in zip(row, levels, strict=True))
+
+
+_IDLE = Action.STANDBY
+
+#: Table 6.4. The last row is ours: the table leaves it open, table 7.1 has both cameras imaging.
+COMMANDS = (
+    Command(None, None, None, 1, 1, Actions(_IDLE, _IDLE)),
+    Command(0, 0, 0, 0, 1, Actions(Action.STORE, _IDLE)),
+    Command(0, 0, 0, 1, 0, Actions(_IDLE, Action.STORE)),
+    Command(0, 0, 1, 0, 1, Actions(Action.READ, _IDLE)),
+    Command(0, 0, 1, 1, 0, Actions(_IDLE, Action.READ)),
+    Command(0, 1, 1, 0, 1, Actions(Action.EDGE, _IDLE)),
+    Command(0, 1, 1, 1, 0, Actions(_IDLE, Action.EDGE)),
+    Command(1, 0, 0, 0, 0, Actions(Action.SEND_PICTURE, Action.STORE_OTHER)),
+    Command(1, 0, 1, 0, 0, Actions(Action.STORE_OTHER, Action.SEND_PICTURE)),
+    Command(1, 1, 0, 0, 0, Actions(Action.PASS_EDGE, Action.SEND_EDGE)),
+    Command(1, 1, 1, 0, 0, Actions(Action.SEND_EDGE, Action.PASS_EDGE)),
+    Command(0, 0, 0, 0, 0, Actions(Action.STORE, Action.STORE)),
+)
+
+
+def actions(shift: int, edge: int, rnw: int, sunen: int, naden: int) -> Actions:
+    """What both FPGAs do at these levels; an unlisted row is standby for both."""
+    for command in COMMANDS:
+        if command.fits(shift, edge, rnw, sunen, naden):
+            return command.actions
+    return Actions(_IDLE, _IDLE)
+
+
+def link_shows_enables(shift: int, edge: int) -> bool:
+    """Whether each FPGA can see the other's enable at these levels.
+
+    It can unless a picture crosses the link, which takes both control lines for its clock and its
+    HREF. An FPGA that is enabled alone then acts as if the other were enabled too.
+    """
+    return not (shift and not edge)
+
+
+#: Lowest value of a bright pixel; figure 6.15.
+SUN_THRESHOLD = 200
+
+#: So many bright pixels in one row make the first of them the first Sun pixel; figure 6.15.
+SUN_RUN = 3
+
+#: x and y, read as the first Sun pixel's, of a picture that has none; ours.
+SUN_NOT_FOUND = (0x3FF, 0x1FF)
+
+
+@dataclass(frozen=True)
+class ReadOut:
+    """Size of the picture and what the edge read-outs take of it, in pixels from (0, 0).
+
+    Nadir scan: ``scan_clocks`` data clocks. Two of them present no pixel of a scanned line: the
+    first one, and the one between the last row and the first column. Sun window: four bytes (x low,
+    x high, y low, y high), then the window row by row. Past the end the scan goes on with its
+    first column, and the window with its first pixel.
+
+    Attributes:
+        columns, rows: size of the picture.
+        frame_gap: a frame starts with the first line after more clocks than this with HREF low.
+        scan_step: distance of two scanned lines, a power of two.
+        first_row, first_column: where the scanned rows and columns start; below ``scan_step``.
+        window: side of the Sun window.
+        window_left, window_above: the window's origin is so far left of and above the first Sun
+            pixel, unless the picture's border is nearer.
+    """
+
+    columns: int = 640
+    rows: int = 480
+    frame_gap: int = 858
+    scan_step: int = 64
+    first_row: int = 15
+    first_column: int = 63
+    window: int = 15
+    window_left: int = 5
+    window_above: int = 3
+
+    def __post_init__(self) -> None:
+        """Check that the read-outs fit the picture; ValueError when one does not."""
+        if self.scan_step & (self.scan_step - 1):
+            raise ValueError(f"scan_step must be a power of two, not {self.scan_step}")
+        if not max(self.first_row, self.first_column) < self.scan_step:
+            raise ValueError(
+                f"first_row and first_column must be below scan_step {self.scan_step}, "
+                f"not {self.first_row} and {self.first_column}"
+            )
+        if self.first_row >= self.rows or self.first_column >= self.columns:
+            raise ValueError("the first scanned row and column must be inside of the picture")
+        if self.window > min(self.columns, self.rows):
+            raise ValueError(
+                f"a window of {self.window} does not fit into {self.columns} x {self.rows} pixels"
+            )
+
+    @property
+    def pixels(self) -> int:
+        """Bytes of a picture."""
+        return self.columns * self.rows
+
+    @property
+    def scan_rows(self) -> range:
+        """Rows that the nadir scan presents from the first to the last column."""
+        return range(self.first_row, self.rows, self.scan_step)
+
+    @property
+    def scan_columns(self) -> range:
+        """Columns that it presents next, from the first to the last row."""
+        return range(self.first_column, self.columns, self.scan_step)
+
+    @property
+    def scan_clocks(self) -> int:
+        """Data clocks of one nadir scan: 1 + 8 x 640 + 1 + 10 x 480 at full size."""
+        horizontal = len(self.scan_rows) * self.columns
+        return 1 + horizontal + 1 + len(self.scan_columns) * self.rows
+
+    def scan(self) -> Iterator[tuple[int, int] | None]:
+        """Pixel (x, y) that each clock of the nadir scan presents, None for the two presets."""
+        yield None
+        for y in self.scan_rows:
+            yield from ((x, y) for x in range(self.columns))
+        yield None
+        for x in self.scan_columns:
+            yield from ((x, y) for y in range(self.rows))
+
+    def window_origin(self, x: int, y: int) -> tuple[int, int]:
+        """First pixel (x, y) of the window around first Sun pixel (x, y).
+
+        Clamped, so that the whole window is inside of the picture.
+        """
+        return (
+            min(max(x - self.window_left, 0), self.columns - self.window),
+            min(max(y - self.window_above, 0), self.rows - self.window),
+        )
+
+
+#: The OV7620's picture and the published read-outs.
+FULL_SIZE = ReadOut()
