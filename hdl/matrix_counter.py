@@ -61,14 +61,13 @@ class MatrixCounter(Component):
             self.last_row.eq(row == self._rows - 1),
             self.address.eq(Cat(column, row)),
         ]
-        with m.If(self.clear):
-            m.d[self._domain] += [column.eq(0), row.eq(0)]
-        with m.Elif(self.next_row | (self.next_column & self.last_column)):
+        row_over = self.next_row | (self.next_column & self.last_column)
+        with m.If(self.clear | row_over):
             m.d[self._domain] += column.eq(0)
-            with m.If(self.last_row):
-                m.d[self._domain] += row.eq(0)
-            with m.Else():
-                m.d[self._domain] += row.eq(row + 1)
         with m.Elif(self.next_column):
             m.d[self._domain] += column.eq(column + 1)
+        with m.If(self.clear | (row_over & self.last_row)):
+            m.d[self._domain] += row.eq(0)
+        with m.Elif(row_over):
+            m.d[self._domain] += row.eq(row + 1)
         return m
