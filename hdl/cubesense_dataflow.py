@@ -1,0 +1,91 @@
+"""Dataflow control: what one of CubeSense's FPGAs does at the levels of the control lines.
+
+CubeSense thesis, section 6.4.2 and table 6.4. The rows are those of the command table in
+:mod:`cubestack.firmware_model.interface.cubesense_fpga`; every other one is standby.
+"""
+
+from typing import Literal
+
+from amaranth.hdl import Cat, Module, Value
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.firmware_model.interface.cubesense_fpga import (
+    COMMANDS,
+    Action,
+    Command,
+    link_shows_enables,
+)
+
+__all__ = ["DataflowControl", "Side"]
+
+Side = Literal["sun", "nadir"]
+
+
+class DataflowControl(Component):
+    """Decodes the control lines; no clock.
+
+    Ports:
+        en_n: own enable, low active.
+        other_en_n: the other FPGA's, as the link shows it; not looked at when the link can not.
+        rnw, edge, shift: the other control lines.
+        store, read, edge_data, send_picture, store_other, send_edge, pass_edge: one is high, the
+            one with the name of the action to be taken (``edge_data`` is EDGE); none in standby.
+    """
+
+    def __init__(self, side: Side) -> None:
+        """Make the control of the sun sensor's or the nadir sensor's FPGA."""
+        self._side = side
+        super().__init__(
+            {
+                "en_n": In(1),
+                "other_en_n": In(1),
+                "rnw": In(1),
+                "edge": In(1),
+                "shift": In(1),
+                "store": Out(1),
+                "read": Out(1),
+                "edge_data": Out(1),
+                "send_picture": Out(1),
+                "store_other": Out(1),
+                "send_edge": Out(1),
+                "pass_edge": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build one condition for each row that this FPGA acts on."""
+        m = Module()
+        outputs = {
+            Action.STORE: self.store,
+            Action.READ: self.read,
+            Action.EDGE: self.edge_data,
+            Action.SEND_PICTURE: self.send_picture,
+            Action.STORE_OTHER: self.store_other,
+            Action.SEND_EDGE: self.send_edge,
+            Action.PASS_EDGE: self.pass_edge,
+        }
+        for command in COMMANDS:
+            action = getattr(command.actions, self._side)
+            if action is not Action.STANDBY:
+                with m.If(self._fits(command)):
+                    m.d.comb += outputs[action].eq(1)
+        return m
+
+    def _fits(self, command: Command) -> Value:
+        """Whether the lines are at the levels of a row.
+
+        Where the link can not show the other enable, it is no input at all: there the line itself
+        depends on the result.
+        """
+        own, other = command.sunen, command.naden
+        if self._side == "nadir":
+            own, other = other, own
+        levels = [
+            (self.shift, command.shift),
+            (self.edge, command.edge),
+            (self.rnw, command.rnw),
+            (self.en_n, own),
+        ]
+        if link_shows_enables(bool(command.shift), bool(command.edge)):
+            levels.append((self.other_en_n, other))
+        return Cat(line == level for line, level in levels if level is not None).all()

@@ -1,0 +1,75 @@
+"""SRAM to microcontroller: the whole picture, the nadir scan or the Sun window, byte by byte.
+
+CubeSense thesis, section 6.4.2 (microcontroller, edge and address control) and figures 6.7 and
+6.16. The microcontroller makes the clock, so it alone sets the rate, and reading works when no
+camera gives a clock.
+"""
+
+from amaranth.hdl import ClockDomain, ClockSignal, Module, Mux, ResetSignal
+from amaranth.lib.wiring import Component, In, Out
+from amaranth.utils import ceil_log2
+
+from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.nadir_scan import NadirScan
+from cubestack.hdl.sun_window import SunWindow
+
+__all__ = ["CubeSenseReader"]
+
+
+class CubeSenseReader(Component):
+    """Presents the next byte at each rising edge of ``clk``, in one of three orders.
+
+    At most one of the three requests is high. Each is the other end of its order's reset: while it
+    is low the order stands at its first byte, and while all are low ``address`` and ``data`` are 0.
+
+    Ports:
+        clk: data clock.
+        picture: row by row without end; past the last pixel comes the first one.
+        scan: the nadir scan.
+        window: the Sun window.
+        sun_x, sun_y: first Sun pixel, for the window.
+        address: SRAM address of the byte that the next edge presents.
+        memory: what the SRAM offers at that address.
+        data: the byte presented.
+    """
+
+    def __init__(self, read_out: ReadOut) -> None:
+        """Make a reader of ``read_out``."""
+        self._read_out = read_out
+        super().__init__(
+            {
+                "clk": In(1),
+                "picture": In(1),
+                "scan": In(1),
+                "window": In(1),
+                "sun_x": In(ceil_log2(read_out.columns)),
+                "sun_y": In(ceil_log2(read_out.rows)),
+                "address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "memory": In(8),
+                "data": Out(8),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the three orders, each with a reset of its own, and the output register."""
+        m = Module()
+        size = self._read_out
+        requests = {"picture": self.picture, "scan": self.scan, "window": self.window}
+        domains = {**requests, "output": self.picture | self.scan | self.window}
+        for name, wanted in domains.items():
+            m.domains += ClockDomain(name, async_reset=True, local=True)
+            m.d.comb += [ClockSignal(name).eq(self.clk), ResetSignal(name).eq(~wanted)]
+
+        m.submodules.picture = picture = MatrixCounter(size.columns, size.rows, domain="picture")
+        m.submodules.scan = scan = NadirScan(size, domain="scan")
+        m.submodules.window = window = SunWindow(size, domain="window")
+        m.d.comb += [
+            picture.next_column.eq(1),
+            window.x.eq(self.sun_x),
+            window.y.eq(self.sun_y),
+            # In reset the address of each is 0.
+            self.address.eq(picture.address | scan.address | window.address),
+        ]
+        m.d.output += self.data.eq(Mux(self.window & window.coordinate, window.byte, self.memory))
+        return m

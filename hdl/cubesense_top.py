@@ -1,0 +1,192 @@
+"""One of CubeSense's two FPGAs: an AGLN030 between camera, SRAM, microcontroller and its twin.
+
+CubeSense thesis, tables 3.4, 6.3 and 6.4, sections 6.4 to 6.6 and figure 6.5.
+
+How each asynchronous input is brought in:
+
+- Y and HREF change with PCLK and are used in its domain only; what comes over the link, in the
+  domain of the clock that comes with it. Each stores by a writer of its own, so no clock is ever
+  switched, and a camera without a clock stops nothing but its own picture.
+- The control lines come from the microcontroller. For both pixel clocks, "not storing" is the
+  domain's reset: asserted at once, without a clock, released through two flip-flops. For the data
+  clock, "not reading" is reset without a synchroniser, because the same microcontroller makes
+  control lines and CLK one after the other. Picture, scan and window have one such reset each, so
+  each starts from its first byte however it was reached.
+- The other FPGA's enable comes over the link and is used like the own one.
+
+The coordinates of the first Sun pixel outlive the reset: they are written by a pixel clock while a
+Sun picture is stored and stand still whenever a data clock looks at them.
+"""
+
+from typing import NamedTuple
+
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal, Value
+from amaranth.lib.cdc import ResetSynchronizer
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
+from cubestack.hdl.cubesense_dataflow import DataflowControl, Side
+from cubestack.hdl.cubesense_reader import CubeSenseReader
+from cubestack.hdl.frame_gap import FrameGap
+from cubestack.hdl.frame_writer import FrameWriter
+from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.sun_search import SunSearch
+
+__all__ = ["PINS", "CubeSenseFpga", "FpgaPins"]
+
+
+class FpgaPins(NamedTuple):
+    """Pins of one purpose."""
+
+    number: int
+    ports: tuple[str, ...]
+    meaning: str
+
+
+#: Table 3.4: 64 pins. Ports ending in _I, _O and _OE are three sides of the same pins.
+PINS = (
+    FpgaPins(19, ("SRAM_A",), "SRAM address, row : column"),
+    FpgaPins(8, ("SRAM_D_I", "SRAM_D_O", "SRAM_D_OE"), "SRAM data"),
+    FpgaPins(1, ("SRAM_CE_N",), "SRAM chip enable, low active"),
+    FpgaPins(1, ("SRAM_OE_N",), "SRAM output enable, low active"),
+    FpgaPins(1, ("SRAM_WE_N",), "SRAM write enable, low active"),
+    FpgaPins(8, ("Y",), "pixel data from the camera"),
+    FpgaPins(1, ("HREF",), "high while a line's pixels are sent"),
+    FpgaPins(1, ("PCLK",), "pixel clock"),
+    FpgaPins(8, ("DATA_O", "DATA_OE"), "bytes to the microcontroller, on a bus for both FPGAs"),
+    FpgaPins(1, ("EN",), "own enable, low active: SUNEN or NADEN"),
+    FpgaPins(1, ("RNW",), "read, not write; with SHIFT the direction across the link"),
+    FpgaPins(1, ("CLK",), "data clock"),
+    FpgaPins(1, ("EDGE",), "edge data instead of the picture"),
+    FpgaPins(1, ("SHIFT",), "across the link"),
+    FpgaPins(1, ("ACK",), "a whole picture is stored: SUNACK or NADACK"),
+    FpgaPins(8, ("LINK_D_I", "LINK_D_O", "LINK_D_OE"), "data between the FPGAs"),
+    FpgaPins(
+        2,
+        ("LINK_C_I", "LINK_C_O", "LINK_C_OE"),
+        "bit 0: sun's enable or PCLK; bit 1: nadir's enable or HREF; pulled up",
+    ),
+)
+
+
+class CubeSenseFpga(Component):
+    """The sun sensor's or the nadir sensor's FPGA with the pins of table 3.4.
+
+    Bidirectional pins are i / o / oe triples. LINK_C_OE has one bit for each of its two lines.
+    With EN high every output is at its reset value, all drivers off, whatever the other pins do.
+    """
+
+    def __init__(self, side: Side, read_out: ReadOut = FULL_SIZE) -> None:
+        """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
+        if side not in ("sun", "nadir"):
+            raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
+        self.side = side
+        self.read_out = read_out
+        super().__init__(
+            {
+                "Y": In(8),
+                "HREF": In(1),
+                "PCLK": In(1),
+                "EN": In(1, init=1),
+                "RNW": In(1),
+                "CLK": In(1),
+                "EDGE": In(1),
+                "SHIFT": In(1),
+                "ACK": Out(1),
+                "DATA_O": Out(8),
+                "DATA_OE": Out(1),
+                "LINK_D_I": In(8),
+                "LINK_D_O": Out(8),
+                "LINK_D_OE": Out(1),
+                "LINK_C_I": In(2, init=0b11),
+                "LINK_C_O": Out(2),
+                "LINK_C_OE": Out(2),
+                "SRAM_A": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "SRAM_D_I": In(8),
+                "SRAM_D_O": Out(8),
+                "SRAM_D_OE": Out(1),
+                "SRAM_CE_N": Out(1, init=1),
+                "SRAM_OE_N": Out(1, init=1),
+                "SRAM_WE_N": Out(1, init=1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Wire the blocks to the pins."""
+        m = Module()
+        m.submodules.dataflow = mode = DataflowControl(self.side)
+        m.submodules.reader = reader = CubeSenseReader(self.read_out)
+        own_writer = self._writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y)
+        link_writer = self._writer(
+            m, "link", mode.store_other, self.LINK_C_I[0], self.LINK_C_I[1], self.LINK_D_I
+        )
+        sun_domain, sun_writer = (
+            ("pix", own_writer) if self.side == "sun" else ("link", link_writer)
+        )
+        m.submodules.search = search = SunSearch(self.read_out, domain=sun_domain)
+
+        own_line, other_line = (0, 1) if self.side == "sun" else (1, 0)
+        own_edge, other_edge = (
+            (reader.window, reader.scan) if self.side == "sun" else (reader.scan, reader.window)
+        )
+        reading = mode.read | mode.edge_data | mode.send_edge
+        storing = ~ResetSignal("pix") | ~ResetSignal("link")
+        shows_enable = ~self.EN & (self.EDGE | ~self.SHIFT)
+        m.d.comb += [
+            mode.en_n.eq(self.EN),
+            mode.other_en_n.eq(self.LINK_C_I[other_line]),
+            mode.rnw.eq(self.RNW),
+            mode.edge.eq(self.EDGE),
+            mode.shift.eq(self.SHIFT),
+            search.start.eq(~sun_writer.vsync),
+            search.store.eq(sun_writer.store),
+            search.pixel.eq(sun_writer.data),
+            search.address.eq(sun_writer.address),
+            reader.clk.eq(self.CLK),
+            reader.picture.eq(mode.read),
+            own_edge.eq(mode.edge_data),
+            other_edge.eq(mode.send_edge),
+            reader.sun_x.eq(search.x),
+            reader.sun_y.eq(search.y),
+            reader.memory.eq(self.SRAM_D_I),
+            self.ACK.eq(own_writer.ack | link_writer.ack),
+            self.DATA_O.eq(reader.data | (self.LINK_D_I & mode.pass_edge.replicate(8))),
+            self.DATA_OE.eq(mode.read | mode.edge_data | mode.pass_edge),
+            self.LINK_D_O.eq(reader.data | (self.Y & mode.send_picture.replicate(8))),
+            self.LINK_D_OE.eq(mode.send_picture | mode.send_edge),
+            # An enable is shown by pulling the line low, so an FPGA without power shows none.
+            self.LINK_C_O.eq(Cat(self.PCLK, self.HREF) & mode.send_picture.replicate(2)),
+            self.LINK_C_OE[own_line].eq(mode.send_picture | shows_enable),
+            self.LINK_C_OE[other_line].eq(mode.send_picture),
+            # At most one of the three is out of reset, and in reset an address is 0.
+            self.SRAM_A.eq(own_writer.address | link_writer.address | reader.address),
+            self.SRAM_D_O.eq(own_writer.data | link_writer.data),
+            self.SRAM_D_OE.eq(own_writer.store | link_writer.store),
+            self.SRAM_CE_N.eq(~(reading | storing)),
+            self.SRAM_OE_N.eq(~reading),
+            # The pulse ends with the clock's rising edge itself, ahead of the address that the
+            # same edge moves on.
+            self.SRAM_WE_N.eq(
+                ~((own_writer.store & ~self.PCLK) | (link_writer.store & ~self.LINK_C_I[0]))
+            ),
+        ]
+        return m
+
+    def _writer(
+        self, m: Module, domain: str, wanted: Signal, clock: Value, href: Value, pixel: Signal
+    ) -> FrameWriter:
+        """A writer in a domain of its own, which is in reset unless ``wanted``."""
+        m.domains += ClockDomain(domain, async_reset=True, local=True)
+        m.d.comb += ClockSignal(domain).eq(clock)
+        m.submodules[f"{domain}_reset"] = ResetSynchronizer(~wanted, domain=domain)
+        m.submodules[f"{domain}_gap"] = gap = FrameGap(self.read_out.frame_gap, domain=domain)
+        m.submodules[f"{domain}_writer"] = writer = FrameWriter(
+            self.read_out.columns, self.read_out.rows, domain=domain
+        )
+        m.d.comb += [
+            gap.href.eq(href),
+            writer.hsync.eq(href),
+            writer.vsync.eq(gap.vsync),
+            writer.pixel.eq(pixel),
+        ]
+        return writer
