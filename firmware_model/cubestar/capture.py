@@ -12,6 +12,7 @@ from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.hardware import (
     AwaitPin,
     Hardware,
@@ -43,11 +44,19 @@ class ImageCapture:
         sensor: the image sensor.
     """
 
-    def __init__(self, hardware: Hardware, state: State, phases: Phases, meter: Meter) -> None:
+    def __init__(
+        self,
+        hardware: Hardware,
+        state: State,
+        phases: Phases,
+        supply: SupplyMonitor,
+        meter: Meter,
+    ) -> None:
         """Use ``hardware`` as the settings in ``state`` say."""
         self._hardware = hardware
         self._state = state
         self._phases = phases
+        self._supply = supply
         self._transfer_cycles = meter.table.operations["transfer_byte"].cycles
         self.sensor = ImageSensor(state, phases)
 
@@ -60,23 +69,27 @@ class ImageCapture:
         """Capture a picture into the external RAM; False, with a flag raised, when it failed.
 
         ``meanwhile`` runs while the FPGA waits for the frame, or at once when there will be none.
+        After a failure there is no picture to process.
         """
-        self._state.task_status = TaskStatus.CAPTURING
+        state = self._state
+        state.task_status = TaskStatus.CAPTURING
         failure = yield from self._enable_sensor()
         if failure is None:
             failure = yield from self._store_frame(meanwhile)
         elif meanwhile is not None:
             yield from meanwhile
+        if failure is None:
+            yield from self._image_transfer()
+            if self._supply.cut:  # while the picture was on its way
+                failure = "ImageCaptureError"
         if failure is not None:
-            self._state.raise_flag(failure)
-            self._state.task_status = TaskStatus.CAPTURE_FAILED
+            state.raise_flag(failure)
+            state.retained.image_present = 0
+            state.task_status = TaskStatus.CAPTURE_FAILED
             return False
-        started_us: int = yield ReadTimer()
-        yield from self._image_transfer()
-        yield from self._phases.end("transfer_us", started_us)
-        self._state.retained.image_present = 1
-        self._state.retained.frame += 1
-        self._state.task_status = TaskStatus.CAPTURED
+        state.retained.image_present = 1
+        state.retained.frame += 1
+        state.task_status = TaskStatus.CAPTURED
         return True
 
     def replaced(self) -> Routine[None]:
@@ -88,8 +101,9 @@ class ImageCapture:
 
     def _enable_sensor(self) -> Routine[str | None]:
         """Start the sensor and let its first, invalid frame pass; returns a failure's flag."""
-        if not (yield from self.sensor.configure()):
-            return "ISSetupError"
+        failure = yield from self.sensor.configure()
+        if failure is not None:
+            return failure
         if not (yield from self.sensor.enable(True)):
             return "ISEnableError"
         self._phases.begin_capture()
@@ -100,11 +114,16 @@ class ImageCapture:
         return None
 
     def _store_frame(self, meanwhile: Routine[bool] | None) -> Routine[str | None]:
-        """Get a frame into the FPGA's SRAM (fpgaWriteToRam); returns a failure's flag."""
+        """Get a frame into the FPGA's SRAM (fpgaWriteToRam); returns a failure's flag.
+
+        The picture's time is that of ACK's poll: late by as much as ``meanwhile`` outlasts the
+        frame.
+        """
         started_us: int = yield ReadTimer()
         yield SetPin("BANK", self._state.settings.get("SelectImageBank", "Bank"))
         yield SetPin("RNW", 0)
         yield SetPin("ENABLE", 1)
+        self._supply.sample()
         if meanwhile is not None:
             yield from meanwhile
         stored: bool = yield AwaitPin("ACK", 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
@@ -118,8 +137,11 @@ class ImageCapture:
 
     def _image_transfer(self) -> Routine[None]:
         """Copy the frame from the FPGA's SRAM to the external RAM (imageTransfer)."""
+        started_us: int = yield ReadTimer()
         yield SetPin("RNW", 1)
         yield SetPin("ENABLE", 1)
+        self._supply.sample()
         yield StrobeRead(self._hardware.external_ram[:IMAGE_BYTES], self._transfer_cycles)
         yield SetPin("ENABLE", 0)
         yield SetPin("RNW", 0)
+        yield from self._phases.end("transfer_us", started_us)

@@ -1,4 +1,8 @@
-"""What each telecommand does, executed by the main loop one after the other."""
+"""What each telecommand does, executed by the main loop one after the other.
+
+A setting telecommand stores its parameters. Others act at once, or take time; a few end in a reset,
+in which telecommands that still wait are lost.
+"""
 
 from collections.abc import Callable
 
@@ -9,7 +13,7 @@ from cubestack.firmware_model.cubestar.capture import COLUMNS, ROWS, ImageCaptur
 from cubestack.firmware_model.cubestar.host_link import Command
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
-from cubestack.firmware_model.cubestar.state import CONFIG_PAGE, State
+from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.hardware import Hardware, Pay, ReadTimer, Routine, Sleep
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, UPLOAD_BLOCK_BYTES
@@ -21,7 +25,7 @@ from cubestack.firmware_model.interface.cubestar_codes import (
 )
 from cubestack.firmware_model.interface.frames import encode_frame
 
-__all__ = ["Commands"]
+__all__ = ["WATCHDOG_US", "Commands"]
 
 WATCHDOG_US = 2_000_000
 """Period of the watchdog; ours, the sources give none."""
@@ -29,14 +33,13 @@ WATCHDOG_US = 2_000_000
 STREAM_BACKLOG_BYTES = 512
 STREAM_PAUSE_US = 20_000
 
-Handler = Callable[[Command], Routine[int | None]]
-
 
 class Commands:
     """Executes telecommands.
 
     Attributes:
-        running: whether one is being executed.
+        handled: names of the telecommands that have an effect.
+        running: whether one is being executed, the reset that it asked for included.
         memory_test: result of the last TestSRAM.
         next_block: upload block behind the latest one.
         blocks_received: upload blocks since UploadImage.
@@ -64,104 +67,94 @@ class Commands:
         self.next_block = 0
         self.blocks_received = 0
         self.second_half = False
-        self._handlers: dict[str, Handler] = {
-            "TogglePowerSW": self._toggle_supply,
+        self._reset_cause: ResetCause | None = None
+        self._actions: dict[str, Callable[[Command], None]] = {
             "Reset": self._reset,
             "MCUReset": self._reset_processor,
             "ClearWDGResetCounter": self._clear_watchdog_count,
-            "ClearErrorFlags": self._clear_flags,
+            "ClearErrorFlags": lambda _: state.flags.clear(),
+            "ImageBlockSet": self._select_block,
+            "UploadBlock": self._upload_block,
+            "setTrackingMode": self._set_hint,
+            "ReadConfig": lambda _: state.load_config(),
+            "SaveConfig": lambda _: state.save_config(),
+            "ClearConfig": lambda _: state.erase_config(),
+            "StopLoop": self._stop_loop,
+        }
+        self._routines: dict[str, Callable[[Command], Routine[object]]] = {
+            "TogglePowerSW": self._toggle_supply,
             "WriteTo_IS_Register": self._write_paged_register,
             "ReadFrom_IS_Register": self._read_paged_register,
             "WriteCameraRegister": self._write_register,
             "SelectCameraRegister": self._read_register,
             "CaptureTestPatern": self._test_pattern,
-            "CaptureImage": self._capture_image,
+            "CaptureImage": lambda _: capture.get_image(),
             "UploadImage": self._begin_upload,
-            "UploadBlock": self._upload_block,
-            "ImageBlockSet": self._select_block,
             "StreamDownImage": self._stream_image,
-            "DetectStars": self._detect,
-            "IDStars": self._identify,
-            "SelectBestStars": self._select_best,
-            "EstimateAttitude": self._estimate,
-            "setTrackingMode": self._set_hint,
-            "ReadConfig": self._read_config,
-            "SaveConfig": self._save_config,
-            "ClearConfig": self._clear_config,
+            "DetectStars": lambda _: processing.detect(),
+            "IDStars": lambda _: processing.identify(),
+            "SelectBestStars": lambda _: processing.select_best(),
+            "EstimateAttitude": lambda _: processing.estimate(),
             "TestSRAM": self._test_memory,
             "TestWDG": self._test_watchdog,
             "CaptureAndProcess": self._capture_and_process,
-            "ProcessImage": self._process,
+            "ProcessImage": lambda _: processing.process(),
             "Trigger": self._trigger,
-            "StopLoop": self._stop_loop,
         }
+        self.handled = frozenset({*SETTING_COMMANDS, *self._actions, *self._routines})
 
-    def execute(self, command: Command) -> Routine[int | None]:
-        """Execute ``command``; returns a reset cause when the program has to end in a reset."""
+    def execute(self, command: Command) -> Routine[ResetCause | None]:
+        """Execute ``command``; returns a cause when the program has to end in a reset."""
         self.running = True
         name = command.message.name
         if name in SETTING_COMMANDS:
             self._state.settings.put(name, command.values)
-        handler = self._handlers.get(name)
-        cause = None if handler is None else (yield from handler(command))
+        if name in self._actions:
+            self._actions[name](command)
+        if name in self._routines:
+            yield from self._routines[name](command)
         yield Pay()
-        self.running = False
-        return cause
+        self.running = self._reset_cause is not None
+        return self._reset_cause
 
     # --- node ---------------------------------------------------------------------------------
 
     def _toggle_supply(self, _command: Command) -> Routine[None]:
-        if (yield from self._supply.toggle_imager()):
+        if self._supply.toggle_imager():
             yield from self._capture.sensor.power_up()
 
-    def _reset(self, _command: Command) -> Routine[int]:
+    def _reset(self, _command: Command) -> None:
+        if self._state.retained.imager_off:
+            self._supply.toggle_imager()
         self._state.forget()
-        yield Pay()
-        return ResetCause.SYSTEM_REQUEST
+        self._reset_cause = ResetCause.SYSTEM_REQUEST
 
-    def _reset_processor(self, _command: Command) -> Routine[int]:
-        self._state.retain()
-        yield Pay()
-        return ResetCause.SYSTEM_REQUEST
+    def _reset_processor(self, _command: Command) -> None:
+        self._reset_cause = ResetCause.SYSTEM_REQUEST
 
-    def _test_watchdog(self, _command: Command) -> Routine[int]:
-        self._state.retain()
+    def _test_watchdog(self, _command: Command) -> Routine[None]:
+        """Hang; interrupts are still served."""
         now_us: int = yield ReadTimer()
         yield Sleep(now_us + WATCHDOG_US, wakeable=False)
-        return ResetCause.WATCHDOG
+        self._reset_cause = ResetCause.WATCHDOG
 
-    def _clear_watchdog_count(self, _command: Command) -> Routine[None]:
+    def _clear_watchdog_count(self, _command: Command) -> None:
         self._state.retained.watchdog_resets = 0
-        yield Pay()
-
-    def _clear_flags(self, _command: Command) -> Routine[None]:
-        self._state.flags.clear()
-        yield Pay()
-
-    def _read_config(self, _command: Command) -> Routine[None]:
-        self._state.load_config()
-        yield Pay()
-
-    def _save_config(self, _command: Command) -> Routine[None]:
-        self._state.save_config()
-        yield Pay()
-
-    def _clear_config(self, _command: Command) -> Routine[None]:
-        self._hardware.flash.erase(CONFIG_PAGE)
-        self._state.settings.clear()
-        yield Pay()
 
     def _test_memory(self, _command: Command) -> Routine[None]:
-        """Write and read back a pattern and its complement; the picture is lost."""
-        memory = self._hardware.external_ram
-        passed = True
-        pattern = (np.arange(len(memory)) * 167 >> 3).astype(np.uint8)  # differs between rows
-        for pass_pattern in (pattern, ~pattern):
-            memory[:] = pass_pattern
-            passed &= bool(np.array_equal(memory, pass_pattern))
-            self._meter.charge(ebi_write=len(memory), ebi_read=len(memory), loop=2 * len(memory))
-            yield Pay()
+        """Write a pattern and read it back, then its complement; the picture is lost."""
         self._state.retained.image_present = 0
+        memory = self._hardware.external_ram
+        size = len(memory)
+        passed = True
+        pattern = (np.arange(size) * 167 >> 3).astype(np.uint8)  # differs between rows
+        for wanted in (pattern, ~pattern):
+            memory[:] = wanted
+            self._meter.charge(ebi_write=size, loop=size)
+            yield Pay()
+            passed &= bool(np.array_equal(memory, wanted))
+            self._meter.charge(ebi_read=size, loop=size)
+            yield Pay()
         self.memory_test = MemoryTest.PASSED if passed else MemoryTest.FAILED
 
     # --- image sensor -------------------------------------------------------------------------
@@ -185,16 +178,15 @@ class Commands:
 
     # --- picture ------------------------------------------------------------------------------
 
-    def _capture_image(self, _command: Command) -> Routine[None]:
-        yield from self._capture.get_image()
-
     def _test_pattern(self, command: Command) -> Routine[None]:
-        row, column = np.indices((ROWS, COLUMNS))
-        pattern = {
-            TestPattern.COLUMN_RAMP: column,
-            TestPattern.ROW_RAMP: row,
-            TestPattern.DIAGONAL_RAMP: row + column,
-        }[TestPattern(int(command.values["TestPaternType"]))]
+        row, column = np.ogrid[:ROWS, :COLUMNS]
+        match TestPattern(command.values["TestPaternType"]):
+            case TestPattern.COLUMN_RAMP:
+                pattern = column
+            case TestPattern.ROW_RAMP:
+                pattern = row
+            case TestPattern.DIAGONAL_RAMP:
+                pattern = row + column
         self._capture.image[:] = pattern.astype(np.uint8)
         self._meter.charge(ebi_write=IMAGE_BYTES, i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
         yield from self._capture.replaced()
@@ -205,20 +197,17 @@ class Commands:
         self._meter.charge(ebi_write=IMAGE_BYTES, loop=IMAGE_BYTES)
         yield from self._capture.replaced()
 
-    def _upload_block(self, command: Command) -> Routine[None]:
+    def _upload_block(self, command: Command) -> None:
         number, data = int(command.values["BlockNumber"]), bytes(command.values["Data"])
         start = number * UPLOAD_BLOCK_BYTES
-        self._hardware.external_ram[start : start + UPLOAD_BLOCK_BYTES] = np.frombuffer(
-            data, np.uint8
-        )
+        pixels = np.frombuffer(data, np.uint8)
+        self._hardware.external_ram[start : start + UPLOAD_BLOCK_BYTES] = pixels
         self._meter.charge(ebi_write=UPLOAD_BLOCK_BYTES, loop=UPLOAD_BLOCK_BYTES)
         self.next_block = number + 1
         self.blocks_received += 1
-        yield Pay()
 
-    def _select_block(self, _command: Command) -> Routine[None]:
+    def _select_block(self, _command: Command) -> None:
         self.second_half = False
-        yield Pay()
 
     def _stream_image(self, _command: Command) -> Routine[None]:
         step = UPLOAD_BLOCK_BYTES
@@ -232,45 +221,29 @@ class Commands:
 
     # --- stars --------------------------------------------------------------------------------
 
-    def _detect(self, _command: Command) -> Routine[None]:
-        yield from self._processing.detect()
-
-    def _identify(self, _command: Command) -> Routine[None]:
-        yield from self._processing.identify()
-
-    def _select_best(self, _command: Command) -> Routine[None]:
-        yield from self._processing.select_best()
-
-    def _estimate(self, _command: Command) -> Routine[None]:
-        yield from self._processing.estimate()
-
-    def _process(self, _command: Command) -> Routine[None]:
-        yield from self._processing.process()
-
     def _capture_and_process(self, _command: Command) -> Routine[None]:
         if (yield from self._capture.get_image()):
             yield from self._processing.process()
         else:
             self._processing.discard_results()
 
-    def _set_hint(self, _command: Command) -> Routine[None]:
+    def _set_hint(self, _command: Command) -> None:
         self._state.retained.hint_present = 1
         self._state.mode = MatchMode.ASSISTED
-        yield Pay()
 
     # --- loop ---------------------------------------------------------------------------------
 
     def _trigger(self, _command: Command) -> Routine[None]:
         retained = self._state.retained
-        now_us: int = yield ReadTimer()
         if retained.looping:
-            waiting = retained.iterations == 0 and now_us // 1000 < retained.loop_due_ms
-            self._state.raise_flag("TimerAlreadyRunning" if waiting else "TriggerAlreadySet")
+            self._state.raise_flag(
+                "TimerAlreadyRunning" if retained.delaying else "TriggerAlreadySet"
+            )
             return
+        now_us: int = yield ReadTimer()
         delay_s = float(self._state.settings.get("setDelayTimerTimeout", "Time"))
-        retained.looping = 1
-        retained.loop_due_ms = now_us // 1000 + round(1000 * delay_s)
+        retained.looping = retained.delaying = 1
+        retained.loop_due_us = now_us + round(1_000_000 * delay_s)
 
-    def _stop_loop(self, _command: Command) -> Routine[None]:
-        self._state.retained.looping = 0
-        yield Pay()
+    def _stop_loop(self, _command: Command) -> None:
+        self._state.retained.looping = self._state.retained.delaying = 0

@@ -3,7 +3,9 @@
 Both carry the same telecommands and telemetry. A telecommand is checked here against the table
 (ID, length, parameter ranges), acknowledged, and queued for the main loop; telemetry is answered
 at once. Node dialect: a telemetry answer does not repeat the ID; a telecommand is acknowledged on
-the UART with one error byte, on I2C through telemetry TcmdProcessed.
+the UART with one error byte, on I2C through telemetry TcmdProcessed. Parameters behind the ID of
+a telemetry request are ignored. An answer that the UART's buffer has no room for is dropped: a
+host that waits for each answer never fills it.
 """
 
 from collections import deque
@@ -19,10 +21,15 @@ from cubestack.firmware_model.interface.cubestar_codes import AckError
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.message import TELEMETRY_BIT, Kind, Message
 
-__all__ = ["QUEUE_DEPTH", "Command", "HostLink"]
+__all__ = ["LONGEST_COMMAND", "QUEUE_DEPTH", "SEND_BUFFER_BYTES", "Command", "HostLink"]
 
 QUEUE_DEPTH = 4
 LONGEST_COMMAND = 1 + max(message.length for message in INTERFACE.telecommands)
+"""Bytes of the longest telecommand, its ID included."""
+
+SEND_BUFFER_BYTES = 2048
+"""What the UART may still have to send: ours, a third of a second at the default baud rate."""
+
 NO_DATA = 0xFF
 """What a read delivers beyond the end of a message, or without one."""
 
@@ -69,6 +76,7 @@ class HostLink:
         self._telemetry = telemetry
         self.queue: deque[Command] = deque()
         self._decoder = FrameDecoder(LONGEST_COMMAND + 1)
+        self._addressed = False
         self._written = bytearray()
         self._reading = False
         self._answer: bytes | None = None
@@ -77,6 +85,12 @@ class HostLink:
     def next_command(self) -> Command:
         """Take the oldest accepted telecommand."""
         return self.queue.popleft()
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is under way that a reset would cut short: a message or an answer."""
+        receiving = self._decoder.unfinished or self._addressed
+        return not (receiving or self.queue or self._hardware.uart_backlog())
 
     # --- UART ---------------------------------------------------------------------------------
 
@@ -101,12 +115,17 @@ class HostLink:
         elif payload[0] & TELEMETRY_BIT:
             answer = self._read_telemetry(payload[0])
             if answer is not None:
-                self._hardware.uart_send(encode_frame(answer))
+                self._uart_send(answer)
         else:
             self._acknowledge(self._accept(payload[0], payload[1:], _UART))
 
     def _acknowledge(self, error: AckError) -> None:
-        self._hardware.uart_send(encode_frame(bytes([error])))
+        self._uart_send(bytes([error]))
+
+    def _uart_send(self, payload: bytes) -> None:
+        frame = encode_frame(payload)
+        if self._hardware.uart_backlog() + len(frame) <= SEND_BUFFER_BYTES:
+            self._hardware.uart_send(frame)
 
     def uart_silence(self) -> None:
         """Interrupt: nothing came for a while."""
@@ -119,6 +138,7 @@ class HostLink:
     def i2c_start(self, read: bool) -> None:
         """Interrupt: our address came, to write or to ``read``."""
         self._finish_write()
+        self._addressed = True
         self._reading = read
         if read and self._answer is None:
             self._state.raise_flag("I2C_WaitForIDReadRequestError")
@@ -144,7 +164,7 @@ class HostLink:
         self._finish_write()
         if self._reading:
             self._answer = None
-        self._reading = False
+        self._addressed = self._reading = False
 
     def _finish_write(self) -> None:
         """Act on the message that a stop or a repeated start ended."""
@@ -154,7 +174,7 @@ class HostLink:
         identifier, parameters = self._written[0], bytes(self._written[1:])
         self._written.clear()
         if identifier & TELEMETRY_BIT:
-            self._answer = self._read_telemetry(identifier)
+            self._answer = self._read_telemetry(identifier) or b""
             self._position = 0
         else:
             self._accept(identifier, parameters, _I2C)

@@ -54,29 +54,43 @@ class ImageSensor:
         yield Sleep(now_us + SETTLE_US, wakeable=False)
         self._state.retained.camera_setup = 0
 
-    def configure(self) -> Routine[bool]:
-        """Set up for stars, unless that is done already; False when the sensor does not answer."""
-        rate = self._state.settings.get("SetFrameRate", "FrameRate")
-        exposure = self._state.settings.get("Exposure", "exposure")
+    def configure(self) -> Routine[str | None]:
+        """Set up for stars, unless that is done already; the flag of an unanswered write."""
+        retained, settings = self._state.retained, self._state.settings
+        rate = settings.get("SetFrameRate", "FrameRate")
+        exposure = settings.get("Exposure", "exposure")
         wanted = rate << 16 | exposure
-        if self._state.retained.camera_setup == wanted:
-            return True
-        started_us: int = yield ReadTimer()
-        steps = {
+        if retained.camera_setup == wanted:
+            return None
+        failure = "ConfigChangeError" if retained.camera_setup else "ISSetupError"
+        retained.camera_setup = 0  # until all is written
+        set_up = {
             "MODE_SELECT": _REST,
             "HARDWARE_FEATURES": _ALL_BUT_SHARPENING,
             "LINEARITY": 0,
             "FRAMES_PER_SECOND": rate,
             "FIRMWARE_FEATURES": _AUTOVIEW_ONLY,
+        }
+        exposing = {
             "EXPOSURE_RULE": 0 if exposure else LONGEST_EXPOSURE,
             "EXPOSURE": exposure,
             "SYNC": SYNC_APPLY,
         }
-        for register, value in steps.items():
+        started_us: int = yield ReadTimer()
+        if not (yield from self._write_all(set_up)):
+            return failure
+        exposing_us: int = yield ReadTimer()
+        if not (yield from self._write_all(exposing)):
+            return failure
+        yield from self._phases.end("exposure_setup_us", exposing_us)
+        yield from self._phases.end("camera_setup_us", started_us)
+        retained.camera_setup = wanted
+        return None
+
+    def _write_all(self, values: dict[str, int]) -> Routine[bool]:
+        for register, value in values.items():
             if not (yield from self._write(register, value)):
                 return False
-        self._state.retained.camera_setup = wanted
-        yield from self._phases.end("camera_setup_us", started_us)
         return True
 
     def enable(self, on: bool) -> Routine[bool]:
@@ -108,9 +122,12 @@ class ImageSensor:
             self._state.raise_flag("ISSetupError")
 
     def age_at_frame_end_us(self) -> int:
-        """From the mid-exposure of the middle row to the end of a frame's read-out, in us."""
+        """From the mid-exposure of the middle row to the end of a frame's read-out, in us.
+
+        The sensor shortens an exposure that does not fit the frame.
+        """
         rate = self._state.settings.get("SetFrameRate", "FrameRate")
         exposure = self._state.settings.get("Exposure", "exposure")
-        longest = REGISTERS["CLOCKS_PER_SECOND"].reset // (rate * LINE_CLOCKS) - 1
+        longest = round(REGISTERS["CLOCKS_PER_SECOND"].reset / (rate * LINE_CLOCKS)) - 1
         lines = ROWS / 2 + min(exposure or longest, longest) / 2
         return int(lines * LINE_CLOCKS * 1_000_000 / CRYSTAL_HZ)

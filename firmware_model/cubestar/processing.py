@@ -2,7 +2,8 @@
 
 CubeStar thesis, sections 5.3.3 to 5.3.5. What the mode flag selects is published; how it changes
 is not, so it is ours: an attitude leads to tracking, a failure leads one step back (tracking,
-assisted, lost in space).
+assisted, lost in space). Without an attitude and a hint (telecommand setTrackingMode) the node is
+lost in space, whatever the flag says.
 """
 
 from collections.abc import Iterator
@@ -12,25 +13,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.assisted import identify_assisted
-from cubestack.firmware_model.algorithms.detection import (
-    Detection,
-    DetectionConfig,
-    SearchEnd,
-    detect_stars,
-)
-from cubestack.firmware_model.algorithms.geometry import (
-    CameraParameters,
-    direction_of,
-    undistort,
-    unit_vectors,
-)
+from cubestack.firmware_model.algorithms.assisted import CUT_RADIUS_DEG, identify_assisted
+from cubestack.firmware_model.algorithms.detection import Detection, SearchEnd, detect_stars
+from cubestack.firmware_model.algorithms.geometry import direction_of, undistort, unit_vectors
 from cubestack.firmware_model.algorithms.identification import Identification, Outcome
 from cubestack.firmware_model.algorithms.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.algorithms.tracking import track
 from cubestack.firmware_model.algorithms.voting import identify
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.capture import ImageCapture
+from cubestack.firmware_model.cubestar.configuration import (
+    camera_parameters,
+    detection_config,
+    field_radius_deg,
+)
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.hardware import ReadTimer, Routine
@@ -44,6 +40,9 @@ _SEARCH_FLAGS = {
     SearchEnd.INVALID: "MaxInvalidStarsDetectionError",
     SearchEnd.NOISE: "MaxNoiseDetected",
 }
+FEWEST_STARS = 3
+"""Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4)."""
+
 _OUTCOME_FLAGS = {
     Outcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
     Outcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
@@ -63,7 +62,7 @@ class Results:
         identification: identity of each centroid.
         mode: MatchMode that identified it.
         best: indices of the selected stars, at most three.
-        solved: the latest picture gave an attitude.
+        frame, image_ms: number and time of the picture, as in ``Attitude``.
     """
 
     detection: Detection | None = None
@@ -72,7 +71,8 @@ class Results:
     identification: Identification | None = None
     mode: MatchMode = MatchMode.LOST_IN_SPACE
     best: list[int] = field(default_factory=list)
-    solved: bool = False
+    frame: int = 0
+    image_ms: int = 0
 
 
 class Processing:
@@ -129,21 +129,23 @@ class Processing:
         return False
 
     def discard_results(self) -> None:
-        """The latest capture failed: there is nothing to report."""
+        """There is nothing to report about the latest picture."""
         self.results = Results()
+        self._state.retained.solved = 0
 
     # --- detection ----------------------------------------------------------------------------
 
     def detect(self) -> Routine[bool]:
         """Find the stars of the picture and their camera unit vectors."""
-        self.results = Results()
-        if not self._state.retained.image_present:
+        self.discard_results()
+        retained, settings = self._state.retained, self._state.settings
+        if not retained.image_present:
             return self._fail(TaskStatus.DETECTION_FAILED, "StatusError")
         self._state.task_status = TaskStatus.DETECTING
         started_us: int = yield ReadTimer()
         with self._cycles():
-            detection = detect_stars(self._capture.image, self._config(), self._meter)
-            camera = self._camera()
+            detection = detect_stars(self._capture.image, detection_config(settings), self._meter)
+            camera = camera_parameters(settings)
             with self._meter.phase("correction"):
                 points = undistort(detection.centroids, camera, self._meter)
             with self._meter.phase("vectors"):
@@ -151,56 +153,24 @@ class Processing:
         self._record("detection", (yield from self._phases.end("detect_us", started_us)))
         if detection.end in _SEARCH_FLAGS:
             self._state.raise_flag(_SEARCH_FLAGS[detection.end])
-        self.results = Results(detection, points, vectors)
+        if len(vectors) < FEWEST_STARS:
+            self._state.raise_flag("LessThanThreeStarsDetected")
+        self.results = Results(
+            detection, points, vectors, frame=retained.frame, image_ms=retained.image_ms
+        )
         if not len(vectors):
-            return self._fail(TaskStatus.DETECTION_FAILED, "LessThanThreeStarsDetected")
+            self._state.task_status = TaskStatus.DETECTION_FAILED
+            return False
         self._state.task_status = TaskStatus.DETECTED
         return True
-
-    def _config(self) -> DetectionConfig:
-        settings = self._state.settings
-        region = settings.all("setDetectionRegion")
-        thresholds = settings.all("setDetectionThresholds")
-        pixels = settings.all("setStarPixels")
-        limits = settings.all("setDetectionVariables")
-        return DetectionConfig(
-            step=region["StepSize"],
-            x_start=region["Xstart"],
-            x_end=region["Xend"] + 1,
-            y_start=region["Ystart"],
-            y_end=region["Yend"] + 1,
-            detection_threshold=thresholds["DetectionThreshold"],
-            star_threshold=thresholds["StarThreshold"],
-            min_pixels=pixels["MinPixels"],
-            max_pixels=pixels["MaxPixels"],
-            grid_size=limits["GridSize"],
-            max_stars=limits["MaxStars"],
-            max_invalid=limits["MaxInvalidStars"],
-            max_noise=limits["MaxNoise"],
-        )
-
-    def _camera(self) -> CameraParameters:
-        settings = self._state.settings
-        radial = settings.all("setRadialDistortionGains")
-        tangential = settings.all("setTangentalDistortionGains")
-        return CameraParameters(
-            focal_length_mm=settings.get("setFocalLength", "FocalLength"),
-            fx=settings.get("setFocalLengthComponents", "Fx"),
-            fy=settings.get("setFocalLengthComponents", "Fy"),
-            cx=settings.get("setPrincipalPoint", "Cx"),
-            cy=settings.get("setPrincipalPoint", "Cy"),
-            k1=radial["K1"],
-            k2=radial["K2"],
-            p1=tangential["P1"],
-            p2=tangential["P2"],
-        )
 
     # --- identification -----------------------------------------------------------------------
 
     def identify(self) -> Routine[bool]:
         """Find the catalogue star of each detected one."""
         results = self.results
-        results.identification, results.best, results.solved = None, [], False
+        results.identification, results.best = None, []
+        self._state.retained.solved = 0
         if results.detection is None:
             return self._fail(TaskStatus.IDENTIFICATION_FAILED, "StatusError")
         self._state.task_status = TaskStatus.IDENTIFYING
@@ -210,9 +180,8 @@ class Processing:
             identification = self._match(results.mode, results.vectors)
         self._record("identification", (yield from self._phases.end("match_us", started_us)))
         if identification.outcome is not Outcome.IDENTIFIED:
+            self._explain_failure(identification)
             self._step_back()
-            if results.mode is MatchMode.TRACKING:
-                self._state.raise_flag("RateExceeded")
             return self._fail(
                 TaskStatus.IDENTIFICATION_FAILED, _OUTCOME_FLAGS[identification.outcome]
             )
@@ -223,26 +192,49 @@ class Processing:
     def _choose_mode(self) -> MatchMode:
         if self._state.settings.get("setIDMode", "IdMode") == IdMode.LOST_IN_SPACE:
             return MatchMode.LOST_IN_SPACE
-        mode = self._state.mode
-        known = self._state.attitude is not None
-        if mode is MatchMode.LOST_IN_SPACE and not known:
+        if self._state.attitude is None and not self._state.retained.hint_present:
             self._state.raise_flag("IDModeError")
-        return mode
+            return MatchMode.LOST_IN_SPACE
+        return self._state.mode
 
     def _match(self, mode: MatchMode, vectors: NDArray[np.float32]) -> Identification:
         margin = float(self._state.settings.get("setIDMargin", "Margin"))
         meter, catalogue, attitude = self._meter, self.catalogue, self._state.attitude
         if mode is MatchMode.LOST_IN_SPACE:
             return identify(vectors, catalogue, meter, margin_rad=margin)
-        rotation = None if attitude is None else dcm(attitude.quaternion, meter)
-        if mode is MatchMode.TRACKING and rotation is not None:
+        if mode is MatchMode.TRACKING and attitude is not None:
+            rotation = dcm(attitude.quaternion, meter)
             return track(vectors, catalogue, rotation, meter, margin_rad=margin)
-        if self._state.retained.hint_present or rotation is None:
+        return identify_assisted(
+            vectors, catalogue, self._expected_boresight(), meter, margin_rad=margin
+        )
+
+    def _expected_boresight(self) -> NDArray[np.float32]:
+        """The hint until the first fix after it, then the boresight of the latest attitude."""
+        attitude = self._state.attitude
+        if attitude is None or self._state.retained.hint_present:
             hint = self._state.settings.all("setTrackingMode")
-            boresight = direction_of(hint["RightAscension"], hint["Declination"], meter)
-        else:
-            boresight = rotation[2]
-        return identify_assisted(vectors, catalogue, boresight, meter, margin_rad=margin)
+            return direction_of(hint["RightAscension"], hint["Declination"], self._meter)
+        boresight: NDArray[np.float32] = dcm(attitude.quaternion, self._meter)[2]
+        return boresight
+
+    def _explain_failure(self, identification: Identification) -> None:
+        """Raise the flags that say more about a failure than its outcome."""
+        too_few = identification.outcome is Outcome.TOO_FEW_MATCHED
+        if too_few and not identification.votes.any():
+            self._state.raise_flag("IDSearchError")
+        mode = self.results.mode
+        if mode is MatchMode.LOST_IN_SPACE:
+            return
+        if mode is MatchMode.TRACKING and too_few:
+            self._state.raise_flag("RateExceeded")
+        boresight = self._expected_boresight()
+        radius_deg = field_radius_deg(camera_parameters(self._state.settings))
+        in_field = self.catalogue.near(boresight, radius_deg, self._meter)
+        if len(in_field) < FEWEST_STARS:
+            self._state.raise_flag("LessThanThreeStarsInFoV")
+        if not len(self.catalogue.near(boresight, CUT_RADIUS_DEG, self._meter)):
+            self._state.raise_flag("ReducedIDListSizeError")
 
     def _step_back(self) -> None:
         self._state.mode = MatchMode(min(self.results.mode + 1, MatchMode.LOST_IN_SPACE))
@@ -283,12 +275,11 @@ class Processing:
             self._step_back()
             return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
         self._record("attitude", (yield from self._phases.end("attitude_us", started_us)))
-        retained = self._state.retained
         self._state.attitude = Attitude(
-            quaternion, retained.frame, retained.image_ms, len(kept), results.mode
+            quaternion, results.frame, results.image_ms, len(kept), results.mode
         )
         self._state.mode = MatchMode.TRACKING
-        retained.hint_present = 0
-        results.solved = True
+        self._state.retained.hint_present = 0
+        self._state.retained.solved = 1
         self._state.task_status = TaskStatus.CALCULATED
         return True

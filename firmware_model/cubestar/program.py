@@ -2,6 +2,8 @@
 
 CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new picture, the processor
 works on the previous one; then the picture is transferred, and a software reset ends the iteration.
+Ours: the reset waits until shortly before the next iteration, so that results can be read until
+then, and leaves out a turn when the host is in the middle of a message.
 """
 
 from cubestack.firmware_model.costs import Meter
@@ -13,13 +15,19 @@ from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry import Telemetry
-from cubestack.firmware_model.hardware import Hardware, ReadTimer, Reset, Routine
+from cubestack.firmware_model.hardware import Hardware, Pay, ReadTimer, Reset, Routine
 from cubestack.firmware_model.interface.cubestar_codes import ResetCause
 from cubestack.firmware_model.star_catalogue import StarCatalogue
 
-__all__ = ["ITERATION_MS", "CubeStarProgram"]
+__all__ = ["ITERATION_US", "RESET_LEAD_US", "CubeStarProgram"]
 
-ITERATION_MS = 1000
+ITERATION_US = 1_000_000
+
+RESET_LEAD_US = 10_000
+"""From the reset to the next iteration: more than the few milliseconds that the reset takes."""
+
+LATE_US = 10_000
+"""An iteration that starts later than this after its time is a timing error; ours."""
 
 
 class CubeStarProgram:
@@ -28,81 +36,99 @@ class CubeStarProgram:
     Attributes:
         link: the satellite's interface; its methods are the UART and I2C interrupts.
         supply: supply monitor; its ``overcurrent`` is the comparators' interrupt.
+        commands: the telecommands.
     """
 
     def __init__(self, hardware: Hardware, meter: Meter, catalogue: StarCatalogue) -> None:
         """Reset: set up RAM from the retention registers and flash."""
         self._hardware = hardware
-        self._state = State(hardware)
-        self._phases = Phases(self._state.retained)
-        self.supply = SupplyMonitor(hardware, self._state)
-        self._capture = ImageCapture(hardware, self._state, self._phases, meter)
-        self._processing = Processing(meter, self._state, self._capture, self._phases, catalogue)
-        self._commands = Commands(
-            hardware, meter, self._state, self._capture, self._processing, self.supply
+        self._state = state = State(hardware)
+        self._phases = Phases(state)
+        self.supply = SupplyMonitor(hardware, state)
+        self._capture = ImageCapture(hardware, state, self._phases, self.supply, meter)
+        self._processing = Processing(meter, state, self._capture, self._phases, catalogue)
+        self.commands = Commands(
+            hardware, meter, state, self._capture, self._processing, self.supply
         )
         telemetry = Telemetry(
             hardware,
             meter,
-            self._state,
+            state,
             self._capture,
             self._processing,
             self.supply,
-            self._commands,
+            self.commands,
             lambda: bool(self.link.queue),
         )
-        self.link = HostLink(hardware, meter, self._state, telemetry.values)
+        self.link = HostLink(hardware, meter, state, telemetry.values)
         if hardware.reset_cause == ResetCause.WATCHDOG:
-            self._state.retained.watchdog_resets += 1
+            state.retained.watchdog_resets += 1
 
     def main(self) -> Routine[None]:
         """Run until a reset."""
-        if self._hardware.reset_cause != ResetCause.SYSTEM_REQUEST or not self._state.restored:
+        yield from self._phases.started()
+        retained = self._state.retained
+        if self._hardware.reset_cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
             yield from self._capture.sensor.power_up()
         while True:
-            if self.supply.cut and (yield from self.supply.power_cycle()):
-                yield from self._capture.sensor.power_up()
-            if self.link.queue:
-                yield from self._command()
-            elif self._state.retained.looping:
+            if (yield from self._serve()):
+                continue
+            if retained.looping:
                 yield from self._iteration()
             else:
                 yield from self._phases.idle(None)
 
-    def _command(self) -> Routine[None]:
-        cause = yield from self._commands.execute(self.link.next_command())
-        if cause is not None:
-            yield Reset(cause)
+    def _serve(self) -> Routine[bool]:
+        """Restore a supply and execute a telecommand, if any waits; False when none does."""
+        self.supply.sample()
+        waiting = bool(self.supply.cut or self.link.queue)
+        if self.supply.cut and (yield from self.supply.restore()):
+            yield from self._capture.sensor.power_up()
+        if self.link.queue:
+            cause = yield from self.commands.execute(self.link.next_command())
+            if cause is not None:
+                yield from self._reset(cause)
+        return waiting
+
+    def _reset(self, cause: ResetCause) -> Routine[None]:
+        yield Pay()  # so that nothing can happen between the next line and the reset
+        self._state.retained.reset_us = yield ReadTimer()
+        self._state.retain()
+        yield Reset(cause)
 
     def _iteration(self) -> Routine[None]:
         """One turn of the loop; it starts when the last one's second is over."""
         retained = self._state.retained
-        yield from self._wait_until(retained.loop_due_ms)
+        yield from self._wait_until(retained.loop_due_us)
         if not retained.looping:
             return
         started_us: int = yield ReadTimer()
-        retained.loop_due_ms = started_us // 1000 + ITERATION_MS
+        if started_us > retained.loop_due_us + LATE_US:
+            self._state.raise_flag("TimingError")
+            retained.loop_due_us = started_us
+        retained.loop_due_us += ITERATION_US
+        retained.delaying = 0
 
         previous = self._processing.process() if retained.image_present else None
         yield from self._capture.get_image(meanwhile=previous)
         retained.iterations += 1
+        yield from self._phases.end("loop_us", started_us)
+        retained.longest_loop_us = max(retained.longest_loop_us, retained.loop_us)
 
-        now_us: int = yield ReadTimer()
-        retained.loop_ms = (now_us - started_us) // 1000
-        retained.longest_loop_ms = max(retained.longest_loop_ms, retained.loop_ms)
-        if retained.loop_ms > ITERATION_MS:
-            self._state.raise_flag("TimingError")
-        yield from self._wait_until(retained.loop_due_ms)
-        if retained.looping and not self.link.queue:
-            self._state.retain()
-            yield Reset(ResetCause.SYSTEM_REQUEST)
+        yield from self._wait_until(retained.loop_due_us - RESET_LEAD_US)
+        yield Pay()
+        if retained.looping and self.link.idle:
+            yield from self._reset(ResetCause.SYSTEM_REQUEST)
 
-    def _wait_until(self, due_ms: int) -> Routine[None]:
-        """Idle until uptime ``due_ms``, executing commands meanwhile."""
-        while True:
-            if self.link.queue:
-                yield from self._command()
-                if not self._state.retained.looping:
-                    return
-            elif self.supply.cut or not (yield from self._phases.idle(due_ms * 1000)):
+    def _wait_until(self, due_us: int) -> Routine[None]:
+        """Idle until ``due_us``; what the host and the supplies want is done meanwhile.
+
+        Returns at once when the loop is stopped. Telecommands go before the next iteration.
+        """
+        while self._state.retained.looping:
+            served = yield from self._serve()
+            now_us: int = yield ReadTimer()
+            if now_us >= due_us and not self.link.queue:
                 return
+            if not served:
+                yield from self._phases.idle(due_us)

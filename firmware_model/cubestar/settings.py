@@ -22,7 +22,6 @@ SETTING_COMMANDS = (
     "setPrincipalPoint",
     "setRadialDistortionGains",
     "setTangentalDistortionGains",
-    "ReadFrom_IS_Register",
     "ImageBlockSet",
     "setDetectionRegion",
     "setDetectionThresholds",
@@ -35,7 +34,6 @@ SETTING_COMMANDS = (
     "SetFrameRate",
     "SetDiscardDelay",
     "SetCameraRegisterPage",
-    "SelectCameraRegister",
 )
 
 _MESSAGES = {name: INTERFACE.telecommand(name) for name in SETTING_COMMANDS}

@@ -6,69 +6,83 @@ CubeStar thesis, section 5.2.3. The main loop later powers the channel up again.
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.hardware import Hardware, ReadTimer, Routine, Sleep
 
-__all__ = ["CHANNELS", "OFF_TIME_US", "SupplyMonitor"]
+__all__ = ["CHANNELS", "OFF_TIME_US", "UNDER_CURRENT_MA", "SupplyMonitor"]
 
+#: The processor's SRAM; the boards of FPGA and image sensor.
 CHANNELS = ("memory", "imager")
+
 OFF_TIME_US = 100_000
 """How long a channel stays off after a latch-up: ours, the sources give no time."""
 
+UNDER_CURRENT_MA = 0.5
+"""Less than any working part behind a switch draws: assumed, a quarter of an SRAM in standby."""
+
 
 class SupplyMonitor:
-    """Cuts, counts and restores the two monitored supplies.
-
-    Attributes:
-        cut: channels that were cut by a comparator and wait for power cycling.
-    """
+    """Cuts, counts and restores the two monitored supplies."""
 
     def __init__(self, hardware: Hardware, state: State) -> None:
         """Watch the channels of ``hardware``."""
         self._hardware = hardware
         self._state = state
-        self.cut: list[str] = []
-        self._imager_off = False
-        self.lowest_ma = self.highest_ma = self.total_ma()
 
     def overcurrent(self, channel: str) -> None:
         """Interrupt: the comparator of ``channel`` tripped."""
         self._hardware.switch_supply(channel, False)
+        retained = self._state.retained
+        retained.cut |= 1 << CHANNELS.index(channel)
+        retained.latch_ups += 1
+        if channel == "memory":
+            retained.image_present = 0
         self._state.raise_flag("OverCurrent")
-        self._state.retained.latch_ups += 1
-        self.cut.append(channel)
         self._hardware.wake()
 
-    def total_ma(self) -> float:
-        """Sum of both monitored currents."""
-        return sum(self._hardware.supply_current_ma(channel) for channel in CHANNELS)
-
-    def sample(self) -> float:
-        """Measure the total, keep the extremes; in mA."""
-        total = self.total_ma()
-        self.lowest_ma = min(self.lowest_ma, total)
-        self.highest_ma = max(self.highest_ma, total)
-        return total
+    @property
+    def cut(self) -> list[str]:
+        """Channels that a comparator cut off and that wait for ``restore``."""
+        return [name for bit, name in enumerate(CHANNELS) if self._state.retained.cut >> bit & 1]
 
     @property
     def imager_on(self) -> bool:
         """Whether the switch of FPGA and imager is closed."""
-        return not self._imager_off and "imager" not in self.cut
+        return self._is_on("imager")
 
-    def toggle_imager(self) -> Routine[bool]:
-        """Open or close the switch of FPGA and imager; True when it was closed."""
-        self._imager_off = not self._imager_off
-        self._hardware.switch_supply("imager", not self._imager_off)
-        yield ReadTimer()
-        return not self._imager_off
+    def sample(self) -> float:
+        """Measure both channels and keep the imager's extremes; its current in mA.
 
-    def power_cycle(self) -> Routine[bool]:
-        """Restore what was cut; True when the imager came back, with its registers at reset."""
-        camera_lost = False
-        while self.cut:
-            channel = self.cut.pop(0)
-            now_us: int = yield ReadTimer()
-            yield Sleep(now_us + OFF_TIME_US, wakeable=False)
-            self._hardware.switch_supply(channel, True)
+        A closed switch with next to no current behind it raises UnderCurrent.
+        """
+        currents = {channel: self._hardware.supply_current_ma(channel) for channel in CHANNELS}
+        if any(self._is_on(name) and ma < UNDER_CURRENT_MA for name, ma in currents.items()):
+            self._state.raise_flag("UnderCurrent")
+        retained, present_ua = self._state.retained, round(1000 * currents["imager"])
+        first = retained.highest_ua == 0
+        retained.lowest_ua = present_ua if first else min(retained.lowest_ua, present_ua)
+        retained.highest_ua = max(retained.highest_ua, present_ua)
+        return currents["imager"]
+
+    def toggle_imager(self) -> bool:
+        """Open or close the switch of FPGA and imager; whether it is closed now."""
+        retained = self._state.retained
+        retained.imager_off ^= 1
+        retained.cut &= ~(1 << CHANNELS.index("imager"))
+        self._hardware.switch_supply("imager", not retained.imager_off)
+        return not retained.imager_off
+
+    def restore(self) -> Routine[bool]:
+        """Close what was cut, after a pause; True when the imager came back, at reset values.
+
+        A channel that is cut meanwhile waits for the next call.
+        """
+        channels = self.cut
+        now_us: int = yield ReadTimer()
+        yield Sleep(now_us + OFF_TIME_US, wakeable=False)
+        for channel in channels:
+            self._state.retained.cut &= ~(1 << CHANNELS.index(channel))
             self._state.retained.power_cycles += 1
-            camera_lost |= channel == "imager"
-            if channel == "memory":
-                self._state.retained.image_present = 0
-        return camera_lost
+            self._hardware.switch_supply(channel, True)
+        return "imager" in channels
+
+    def _is_on(self, channel: str) -> bool:
+        off = self._state.retained.imager_off if channel == "imager" else 0
+        return not off and channel not in self.cut

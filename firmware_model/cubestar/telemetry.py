@@ -3,17 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from cubestack.firmware_model.algorithms.geometry import angles_of
-from cubestack.firmware_model.algorithms.quest import dcm
 from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubestar.attitude_reports import AttitudeReports
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.star_reports import StarReports
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
+from cubestack.firmware_model.cubestar.telemetry_tables import SETTINGS_SHOWN, TIMES_SHOWN
 from cubestack.firmware_model.hardware import Hardware
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar_codes import ImageBlockSize, SwitchState
@@ -25,71 +23,8 @@ __all__ = ["Telemetry"]
 NODE_TYPE = 5
 FIRMWARE_VERSION = (0, 1)
 SERIAL_NUMBER = 1
-PROCESSING_LIMIT_MS = 500
 
 Values = dict[str, Any]
-
-#: Telemetry that shows a setting: (telemetry field, setting telecommand, its field).
-_SETTINGS_SHOWN: dict[str, tuple[tuple[str, str, str], ...]] = {
-    "Exposure": (("exposure", "Exposure", "exposure"),),
-    "FocalLengthDetails": (
-        ("FocalLength", "setFocalLength", "FocalLength"),
-        ("Fx", "setFocalLengthComponents", "Fx"),
-        ("Fy", "setFocalLengthComponents", "Fy"),
-    ),
-    "PrincipalPoint": (("Cx", "setPrincipalPoint", "Cx"), ("Cy", "setPrincipalPoint", "Cy")),
-    "DistortionCoef": (
-        ("K1", "setRadialDistortionGains", "K1"),
-        ("K2", "setRadialDistortionGains", "K2"),
-        ("P1", "setTangentalDistortionGains", "P1"),
-        ("P2", "setTangentalDistortionGains", "P2"),
-    ),
-    "DetectionRegion": tuple(
-        (name, "setDetectionRegion", name)
-        for name in ("StepSize", "Xstart", "Xend", "Ystart", "Yend")
-    ),
-    "StarPixels": tuple((name, "setStarPixels", name) for name in ("MinPixels", "MaxPixels")),
-    "StarGrid": (("GridSize", "setDetectionVariables", "GridSize"),),
-    "MaxStars": (
-        ("maxStars", "setDetectionVariables", "MaxStars"),
-        ("maxInvalidStars", "setDetectionVariables", "MaxInvalidStars"),
-        ("maxNoise", "setDetectionVariables", "MaxNoise"),
-    ),
-    "IDMode": (("Mode", "setIDMode", "IdMode"),),
-    "IDMargin": (("Margin", "setIDMargin", "Margin"),),
-    "DelayTime": (("Timeout", "setDelayTimerTimeout", "Time"),),
-}
-
-#: Telemetry that shows times in ms: (field, step of Processing, longest or latest).
-_TIMES_SHOWN: dict[str, tuple[tuple[str, str, bool], ...]] = {
-    "DetectionTimingOne": (
-        ("MaxStarSearchTime", "search", True),
-        ("MaxCentroidFindTime", "centroid", True),
-        ("MaxCorrectionTime", "correction", True),
-        ("MaxVectorCalTime", "vectors", True),
-    ),
-    "DetectionTimingTwo": (
-        ("StarDetectionTime", "detection", False),
-        ("MaxStarDetectionTime", "detection", True),
-    ),
-    "IDTimingOne": (
-        ("MaxModeSelectionTime", "reduction", True),
-        ("MaxDistanceCalTime", "distances", True),
-        ("MaxVoteRoundOneTime", "votes", True),
-        ("MaxFindIDTime", "identities", True),
-    ),
-    "IDTimingTwo": (
-        ("MaxVoteRoundTwoTime", "verification", True),
-        ("MaxSelectID", "selection", True),
-        ("MaxAlgoCompletionTime", "identification", True),
-    ),
-    "IDTimingThree": (
-        ("StarIdentificationTime", "identification", False),
-        ("MaxStarIdentificationTime", "identification", True),
-    ),
-    "BestStarSelectionTime": (("LatestTime", "best", False), ("MaxTime", "best", True)),
-    "AttitudeTiming": (("LatestTime", "attitude", False), ("MaxTime", "attitude", True)),
-}
 
 
 class Telemetry:
@@ -115,7 +50,6 @@ class Telemetry:
         self._supply = supply
         self._commands = commands
         self._pending = pending
-        stars = StarReports(processing)
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": self._identification,
             "ExtendedIdentification": self._extended_identification,
@@ -132,14 +66,6 @@ class Telemetry:
             "TimingSummary": self._timing_summary,
             "DetectionThresholdValues": self._thresholds,
             "LogStatus": self._log_status,
-            "Quaternion": lambda: dict(
-                zip(("Qbar0", "Qbar1", "Qbar2", "Qbar3"), self._quaternion(), strict=True)
-            ),
-            "SphereicalCoordinates": self._boresight_angles,
-            "AttitudeData": self._attitude_data,
-            "PerformanceParameters": self._performance,
-            "Results": self._result_counts,
-            "AttitudeQuaternion": self._attitude_quaternion,
             "PhaseTimes": self._phase_times,
             "UploadStatus": lambda: {
                 "NextBlock": commands.next_block,
@@ -148,21 +74,22 @@ class Telemetry:
             "SupplyReport": self._supply_report,
             "CameraRegister": self._camera_register,
             "LoopStatus": self._loop_status,
-            **stars.sources,
+            **StarReports(processing).sources,
+            **AttitudeReports(state, processing, meter).sources,
         }
 
     def values(self, message: Message) -> Values | None:
         """Values of every field of ``message``; None when the node does not offer it."""
-        shown = _SETTINGS_SHOWN.get(message.name)
-        if shown is not None:
-            return {name: self._state.settings.get(*setting) for name, *setting in shown}
-        times = _TIMES_SHOWN.get(message.name)
-        if times is not None:
+        if message.name in SETTINGS_SHOWN:
             return {
-                name: (self._processing.longest_ms if longest else self._processing.latest_ms).get(
-                    step, 0.0
-                )
-                for name, step, longest in times
+                name: self._state.settings.get(command, field)
+                for name, command, field in SETTINGS_SHOWN[message.name]
+            }
+        if message.name in TIMES_SHOWN:
+            latest, longest = self._processing.latest_ms, self._processing.longest_ms
+            return {
+                name: (longest if is_longest else latest).get(step, 0.0)
+                for name, step, is_longest in TIMES_SHOWN[message.name]
             }
         source = self._sources.get(message.name)
         return None if source is None else source()
@@ -195,25 +122,24 @@ class Telemetry:
         return {"Processed": int(not self._pending() and not self._commands.running)}
 
     def _loop_times(self) -> Values:
-        retained = self._state.retained
         return {
-            "StartupTime": self._state.startup_ms,
-            "LoopTime": retained.loop_ms,
-            "MaxLoopTime": retained.longest_loop_ms,
+            "StartupTime": self._state.startup_us / 1000,
+            "LoopTime": self._state.retained.loop_us / 1000,
+            "MaxLoopTime": self._state.retained.longest_loop_us / 1000,
         }
 
     def _switch(self) -> SwitchState:
         return SwitchState.ON if self._supply.imager_on else SwitchState.OFF
 
     def _currents(self) -> Values:
-        present = self._supply.sample()
         return {
-            "Current": present,
-            "MaxCurrent": self._supply.highest_ma,
-            "MinCurrent": self._supply.lowest_ma,
+            "Current": self._supply.sample(),
+            "MaxCurrent": self._state.retained.highest_ua / 1000,
+            "MinCurrent": self._state.retained.lowest_ua / 1000,
         }
 
     def _log_status(self) -> Values:
+        currents = self._currents()
         shown = {f.name: f.flag in self._state.flags for f in flag_fields(log_names=True)}
         return {
             "Temp": self._hardware.temperature_c(),
@@ -221,7 +147,7 @@ class Telemetry:
             "WDGcounter": self._state.retained.watchdog_resets,
             "Status": self._state.task_status,
             "SW": self._switch(),
-            **self._currents(),
+            **currents,
             **shown,
         }
 
@@ -256,7 +182,7 @@ class Telemetry:
         retained = self._state.retained
         return {
             "SetupTime": retained.camera_setup_us / 1000,
-            "ExposureUpdateTime": retained.camera_setup_us / 1000,
+            "ExposureUpdateTime": retained.exposure_setup_us / 1000,
             "CaptureTime": (retained.discard_us + retained.capture_us) / 1000,
         }
 
@@ -283,7 +209,7 @@ class Telemetry:
 
     def _phase_times(self) -> Values:
         retained = self._state.retained
-        phases = {
+        return {
             "Idle": retained.idle_us,
             "Discard": retained.discard_us,
             "Capture": retained.capture_us,
@@ -291,85 +217,12 @@ class Telemetry:
             "Detect": retained.detect_us,
             "Match": retained.match_us,
             "Attitude": retained.attitude_us,
+            "LoopTotal": retained.loop_us,
         }
-        return {**phases, "LoopTotal": 1000 * retained.loop_ms}
-
-    # --- results ------------------------------------------------------------------------------
 
     def _thresholds(self) -> Values:
         detection = self._processing.results.detection
         return {
             "DarkThreshold": 0 if detection is None else detection.dark_value,
             **self._state.settings.all("setDetectionThresholds"),
-        }
-
-    def _quaternion(self) -> np.ndarray[Any, Any]:
-        attitude = self._state.attitude
-        return np.array([0, 0, 0, 1], np.float32) if attitude is None else attitude.quaternion
-
-    def _boresight_angles(self) -> Values:
-        right_ascension, declination = angles_of(
-            dcm(self._quaternion(), self._meter)[2], self._meter
-        )
-        return {"RightAscension": right_ascension, "Declination": declination}
-
-    def _attitude_data(self) -> Values:
-        quaternion = self._quaternion()
-        boresight = dcm(quaternion, self._meter)[2]
-        return {
-            **dict(zip(("Qbar0", "Qbar1", "Qbar2", "Qbar3"), quaternion, strict=True)),
-            **self._boresight_angles(),
-            **dict(zip(("BSVX", "BSVY", "BSVZ"), boresight, strict=True)),
-        }
-
-    def _attitude_quaternion(self) -> Values:
-        attitude = self._state.attitude
-        return {
-            **dict(zip(("Q0", "Q1", "Q2", "Q3"), self._quaternion(), strict=True)),
-            "FrameCounter": 0 if attitude is None else attitude.frame,
-            "ImageTime": 0 if attitude is None else attitude.image_ms,
-            "Mode": self._processing.results.mode if attitude is None else attitude.mode,
-            "Matched": 0 if attitude is None else attitude.matched,
-            "Valid": self._processing.results.solved,
-        }
-
-    def _result_counts(self) -> Values:
-        counts = self._counts()
-        return {
-            "DarkValue": counts["ImageDarkValue"],
-            "Detected": counts["NumStarsDetected"],
-            "Invalid": counts["InvalidStars"],
-            "Noise": counts["StarImageNoise"],
-            "IDMode": counts["Idmode"],
-            "ID": counts["NumberOfStarsID"],
-        }
-
-    def _counts(self) -> Values:
-        results = self._processing.results
-        detection, identification = results.detection, results.identification
-        return {
-            "NumStarsDetected": len(results.vectors),
-            "StarImageNoise": 0 if detection is None else detection.noise,
-            "InvalidStars": 0 if detection is None else detection.invalid,
-            "NumberOfStarsID": 0 if identification is None else len(identification.matched),
-            "Idmode": self._state.settings.get("setIDMode", "IdMode"),
-            "ImageDarkValue": 0 if detection is None else detection.dark_value,
-        }
-
-    def _performance(self) -> Values:
-        results, latest = self._processing.results, self._processing.latest_ms
-        flags = self._state.flags
-        processing_ms = sum(
-            latest.get(step, 0.0) for step in ("detection", "identification", "attitude")
-        )
-        return {
-            **self._counts(),
-            "ImageCaptureSuccess": bool(self._state.retained.image_present),
-            "DetectionSuccess": len(results.vectors) > 0,
-            "IdentificationSuccess": results.identification is not None,
-            "AttitudeSuccess": results.solved,
-            "ProcessingTimeError": processing_ms > PROCESSING_LIMIT_MS,
-            "MaxStarsDetected": "MaxStarsDetection" in flags,
-            "LessThanThreeStarsInFoV": "LessThanThreeStarsInFoV" in flags,
-            "CommsError": any(flag.startswith(("UART_", "I2C_")) for flag in flags),
         }

@@ -1,0 +1,160 @@
+"""Where everything lies, and whether it fits: the memory budget of the EFM32GG280F1024 on CubeStar.
+
+CubeStar thesis, sections 3.2 and 5.2.1 (128 kB of RAM, 1024 kB of flash, 1024 kB of SRAM on the
+external bus), appendix E (retention registers, 512 bytes), section 5.3.2 (catalogue as constant
+arrays in flash) and 5.3.4 (preassigned arrays). Sizes are those of the part's program: derived
+from the tables, the settings' limits and the catalogue, wherever these decide. Program code is not
+modelled, so flash and RAM must leave room for it.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.algorithms.assisted import CUT_RADIUS_DEG
+from cubestack.firmware_model.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.cubestar.host_link import (
+    LONGEST_COMMAND,
+    QUEUE_DEPTH,
+    SEND_BUFFER_BYTES,
+)
+from cubestack.firmware_model.cubestar.state import (
+    ATTITUDE_PAGE,
+    CONFIG_PAGE,
+    MODE_PAGE,
+    State,
+)
+from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
+from cubestack.firmware_model.star_catalogue import StarCatalogue
+
+__all__ = [
+    "CAPACITY",
+    "EXTERNAL_RAM_BYTES",
+    "RETENTION_BYTES",
+    "Buffer",
+    "Memory",
+    "budget",
+    "used",
+]
+
+KB = 1024
+EXTERNAL_RAM_BYTES = 1024 * KB
+RETENTION_BYTES = 512
+
+FLASH_PAGE_BYTES = 4 * KB
+"""Smallest part of this flash that can be erased."""
+
+STACK_BYTES = 4 * KB
+"""Main program and nested interrupts, without the recursion of region growing: assumed."""
+
+GROW_FRAME_BYTES = 5 * 4
+"""One level of region growing: four registers and the return address, as the cost table has it."""
+
+DIRECTIONS = 500
+"""In which the reduced catalogue is tried, about 9 deg apart."""
+
+
+class Memory(Enum):
+    """A memory of the processor board."""
+
+    RAM = "RAM"
+    FLASH = "flash"
+    EXTERNAL_RAM = "external SRAM"
+    RETENTION = "retention registers"
+
+
+#: Size of each memory in bytes.
+CAPACITY = {
+    Memory.RAM: 128 * KB,
+    Memory.FLASH: 1024 * KB,
+    Memory.EXTERNAL_RAM: EXTERNAL_RAM_BYTES,
+    Memory.RETENTION: RETENTION_BYTES,
+}
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """One buffer: its name, where it lies, its size in bytes."""
+
+    name: str
+    memory: Memory
+    size: int
+
+
+def _limit(command: str, field: str) -> int:
+    """Largest value that a telecommand's parameter may have."""
+    declared = INTERFACE.telecommand(command).field(field)
+    largest = declared.raw_range[1] if declared.maximum is None else declared.maximum
+    return int(largest)
+
+
+def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
+    """Every buffer of the program with ``catalogue`` in its flash, at the settings' limits."""
+    stars = _limit("setDetectionVariables", "MaxStars")
+    pairs = stars * (stars - 1) // 2
+    pixels = _limit("setStarPixels", "MaxPixels")
+    invalid = _limit("setDetectionVariables", "MaxInvalidStars") + 1
+    noise = _limit("setDetectionVariables", "MaxNoise") + 1
+    visited = (stars + invalid) * pixels + noise * (pixels - 1)
+    listed = len(catalogue)
+    longest_answer = max(message.length for message in INTERFACE.telemetries)
+    ram = {
+        # centroid, undistorted point, camera vector; size, intensity, identity, votes
+        "detected stars": stars * (4 * (2 + 2 + 3) + 1 + 2 + 2 + 1),
+        # place in the picture (19 bits) and value (8 bits) in one word
+        "area that is grown": pixels * 4,
+        "recursion of region growing": pixels * GROW_FRAME_BYTES,
+        # angle; first entry and number of entries in the pair list
+        "pairs of stars": pairs * (4 + 2 + 2),
+        "votes": stars * listed * 2,
+        "identities that still stand": stars * listed,
+        "agreement of the stars": stars * stars,
+        "marks of the reduced catalogue": listed,
+        "reduced pair list": _largest_reduction(catalogue) * (2 + 2 + 4),
+        "received frame, I2C message, waiting telecommands": (2 + QUEUE_DEPTH)
+        * (LONGEST_COMMAND + 1),
+        "I2C answer": longest_answer,
+        "UART send buffer": SEND_BUFFER_BYTES,
+        "settings, flags and counters": State.RETENTION_SIZE,
+        "stack": STACK_BYTES,
+    }
+    return (
+        *(Buffer(name, Memory.RAM, size) for name, size in ram.items()),
+        Buffer("picture", Memory.EXTERNAL_RAM, IMAGE_BYTES),
+        Buffer("visited pixels", Memory.EXTERNAL_RAM, visited * 4),
+        Buffer("star list", Memory.FLASH, catalogue.star_bytes),
+        Buffer("pair list", Memory.FLASH, catalogue.pair_bytes),
+        *(
+            Buffer(f"page {page}", Memory.FLASH, FLASH_PAGE_BYTES)
+            for page in (CONFIG_PAGE, ATTITUDE_PAGE, MODE_PAGE)
+        ),
+        Buffer("settings, flags and counters", Memory.RETENTION, State.RETENTION_SIZE),
+    )
+
+
+def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
+    """Bytes in use of each memory."""
+    return {
+        memory: sum(buffer.size for buffer in buffers if buffer.memory is memory)
+        for memory in Memory
+    }
+
+
+def _largest_reduction(catalogue: StarCatalogue) -> int:
+    """Pairs that the reduced catalogue holds where it holds most, of evenly spread directions."""
+    meter = Meter(CORTEX_M3)
+    return max(
+        len(catalogue.reduced(direction, CUT_RADIUS_DEG, meter).pairs)
+        for direction in _even_directions(DIRECTIONS)
+    )
+
+
+def _even_directions(count: int) -> NDArray[np.float32]:
+    """Unit vectors (count, 3) on a spiral from pole to pole."""
+    step = np.arange(count) + 0.5
+    z = 1 - 2 * step / count
+    turn = step * np.pi * (3 - np.sqrt(5))
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1).astype(np.float32)

@@ -1,0 +1,35 @@
+"""A bench with the program on it, and skies to look at."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.star_catalogue import StarCatalogue
+
+from .bench import Bench
+from .sky import Sky, take
+
+
+@pytest.fixture(scope="session")
+def catalogue() -> StarCatalogue:
+    rng = np.random.default_rng(2024)
+    vectors = rng.normal(size=(405, 3))
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    hip = rng.permutation(100_000)[:405] + 1
+    return StarCatalogue.build(hip, vectors, rng.uniform(0, 3.7, 405), 3.8, 57.3)
+
+
+@pytest.fixture(scope="session")
+def pose() -> Rotation:
+    """An attitude, inertial to camera, with enough stars in view."""
+    return Rotation.from_euler("zxz", [40, 65, -110], degrees=True)
+
+
+@pytest.fixture(scope="session")
+def sky(catalogue: StarCatalogue, pose: Rotation) -> Sky:
+    return take(catalogue, pose)
+
+
+@pytest.fixture
+def bench(catalogue: StarCatalogue) -> Bench:
+    return Bench(catalogue)
