@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 
 from cubestack.firmware_model.interface.message import Field, Interface, Kind, Message
+from cubestack.host.side_protocols import side_c
 
 __all__ = ["c_header"]
 
@@ -96,6 +97,7 @@ def c_header(interface: Interface) -> str:
         lines += ["", *_enumeration(prefix, choices)]
     for message in interface.messages:
         lines += ["", *_message(upper, message)]
+    lines += side_c(interface)
     lines += _ACCESSORS.format(p=prefix).splitlines()
     lines += ["", "#endif"]
     return "\n".join(lines) + "\n"

@@ -5,10 +5,11 @@ Everything comes from the interface tables; the C header has a module of its own
 
 import json
 from collections.abc import Callable
-from enum import IntEnum
 
-from cubestack.firmware_model.interface.message import Field, Interface, Kind, Message
+from cubestack.firmware_model.interface.message import Interface, Kind, Message
 from cubestack.host.c_header import c_header
+from cubestack.host.field_text import choice_rows, field_details, field_json, field_type
+from cubestack.host.side_protocols import side_json, side_markdown, side_table
 
 __all__ = ["FORMATS", "render"]
 
@@ -21,10 +22,11 @@ def _table(interface: Interface) -> str:
         for message in _of_kind(interface, kind):
             lines.append(f"{message.id:4d} {message.name}, {message.length} B: {_meaning(message)}")
             lines += [
-                f"     {field.bit_offset:5d} {_type(field):<13} {field.name:<31} {_details(field)}"
+                f"     {field.bit_offset:5d} {field_type(field):<13} {field.name:<31} "
+                f"{field_details(field)}"
                 for field in message.fields
             ]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *side_table(interface)]) + "\n"
 
 
 def _markdown(interface: Interface) -> str:
@@ -40,15 +42,15 @@ def _markdown(interface: Interface) -> str:
         "A value is the raw count divided by the number behind the type. Counts are rounded to the "
         "nearest, halves away from zero; telemetry saturates at the ends of its type. A "
         "telecommand with a parameter outside of its range is refused with error 3 and raises the "
-        "error flag that is named. A reset value that is not given is 0.",
+        "error flag that is named, if any. A reset value that is not given is 0.",
         "",
         "## Error codes of an acknowledge",
         "",
-        *_choice_rows(interface.ack_errors),
+        *choice_rows(interface.ack_errors),
     ]
     for choices in interface.choices:
         parts += ["", f"## {choices.__name__}", "", f"{choices.__doc__}", ""]
-        parts += _choice_rows(choices)
+        parts += choice_rows(choices)
     for message in interface.messages:
         title = f"{message.kind.value.capitalize()} {message.id}: {message.name}"
         meaning = _meaning(message)
@@ -57,10 +59,11 @@ def _markdown(interface: Interface) -> str:
         if message.fields:
             parts += ["", "| offset | type | field | meaning |", "|-|-|-|-|"]
             parts += [
-                f"| {field.bit_offset} | {_type(field)} | {field.name} | {_details(field)} |"
+                f"| {field.bit_offset} | {field_type(field)} | {field.name} "
+                f"| {field_details(field)} |"
                 for field in message.fields
             ]
-    return "\n".join(parts) + "\n"
+    return "\n".join([*parts, *side_markdown(interface)]) + "\n"
 
 
 def _json(interface: Interface) -> str:
@@ -82,10 +85,12 @@ def _json(interface: Interface) -> str:
                 "steps": message.steps,
                 "supported": message.supported,
                 "ordered": message.ordered,
-                "fields": [_json_field(field) for field in message.fields],
+                "confidence": message.confidence and message.confidence.name,
+                "fields": [field_json(field) for field in message.fields],
             }
             for message in interface.messages
         ],
+        **side_json(interface),
     }
     return json.dumps(content, indent=1) + "\n"
 
@@ -128,57 +133,7 @@ def _meaning(message: Message) -> str:
         )
         if applies
     ]
+    if message.confidence is not None:
+        notes.append(message.confidence.value)
     notes += [f"{low} must not exceed {high}" for low, high in message.ordered]
     return "; ".join([message.meaning, *notes])
-
-
-def _type(field: Field) -> str:
-    return field.type if field.scale == 1 else f"{field.type} / {field.scale:g}"
-
-
-def _details(field: Field) -> str:
-    """Meaning, unit, allowed values, reset value and error flag."""
-    parts = [field.meaning + (f" [{field.unit}]" if field.unit else "")]
-    if field.choices is not None:
-        parts.append(f"see {field.choices.__name__}")
-    if field.maximum_by is not None:
-        other, limits = field.maximum_by
-        listed = ", ".join(f"{limit:g} for {int(value)}" for value, limit in limits.items())
-        parts.append(f"at most, by {other}, {listed}")
-    elif field.minimum is not None and field.maximum is not None:
-        parts.append(f"{field.minimum:g} to {field.maximum:g}")
-    elif field.minimum is not None:
-        parts.append(f"at least {field.minimum:g}")
-    elif field.maximum is not None:
-        parts.append(f"at most {field.maximum:g}")
-    if field.reset and not isinstance(field.reset, bytes):
-        parts.append(f"reset {field.label(field.reset)}")
-    if field.range_flag:
-        parts.append(f"else {field.range_flag}")
-    if field.flag and field.flag != field.name:
-        parts.append(f"shows {field.flag}")
-    return "; ".join(parts)
-
-
-def _choice_rows(choices: type[IntEnum]) -> list[str]:
-    rows = [f"| {int(choice)} | {choice.name} |" for choice in choices]
-    return ["| value | name |", "|-|-|", *rows]
-
-
-def _json_field(field: Field) -> dict[str, object]:
-    choices = field.choices
-    return {
-        "name": field.name,
-        "type": field.type,
-        "bit_offset": field.bit_offset,
-        "meaning": field.meaning,
-        "unit": field.unit,
-        "scale": field.scale,
-        "choices": None if choices is None else {choice.name: int(choice) for choice in choices},
-        "minimum": field.minimum,
-        "maximum": field.maximum,
-        "maximum_by": field.maximum_by,
-        "range_flag": field.range_flag,
-        "flag": field.flag,
-        "reset": field.reset.hex() if isinstance(field.reset, bytes) else field.reset,
-    }

@@ -1,4 +1,4 @@
-"""List a device's telecommands and telemetry, from the tables that firmware and host share.
+"""List a device's telecommands, telemetry and registers, from the tables that all sides share.
 
 examples:
   cubestack registers cubestar
@@ -8,20 +8,23 @@ examples:
 
 import argparse
 
-from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.cli.session import DEVICES
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.registers import FORMATS, render
 
 __all__ = ["add_arguments", "run"]
 
+#: Interface of each device, by the name that the command line uses.
+INTERFACES = {interface.name.lower(): interface for interface in (CUBESTAR, CUBESENSE)}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("device", choices=DEVICES, help="device whose interface is listed")
+    parser.add_argument("device", choices=INTERFACES, help="device whose interface is listed")
     parser.add_argument("--format", choices=FORMATS, default="table", help="default: table")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the listing."""
-    print(render(INTERFACE, args.format), end="")
+    print(render(INTERFACES[args.device], args.format), end="")
     return 0

@@ -7,10 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.message import Interface
+from cubestack.host.cli.main import main
 from cubestack.host.registers import FORMATS, render
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "registers-cubestar.md"
+DOCUMENTS = Path(__file__).parents[2] / "docs"
+DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE], ids=lambda i: i.name)
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 PROGRAM = """
@@ -41,44 +45,79 @@ int main(void)
 """
 
 
-@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
-def test_c_header_compiles_and_agrees_with_the_tables(tmp_path: Path) -> None:
-    (tmp_path / "cubestar.h").write_text(render(INTERFACE, "c"))
-    (tmp_path / "main.c").write_text(PROGRAM)
+SENSE_PROGRAM = """
+#include <stdio.h>
+#include "cubesense.h"
+
+int main(void)
+{
+    const uint8_t in[6] = {0xd2, 0x04, 0xc9, 0xfd, 2, 7};
+    printf("%d %d %d\\n", cubesense_get_i16(in, CUBESENSE_TLM_Result1_Alpha_OFFSET),
+           cubesense_get_i16(in, CUBESENSE_TLM_Result1_Beta_OFFSET),
+           in[CUBESENSE_TLM_Result1_Detect_OFFSET] == CUBESENSE_DETECT_RESULT_SUCCESS);
+    printf("%x %x %d %c %d\\n", CUBESENSE_REGISTER_I2C_ADDRESS, CUBESENSE_REGISTER_NADIR_X,
+           CUBESENSE_REGISTER_NADIR_X_SCALE, CUBESENSE_BENCH_TAKE_NADIR,
+           CUBESENSE_BENCH_SEND_SUN_LENGTH);
+    return 0;
+}
+"""
+
+
+def compile_and_run(folder: Path, interface: Interface, program: str, data: bytes) -> list[str]:
+    (folder / f"{interface.name.lower()}.h").write_text(render(interface, "c"))
+    (folder / "main.c").write_text(program)
     flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     command = [str(COMPILER), *flags, "main.c", "-o", "main"]
-    subprocess.run(command, cwd=tmp_path, check=True)
+    subprocess.run(command, cwd=folder, check=True)
+    run = subprocess.run([folder / "main"], input=data, stdout=subprocess.PIPE, check=True)
+    return run.stdout.decode().splitlines()
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_c_header_compiles_and_agrees_with_the_tables(tmp_path: Path) -> None:
     data = bytes.fromhex("0102 f0c2 8090a0b0 0000c03f 99aabbcc")
-    run = subprocess.run([tmp_path / "main"], input=data, stdout=subprocess.PIPE, check=True)
-    first, second, copied = run.stdout.decode().splitlines()
+    first, second, copied = compile_and_run(tmp_path, INTERFACE, PROGRAM, data)
     fx = struct.unpack("<f", data[:4])[0]
     assert first.split() == [str(len(data)), f"{fx:.9g}", "-15632", str(0xB0A09080), "-1.5632"]
     assert second == "177 18 29 0"
     assert copied == data[:11].hex()
 
 
-def test_c_header_defines_every_name_once_and_has_every_message() -> None:
-    names = re.findall(r"(?:#define|^   ) (CUBESTAR_\w+)", render(INTERFACE, "c"), re.MULTILINE)
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_c_header_of_a_device_with_registers_and_letters(tmp_path: Path) -> None:
+    lines = compile_and_run(tmp_path, CUBESENSE, SENSE_PROGRAM, b"")
+    assert lines == ["1234 -567 1", "1c 48 100 a 307200"]
+
+
+@DEVICES
+def test_c_header_defines_every_name_once_and_has_every_message(interface: Interface) -> None:
+    upper = interface.name.upper()
+    pattern = rf"(?:#define|^   ) ({upper}_\w+)"
+    names = re.findall(pattern, render(interface, "c"), re.MULTILINE)
     assert len(names) == len(set(names))
-    for message in INTERFACE.messages:
-        kind = "TLM" if message.id & 0x80 else "TC"
-        assert f"CUBESTAR_{kind}_{message.name}" in names
-        assert all(
-            f"CUBESTAR_{kind}_{message.name}_{f.name}_OFFSET" in names for f in message.fields
-        )
+    for message in interface.messages:
+        name = f"{upper}_{'TLM' if message.id & 0x80 else 'TC'}_{message.name}"
+        assert {name, *(f"{name}_{field.name}_OFFSET" for field in message.fields)} <= set(names)
+    for register in interface.registers or ():
+        assert f"{upper}_REGISTER_{register.name}" in names
 
 
-def test_the_document_is_the_generated_one() -> None:
-    assert DOCUMENT.read_text(encoding="utf-8") == render(INTERFACE, "markdown"), (
-        "docs/registers-cubestar.md is stale: "
-        "cubestack registers cubestar --format markdown > docs/registers-cubestar.md"
+@DEVICES
+def test_the_document_is_the_generated_one(interface: Interface) -> None:
+    device = interface.name.lower()
+    text = (DOCUMENTS / f"registers-{device}.md").read_text(encoding="utf-8")
+    assert text == render(interface, "markdown"), (
+        f"docs/registers-{device}.md is stale: "
+        f"cubestack registers {device} --format markdown > docs/registers-{device}.md"
     )
 
 
+@DEVICES
 @pytest.mark.parametrize("form", FORMATS)
-def test_every_format_names_every_message_and_field(form: str) -> None:
-    words = set(re.findall(r"\w+", render(INTERFACE, form).replace("CUBESTAR_", " ")))
-    for message in INTERFACE.messages:
+def test_every_format_names_every_message_and_field(interface: Interface, form: str) -> None:
+    text = render(interface, form).replace(f"{interface.name.upper()}_", " ")
+    words = set(re.findall(r"\w+", text))
+    for message in interface.messages:
         if form == "c":
             kind = "TLM" if message.id & 0x80 else "TC"
             assert {f"{kind}_{message.name}_{f.name}_OFFSET" for f in message.fields} <= words
@@ -97,6 +136,38 @@ def test_json_carries_the_whole_declaration() -> None:
     assert messages["telemetry", 138]["supported"] is False
     assert messages["telemetry", 151]["steps"] is True
     assert messages["telecommand", 100]["ours"] is True
+
+
+def test_json_carries_registers_and_letters_where_there_are_any() -> None:
+    content = json.loads(render(CUBESENSE, "json"))
+    registers = {entry["field"]["name"]: entry for entry in content["registers"]["registers"]}
+    assert content["registers"]["i2c_address"] == 0x1C
+    assert registers["NADIR_X"]["access"] == "ro"
+    assert (registers["NADIR_X"]["length"], registers["NADIR_X"]["field"]["scale"]) == (2, 100)
+    assert content["bench"]["baud"] == 115_200
+    letters = {entry["letter"]: entry for entry in content["bench"]["letters"]}
+    assert (letters["a"]["answer"], letters["s"]["length"]) == ("59", 307_200)
+    confidences = {entry["name"]: entry["confidence"] for entry in content["messages"]}
+    assert confidences["Result1"] == "MEDIUM"
+    assert confidences["Details1"] is None
+    assert not {"registers", "bench"} & json.loads(render(INTERFACE, "json")).keys()
+
+
+@pytest.mark.parametrize("form", ["table", "markdown"])
+def test_readers_find_registers_letters_and_what_is_ours(form: str) -> None:
+    text = render(CUBESENSE, form)
+    assert "which registers there are, and their addresses, are ours" in text
+    assert "0x48" in text
+    assert "layout only declared somewhere" in text
+    assert re.search(r"\ba\b.*TAKE_NADIR.*'Y'", text)
+
+
+@DEVICES
+def test_the_command_lists_a_device(
+    interface: Interface, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["registers", interface.name.lower()]) == 0
+    assert capsys.readouterr().out == render(interface, "table")
 
 
 def test_table_tells_ranges_resets_and_flags() -> None:
