@@ -5,13 +5,17 @@ Messages come from the interface tables; nothing about a device is written here.
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from cubestack.firmware_model.interface.message import Interface, Value
-from cubestack.host.errors import NoAnswerError
+from cubestack.firmware_model.interface.message import Interface, Message, Value
+from cubestack.host.errors import CommandRefusedError, NoAnswerError
 
-__all__ = ["POLL_PERIOD_S", "Client"]
+__all__ = ["POLL_PERIOD_S", "Client", "Progress"]
+
+#: Called with (pieces done, pieces in all) during a transfer.
+Progress = Callable[[int, int], None]
 
 #: Time between two polls of a node.
 POLL_PERIOD_S = 0.01
@@ -49,16 +53,23 @@ class Client(ABC):
     def close(self) -> None:
         """Release the bus."""
 
-    def wait_processed(self, timeout_s: float) -> None:
+    def wait_processed(self, timeout_s: float) -> dict[str, Value]:
         """Poll telemetry TcmdProcessed until every accepted telecommand is processed.
 
-        Raises NoAnswerError after ``timeout_s``.
+        Returns that frame's fields. Raises NoAnswerError after ``timeout_s``.
         """
         for _ in range(math.ceil(timeout_s / POLL_PERIOD_S)):
-            if self.telemetry("TcmdProcessed")["Processed"]:
-                return
+            values = self.telemetry("TcmdProcessed")
+            if values["Processed"]:
+                return values
             self.pause(POLL_PERIOD_S)
         raise NoAnswerError(f"telecommand not processed within {timeout_s:g} s")
+
+    def _check_error(self, message: Message, error: int) -> None:
+        """Raise CommandRefusedError when an acknowledge's ``error`` code is one."""
+        if error:
+            known = {int(code): code for code in self.interface.ack_errors}
+            raise CommandRefusedError(message.name, known.get(error, error))
 
     def __enter__(self) -> Self:
         """Use the client in a ``with`` block."""

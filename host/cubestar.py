@@ -6,7 +6,7 @@ v_camera = q v_inertial q*; pixel coordinates count from the middle of the first
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,20 +21,17 @@ from cubestack.firmware_model.interface.cubestar import (
     TaskStatus,
 )
 from cubestack.firmware_model.interface.message import Value
-from cubestack.host.client import Client
+from cubestack.host.client import Client, Progress
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
 from cubestack.host.node_client import NodeClient
 
-__all__ = ["COLUMNS", "ROWS", "Attitude", "CubeStar", "Progress", "Star"]
+__all__ = ["COLUMNS", "ROWS", "Attitude", "CubeStar", "Star"]
 
 COLUMNS = 1024
 ROWS = IMAGE_BYTES // COLUMNS
 
 #: Longer than two frames at the lowest frame rate, a transfer and the processing.
 STEP_TIMEOUT_S = 10.0
-
-#: Called with (blocks done, blocks in all).
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

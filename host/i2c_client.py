@@ -1,8 +1,9 @@
 """Client of a node on I2C, through any object with smbus2's ``i2c_rdwr``.
 
 Telemetry is one transfer: write the ID, repeated start, read the data. A telecommand is one write;
-there is no error byte on this bus, so the node's refusals show in telemetry ErrorFlags only. What
-the tables forbid is therefore refused here, before it is sent.
+there is no error byte on this bus, so a node's refusal shows in telemetry only: in TcmdProcessed
+where that has an error code, else in ErrorFlags. What the tables forbid is therefore refused here,
+before it is sent.
 """
 
 import time
@@ -63,7 +64,8 @@ class I2cClient(Client):
             raise NoAnswerError(
                 f"telecommand {message.name} not acknowledged at I2C address {self._address:#04x}"
             ) from error
-        self.wait_processed(self._processing_timeout_s)
+        values = self.wait_processed(self._processing_timeout_s)
+        self._check_error(message, int(values.get("Error", 0)))
 
     def telemetry(self, name: str) -> dict[str, Value]:
         """See Client. A frame that steps may skip a record when a transfer broke off."""

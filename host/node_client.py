@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.message import Interface, Value
 from cubestack.host.client import Client
-from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError
+from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.transport import Transport
 
 __all__ = ["NodeClient"]
@@ -56,10 +56,7 @@ class NodeClient(Client):
             raise BadAnswerError(
                 f"acknowledge of telecommand {message.name} has {len(answer)} bytes, not 1"
             )
-        known = {int(error): error for error in self.interface.ack_errors}
-        code = known.get(answer[0], answer[0])
-        if code != 0:
-            raise CommandRefusedError(message.name, code)
+        self._check_error(message, answer[0])
 
     def telemetry(self, name: str) -> dict[str, Value]:
         """See Client. A frame that steps may skip a record when an answer was lost."""

@@ -52,4 +52,5 @@ def thumbnail(picture: NDArray[np.uint8], size: ImageSize) -> NDArray[np.uint8]:
     pixels = np.concatenate([frame_pixels(size, frame) for frame in range(size.frames)])
     padded = np.zeros(IMAGE_BYTES + 1, np.uint8)  # OUTSIDE counts as its last element
     padded[:IMAGE_BYTES] = picture.reshape(IMAGE_BYTES)
-    return padded[pixels].reshape(size.side, size.side)
+    square: NDArray[np.uint8] = padded[pixels]
+    return square.reshape(size.side, size.side)

@@ -1,4 +1,4 @@
-"""A node in memory, driven by the interface tables: what host code talks to in these tests."""
+"""Nodes in memory, driven by the interface tables: what host code talks to in these tests."""
 
 from collections import defaultdict, deque
 from collections.abc import Callable
@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE, AckError
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.message import Kind
+from cubestack.firmware_model.interface.message import Interface, Kind
 
 
 class FakeNode:
@@ -19,32 +20,30 @@ class FakeNode:
     Attributes:
         values: telemetry name to the fields that differ from their reset value.
         records: name of a stepping telemetry to its records.
-        memory: picture memory.
         log: accepted telecommands, (name, parameters).
         busy: polls that answer "not processed" after each telecommand.
         refusals: error codes for the next telecommands.
         lost: answers that the wire swallows.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, interface: Interface) -> None:
+        self.interface = interface
         self.values: defaultdict[str, dict[str, Any]] = defaultdict(dict)
         self.records: dict[str, list[dict[str, Any]]] = {}
-        self.memory = np.zeros(IMAGE_BYTES, np.uint8)
         self.log: list[tuple[str, dict[str, Any]]] = []
         self.busy = 0
         self.refusals: deque[AckError] = deque()
         self.lost = 0
         self._polls = 0
-        self._block = {"BlockNumber": 0, "BlockSize": 2}
         self._steps: dict[str, Any] = {}
 
     def answer(self, payload: bytes) -> bytes | None:
         """The answer to a message, None for no answer."""
-        message = INTERFACE.find(payload[0])
+        message = self.interface.find(payload[0])
         if message is None:
             return None if payload[0] & 0x80 else bytes([AckError.INVALID_ID])
         if message.kind is Kind.TELEMETRY:
-            fields = message.reset_values() | self._telemetry(message.name)
+            fields = message.reset_values() | self.telemetry(message.name)
             answer = message.pack(**fields)
         elif len(payload) != 1 + message.length:
             answer = bytes([AckError.WRONG_LENGTH])
@@ -63,28 +62,111 @@ class FakeNode:
             return error
         self.log.append((message.name, values))
         self._polls = self.busy
-        if message.name == "UploadImage":
+        self.execute(message.name, values)
+        return AckError.OK
+
+    def execute(self, name: str, values: dict[str, Any]) -> None:
+        """Do what an accepted telecommand asks for."""
+
+    def telemetry(self, name: str) -> dict[str, Any]:
+        """The fields of a telemetry frame that differ from their reset value."""
+        if name == "TcmdProcessed":
+            self._polls -= 1
+            return self.values[name] | {"Processed": int(self._polls < 0)}
+        if name in self.records:
+            return next(self._steps.setdefault(name, cycle(self.records[name])))
+        return self.values[name]
+
+
+class FakeCubeStar(FakeNode):
+    """Stores what is uploaded in ``memory``."""
+
+    def __init__(self) -> None:
+        super().__init__(INTERFACE)
+        self.memory = np.zeros(IMAGE_BYTES, np.uint8)
+        self._block = {"BlockNumber": 0, "BlockSize": 2}
+
+    def execute(self, name: str, values: dict[str, Any]) -> None:
+        if name == "UploadImage":
             self.memory[:] = 0
             self.values["UploadStatus"]["BlocksReceived"] = 0
-        if message.name == "UploadBlock":
+        if name == "UploadBlock":
             start = 128 * values["BlockNumber"]
             self.memory[start : start + 128] = np.frombuffer(values["Data"], np.uint8)
             status = self.values["UploadStatus"]
             status["BlocksReceived"] = status.get("BlocksReceived", 0) + 1
-        if message.name == "ImageBlockSet":
+        if name == "ImageBlockSet":
             self._block = values
-        return AckError.OK
 
-    def _telemetry(self, name: str) -> dict[str, Any]:
-        if name == "TcmdProcessed":
-            self._polls -= 1
-            return {"Processed": int(self._polls < 0)}
+    def telemetry(self, name: str) -> dict[str, Any]:
         if name == "ImageBlock":
             start = 128 * self._block["BlockNumber"]
             return {"Block": self.memory[start : start + 128].tobytes()}
-        if name in self.records:
-            return next(self._steps.setdefault(name, cycle(self.records[name])))
-        return self.values[name]
+        return super().telemetry(name)
+
+
+class FakeCubeSense(FakeNode):
+    """Measures what a test puts in, and sends pictures in frames.
+
+    Attributes:
+        pictures: the picture (480, 640) in each memory.
+        outcomes: fields of a camera's result once the measurement is done.
+        capturing, detecting: polls of a result that answer pending after a telecommand.
+        preparing: polls of ImageFrameInfo before a frame is ready.
+        damaged: reads of ImageFrame that come with a wrong byte.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(CUBESENSE)
+        self.pictures = np.zeros((2, 480, 640), np.uint8)
+        self.outcomes: list[dict[str, Any]] = [{}, {}]
+        self.capturing = self.detecting = self.preparing = self.damaged = 0
+        self._results: list[deque[dict[str, Any]]] = [deque([{}]), deque([{}])]
+        self._frames = np.zeros((0, 128), np.uint8)
+        self._frame = 0
+        self._unready = 0
+
+    def execute(self, name: str, values: dict[str, Any]) -> None:
+        if name in ("CaptureAndDetect", "CaptureOnly"):
+            self._start(values["Camera"], name == "CaptureAndDetect")
+        if name == "StartImageDownload":
+            canvas = np.pad(self.pictures[values["Sram"]], ((272, 272), (192, 192)))
+            step = 1 << values["Size"]
+            self._frames = canvas[::step, ::step].reshape(-1, 128)
+        if name in ("StartImageDownload", "NextImageFrame"):
+            self._frame = values.get("Frame", 0)
+            self._unready = self.preparing
+
+    def _start(self, camera: int, detect: bool) -> None:
+        busy = {"Capture": 1, "Detect": 2 if detect else 1}
+        self._results[camera] = deque(
+            [busy] * self.capturing
+            + [busy | {"Capture": 2}] * (self.detecting if detect else 0)
+            + [self.outcomes[camera]]
+        )
+
+    def telemetry(self, name: str) -> dict[str, Any]:
+        if name.startswith("Result"):
+            camera = int(name[len("Result")]) - 1
+            results = self._results[camera]
+            found = results.popleft() if len(results) > 1 else results[0]
+            if "Then" in name:
+                self.log.append((name, found))
+                self._start(camera, True)
+            return found
+        if name == "ImageFrameInfo":
+            self._unready -= 1
+            if self._unready >= 0:
+                return {}
+            check = int(np.bitwise_xor.reduce(self._frames[self._frame]))
+            return {"FrameNumber": self._frame, "Checksum": check}
+        if name == "ImageFrame":
+            frame = self._frames[self._frame].copy()
+            self.damaged -= 1
+            if self.damaged >= 0:
+                frame[7] ^= 0x40
+            return {"Frame": frame.tobytes()}
+        return super().telemetry(name)
 
 
 class UartLink:
@@ -139,8 +221,8 @@ class I2cLink:
 
 
 @pytest.fixture
-def node() -> FakeNode:
-    return FakeNode()
+def node() -> FakeCubeStar:
+    return FakeCubeStar()
 
 
 @pytest.fixture
@@ -150,4 +232,19 @@ def uart(node: FakeNode) -> UartLink:
 
 @pytest.fixture
 def i2c(node: FakeNode) -> I2cLink:
-    return I2cLink(node, INTERFACE.i2c_address)
+    return I2cLink(node, node.interface.i2c_address)
+
+
+@pytest.fixture
+def sense() -> FakeCubeSense:
+    return FakeCubeSense()
+
+
+@pytest.fixture
+def sense_uart(sense: FakeCubeSense) -> UartLink:
+    return UartLink(sense)
+
+
+@pytest.fixture
+def sense_i2c(sense: FakeCubeSense) -> I2cLink:
+    return I2cLink(sense, sense.interface.i2c_address)

@@ -2,6 +2,7 @@ from typing import Any
 
 import pytest
 
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.message import InterfaceError, Message
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
@@ -47,6 +48,15 @@ def test_what_the_node_could_not_refuse_visibly_is_not_sent(client: I2cClient, n
     with pytest.raises(InterfaceError, match="did you mean IdMode"):
         client.command("setIDMode", IdMod=0)
     assert node.log == []
+
+
+def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any, sense_i2c: Any) -> None:
+    client = I2cClient(sense_i2c, CUBESENSE, wait=sense_i2c.waits.append)
+    client.command("CaptureAndDetect", Camera=0, Sram=0)
+    for code, text in ((4, r"BUFFER_FULL \(4\)"), (99, r"unknown code \(99\)")):
+        sense.values["TcmdProcessed"] = {"Error": code}
+        with pytest.raises(CommandRefusedError, match=f"CaptureAndDetect refused: {text}"):
+            client.command("CaptureAndDetect", Camera=0, Sram=0)
 
 
 def test_telemetry_is_asked_for_again(client: I2cClient, i2c: Any) -> None:
