@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubestar import IdMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 from cubestack.host.calibration import calibrate, load_camera
 from cubestack.host.cli.session import Session, open_session
 from cubestack.host.operator import find_threshold
@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from cubestack.emulator.sky.scene import Scene
 
 __all__ = ["FrameResult", "compare", "measure_frames"]
+
+#: Names of --mode for the firmware's modes.
+MODE_NAMES = {
+    MatchMode.LOST_IN_SPACE: "lis",
+    MatchMode.ASSISTED: "assisted",
+    MatchMode.TRACKING: "tracking",
+}
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3
@@ -139,7 +146,7 @@ def _measure_frame(
         centroids=int(summary["NumStarsDetected"]),
         matched=attitude.matched if solved else 0,
         wrong=_count_wrong(session, known) if solved else 0,
-        mode=attitude.mode.name.lower() if solved else args.mode,
+        mode=MODE_NAMES[attitude.mode] if solved else args.mode,
         error_cross_deg=cross,
         error_roll_deg=roll,
         truth=None if known is None else [float(part) for part in known],
