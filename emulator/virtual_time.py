@@ -23,9 +23,24 @@ class Kernel(simpy.Environment):
         return None if peek == float("inf") else int(peek)
 
     def advance_to(self, time_ps: int) -> None:
-        """Let everything before ``time_ps`` happen, then stand there; a past time does nothing."""
+        """Let everything before ``time_ps`` happen, then stand there; a past time does nothing.
+
+        Unlike ``run``, it leaves no event of its own behind, which would pass for the horizon.
+        """
         if time_ps > self.now:
-            self.run(until=time_ps)
+            arrival = _Arrival(self, time_ps)
+            while not arrival.processed:
+                self.step()
+
+
+class _Arrival(simpy.Event):
+    """Comes before all else that happens at its time."""
+
+    def __init__(self, env: Kernel, time_ps: int) -> None:
+        super().__init__(env)
+        self._ok = True
+        self._value = None
+        env.schedule(self, simpy.events.URGENT, time_ps - env.now)
 
 
 class CycleClock:

@@ -34,7 +34,7 @@ class DirectSerial:
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """Wait at most ``timeout_s`` of virtual time for a byte; return those that have arrived."""
         deadline = self._env.now + int(timeout_s * PS_PER_S)
-        while (arrival := self._line.next_arrival_ps) is None or arrival > self._env.now:
+        while (arrival := self._line.arrival_ps()) is None or arrival > self._env.now:
             target = deadline if arrival is None else min(deadline, arrival)
             if self._env.now >= target:
                 return b""
@@ -83,4 +83,5 @@ def _to_plain(message: Any) -> I2cMessage:
         )
     if message.flags & I2C_M_RD:
         return I2cMessage(message.addr, read=message.len)
-    return I2cMessage(message.addr, bytearray(message))
+    # Not bytearray(message): that is the structure itself, by the buffer protocol of ctypes.
+    return I2cMessage(message.addr, bytearray(bytes(message)))

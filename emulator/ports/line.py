@@ -16,18 +16,18 @@ class HostLine:
         self._blocks: deque[tuple[bytes, int, int]] = deque()
         uart.line = self._deliver
 
-    @property
-    def next_arrival_ps(self) -> int | None:
-        """When the next byte that was not taken arrives or arrived; None without one."""
-        return self._blocks[0][1] if self._blocks else None
+    def arrival_ps(self, count: int = 1) -> int | None:
+        """When ``count`` of the bytes not taken yet have arrived, or all if there are fewer.
 
-    @property
-    def last_arrival_ps(self) -> int | None:
-        """When all that the device sent so far has arrived; None when all of it was taken."""
-        if not self._blocks:
-            return None
-        data, first_ps, byte_ps = self._blocks[-1]
-        return first_ps + (len(data) - 1) * byte_ps
+        None when there are none.
+        """
+        arrival = None
+        for data, first_ps, byte_ps in self._blocks:
+            arrival = first_ps + (min(count, len(data)) - 1) * byte_ps
+            count -= len(data)
+            if count <= 0:
+                break
+        return arrival
 
     @property
     def write_backlog(self) -> int:

@@ -21,6 +21,9 @@ SLICE_S = 0.005
 IDLE_S = 0.02
 """Longest wait: a client that opens a pseudo-terminal and ``stop`` are noticed within it."""
 
+BURST_BYTES = 4096
+"""Bytes from the device between two looks at its client, to notice in time that it is slow."""
+
 LAG_WORTH_SAYING_S = 0.5
 LAG_REPORT_S = 5.0
 """Wall time between two reports of a lag."""
@@ -117,17 +120,24 @@ class Pump:
         progress = False
         end_ns = self._slice_end_ns()
         while self._clock_ns() < end_ns:
-            horizon = self._env.horizon()
-            releases = [endpoint.last_release_ps() for endpoint in self._endpoints]
-            on_wire = [ps for ps in releases if ps is not None and ps > self._env.now]
-            if on_wire and (horizon is None or horizon > min(on_wire)):
-                self._env.advance_to(min(on_wire))
-            elif horizon is not None and (on_wire or self._busy()):
+            horizon, release = self._env.horizon(), self._release_ps(BURST_BYTES)
+            if release is None and not self._busy():
+                break
+            if release is not None and release <= self._env.now:
+                break  # to the clients with it
+            if horizon is not None and (release is None or horizon <= release):
                 self._env.step()
+            elif release is not None:
+                self._env.advance_to(release)
             else:
                 break
             progress = True
         return progress
+
+    def _release_ps(self, count: int) -> int | None:
+        """When an endpoint has ``count`` bytes from the device, or all that it will get."""
+        releases = [endpoint.release_ps(count) for endpoint in self._endpoints]
+        return min((ps for ps in releases if ps is not None), default=None)
 
     def _follow(self) -> None:
         """Bring virtual time up to wall time, as far as a slice of wall time allows."""
@@ -150,8 +160,7 @@ class Pump:
 
     def _until_next_s(self) -> float:
         """Wall time until something is due, at most ``IDLE_S``."""
-        due = [endpoint.next_release_ps() for endpoint in self._endpoints]
-        times = [ps for ps in (*due, self._env.horizon()) if ps is not None]
+        times = [ps for ps in (self._release_ps(1), self._env.horizon()) if ps is not None]
         if not times:
             return IDLE_S
         return min(IDLE_S, max(0.0, (min(times) - self._wall_ps()) / PS_PER_S))

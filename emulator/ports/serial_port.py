@@ -45,11 +45,8 @@ class Endpoint(Protocol):
     def exchange(self, now_ps: int) -> None:
         """Move what can be moved at virtual time ``now_ps``, without blocking."""
 
-    def next_release_ps(self) -> int | None:
-        """When the next byte from the device arrives at the host; None without one."""
-
-    def last_release_ps(self) -> int | None:
-        """When the last byte that the device has sent so far arrives; None without one."""
+    def release_ps(self, count: int) -> int | None:
+        """When the next ``count`` bytes from the device, or all, have arrived; None without any."""
 
     def close(self) -> None:
         """Release the port."""
@@ -86,13 +83,9 @@ class SerialPort(ABC):
         if self._unread:
             del self._unread[: self._write(self._unread)]
 
-    def next_release_ps(self) -> int | None:
+    def release_ps(self, count: int) -> int | None:
         """See Endpoint."""
-        return self._line.next_arrival_ps
-
-    def last_release_ps(self) -> int | None:
-        """See Endpoint."""
-        return self._line.last_arrival_ps
+        return self._line.arrival_ps(count)
 
     def close(self) -> None:
         """See Endpoint."""

@@ -67,6 +67,25 @@ def test_advance_performs_what_lies_before():
     assert (happened, kernel.now) == ([10, 20], 25)
 
 
+def test_advance_leaves_nothing_behind():
+    kernel = Kernel()
+    kernel.advance_to(20)
+    assert kernel.horizon() is None
+    kernel.timeout(7)
+    kernel.advance_to(25)
+    assert kernel.horizon() == 27
+
+
+def test_horizon_is_no_later_than_where_time_is_advanced_to():
+    """What looks ahead stops there, as somebody outside may act then."""
+    kernel = Kernel()
+    seen = []
+    kernel.timeout(10).callbacks.append(lambda _event: seen.append(kernel.horizon()))
+    kernel.timeout(50)
+    kernel.advance_to(20)
+    assert seen == [20]
+
+
 @pytest.mark.parametrize("time", [0, 19, 20])
 def test_advance_never_goes_back(time):
     kernel = Kernel()
