@@ -50,7 +50,7 @@ def test_lost_in_space(measure: Measure) -> None:
     frames = measure(*SAMPLE, "--seed", 11)
     assert percent_right(frames) >= 95
     assert not wrong_attitudes(frames)
-    assert {frame["mode"] for frame in frames if frame["solved"]} == {"lost_in_space"}
+    assert {frame["mode"] for frame in frames if frame["solved"]} == {"lis"}
 
 
 def test_assisted_within_five_degrees(measure: Measure) -> None:
@@ -128,7 +128,7 @@ def test_photographs(measure: Measure, photographs: Any) -> None:
         arguments = ("--image", picture, "--crop", "0,256")
         (frame,) = measure(*arguments, "--camera", photographs / "truth.json")
         assert frame["right"], picture.name
-        assert frame["mode"] == "lost_in_space"
+        assert frame["mode"] == "lis"
         assert frame["wrong"] == 0
         assert frame["error_cross_deg"] <= 0.03, picture.name
         assert abs(frame["error_roll_deg"]) <= 0.08, picture.name
