@@ -1,0 +1,120 @@
+// One frame of full size around the board's top: camera, SRAM and data clock in Verilog, because
+// Python would need minutes for them. cocotb drives ENABLE, RNW, BANK and the requests, and
+// judges the counts.
+//
+// A pixel's value is a hash of frame, row and column, so source and checkers share no state.
+module full_frame;
+    parameter COLUMNS = 1024;
+    parameter ROWS = 512;
+    localparam PIXELS = COLUMNS * ROWS;
+    localparam COLUMN_BITS = $clog2(COLUMNS);
+    localparam POSITION_BITS = COLUMN_BITS + $clog2(ROWS);
+
+    reg ENABLE = 0, RNW = 0, BANK = 0, PIXCLK = 0, HSYNC = 0, VSYNC = 0, DCLK = 0;
+    reg [7:0] PIXDATA = 0;
+    wire ACK, SRAM_D_OE, SRAM_CE_N, SRAM_OE_N, SRAM_WE_N;
+    wire [7:0] DATA, SRAM_D_O;
+    wire [POSITION_BITS:0] SRAM_A;
+
+    // The one data bus: the FPGA's pads and the SRAM on the same wires.
+    wire [7:0] bus;
+    reg [7:0] memory [0:2 * (1 << POSITION_BITS) - 1];
+    assign bus = SRAM_D_OE ? SRAM_D_O : 8'bz;
+    assign bus = (SRAM_CE_N | SRAM_OE_N | ~SRAM_WE_N) ? 8'bz : memory[SRAM_A];
+
+    dut dut (
+        .PIXCLK(PIXCLK), .PIXDATA(PIXDATA), .HSYNC(HSYNC), .VSYNC(VSYNC),
+        .ENABLE(ENABLE), .RNW(RNW), .BANK(BANK), .DCLK(DCLK), .ACK(ACK), .DATA(DATA),
+        .SRAM_A(SRAM_A), .SRAM_D_I(bus), .SRAM_D_O(SRAM_D_O), .SRAM_D_OE(SRAM_D_OE),
+        .SRAM_CE_N(SRAM_CE_N), .SRAM_OE_N(SRAM_OE_N), .SRAM_WE_N(SRAM_WE_N)
+    );
+
+    function [7:0] pixel(input integer frame, input integer row, input integer column);
+        reg [31:0] mixed;
+        begin
+            mixed = (frame * 32'h85EBCA6B) ^ (row * 32'hC2B2AE35) ^ (column * 32'h9E3779B1);
+            mixed = (mixed ^ (mixed >> 15)) * 32'h2C1B3C6D;
+            pixel = mixed[31:24];
+        end
+    endfunction
+
+    // Camera: free-running, joined in the middle of frame 0. One clock in 256 is stretched.
+    integer seed, half, frame, row, column, blank, stretch;
+    initial begin
+        if (!$value$plusargs("seed=%d", seed)) seed = 1;
+        half = 30000 + $unsigned($random(seed)) % 40000;
+        frame = 0;
+        row = $unsigned($random(seed)) % (ROWS - 32);
+        column = $unsigned($random(seed)) % COLUMNS;
+        blank = 0;
+        forever begin
+            stretch = $random(seed);
+            #(half + (stretch[7:0] == 0 ? stretch[19:8] * 100 : 0)) PIXCLK = 1;
+            #(half / 4) if (blank > 0) begin
+                blank = blank - 1;
+                HSYNC = 0;
+                VSYNC = row != 0;
+                PIXDATA = stretch[31:24];
+            end else begin
+                HSYNC = 1;
+                VSYNC = 1;
+                PIXDATA = pixel(frame, row, column);
+                column = column + 1;
+                if (column == COLUMNS) begin
+                    column = 0;
+                    blank = 1 + $unsigned($random(seed)) % 20;
+                    row = row + 1;
+                    if (row == ROWS) begin
+                        row = 0;
+                        frame = frame + 1;
+                    end
+                end
+            end
+            #(half - half / 4) PIXCLK = 0;
+        end
+    end
+
+    // SRAM. A frame's pulses are counted from its VSYNC on, and its addresses go with the count.
+    integer pulses = 0, disorder = 0, unstable = 0, contention = 0;
+    time pulse_end = 0;
+    reg bank_wanted = 0;
+    always @(posedge VSYNC) if (!ACK) pulses = 0;
+    always @(negedge SRAM_WE_N) if (PIXCLK !== 0) unstable = unstable + 1;
+    always @(SRAM_A or bus) if (SRAM_WE_N === 0 && SRAM_CE_N === 0) unstable = unstable + 1;
+    always @(posedge SRAM_WE_N) if (SRAM_CE_N === 0) begin
+        memory[SRAM_A] = bus;
+        if (SRAM_A !== {bank_wanted, pulses[POSITION_BITS - 1:0]}) disorder = disorder + 1;
+        pulses = pulses + 1;
+        pulse_end = $time;
+    end
+    always @(SRAM_D_OE or SRAM_OE_N) #1 if (SRAM_D_OE && !SRAM_OE_N) contention = contention + 1;
+
+    integer ack_pulses = 0, ack_frame = 0;
+    time ack_delay = 0;
+    always @(posedge ACK) begin
+        ack_pulses = pulses;
+        ack_delay = $time - pulse_end;
+        ack_frame = frame;
+    end
+
+    // Requests: compare the bank with frame `expected`, in the memory or through the data clock.
+    reg look = 0, read = 0, read_done = 0;
+    integer expected = 0, wrong_in_memory = -1, wrong_in_data = -1, step, index;
+    always @(posedge look) begin
+        wrong_in_memory = 0;
+        for (index = 0; index < PIXELS; index = index + 1)
+            if (memory[bank_wanted * PIXELS + index] !== pixel(expected, index / COLUMNS, index % COLUMNS))
+                wrong_in_memory = wrong_in_memory + 1;
+    end
+    always @(posedge read) begin
+        wrong_in_data = 0;
+        for (step = 0; step < PIXELS + COLUMNS; step = step + 1) begin
+            index = step % PIXELS;
+            #331007 DCLK = 1;
+            #100003 if (DATA !== pixel(expected, index / COLUMNS, index % COLUMNS))
+                wrong_in_data = wrong_in_data + 1;
+            DCLK = 0;
+        end
+        read_done = 1;
+    end
+endmodule
