@@ -71,11 +71,10 @@ class CubeStarProgram:
         if self._hardware.reset_cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
             yield from self._capture.sensor.power_up()
         while True:
-            if (yield from self._serve()):
-                continue
+            served = yield from self._serve()
             if retained.looping:
                 yield from self._iteration()
-            else:
+            elif not served:
                 yield from self._phases.idle(None)
 
     def _serve(self) -> Routine[bool]:
