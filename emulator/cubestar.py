@@ -171,12 +171,14 @@ class CubeStarBoard:
         self.power.set_state("memory", "transfer" if state == "reading" else "standby")
 
     def _supply_switched(self, channel: str, on: bool) -> None:
-        self.engine.run(self.kernel.now)
+        # A latch-up comes from outside, so the FPGA may have run ahead; see emulator/processor.py.
+        now_ps = max(self.kernel.now, self.engine.now_ps)
+        self.engine.run(now_ps)
         if channel == "memory":
             if not on:
                 self._scramble(self._hardware.external_ram)
             return
-        self.camera.power(on, self.kernel.now)
+        self.camera.power(on, now_ps)
         if not on:
             self._scramble(self.engine.sram)
 
