@@ -101,6 +101,8 @@ class Served:
         )
         assert self.process.stderr is not None
         line = self.process.stderr.readline()
+        if " serves on " not in line:
+            self.end()
         assert " serves on " in line, line
         self.port = line.split(" serves on ")[1].split()[0]
 

@@ -1,4 +1,4 @@
-"""Centroids as the host reads them, against where the stars are (CubeStar thesis, section 4.1.6)."""
+"""Centroids that the host reads, against the truth (CubeStar thesis, section 4.1.6)."""
 
 from typing import Any
 

@@ -1,0 +1,110 @@
+"""An emulator process that any program can talk to, and the README's word about it."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+POINTING_RAD = (1.4661, -0.0175)  # right ascension 84, declination -1 degrees: what emulate shows
+TOLERANCE_RAD = 3e-4  # telemetry counts in steps of 1e-4
+
+Emulate = Callable[..., Any]
+
+
+def run_script(script: str | Path, *arguments: str, folder: Path) -> str:
+    """Run a Python program as a user would; what it prints."""
+    source = ["-c", script] if isinstance(script, str) else [str(script)]
+    result = subprocess.run(
+        [sys.executable, *source, *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def check_plain_pyserial(output: str) -> None:
+    found = re.search(r"right ascension (\S+) rad, declination (\S+) rad", output)
+    assert found is not None, output
+    assert [float(angle) for angle in found.groups()] == pytest.approx(
+        POINTING_RAD, abs=TOLERANCE_RAD
+    )
+
+
+def test_plain_pyserial_on_a_pseudo_terminal(emulate: Emulate, root: Path, tmp_path: Path) -> None:
+    with emulate("--pty", "port", "--pace", "fast") as served:
+        output = run_script(root / "examples" / "plain_pyserial.py", "./port", folder=tmp_path)
+    check_plain_pyserial(output)
+    assert served.process.returncode == 0
+
+
+def test_plain_pyserial_over_tcp(emulate: Emulate, root: Path, tmp_path: Path) -> None:
+    with emulate("--tcp", 0, "--pace", "fast") as served:
+        target = served.port.replace("tcp://", "socket://")
+        output = run_script(root / "examples" / "plain_pyserial.py", target, folder=tmp_path)
+    check_plain_pyserial(output)
+
+
+def test_the_example_is_short_and_knows_only_the_protocol(root: Path) -> None:
+    text = (root / "examples" / "plain_pyserial.py").read_text(encoding="utf-8")
+    assert "cubestack" not in text
+    assert len(text.splitlines()) <= 40
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_cleanly(emulate: Emulate, tmp_path: Path, number: int) -> None:
+    with emulate("--pty", "port") as served:
+        assert (tmp_path / "port").is_char_device()
+        served.process.send_signal(number)
+        assert served.process.wait(timeout=30) == 0
+    assert not os.path.lexists(tmp_path / "port")
+
+
+def test_a_scene_file_is_served(emulate: Emulate, root: Path, tmp_path: Path) -> None:
+    scene = tmp_path / "crux.toml"
+    scene.write_text(
+        'kind = "sky"\nra_deg = 186.0\ndec_deg = -60.0\nmag_limit = 3.8\n', encoding="utf-8"
+    )
+    with emulate("--scene", scene, "--pty", "port", "--pace", "fast"):
+        output = run_script(root / "examples" / "plain_pyserial.py", "port", folder=tmp_path)
+    assert "right ascension -3.03" in output  # 186 degrees, in the range -pi to pi
+    assert "declination -1.04" in output
+
+
+def test_a_second_emulator_is_refused_the_same_port(emulate: Emulate) -> None:
+    with emulate("--tcp", 0) as served:
+        port = int(served.port.rsplit(":", 1)[1])
+        with pytest.raises(AssertionError, match="choose another port"), emulate("--tcp", port):
+            pass
+        with socket.create_connection(("127.0.0.1", port), timeout=10):
+            pass  # the first one still serves
+
+
+def code_block(text: str, language: str, word: str) -> str:
+    """The block of ``language`` in a Markdown text that has ``word`` in it."""
+    blocks = re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+    (block,) = (block for block in blocks if word in block)
+    return str(block)
+
+
+def test_first_script_of_the_readme(emulate: Emulate, root: Path, tmp_path: Path) -> None:
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    command = code_block(readme, "sh", "cubestack emulate").split()
+    assert command[:3] == [".venv/bin/cubestack", "emulate", "cubestar"]
+    script = code_block(readme, "python", "NodeClient")
+    with emulate(*command[3:]):
+        output = run_script(script, folder=tmp_path)
+    first, *stars = output.splitlines()
+    assert "valid=True" in first
+    identified = [star.split()[0] for star in stars if not star.startswith("None")]
+    assert len(identified) >= 4
+    assert all(number.isdigit() for number in identified)
