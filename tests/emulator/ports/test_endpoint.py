@@ -501,6 +501,7 @@ def test_tcp_client_that_floods_and_dies_makes_room(tcp, device, connect):
     assert device.uart.host_backlog == MAX_UNSENT < sent
     assert ready(tcp) == []
     reset(first)
+    assert ready(tcp) == []
     second = connect()
     device_sends(tcp, device, b"fresh")
     assert receive(second, 5) == b"fresh"
