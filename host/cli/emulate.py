@@ -11,6 +11,7 @@ import signal
 from pathlib import Path
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.session import DEVICES
 from cubestack.host.cli.terminal import say
 
@@ -30,9 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="link to a pseudo-terminal; default without --tcp: ./ttyCUBESTAR",
     )
-    parser.add_argument("--tcp", type=int, metavar="PORT", help="serial line on a local TCP port")
-    parser.add_argument("--baud", type=int, default=INTERFACE.baud, help="default 57600")
-    parser.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
+    parser.add_argument(
+        "--tcp", type=whole(0, 65535), metavar="PORT", help="serial line on a local TCP port"
+    )
+    parser.add_argument("--baud", type=whole(1), default=INTERFACE.baud, help="default 57600")
+    parser.add_argument("--seed", type=whole(0), default=0, help="of everything random (default 0)")
     parser.add_argument(
         "--engine",
         choices=("auto", "compiled", "python"),

@@ -62,10 +62,10 @@ class FrameResult:
 def measure_frames(args: argparse.Namespace) -> Iterator[FrameResult]:
     """Measure ``args.frames`` frames as the options of `cubestack measure` say."""
     rng = np.random.default_rng(args.seed)
+    camera = None if args.camera is None else load_camera(args.camera).cropped(*args.crop)
     scene, truth = _first_scene(args, rng)
     with open_session(scene, seed=args.seed, engine=args.engine) as session:
-        if args.camera is not None:
-            camera = load_camera(args.camera).cropped(*args.crop)
+        if camera is not None:
             session.cubestar.configure(calibrate(camera).settings)
         if args.image is not None:
             find_threshold(session.cubestar)

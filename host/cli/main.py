@@ -9,6 +9,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from cubestack.host.cli.arguments import Parser
+
 __all__ = ["main"]
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
@@ -24,9 +26,9 @@ COMMANDS = {
 }
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Parser with every subcommand."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="cubestack",
         description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
         epilog="Try: cubestack measure cubestar --frames 3    |    cubestack COMMAND --help",

@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cubestack.host.cli.arguments import angle, corner, whole
 from cubestack.host.cli.session import DEVICES
 from cubestack.host.cli.terminal import console, progress
 
@@ -27,32 +28,16 @@ if TYPE_CHECKING:
 __all__ = ["add_arguments", "run"]
 
 
-def _crop(text: str) -> tuple[int, int]:
-    try:
-        left, top = (int(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y, as in 0,256") from None
-    return left, top
-
-
-def _positive(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of at least 1")
-    return value
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("device", choices=DEVICES, help="device to emulate")
     light = parser.add_mutually_exclusive_group()
     light.add_argument("--scene", type=Path, metavar="FILE", help="TOML scene; default: random sky")
     light.add_argument("--image", type=Path, metavar="FILE", help="picture file as the light")
-    parser.add_argument("--frames", type=_positive, default=1, help="number of frames (default 1)")
-    parser.add_argument("--seed", type=int, default=0, help="of poses, noise and hints (default 0)")
+    parser.add_argument("--frames", type=whole(1), default=1, help="number of frames (default 1)")
+    parser.add_argument(
+        "--seed", type=whole(0), default=0, help="of poses, noise and hints (default 0)"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a frame, nothing else")
     parser.add_argument(
         "--mode",
@@ -62,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--hint-error",
-        type=float,
+        type=angle,
         default=0.0,
         metavar="DEG",
         help="largest error of the hint (assisted) or of the last attitude (tracking)",
@@ -75,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--false-stars",
-        type=int,
+        type=whole(0),
         default=0,
         metavar="N",
         help="stars that are in no catalogue, at random places",
@@ -83,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-noise", action="store_true", help="a sensor without any noise")
     parser.add_argument(
         "--crop",
-        type=_crop,
+        type=corner,
         default=(0, 0),
         metavar="X,Y",
         help="with --image: left upper corner of the 1024 x 512 part",
