@@ -141,6 +141,10 @@ class Bench:
             self.program.link.uart_byte(byte)
         return self.received()
 
+    def never_stored(self) -> None:
+        """ACK will not rise for the picture that the FPGA waits for."""
+        self._ack_us = None
+
     def received(self) -> list[bytes]:
         """Payloads of the frames that came since the last call."""
         decoder, frames = FrameDecoder(1024), []

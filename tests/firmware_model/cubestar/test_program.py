@@ -369,7 +369,7 @@ def test_a_latch_up_in_the_loop_costs_one_picture(bench: Bench, sky: Sky) -> Non
         if isinstance(request, AwaitPin):
             bench.on_request = lambda _request: None
             bench.program.supply.overcurrent("imager")
-            bench._ack_us = None
+            bench.never_stored()
 
     start_us = start(bench, 2.95)
     bench.on_request = strike
