@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.sky.attitude import quaternion_from_pointing
     from cubestack.emulator.sky.scene import SkyScene
 
-    figures = {"rtl_clocks_per_s": round(rtl_clocks_per_s())}
+    figures: dict[str, float] = {"rtl_clocks_per_s": round(rtl_clocks_per_s())}
     scene = SkyScene(quaternion=quaternion_from_pointing(84.0, -1.0, 0.0))
     with open_session(scene, engine="compiled") as session:
         figures |= _capture(session)

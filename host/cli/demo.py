@@ -194,11 +194,11 @@ def _report_attitude(
             f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]",
             soft_wrap=True,
         )
-    cross, roll = compare(quaternion, truth)
-    assert cross is not None
-    assert roll is not None
+    across, about = compare(quaternion, truth)
+    assert across is not None
+    assert about is not None
     console.print(
-        f"error: {3600 * cross:.1f} arcsec across, {3600 * roll:+.1f} arcsec about the boresight"
+        f"error: {3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight"
     )
 
 

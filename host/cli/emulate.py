@@ -64,8 +64,9 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.ports.endpoint import Endpoint, PtyEndpoint, TcpEndpoint
     from cubestack.emulator.ports.pump import Pump
     from cubestack.emulator.sky.attitude import quaternion_from_pointing
-    from cubestack.emulator.sky.scene import SkyScene, load_scene
+    from cubestack.emulator.sky.scene import Scene, SkyScene, load_scene
 
+    scene: Scene
     if args.scene is None:
         scene = SkyScene(quaternion=quaternion_from_pointing(*DEFAULT_POINTING_DEG))
     else:

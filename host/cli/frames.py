@@ -224,12 +224,12 @@ def _count_wrong(session: Session, truth: NDArray[np.float64] | None) -> int | N
     if truth is None:
         return None
     cubestar = session.cubestar
-    stars = [star for star in cubestar.stars() if star.hipparcos is not None]
+    stars = {s.number: s.hipparcos for s in cubestar.stars() if s.hipparcos is not None}
     directions = _directions(session)
     sky = load_sky()
-    rows = np.searchsorted(sky.hip, [star.hipparcos for star in stars])
+    rows = np.searchsorted(sky.hip, list(stars.values()))
     expected = sky.vectors[rows] @ matrix_from_quaternion(truth).T
-    measured = directions[[star.number for star in stars]]
+    measured = directions[list(stars)]
     cosines = np.sum(expected * measured, axis=1) / np.linalg.norm(measured, axis=1)
     return int(np.sum(np.degrees(np.arccos(np.clip(cosines, -1, 1))) > SAME_STAR_DEG))
 
