@@ -1,0 +1,278 @@
+"""Experiments behind docs/fidelity.md that `cubestack measure` has no options for.
+
+Each runs the whole stack, reads the serial line and prints what it found::
+
+    .venv/bin/python tests/system/experiments.py field          tables 4.4 and 4.5
+    .venv/bin/python tests/system/experiments.py pairs          two pair limits beside each other
+    .venv/bin/python tests/system/experiments.py times          figure 5.7
+    .venv/bin/python tests/system/experiments.py repeatability  table 6.1
+    .venv/bin/python tests/system/experiments.py slew           section 6.2
+    .venv/bin/python tests/system/experiments.py loop           table 6.2
+"""
+
+import argparse
+import math
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cubestack.emulator.camera.optics import Optics
+from cubestack.emulator.cubestar import CubeStarBoard
+from cubestack.emulator.onboard_catalogue import PAIR_LIMIT_DEG, onboard_catalogue
+from cubestack.emulator.power import SUPPLY_VOLTS
+from cubestack.emulator.sky.attitude import (
+    attitude_error_deg,
+    matrix_from_quaternion,
+    pointing_from_matrix,
+    random_quaternion,
+)
+from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
+from cubestack.host.cubestar import CubeStar
+from cubestack.host.node_client import NodeClient
+
+PUBLISHED_PAIR_LIMIT_DEG = 42.1
+SIDEREAL_DEG_S = 360 / 86164.1
+
+#: The field of table 4.4: 54 x 28 degrees, no distortion.
+FOCAL_PX = 512 / math.tan(math.radians(27))
+PLAIN = Optics(
+    focal_length_mm=FOCAL_PX * 0.0056,
+    fx=FOCAL_PX,
+    fy=FOCAL_PX,
+    cx=511.5,
+    cy=255.5,
+    k1=0,
+    k2=0,
+    p1=0,
+    p2=0,
+)
+PLAIN_SETTINGS = {
+    "setFocalLength": {"FocalLength": PLAIN.focal_length_mm},
+    "setFocalLengthComponents": {"Fx": PLAIN.fx, "Fy": PLAIN.fy},
+    "setPrincipalPoint": {"Cx": PLAIN.cx, "Cy": PLAIN.cy},
+    "setRadialDistortionGains": {"K1": 0.0, "K2": 0.0},
+    "setTangentalDistortionGains": {"P1": 0.0, "P2": 0.0},
+}
+
+
+@dataclass
+class Shot:
+    """One picture as the host saw it; errors in degrees, from the truth."""
+
+    valid: bool
+    right: bool
+    detected: int
+    matched: int
+    cross: float
+    roll: float
+    phases: dict[str, float]
+
+
+class Stack:
+    """A board with a client on its serial line."""
+
+    def __init__(self, pair_limit_deg: float = PAIR_LIMIT_DEG, **optics: Any) -> None:
+        catalogue = onboard_catalogue(pair_limit_deg=pair_limit_deg)
+        self.board = CubeStarBoard(SkyScene.pointing(0, 0), catalogue)
+        self.cubestar = CubeStar(NodeClient(self.board.serial(), INTERFACE))
+        self.optics = optics
+        if optics:
+            self.cubestar.configure(PLAIN_SETTINGS)
+
+    def close(self) -> None:
+        self.board.close()
+
+    def shoot(self, hint: "Callable[[Any], None] | None" = None, **scene: Any) -> Shot:
+        """Capture and process; ``hint`` is given the true attitude's matrix before."""
+        self.board.camera.scene = sky = SkyScene(**scene, **self.optics)
+        client = self.cubestar.client
+        client.command("setIDMode", IdMode=IdMode.TRACKING if hint else IdMode.LOST_IN_SPACE)
+        if hint is not None:
+            hint(matrix_from_quaternion(sky.truth(0)))
+        self.cubestar.capture_and_process()
+        attitude, phases = self.cubestar.attitude(), self.cubestar.phase_times()
+        truth = self.board.truth()
+        assert truth is not None
+        cross, roll = attitude_error_deg(attitude.quaternion, truth)
+        detected = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
+        matched = attitude.matched if attitude.valid else 0
+        right = attitude.valid and cross < 0.1 and abs(roll) < 0.3
+        return Shot(attitude.valid, right, detected, matched, cross, roll, phases)
+
+    def hint_within(self, error_deg: float, rng: np.random.Generator) -> "Callable[[Any], None]":
+        """Tells the device a boresight that is at most this far off, uniform over that cap."""
+
+        def tell(matrix: Any) -> None:
+            away = math.radians(error_deg) * math.sqrt(rng.random())
+            side = rng.random() * 2 * math.pi
+            across = math.cos(side) * matrix[0] + math.sin(side) * matrix[1]
+            x, y, z = math.cos(away) * matrix[2] + math.sin(away) * across
+            self.cubestar.client.command(
+                "setTrackingMode",
+                RightAscension=math.atan2(y, x),
+                Declination=math.atan2(z, math.hypot(x, y)),
+            )
+
+        return tell
+
+
+def rates(stack: Stack, frames: int, error_deg: float | None, **scene: Any) -> str:
+    """Percentages over random poses; the same ones in every call."""
+    rng = np.random.default_rng(1)
+    hint = None if error_deg is None else stack.hint_within(error_deg, rng)
+    shots = [
+        stack.shoot(hint, quaternion=random_quaternion(rng), seed=number, **scene)
+        for number in range(frames)
+    ]
+    right = 100 * np.mean([shot.right for shot in shots])
+    wrong = sum(shot.valid and not shot.right for shot in shots)
+    share = 100 * sum(s.matched for s in shots) / sum(s.detected for s in shots)
+    return f"{right:5.1f} % right, {wrong} wrong, {share:5.1f} % of the detected stars matched"
+
+
+MODES = {"lost in space": None, "assisted 5 deg": 5.0, "assisted exact": 0.0}
+
+
+def field(frames: int) -> None:
+    """Tables 4.4 and 4.5."""
+    for limit in (PUBLISHED_PAIR_LIMIT_DEG, PAIR_LIMIT_DEG):
+        with closing(Stack(limit, optics=PLAIN)) as stack:
+            for magnitude in (3.6, 3.7, 3.8):
+                for mode, error in MODES.items():
+                    found = rates(stack, frames, error, mag_limit=magnitude)
+                    print(f"pairs {limit} deg, V < {magnitude}, {mode}: {found}", flush=True)
+            for false in (1, 5, 10):
+                for mode in ("lost in space", "assisted 5 deg"):
+                    found = rates(stack, frames, MODES[mode], mag_limit=3.8, false_stars=false)
+                    print(f"pairs {limit} deg, {false} false stars, {mode}: {found}", flush=True)
+
+
+def pairs(frames: int) -> None:
+    """The default lens, with two catalogues."""
+    for limit in (PUBLISHED_PAIR_LIMIT_DEG, PAIR_LIMIT_DEG):
+        with closing(Stack(limit)) as stack:
+            for mode in ("lost in space", "assisted 5 deg"):
+                found = rates(stack, frames, MODES[mode], mag_limit=3.8)
+                print(f"pairs {limit} deg, {mode}: {found}", flush=True)
+
+
+def times(frames: int) -> None:
+    """Figure 5.7: detection and matching, by the number of centroids."""
+    rng = np.random.default_rng(1)
+    by_count: dict[int, list[dict[str, float]]] = defaultdict(list)
+    with closing(Stack()) as stack:
+        for number in range(frames):
+            shot = stack.shoot(quaternion=random_quaternion(rng), seed=number, mag_limit=3.8)
+            by_count[shot.detected].append(shot.phases)
+    for count, phases in sorted(by_count.items()):
+        detect, match, attitude = (
+            np.array([phase[name] for phase in phases]) for name in ("detect", "match", "attitude")
+        )
+        print(
+            f"{count:2} centroids ({len(phases):3} pictures): detection {detect.mean():5.1f}, "
+            f"matching {match.mean():5.1f}, both {np.mean(detect + match):5.1f} and at most "
+            f"{np.max(detect + match):5.1f}, attitude {attitude.mean():4.2f} ms"
+        )
+
+
+def repeatability(frames: int) -> None:
+    """Table 6.1: scatter of the attitude on a mount that turns with the Earth."""
+    rng = np.random.default_rng(1)
+    with closing(Stack()) as stack:
+        for _ in range(5):
+            pose = random_quaternion(rng)
+            axis_in_camera = matrix_from_quaternion(pose)[:, 2]
+            errors, counts = [], []
+            for number in range(frames):
+                shot = stack.shoot(
+                    quaternion=pose,
+                    rate_deg_s=SIDEREAL_DEG_S * axis_in_camera,
+                    mag_limit=3.8,
+                    seed=number,
+                )
+                if shot.right:
+                    truth = stack.board.truth()
+                    assert truth is not None
+                    measured, true = (
+                        np.array(pointing_from_matrix(matrix_from_quaternion(q)))
+                        for q in (stack.cubestar.attitude().quaternion, truth)
+                    )
+                    errors.append((measured - true + 180) % 360 - 180)
+                    counts.append(shot.matched)
+            ra, dec, roll = np.std(errors, axis=0)
+            across = ra * math.cos(math.radians(true[1]))
+            print(
+                f"{len(errors)} of {frames} right, {np.mean(counts):4.1f} stars: RA cos(Dec) "
+                f"{across:.4f}, Dec {dec:.4f}, roll {roll:.4f} deg (1 sigma)",
+                flush=True,
+            )
+
+
+def slew(frames: int) -> None:
+    """Section 6.2, lost in space, body rates across the boresight."""
+    for rate in (0.0, 0.1333, 0.3, 0.5, 1.0, 2.0, 4.0):
+        rng = np.random.default_rng(1)
+        with closing(Stack()) as stack:
+            shots = []
+            for number in range(frames):
+                side = rng.uniform(0, 2 * math.pi)
+                turning = (rate * math.cos(side), rate * math.sin(side), 0.0)
+                pose = random_quaternion(rng)
+                shots.append(
+                    stack.shoot(quaternion=pose, rate_deg_s=turning, seed=number, mag_limit=3.8)
+                )
+        right = 100 * np.mean([shot.right for shot in shots])
+        valid = 100 * np.mean([shot.valid for shot in shots])
+        share = 100 * sum(s.matched for s in shots) / sum(s.detected for s in shots)
+        cross = [shot.cross for shot in shots if shot.right] or [math.nan]
+        print(
+            f"{rate} deg/s: {valid:5.1f} % solved, {right:5.1f} % right, {share:5.1f} % of the "
+            f"detected stars matched, median error {np.median(cross):.4f} deg across",
+            flush=True,
+        )
+
+
+def loop(frames: int) -> None:
+    """Table 6.2: phases and mean power of the 1 Hz loop."""
+    with closing(Stack()) as stack:
+        client, board = stack.cubestar.client, stack.board
+        board.camera.scene = SkyScene.pointing(84, -1)
+        client.command("Trigger")
+        rows = []
+        for turn in range(frames + 3):
+            if turn == 3:
+                started, charge = board.kernel.now, board.power.charge_mas()
+            due = board.kernel.now + PS_PER_S
+            while board.kernel.now < due:
+                client.pause((due - board.kernel.now) / PS_PER_S)
+            if turn >= 3:
+                rows.append(stack.cubestar.phase_times())
+        seconds = (board.kernel.now - started) / PS_PER_S
+        power = (board.power.charge_mas() - charge) * SUPPLY_VOLTS / seconds
+    for name in rows[0]:
+        print(f"{name}: {np.mean([row[name] for row in rows]):.1f} ms")
+    print(f"mean power {power:.1f} mW over {seconds:.0f} s")
+
+
+EXPERIMENTS = {
+    experiment.__name__: experiment
+    for experiment in (field, pairs, times, repeatability, slew, loop)
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", choices=EXPERIMENTS)
+    parser.add_argument("--frames", type=int, default=200, help="frames of each line")
+    args = parser.parse_args()
+    EXPERIMENTS[args.name](args.frames)
+
+
+if __name__ == "__main__":
+    main()
