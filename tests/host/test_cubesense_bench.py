@@ -63,6 +63,9 @@ def test_nothing_beyond_the_answer_is_taken() -> None:
     line.chunk = 10**6
     BenchClient(line).download(Camera.NADIR)
     assert line.pending == b"more"
+    line = Line(a=b"Yes")
+    BenchClient(line).take(Camera.NADIR)
+    assert line.pending == b"es"
 
 
 def test_silence_and_wrong_answers_are_told() -> None:
