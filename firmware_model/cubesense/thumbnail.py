@@ -31,7 +31,8 @@ def frame_pixels(size: ImageSize, frame: int) -> NDArray[np.int32]:
 
     Each is a pixel's number in the picture, row after row from 0 to 307199, or ``OUTSIDE`` for a
     byte that is zero. The pixels' numbers ascend within a frame and from frame to frame, so a
-    picture that can only be read in sequence is read once. Raises ValueError for a frame that ``size`` lacks.
+    picture that can only be read in sequence is read once. Raises ValueError for a frame that
+    ``size`` lacks.
     """
     if not 0 <= frame < size.frames:
         raise ValueError(f"{size.name} has frames 0 to {size.frames - 1}, not {frame}")
