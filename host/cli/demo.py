@@ -159,6 +159,7 @@ def _served(scene: Path, port: Path) -> Iterator[Path]:
     """An emulator process that serves ``scene`` on ``port``."""
     command = [sys.executable, "-m", "cubestack.host.cli.main", "emulate", "cubestar"]
     command += ["--scene", str(scene), "--pty", str(port), "--pace", "fast"]
+    say("starting the emulator; its first start on a machine compiles the FPGA")
     emulator = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         assert emulator.stderr is not None
