@@ -1,0 +1,105 @@
+"""What documents say, against what is there."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.camera.optics import Optics
+from cubestack.emulator.sky.scene import SceneError, SkyScene, load_scene
+
+BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
+LINK = re.compile(r"\]\(([^)#:]+)\)")
+
+
+def section(text: str, heading: str) -> str:
+    """The part of a Markdown text below a heading."""
+    return text.split(f"## {heading}\n")[1].split("\n## ")[0]
+
+
+def allowed_keys(tmp_path: Path, scene: str) -> set[str]:
+    """Keys that a reader of scenes names when it meets one that it does not know."""
+    path = tmp_path / "scene.toml"
+    path.write_text(scene, encoding="utf-8")
+    with pytest.raises(SceneError, match="unknown key 'colour'; allowed are") as raised:
+        load_scene(path)
+    return set(str(raised.value).split("allowed are ")[1].split(", "))
+
+
+@pytest.mark.parametrize(
+    ("heading", "scene"),
+    [
+        ('Keys of `kind = "sky"`', 'kind = "sky"\ncolour = 1'),
+        ("Keys of `poses`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[[poses]]\ncolour = 1'),
+        ("Keys of `optics`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[optics]\ncolour = 1'),
+        ('Keys of `kind = "picture"`', 'kind = "picture"\ncolour = 1'),
+    ],
+)
+def test_every_key_of_a_scene_is_documented(
+    root: Path, tmp_path: Path, heading: str, scene: str
+) -> None:
+    part = section((root / "docs" / "scenes.md").read_text(encoding="utf-8"), heading)
+    firsts = [row.split("|")[1] for row in part.splitlines() if row.startswith("| `")]
+    documented = set(re.findall(r"`(\w+)`", " ".join(firsts) or part))
+    assert documented == allowed_keys(tmp_path, scene)
+
+
+@pytest.mark.parametrize(
+    ("heading", "defaults"),
+    [
+        ("Keys of `optics`", Optics()),
+        ('Keys of `kind = "sky"`', SkyScene.pointing(0, 0)),
+    ],
+)
+def test_defaults_are_those_of_the_code(root: Path, heading: str, defaults: object) -> None:
+    part = section((root / "docs" / "scenes.md").read_text(encoding="utf-8"), heading)
+    checked = 0
+    for row in part.splitlines():
+        cells = [cell.strip() for cell in row.split("|")]
+        keys = re.findall(r"`(\w+)`", cells[1]) if row.startswith("| `") else []
+        values = re.findall(r"^-?[\d.]+$", cells[2].replace(", ", "\n"), re.M) if keys else []
+        for key, value in zip(keys, values, strict=False):
+            default = getattr(defaults, key, None)
+            if isinstance(default, int | float):
+                assert default == float(value), key
+                checked += 1
+    assert checked >= 4
+
+
+def test_examples_of_scenes_load(root: Path, tmp_path: Path) -> None:
+    sky, picture = BLOCK.findall((root / "docs" / "scenes.md").read_text(encoding="utf-8"))
+    path = tmp_path / "scene.toml"
+    path.write_text(sky, encoding="utf-8")
+    scene = load_scene(path)
+    assert isinstance(scene, SkyScene)
+    assert len(scene.poses) == 1
+    assert tomllib.loads(picture)["kind"] == "picture"
+    path.write_text(picture, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"night\.jpg"):  # read, but there is no such file here
+        load_scene(path)
+
+
+def test_links_lead_somewhere(root: Path) -> None:
+    documents = [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    for document in documents:
+        for target in LINK.findall(document.read_text(encoding="utf-8")):
+            assert (document.parent / target).exists(), f"{document.name}: {target}"
+
+
+def test_make_has_the_targets_that_are_promised(root: Path) -> None:
+    makefile = (root / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^(\w+):", makefile, re.MULTILINE))
+    promised = {"venv", "run", "test", "lint", "bench", "clean"}
+    assert promised <= targets
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^make (\w+)", readme, re.MULTILINE)) <= targets
+
+
+def test_commands_of_the_readme_exist(root: Path) -> None:
+    from cubestack.host.cli.main import COMMANDS
+
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", readme, re.MULTILINE)) <= set(
+        COMMANDS
+    )
