@@ -171,12 +171,13 @@ def test_registers_as_json(run: Run) -> None:
     json.loads(outcome.out)
 
 
-def test_catalogue_as_json(run: Run) -> None:
-    outcome = run("catalogue", "--pair-limit", 42.1, "--json")
+@pytest.mark.parametrize(("limit_deg", "published"), [(42.101, 11_484), (42.105, 11_486)])
+def test_catalogue_as_json(run: Run, limit_deg: float, published: int) -> None:
+    outcome = run("catalogue", "--pair-limit", limit_deg, "--json")
     assert (outcome.code, outcome.err) == (DONE, "")
     facts: dict[str, Any] = json.loads(outcome.out)
-    assert facts["stars"] == 405
-    assert facts["pairs"] == pytest.approx(11_486, abs=20)
+    assert (facts["stars"], facts["pairs"]) == (405, published)
+    assert np.round(facts["closest_pairs_rad"], 4).tolist() == [0.0017, 0.0067]
 
 
 def test_catalogue_for_people(run: Run) -> None:
