@@ -1,1 +1,1 @@
-"""CubeStar's camera: lens, exposure, pixels, and the MLX75412 sensor."""
+"""Cameras: lenses, light on the pixels, and the MLX75412 and OV7620 image sensors."""

@@ -5,9 +5,9 @@ image is 8 px in radius on the boresight and 6 px near the rim, for its 0.27 deg
 (sun exposure) and section 5.7 (levels). Unit: grey values above black for one line time of
 exposure at gain 1.
 
-The thesis takes the Sun's size for charge that flows over from full pixels. Here its image is a
-round spot, wider than the Sun, in full-scale light; the pixels that it fills are the published
-radius. The same spot without the filter is what the nadir camera makes of the Sun.
+The thesis explains the Sun's size by charge that flows over from full pixels into their neighbours.
+Here its image is a round Gaussian spot of light, wider than the Sun and saturated in its middle, of
+the published size. The nadir camera, without a filter, makes a far brighter spot of it.
 
 A picture is taken as of one instant: what is neglected is the satellite's turn during a read-out.
 """

@@ -1,1 +1,1 @@
-"""What the camera looks at: stars, attitudes, scenes."""
+"""What cameras look at: star catalogue, Earth, Sun and Moon, attitudes, scenes, picture files."""

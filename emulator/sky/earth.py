@@ -20,7 +20,7 @@ __all__ = ["EARTH_RADIUS_KM", "Earth", "angular_radius_deg"]
 EARTH_RADIUS_KM = 6378.136
 
 TWILIGHT = 0.05
-"""Sine of the Sun's height within which day turns to night (assumed: nautical twilight's half)."""
+"""Sine of the Sun's height within which day turns to night (assumed: 3 deg)."""
 
 WAVES = 16
 LONGEST_KM, SHORTEST_KM = 6000.0, 500.0  # assumed: continents, weather systems

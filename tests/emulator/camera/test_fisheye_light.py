@@ -61,6 +61,12 @@ def test_nothing_is_beyond_the_rim() -> None:
     picture = levels(noon(EarthSunScene.facing(nadir_deg=(70, 0))), NADIR)
     assert np.all(picture[radius(NADIR) > 227.2] == 34)
     assert np.all(picture[(radius(NADIR) < 226) & (ROWS == 236) & (COLUMNS > 400)] > 100)
+    # A pixel that the rim crosses has a part of the light of the one inside.
+    lens = LENSES[NADIR]
+    share = lens.field.lit[np.searchsorted(lens.field.index, 236 * 640 + 371 + 227)]
+    assert 0 < share < 0.2
+    part, whole = picture[236, 371 + 227] - 34, picture[236, 371 + 226] - 34
+    assert part == pytest.approx(share * whole, rel=0.05)
 
 
 def test_night_side_is_dark() -> None:
