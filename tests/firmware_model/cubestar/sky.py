@@ -19,9 +19,10 @@ PEAK_DN = 150.0
 
 @dataclass
 class Sky:
-    """A picture and what is on it: index in the catalogue and place of each star."""
+    """A picture, how it was taken, and what is on it: catalogue index and place of each star."""
 
     picture: NDArray[np.uint8]
+    attitude: Rotation
     stars: NDArray[np.int64]
     pixels: NDArray[np.float64]
 
@@ -50,7 +51,12 @@ def distort(wanted: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def take(catalogue: StarCatalogue, attitude: Rotation, most: int | None = None) -> Sky:
     """What a camera with this attitude (inertial to camera) sees; at most the ``most`` first."""
-    body = attitude.apply(catalogue.vectors.astype(float))
+    return draw(catalogue.vectors, attitude, most)
+
+
+def draw(vectors: NDArray[Any], attitude: Rotation, most: int | None = None) -> Sky:
+    """A sky with stars at the ``vectors`` (n, 3)."""
+    body = attitude.apply(vectors.astype(float))
     near = np.flatnonzero(body[:, 2] > 0.8)
     ideal = np.array([CX, CY]) + FOCAL_PX * body[near, :2] / body[near, 2:]
     pixels = distort(ideal)
@@ -62,7 +68,7 @@ def take(catalogue: StarCatalogue, attitude: Rotation, most: int | None = None) 
         box = (slice(int(y0) - 6, int(y0) + 8), slice(int(x0) - 6, int(x0) + 8))
         distance2 = (x[box] - x0) ** 2 + (y[box] - y0) ** 2
         light[box] += PEAK_DN * np.exp(-distance2 / (2 * SIGMA_PX**2))
-    return Sky(np.minimum(light, 255).astype(np.uint8), stars, pixels)
+    return Sky(np.minimum(light, 255).astype(np.uint8), attitude, stars, pixels)
 
 
 def attitude_of(values: dict[str, Any]) -> Rotation:

@@ -1,0 +1,389 @@
+"""From picture to attitude: steps, mode flag, failures."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.algorithms.quest import AttitudeError
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
+from cubestack.firmware_model.star_catalogue import StarCatalogue
+
+from .bench import Bench
+from .sky import Sky, attitude_of, error_deg, take
+
+
+def status(bench: Bench) -> TaskStatus:
+    return TaskStatus(bench.telemetry("TaskStatus")["taskStatus"])
+
+
+def mode_flag(bench: Bench) -> MatchMode:
+    return MatchMode(bench.telemetry("LoopStatus")["ModeFlag"])
+
+
+def process(bench: Bench, picture: np.ndarray) -> dict[str, float]:
+    """Capture and process; telemetry AttitudeQuaternion."""
+    bench.command("ClearErrorFlags")
+    bench.picture = picture
+    bench.command("CaptureAndProcess")
+    return bench.telemetry("AttitudeQuaternion")
+
+
+def hint(bench: Bench, attitude: Rotation) -> None:
+    """A rough boresight, 3 deg off."""
+    boresight = attitude.inv().as_matrix()[:, 2]
+    declination = np.arcsin(boresight[2])
+    off = np.deg2rad(3) / np.cos(declination)
+    right_ascension = np.arctan2(boresight[1], boresight[0]) + off
+    bench.command("setTrackingMode", RightAscension=right_ascension, Declination=declination)
+
+
+def turned(pose: Rotation, degrees: float) -> Rotation:
+    """The camera turned about its x axis."""
+    return Rotation.from_euler("x", degrees, degrees=True) * pose
+
+
+@pytest.fixture
+def tracking(bench: Bench) -> Bench:
+    bench.command("setIDMode", IdMode=IdMode.TRACKING)
+    return bench
+
+
+DARK = np.zeros((512, 1024), np.uint8)
+
+
+# --- the attitude ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_picture_gives_its_attitude(bench: Bench, catalogue: StarCatalogue, seed: int) -> None:
+    true = Rotation.random(rng=np.random.default_rng(seed))
+    sky = take(catalogue, true)
+    values = process(bench, sky.picture)
+    assert status(bench) is TaskStatus.CALCULATED
+    assert values["Valid"]
+    assert values["Mode"] == MatchMode.LOST_IN_SPACE
+    assert error_deg(attitude_of(values), true) < 0.005
+    assert values["Matched"] == bench.telemetry("NumIdStars")["numIdStars"] >= 4
+
+
+def test_the_attitude_belongs_to_the_picture_that_the_stars_came_from(
+    bench: Bench, sky: Sky
+) -> None:
+    bench.picture = sky.picture
+    bench.command("CaptureImage")
+    bench.command("DetectStars")
+    bench.command("IDStars")
+    at_ms = bench.now_us / 1000
+    bench.command("CaptureImage")
+    bench.command("EstimateAttitude")
+    values = bench.telemetry("AttitudeQuaternion")
+    assert values["FrameCounter"] == 1
+    assert values["ImageTime"] < at_ms
+
+
+def test_stars_weigh_as_much_as_they_were_confirmed(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, catalogue: StarCatalogue, pose: Rotation
+) -> None:
+    given: list[np.ndarray] = []
+
+    def weigh(*arguments: np.ndarray) -> np.ndarray:
+        given.extend(arguments[:3])
+        return np.array([0, 0, 0, 1], np.float32)
+
+    sky = take(catalogue, pose)
+    monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", weigh)
+    process(bench, sky.picture)
+    details = [bench.telemetry("IDStarsDetails") for _ in sky.stars]
+    measured, inertial, weights = given
+    assert list(weights) == [values["ValidationVotes"] for values in details]
+    assert pose.apply(inertial) == pytest.approx(measured, abs=1e-3)
+
+
+def test_a_failure_leaves_the_last_attitude_but_not_its_validity(bench: Bench, sky: Sky) -> None:
+    good = process(bench, sky.picture)
+    failed = process(bench, DARK)
+    assert failed == good | {"Valid": False}
+    assert not bench.telemetry("PerformanceParameters")["AttitudeSuccess"]
+
+
+def test_identifying_again_takes_the_validity_back_until_the_attitude_is_there(
+    bench: Bench, sky: Sky
+) -> None:
+    process(bench, sky.picture)
+    bench.command("IDStars")
+    assert not bench.telemetry("AttitudeQuaternion")["Valid"]
+    bench.command("EstimateAttitude")
+    assert bench.telemetry("AttitudeQuaternion")["Valid"]
+
+
+def test_the_attitude_survives_power_off_in_flash(bench: Bench, sky: Sky) -> None:
+    good = process(bench, sky.picture)
+    bench.power_on()
+    assert bench.telemetry("AttitudeQuaternion") == good | {"Valid": False}
+
+
+# --- steps that can not be done -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "failed", "flag"),
+    [
+        ("DetectStars", TaskStatus.DETECTION_FAILED, "StatusError"),
+        ("IDStars", TaskStatus.IDENTIFICATION_FAILED, "StatusError"),
+        ("SelectBestStars", TaskStatus.POWERED_UP, "StatusError"),
+        ("EstimateAttitude", TaskStatus.CALCULATION_FAILED, "QuestindexError"),
+        ("ProcessImage", TaskStatus.DETECTION_FAILED, "StatusError"),
+    ],
+)
+def test_a_step_without_its_input(bench: Bench, name: str, failed: TaskStatus, flag: str) -> None:
+    bench.command(name)
+    assert status(bench) is failed
+    assert bench.flags() == {flag}
+
+
+def test_too_few_stars(bench: Bench, catalogue: StarCatalogue, pose: Rotation) -> None:
+    process(bench, DARK)
+    assert status(bench) is TaskStatus.DETECTION_FAILED
+    assert bench.flags() == {"LessThanThreeStarsDetected"}
+    process(bench, take(catalogue, pose, most=2).picture)
+    assert status(bench) is TaskStatus.IDENTIFICATION_FAILED
+    assert bench.flags() == {"LessThanThreeStarsDetected"}
+    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == 2
+
+
+def test_stars_that_are_not_in_the_catalogue(bench: Bench) -> None:
+    picture = DARK.copy()
+    for x, y in ((200, 100), (500, 130), (820, 400), (300, 350)):
+        picture[y : y + 4, x : x + 4] = 90
+    process(bench, picture)
+    assert status(bench) is TaskStatus.IDENTIFICATION_FAILED
+    assert bench.flags() >= {"LessThanThreeStarsID"} or bench.flags() >= {"IDError"}
+    assert bench.telemetry("NumIdStars")["numIdStars"] == 0
+
+
+def test_stars_that_determine_no_attitude(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, sky: Sky
+) -> None:
+    def refuse(*_arguments: object) -> None:
+        raise AttitudeError("the vectors all point the same way")
+
+    monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", refuse)
+    process(bench, sky.picture)
+    assert status(bench) is TaskStatus.CALCULATION_FAILED
+    assert bench.flags() == {"QuestindexError"}
+    assert mode_flag(bench) is MatchMode.LOST_IN_SPACE
+    assert not bench.telemetry("AttitudeQuaternion")["Valid"]
+
+
+# --- modes ----------------------------------------------------------------------------------------
+
+
+def test_lost_in_space_stays_so_when_asked_to(bench: Bench, sky: Sky) -> None:
+    for _ in range(2):
+        assert process(bench, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
+        assert bench.flags() == set()
+        assert mode_flag(bench) is MatchMode.TRACKING  # the firmware's own flag
+
+
+def test_tracking_without_attitude_and_hint_starts_lost_in_space(tracking: Bench, sky: Sky) -> None:
+    assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
+    assert tracking.flags() == {"IDModeError"}
+    assert process(tracking, sky.picture)["Mode"] == MatchMode.TRACKING
+    assert tracking.flags() == set()
+
+
+def test_a_hint_gives_an_assisted_match_and_then_tracking(
+    tracking: Bench, sky: Sky, pose: Rotation
+) -> None:
+    hint(tracking, pose)
+    assert mode_flag(tracking) is MatchMode.ASSISTED
+    assert process(tracking, sky.picture)["Mode"] == MatchMode.ASSISTED
+    assert tracking.flags() == set()
+    assert process(tracking, sky.picture)["Mode"] == MatchMode.TRACKING
+
+
+def test_a_wrong_hint_steps_back_to_lost_in_space(
+    tracking: Bench, sky: Sky, pose: Rotation
+) -> None:
+    hint(tracking, turned(pose, 150))
+    assert not process(tracking, sky.picture)["Valid"]
+    assert "IDModeError" not in tracking.flags()
+    assert mode_flag(tracking) is MatchMode.LOST_IN_SPACE
+    values = process(tracking, sky.picture)
+    assert (values["Valid"], values["Mode"]) == (True, MatchMode.LOST_IN_SPACE)
+    assert "IDModeError" not in tracking.flags()  # there was a hint
+
+
+def test_a_new_hint_replaces_the_attitude(
+    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+) -> None:
+    process(tracking, sky.picture)
+    elsewhere = turned(pose, 90)
+    hint(tracking, elsewhere)
+    values = process(tracking, take(catalogue, elsewhere).picture)
+    assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
+    assert error_deg(attitude_of(values), elsewhere) < 0.01
+
+
+def test_a_hint_is_used_up_by_the_first_fix(
+    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+) -> None:
+    hint(tracking, pose)
+    process(tracking, sky.picture)
+    nearby = turned(pose, 2)  # too far to track
+    assert not process(tracking, take(catalogue, nearby).picture)["Valid"]
+    values = process(tracking, take(catalogue, nearby).picture)
+    assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
+
+
+@pytest.mark.parametrize(("degrees", "kept"), [(0.1333, True), (0.29, True), (0.35, False)])
+def test_tracking_follows_up_to_its_rate(
+    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation, degrees: float, kept: bool
+) -> None:
+    process(tracking, sky.picture)
+    moved = turned(pose, degrees)
+    values = process(tracking, take(catalogue, moved).picture)
+    assert values["Valid"] == kept
+    if kept:
+        assert values["Mode"] == MatchMode.TRACKING
+        assert error_deg(attitude_of(values), moved) < 0.005
+        assert tracking.flags() == set()
+    else:
+        assert "RateExceeded" in tracking.flags()
+        assert mode_flag(tracking) is MatchMode.ASSISTED
+
+
+def test_failures_lead_one_step_back_each(tracking: Bench, sky: Sky) -> None:
+    process(tracking, sky.picture)
+    two_stars = DARK.copy()
+    two_stars[100:104, 100:104] = two_stars[300:304, 700:704] = 80
+    for expected in (MatchMode.ASSISTED, MatchMode.LOST_IN_SPACE, MatchMode.LOST_IN_SPACE):
+        process(tracking, two_stars)
+        assert mode_flag(tracking) is expected
+    values = process(tracking, sky.picture)
+    assert (values["Valid"], values["Mode"]) == (True, MatchMode.LOST_IN_SPACE)
+    assert mode_flag(tracking) is MatchMode.TRACKING
+
+
+def test_two_stars_are_enough_for_tracking(
+    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+) -> None:
+    process(tracking, sky.picture)
+    values = process(tracking, take(catalogue, pose, most=2).picture)
+    assert (values["Valid"], values["Matched"]) == (True, 2)
+    assert error_deg(attitude_of(values), pose) < 0.05
+
+
+def test_too_few_stars_are_no_sign_of_a_rate(
+    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+) -> None:
+    process(tracking, sky.picture)
+    process(tracking, take(catalogue, pose, most=1).picture)
+    assert tracking.flags() == {"LessThanThreeStarsDetected"}
+
+
+def test_the_mode_flag_is_in_flash_and_only_written_when_it_changes(
+    tracking: Bench, sky: Sky
+) -> None:
+    for _ in range(3):
+        process(tracking, sky.picture)
+    assert tracking.flash.writes == {"mode": 1, "attitude": 3}
+    tracking.power_on()
+    assert mode_flag(tracking) is MatchMode.TRACKING
+
+
+def test_a_mode_flag_without_an_attitude_does_not_count(
+    tracking: Bench, sky: Sky, pose: Rotation
+) -> None:
+    hint(tracking, pose)
+    tracking.power_on()  # the flag is in flash, the hint is gone
+    tracking.command("setIDMode", IdMode=IdMode.TRACKING)
+    assert mode_flag(tracking) is MatchMode.ASSISTED
+    assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
+    assert tracking.flags() == {"IDModeError"}
+
+
+# --- what a failure says --------------------------------------------------------------------------
+
+
+def empty_half(catalogue: StarCatalogue) -> StarCatalogue:
+    """The stars of the northern half alone."""
+    north = catalogue.vectors[:, 2] > 0.2
+    return StarCatalogue.build(
+        catalogue.hip[north], catalogue.vectors[north].astype(float), catalogue.v_mag[north], 9, 50
+    )
+
+
+def test_a_boresight_where_the_catalogue_is_empty(catalogue: StarCatalogue, sky: Sky) -> None:
+    bench = Bench(empty_half(catalogue))
+    bench.command("setIDMode", IdMode=IdMode.TRACKING)
+    for declination, flags in (
+        (-1.5, {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}),
+        (1.5, set()),
+    ):
+        bench.command("setTrackingMode", RightAscension=0.3, Declination=declination)
+        process(bench, sky.picture)
+        assert status(bench) is TaskStatus.IDENTIFICATION_FAILED
+        known = {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}
+        assert bench.flags() & known == flags
+        performance = bench.telemetry("PerformanceParameters")
+        assert performance["LessThanThreeStarsInFoV"] == bool(flags)
+
+
+def test_nothing_is_said_about_the_catalogue_when_lost_in_space(
+    catalogue: StarCatalogue, pose: Rotation
+) -> None:
+    bench = Bench(empty_half(catalogue))
+    south = Rotation.from_euler("x", 180, degrees=True)
+    process(bench, take(catalogue, south).picture)
+    assert "LessThanThreeStarsInFoV" not in bench.flags()
+
+
+@pytest.mark.parametrize(
+    ("limits", "flag"),
+    [
+        ({"MaxStars": 5}, "MaxStarsDetection"),
+        ({"MaxInvalidStars": 0}, "MaxInvalidStarsDetectionError"),
+        ({"MaxNoise": 1}, "MaxNoiseDetected"),
+    ],
+)
+def test_why_a_search_stopped(bench: Bench, sky: Sky, limits: dict[str, int], flag: str) -> None:
+    picture = sky.picture.copy()
+    picture[200:220, 600:630] = 200  # the Moon
+    picture[3::30, 3::30] |= 60  # hot pixels
+    bench.picture = picture
+    bench.command("CaptureImage")
+    bench.command("setDetectionVariables", **limits)
+    bench.command("DetectStars")
+    assert bench.flags() - {"LessThanThreeStarsDetected"} == {flag}
+
+
+# --- times ----------------------------------------------------------------------------------------
+
+
+def test_times_are_those_of_the_charged_cycles(bench: Bench, sky: Sky) -> None:
+    bench.picture = sky.picture
+    bench.command("CaptureImage")
+    start_us = bench.now_us
+    bench.command("DetectStars")
+    detect_us = bench.now_us - start_us
+    bench.command("IDStars")
+    bench.command("SelectBestStars")
+    bench.command("EstimateAttitude")
+    assert bench.telemetry("PhaseTimes")["Detect"] == pytest.approx(detect_us, abs=100)
+    parts = bench.telemetry("DetectionTimingOne")
+    assert parts["MaxStarSearchTime"] > 10
+    whole = bench.telemetry("DetectionTimingTwo")
+    assert whole["StarDetectionTime"] == whole["MaxStarDetectionTime"]
+    assert sum(parts.values()) == pytest.approx(whole["StarDetectionTime"], abs=2.5)
+    assert bench.telemetry("TimingSummary")["DetectionTime"] == whole["StarDetectionTime"]
+
+
+def test_the_longest_time_is_kept(bench: Bench, sky: Sky) -> None:
+    bench.picture = sky.picture
+    bench.command("CaptureImage")
+    bench.command("DetectStars")
+    bench.command("setDetectionRegion", Yend=40)
+    bench.command("DetectStars")
+    times = bench.telemetry("DetectionTimingTwo")
+    assert 0 < times["StarDetectionTime"] < times["MaxStarDetectionTime"]
