@@ -15,16 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.host.errors import CameraFileError
 
 __all__ = ["Calibration", "Camera", "calibrate", "load_camera"]
-
-COLUMNS = 1024
-ROWS = IMAGE_BYTES // COLUMNS
-
-#: Pixel pitch of the image sensor, which the firmware divides by (thesis, table 3.3).
-PITCH_MM = 0.0056
 
 GRID_STEP_PX = 8
 INVERSION_STEPS = 100
@@ -127,7 +121,7 @@ def calibrate(camera: Camera) -> Calibration:
     distance_px = camera.f_px * np.hypot(*(fitted - true).T)
     return Calibration(
         settings={
-            "setFocalLength": {"FocalLength": camera.f_px * PITCH_MM / scale},
+            "setFocalLength": {"FocalLength": camera.f_px * PIXEL_PITCH_MM / scale},
             "setFocalLengthComponents": {"Fx": camera.f_px, "Fy": camera.f_px},
             "setPrincipalPoint": {"Cx": camera.cx_px, "Cy": camera.cy_px},
             "setRadialDistortionGains": {"K1": k1, "K2": k2},

@@ -21,14 +21,12 @@ from cubestack.firmware_model.interface.cubestar import (
     TaskStatus,
 )
 from cubestack.firmware_model.interface.message import Value
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 from cubestack.host.client import Client, Progress
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
 from cubestack.host.node_client import NodeClient
 
-__all__ = ["COLUMNS", "ROWS", "Attitude", "CubeStar", "Star"]
-
-COLUMNS = 1024
-ROWS = IMAGE_BYTES // COLUMNS
+__all__ = ["Attitude", "CubeStar", "Star"]
 
 #: Longer than two frames at the lowest frame rate, a transfer and the processing.
 STEP_TIMEOUT_S = 10.0

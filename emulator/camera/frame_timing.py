@@ -6,12 +6,10 @@ whole number of lines. The rate registers assume the clock that CLOCKS_PER_SECON
 crystal there is.
 """
 
-from cubestack.emulator.camera.optics import ROWS
-from cubestack.firmware_model.interface.mlx75412 import LONGEST_EXPOSURE
+from cubestack.firmware_model.interface.mlx75412 import LINE_CLOCKS, LONGEST_EXPOSURE, ROWS
 
 __all__ = ["LINE_CLOCKS", "MOST_FRAME_LINES", "exposure_lines", "frame_lines"]
 
-LINE_CLOCKS = 1322
 MOST_FRAME_LINES = 4095
 FEWEST_FRAME_LINES = ROWS + 8
 """Shortest vertical blanking: assumed, far below what 30 frames a second leave."""

@@ -29,7 +29,7 @@ from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.camera.stream import PixelClock, StreamSegment
 from cubestack.emulator.sky.scene import Scene
 from cubestack.emulator.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.mlx75412 import REGISTERS, SYNC_APPLY
+from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, REGISTERS, SYNC_APPLY
 
 __all__ = ["Mlx75412"]
 
@@ -87,7 +87,7 @@ class Mlx75412:
         scene: Scene,
         *,
         seed: int = 0,
-        crystal_hz: int = 10_000_000,
+        crystal_hz: int = CRYSTAL_HZ,
         vsync_before_first_frame: bool = False,
     ) -> None:
         """Power up with the reset pin high.

@@ -17,10 +17,23 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
+
 __all__ = ["COLUMNS", "ROWS", "Distortion", "Optics"]
 
-COLUMNS = 1024
-ROWS = 512
+_CALIBRATION = {
+    field.name: float(field.reset or 0)
+    for command in (
+        "setFocalLength",
+        "setFocalLengthComponents",
+        "setPrincipalPoint",
+        "setRadialDistortionGains",
+        "setTangentalDistortionGains",
+    )
+    for field in INTERFACE.telecommand(command).fields
+}
+"""What the firmware is set to after power-up: the lens is calibrated."""
 
 Pixels = NDArray[np.float64]
 
@@ -49,16 +62,16 @@ class Optics:
             vignetting, 0 is none (nothing is published for this lens).
     """
 
-    focal_length_mm: float = 6.28
-    pixel_pitch_um: float = 5.6
-    fx: float = 1147.5
-    fy: float = 1147.4
-    cx: float = 539.0
-    cy: float = 175.5
-    k1: float = 0.32358
-    k2: float = -0.12456
-    p1: float = -0.00414
-    p2: float = 0.00624
+    focal_length_mm: float = _CALIBRATION["FocalLength"]
+    pixel_pitch_um: float = 1000 * PIXEL_PITCH_MM
+    fx: float = _CALIBRATION["Fx"]
+    fy: float = _CALIBRATION["Fy"]
+    cx: float = _CALIBRATION["Cx"]
+    cy: float = _CALIBRATION["Cy"]
+    k1: float = _CALIBRATION["K1"]
+    k2: float = _CALIBRATION["K2"]
+    p1: float = _CALIBRATION["P1"]
+    p2: float = _CALIBRATION["P2"]
     distortion: Distortion = Distortion.INVERSE
     psf_sigma_px: float = 0.9
     vignetting: float = 0.0

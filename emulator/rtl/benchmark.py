@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.build import library_for
 from cubestack.emulator.rtl.engine import RtlEngine, make_engine
+from cubestack.firmware_model.interface.mlx75412 import LINE_CLOCKS
 from cubestack.hdl.cubestar_top import CubeStarTop
 
 __all__ = ["cold_build_s", "rtl_clocks_per_s", "strobes_per_s"]
 
 PERIOD = Fraction(100_000)  # 10 MHz
-LINE_CLOCKS = 1322
 ROUNDS = 5  # the best one counts: the others were disturbed
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.interface.mlx75412 import PIXEL_PITCH_MM
 
 _ONE = np.float32(1)
 _TWO = np.float32(2)
@@ -43,7 +44,7 @@ class CameraParameters:
     k2: float
     p1: float
     p2: float
-    pitch_mm: float = 0.0056
+    pitch_mm: float = PIXEL_PITCH_MM
 
     def __post_init__(self) -> None:
         """Refuse lengths that are not positive."""
@@ -51,17 +52,6 @@ class CameraParameters:
             value = getattr(self, name)
             if not value > 0:
                 raise CameraParameterError(f"{name} must be above 0, not {value}")
-
-
-PUBLISHED_CALIBRATION = CameraParameters(
-    focal_length_mm=6.28,
-    fx=1147.5, fy=1147.4,
-    cx=539.0, cy=175.5,
-    k1=0.32358, k2=-0.12456,
-    p1=-0.00414, p2=0.00624,
-)  # fmt: skip
-"""CubeStar's engineering model: figure 5.12 with the signs of the coefficients inverted, and the
-focal length from star pairs (section 5.4)."""
 
 
 def undistort(

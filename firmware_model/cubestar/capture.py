@@ -24,11 +24,9 @@ from cubestack.firmware_model.hardware import (
 )
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.interface.cubestar_codes import TaskStatus
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 
-__all__ = ["COLUMNS", "ROWS", "ImageCapture"]
-
-COLUMNS = 1024
-ROWS = 512
+__all__ = ["ImageCapture"]
 
 ACK_POLL_CYCLES = 8
 """Port read (3) and loop step (5) of the cost table."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.cubestar.capture import COLUMNS, ROWS, ImageCapture
+from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.host_link import Command
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
@@ -24,6 +24,7 @@ from cubestack.firmware_model.interface.cubestar_codes import (
     TestPattern,
 )
 from cubestack.firmware_model.interface.frames import encode_frame
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 
 __all__ = ["WATCHDOG_US", "Commands"]
 

@@ -6,16 +6,19 @@ CubeStar thesis, appendix D; register names and addresses are those of the senso
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.hardware import CameraTransfer, ReadTimer, Routine, Sleep
-from cubestack.firmware_model.interface.mlx75412 import LONGEST_EXPOSURE, REGISTERS, SYNC_APPLY
+from cubestack.firmware_model.interface.mlx75412 import (
+    CRYSTAL_HZ,
+    LINE_CLOCKS,
+    LONGEST_EXPOSURE,
+    REGISTERS,
+    ROWS,
+    SYNC_APPLY,
+)
 
 __all__ = ["ImageSensor"]
 
 SETTLE_US = 2_000
 """From power-up to the first register access; assumed."""
-
-CRYSTAL_HZ = 10_000_000
-LINE_CLOCKS = 1322
-ROWS = 512
 
 
 def _bits(register: str, **fields: int) -> int:

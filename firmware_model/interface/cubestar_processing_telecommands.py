@@ -10,6 +10,7 @@ import math
 from cubestack.firmware_model.interface.cubestar_codes import GridSize, IdMode
 from cubestack.firmware_model.interface.field import Field
 from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 
 __all__ = ["PROCESSING_TELECOMMANDS"]
 
@@ -48,10 +49,10 @@ _DETECTION = (
                 range_flag="ValidImageRangeSetError",
                 reset=3,
             ),
-            _edge("Xstart", 8, "first column", 1023, 0),
-            _edge("Xend", 24, "last column", 1023, 1023),
-            _edge("Ystart", 40, "first row", 511, 0),
-            _edge("Yend", 56, "last row", 511, 511),
+            _edge("Xstart", 8, "first column", COLUMNS - 1, 0),
+            _edge("Xend", 24, "last column", COLUMNS - 1, COLUMNS - 1),
+            _edge("Ystart", 40, "first row", ROWS - 1, 0),
+            _edge("Yend", 56, "last row", ROWS - 1, ROWS - 1),
         ),
         ordered=(("Xstart", "Xend"), ("Ystart", "Yend")),
     ),

@@ -11,11 +11,12 @@ from cubestack.firmware_model.interface.cubestar_codes import (
 )
 from cubestack.firmware_model.interface.field import Field
 from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 
 __all__ = ["DEVICE_TELECOMMANDS", "IMAGE_BYTES"]
 
-#: Bytes of a picture: 1024 columns, 512 rows, one byte each, row after row.
-IMAGE_BYTES = 1024 * 512
+#: Bytes of a picture: one for each pixel, row after row.
+IMAGE_BYTES = COLUMNS * ROWS
 
 
 def _focal_length(name: str, offset: int, meaning: str, reset: float) -> Field:
@@ -119,8 +120,8 @@ _OPTICS = (
                 0,
                 "column, 0 is the middle of the first pixel",
                 "px",
-                minimum=-1024.0,
-                maximum=2047.0,
+                minimum=-COLUMNS,
+                maximum=2 * COLUMNS - 1,
                 range_flag="PrincipalPointRangeError",
                 reset=539.0,
             ),
@@ -130,8 +131,8 @@ _OPTICS = (
                 32,
                 "row, 0 is the middle of the first pixel",
                 "px",
-                minimum=-512.0,
-                maximum=1023.0,
+                minimum=-ROWS,
+                maximum=2 * ROWS - 1,
                 range_flag="PrincipalPointRangeError",
                 reset=175.5,
             ),

@@ -14,6 +14,7 @@ from cubestack.firmware_model.interface.cubestar_codes import (
 from cubestack.firmware_model.interface.cubestar_flags import FLAG_BYTES, flag_fields
 from cubestack.firmware_model.interface.field import Field
 from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 
 __all__ = ["NODE_TELEMETRY", "times"]
 
@@ -132,8 +133,8 @@ _CAMERA = (
         "part of the sensor that is read; fixed on this sensor",
         (
             Field("FirstLine", "u16", 0, "first row", "px", reset=0),
-            Field("Width", "u16", 16, "columns", "px", reset=1024),
-            Field("Height", "u16", 32, "rows", "px", reset=512),
+            Field("Width", "u16", 16, "columns", "px", reset=COLUMNS),
+            Field("Height", "u16", 32, "rows", "px", reset=ROWS),
         ),
     ),
     Message(

@@ -1,4 +1,4 @@
-"""Control registers of the MLX75412 image sensor, as far as they are published.
+"""The MLX75412 image sensor: its picture, its clocks, and its published control registers.
 
 CubeStar thesis, appendix D (and appendix C for the device address). The thesis names registers and
 what they do, but reset values and the positions of most feature bits only where they matter to
@@ -14,7 +14,27 @@ from cubestack.firmware_model.interface.camera_registers import (
     RegisterAccess,
 )
 
-__all__ = ["LONGEST_EXPOSURE", "REGISTERS", "SYNC_APPLY"]
+__all__ = [
+    "COLUMNS",
+    "CRYSTAL_HZ",
+    "LINE_CLOCKS",
+    "LONGEST_EXPOSURE",
+    "PIXEL_PITCH_MM",
+    "REGISTERS",
+    "ROWS",
+    "SYNC_APPLY",
+]
+
+#: Pixels of a picture, and the distance of their centres (table 3.3).
+COLUMNS = 1024
+ROWS = 512
+PIXEL_PITCH_MM = 0.0056
+
+#: Input clocks of a line, active and blank (appendix C).
+LINE_CLOCKS = 1322
+
+#: CubeStar's crystal: all measured frame rates fit 10 MHz, though 11 MHz is printed in places.
+CRYSTAL_HZ = 10_000_000
 
 #: Value of SYNC that makes written values take effect.
 SYNC_APPLY = 0x03

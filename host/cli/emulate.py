@@ -12,7 +12,7 @@ from pathlib import Path
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.session import DEVICES
+from cubestack.host.cli.session import DEVICES, add_engine_arguments
 from cubestack.host.cli.terminal import say
 
 __all__ = ["add_arguments", "run"]
@@ -36,19 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--baud", type=whole(1), default=INTERFACE.baud, help="default 57600")
     parser.add_argument("--seed", type=whole(0), default=0, help="of everything random (default 0)")
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "compiled", "python"),
-        default="auto",
-        help="how the FPGA is run (default: compiled where there is a compiler)",
-    )
-    parser.add_argument(
-        "--layout",
-        type=int,
-        choices=(1,),
-        default=1,
-        help="memory layout of the FPGA board; 1 is the published one",
-    )
+    add_engine_arguments(parser)
     parser.add_argument(
         "--pace",
         choices=("real", "fast"),

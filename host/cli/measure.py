@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import angle, corner, whole
-from cubestack.host.cli.session import DEVICES
+from cubestack.host.cli.session import DEVICES, add_engine_arguments
 from cubestack.host.cli.terminal import console, progress
 
 if TYPE_CHECKING:
@@ -79,19 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="with --image: JSON with the camera's f_px, cx_px, cy_px, k1, k2, p1, p2",
     )
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "compiled", "python"),
-        default="auto",
-        help="how the FPGA is run (default: compiled where there is a compiler)",
-    )
-    parser.add_argument(
-        "--layout",
-        type=int,
-        choices=(1,),
-        default=1,
-        help="memory layout of the FPGA board; 1 is the published one",
-    )
+    add_engine_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.cubestar import CubeStar
@@ -15,12 +16,29 @@ if TYPE_CHECKING:
     from cubestack.emulator.cubestar import CubeStarBoard
     from cubestack.emulator.sky.scene import Scene
 
-__all__ = ["DEVICES", "Engine", "Session", "open_session"]
+__all__ = ["DEVICES", "Engine", "Session", "add_engine_arguments", "open_session"]
 
 #: Devices that can be emulated now.
 DEVICES = ("cubestar",)
 
 Engine = Literal["auto", "compiled", "python"]
+
+
+def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say how the FPGA is run, and which one."""
+    parser.add_argument(
+        "--engine",
+        choices=get_args(Engine),
+        default="auto",
+        help="how the FPGA is run (default: compiled where there is a compiler)",
+    )
+    parser.add_argument(
+        "--layout",
+        type=int,
+        choices=(1,),
+        default=1,
+        help="memory layout of the FPGA board; 1 is the published one",
+    )
 
 
 class Session:

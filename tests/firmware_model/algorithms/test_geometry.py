@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from cubestack.firmware_model.algorithms.geometry import (
-    PUBLISHED_CALIBRATION,
     CameraParameterError,
     CameraParameters,
     angles_of,
@@ -16,7 +15,18 @@ from cubestack.firmware_model.algorithms.geometry import (
 )
 from cubestack.firmware_model.costs import CORTEX_M3, Meter
 
-C = PUBLISHED_CALIBRATION
+#: Figure 5.12 with the signs of the coefficients inverted, focal length from star pairs (5.4).
+C = CameraParameters(
+    focal_length_mm=6.28,
+    fx=1147.5,
+    fy=1147.4,
+    cx=539.0,
+    cy=175.5,
+    k1=0.32358,
+    k2=-0.12456,
+    p1=-0.00414,
+    p2=0.00624,
+)
 
 
 def brown(p: NDArray[np.float64]) -> NDArray[np.float64]:
