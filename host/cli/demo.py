@@ -34,6 +34,12 @@ __all__ = ["add_arguments", "run"]
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius and Procyon
 BOOT_TIMEOUT_S = 120.0  # the first start compiles the FPGA
 RENDERED = Path("docs/images/rendered-sky.png")
+PUBLISHED_TIMES = (
+    "discard 68 ms, capture 388 ms, transfer 404 ms; "
+    "detect and match 320 ms together for 20 stars; attitude below 10 ms"
+)
+"""CubeStar thesis, table 6.2, figure 5.7 and section 5.3.5."""
+
 CROP = (0, 256)  # middle rows of a 1024 x 1024 photograph
 
 
@@ -207,3 +213,4 @@ def _report_phases(phases: dict[str, float]) -> None:
     shown = ("discard", "capture", "transfer", "detect", "match", "attitude")
     times = ", ".join(f"{name} {phases[name]:.1f} ms" for name in shown)
     console.print(f"virtual time: {times}", soft_wrap=True)
+    console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)
