@@ -1,0 +1,228 @@
+"""Telemetry of single stars, against the sky that was drawn."""
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+
+from .bench import Bench
+from .sky import Sky, take, undistort
+
+STEPPING = [message.name for message in INTERFACE.telemetries if message.steps]
+OF_IDENTIFIED_STARS = ("IDStarsDetails", "InertialUnitVectors", "HipparcosNumber")
+VECTOR_STEP = 1e-4
+
+
+@pytest.fixture
+def solved(bench: Bench, sky: Sky) -> Bench:
+    """A bench that has identified the sky, in which one spot is no star."""
+    bench.picture = sky.picture.copy()
+    bench.picture[480:484, 30:34] = 70
+    bench.command("CaptureAndProcess")
+    bench.command("SelectBestStars")
+    return bench
+
+
+def records(bench: Bench, frame: str, count: int) -> dict[int, dict[str, float]]:
+    read = [bench.telemetry(frame) for _ in range(count)]
+    return {int(values["StarNumber"]): values for values in read}
+
+
+def truth(bench: Bench, sky: Sky) -> dict[int, int]:
+    """Number of each detected star that is in the sky -> its index there."""
+    found = {}
+    for number, values in records(bench, "StarPositions", len(sky.stars) + 1).items():
+        place = np.array([values["X_Coordinate"], values["Y_Coordinate"]])
+        distance = np.linalg.norm(sky.pixels - place, axis=1)
+        if distance.min() < 1:
+            found[number] = int(distance.argmin())
+    assert len(found) == len(sky.stars)
+    return found
+
+
+# --- stepping -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("frame", STEPPING)
+def test_each_read_gives_the_next_star_and_wraps(solved: Bench, sky: Sky, frame: str) -> None:
+    stars = len(sky.stars) + (frame not in OF_IDENTIFIED_STARS)
+    numbers = [solved.telemetry(frame)["StarNumber"] for _ in range(2 * stars + 1)]
+    assert len(set(numbers[:stars])) == stars
+    assert numbers[:stars] == sorted(numbers[:stars])
+    assert numbers == numbers[:stars] * 2 + numbers[:1]
+
+
+@pytest.mark.parametrize("frame", STEPPING)
+def test_frames_step_on_their_own(solved: Bench, frame: str) -> None:
+    first = solved.telemetry(frame)
+    for other in STEPPING:
+        if other != frame:
+            solved.telemetry(other)
+    second = solved.telemetry(frame)
+    assert second["StarNumber"] > first["StarNumber"]
+
+
+@pytest.mark.parametrize("frame", STEPPING)
+def test_new_results_start_over(solved: Bench, frame: str) -> None:
+    first = solved.telemetry(frame)
+    solved.telemetry(frame)
+    solved.command("ProcessImage")
+    assert solved.telemetry(frame) == first
+
+
+@pytest.mark.parametrize("frame", STEPPING)
+def test_without_a_star_there_is_none(bench: Bench, frame: str) -> None:
+    values = bench.telemetry(frame)
+    assert values["StarNumber"] == 255
+    identity = next((values[name] for name in ("Identity", "ID") if name in values), 65535)
+    assert identity == 65535
+    others = values.keys() - {"StarNumber", "Identity", "ID"}
+    assert not any(values[name] for name in others)
+
+
+@pytest.mark.parametrize("frame", [frame for frame in STEPPING if frame in OF_IDENTIFIED_STARS])
+def test_a_failed_identification_leaves_none(solved: Bench, frame: str) -> None:
+    solved.command("setIDMargin", Margin=0.0001)
+    solved.command("setFocalLength", FocalLength=7.0)
+    solved.command("ProcessImage")
+    assert solved.telemetry(frame)["StarNumber"] == 255
+    assert solved.telemetry("NumIdStars")["numIdStars"] == 0
+
+
+# --- detected stars -------------------------------------------------------------------------------
+
+
+def test_summary(solved: Bench, sky: Sky) -> None:
+    solved.picture = np.maximum(solved.picture, 3)
+    solved.picture[51, 900:903] = 99  # noise
+    solved.picture[300:320, 60:90] = 99  # too large; its rest is met again
+    solved.command("CaptureAndProcess")
+    values = solved.telemetry("DetectionSummary")
+    assert values["NumStarsDetected"] >= len(sky.stars) + 1
+    assert values["NumInvalidStars"] > 0
+    assert values["AmountOfNoise"] >= 1
+    assert values["ImageDarkValue"] == 3
+
+
+def test_positions(solved: Bench, sky: Sky) -> None:
+    stars = truth(solved, sky)
+    ideal = undistort(sky.pixels)
+    for number, values in records(solved, "StarPositions", len(sky.stars) + 1).items():
+        if number in stars:
+            measured = values["X_Coordinate"], values["Y_Coordinate"]
+            corrected = values["X_CorrectedCoordinate"], values["Y_CorrectedCoordinate"]
+            assert measured == pytest.approx(sky.pixels[stars[number]], abs=0.05)
+            assert corrected == pytest.approx(ideal[stars[number]], abs=0.06)
+        else:
+            assert (values["X_Coordinate"], values["Y_Coordinate"]) == (31.5, 481.5)
+            assert (values["Size"], values["Intensity"]) == (16, 16 * 70)
+
+
+def test_directions_in_the_camera(solved: Bench, sky: Sky) -> None:
+    catalogue = solved.catalogue.vectors[sky.stars].astype(float)
+    body = sky.attitude.apply(catalogue)
+    for frame, axes in (
+        ("BodyUnitVectors", ("VbX", "VbY", "VbZ")),
+        ("StarDetails", ("Vbx", "Vby", "Vbz")),
+    ):
+        found = records(solved, frame, len(sky.stars) + 1)
+        for number, star in truth(solved, sky).items():
+            vector = [found[number][axis] for axis in axes]
+            assert vector == pytest.approx(body[star], abs=VECTOR_STEP)
+
+
+# --- identified stars -----------------------------------------------------------------------------
+
+
+def test_identities(solved: Bench, sky: Sky) -> None:
+    stars = truth(solved, sky)
+    assert solved.telemetry("NumIdStars")["numIdStars"] == len(stars)
+    details = records(solved, "IDStarsDetails", len(stars))
+    inertial = records(solved, "InertialUnitVectors", len(stars))
+    names = records(solved, "HipparcosNumber", len(stars))
+    assert details.keys() == inertial.keys() == names.keys() == stars.keys()
+    for number, star in stars.items():
+        identity = int(sky.stars[star])
+        votes = len(stars) - 1  # of each other star; the false one confirms none
+        confidence = 100 * votes / len(stars)
+        assert details[number]["Identity"] == inertial[number]["Identity"] == identity
+        assert details[number]["ValidationVotes"] == votes
+        assert details[number]["Confidence"] == pytest.approx(confidence, abs=0.5)
+        assert inertial[number]["Confidence"] == pytest.approx(confidence, abs=0.5)
+        vector = [inertial[number][axis] for axis in ("ViX", "ViY", "ViZ")]
+        assert vector == pytest.approx(solved.catalogue.vectors[identity], abs=VECTOR_STEP)
+        assert names[number]["Hipparcos"] == solved.catalogue.hip[identity]
+        place = names[number]["X"], names[number]["Y"]
+        assert place == pytest.approx(sky.pixels[star], abs=0.05)
+
+
+def test_details_of_every_detected_star(solved: Bench, sky: Sky) -> None:
+    stars = truth(solved, sky)
+    ideal = undistort(sky.pixels)
+    for number, values in records(solved, "StarDetails", len(stars) + 1).items():
+        if number in stars:
+            star = stars[number]
+            assert values["ID"] == sky.stars[star]
+            assert (values["CCx"], values["CCy"]) == pytest.approx(ideal[star], abs=0.06)
+            assert values["ValidationVote"] == len(stars) - 1
+            assert values["confidance"] == pytest.approx((len(stars) - 1) / len(stars), abs=1e-6)
+        else:
+            assert (values["ID"], values["ValidationVote"], values["confidance"]) == (65535, 0, 0)
+
+
+def test_match_summary(solved: Bench, sky: Sky) -> None:
+    count = len(sky.stars)
+    values = solved.telemetry("MatchSummary")
+    assert (values["Detected"], values["Matched"]) == (count + 1, count)
+    assert values["MaxVotes"] == count - 1
+    assert values["MeanConfidence"] == pytest.approx((count - 1) / count, abs=1e-6)
+    fresh = Bench(solved.catalogue).telemetry("MatchSummary")
+    assert not any(fresh.values())
+
+
+# --- selected stars -------------------------------------------------------------------------------
+
+
+def test_the_selected_stars_are_the_brightest_of_those_with_most_votes(
+    solved: Bench, sky: Sky
+) -> None:
+    stars = truth(solved, sky)
+    positions = records(solved, "StarPositions", len(stars) + 1)
+    by_light = sorted(stars, key=lambda number: -positions[number]["Intensity"])
+    chosen = solved.telemetry("BestStarIndex")
+    assert [chosen[f"Star{n}Index"] for n in (1, 2, 3)] == by_light[:3]
+
+
+def test_details_of_the_selected_stars(solved: Bench, sky: Sky) -> None:
+    stars = truth(solved, sky)
+    positions = records(solved, "StarPositions", len(stars) + 1)
+    bodies = records(solved, "BodyUnitVectors", len(stars) + 1)
+    chosen = solved.telemetry("BestStarIndex")
+    for n in (1, 2, 3):
+        number = chosen[f"Star{n}Index"]
+        identity = int(sky.stars[stars[number]])
+        values = solved.telemetry(f"Star{n}Details")
+        assert values[f"S{n}CentX"] == pytest.approx(positions[number]["X_Coordinate"], abs=0.011)
+        assert values[f"S{n}CentY"] == pytest.approx(positions[number]["Y_Coordinate"], abs=0.011)
+        assert values[f"S{n}Mag"] == positions[number]["Intensity"]
+        for axis in "XYZ":
+            assert values[f"S{n}VB{axis}"] == bodies[number][f"Vb{axis}"]
+        inertial = [values[f"S{n}VI{axis}"] for axis in "XYZ"]
+        assert inertial == pytest.approx(solved.catalogue.vectors[identity], abs=VECTOR_STEP)
+        assert values[f"S{n}CatNum"] == identity
+        assert values[f"S{n}Conf"] == round(100 * (len(stars) - 1) / len(stars))
+
+
+def test_fewer_than_three_can_be_selected(bench: Bench, sky: Sky) -> None:
+    bench.picture = sky.picture
+    bench.command("CaptureAndProcess")
+    bench.command("setIDMode", IdMode=0)  # tracking needs two stars
+    bench.picture = take(bench.catalogue, sky.attitude, most=2).picture
+    bench.command("CaptureAndProcess")
+    bench.command("SelectBestStars")
+    chosen = bench.telemetry("BestStarIndex")
+    assert sorted([chosen["Star1Index"], chosen["Star2Index"]]) == [0, 1]
+    assert chosen["Star3Index"] == 255
+    values = bench.telemetry("Star3Details")
+    assert values.pop("S3CatNum") == 65535
+    assert not any(values.values())
