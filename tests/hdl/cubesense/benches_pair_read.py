@@ -1,0 +1,113 @@
+"""Reading pictures and edge data, from own memory and across the link."""
+
+import random
+from typing import Any
+
+from bench import picture, timed_test
+from geometry import GEOMETRY
+from pair import OTHER, PairBench, frame
+from pair_reference import SIDES
+from small import READ_OUT
+
+COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
+
+
+def with_sun(x: int, y: int) -> bytes:
+    """A picture whose first Sun pixel is there."""
+    content = bytearray(random.choices(range(200), k=GEOMETRY.pixels))
+    content[y * COLUMNS + x : y * COLUMNS + x + 3] = bytes([200, 255, 231])
+    return bytes(content)
+
+
+async def read_edge(bench: PairBench, sensor: str, memory: str, count: int) -> bytes:
+    """From standby to standby: a sensor's edge data in a memory."""
+    if sensor == memory:
+        await bench.mcu.read_edge(sensor)
+    else:
+        await bench.mcu.read_edge_linked(sensor)
+    data = await bench.mcu.read(count)
+    await bench.mcu.standby()
+    return data
+
+
+@timed_test
+async def pictures(dut: Any) -> None:
+    """From the first pixel on, however far the last reading came, and past the last one."""
+    bench = await PairBench.start(dut)
+    for count in (3, GEOMETRY.pixels // 2, GEOMETRY.pixels + COLUMNS + 1, 1):
+        for side in SIDES:
+            await bench.mcu.read_picture(side)
+            stored = bench.stored(side)
+            assert await bench.mcu.read(count) == (2 * stored)[:count]
+            await bench.mcu.standby()
+    await bench.check()
+
+
+@timed_test
+async def nadir_scan(dut: Any) -> None:
+    """Each clock of a line presents its pixel, from either memory."""
+    bench = await PairBench.start(dut)
+    for memory in random.sample(SIDES, 2):
+        await bench.shoot("nadir", memory, picture())
+        rows = [bench.stored(memory)[y * COLUMNS :][:COLUMNS] for y in range(ROWS)]
+        horizontal = b"".join(rows[y] for y in READ_OUT.scan_rows)
+        vertical = b"".join(bytes(row[x] for row in rows) for x in READ_OUT.scan_columns)
+        data = await read_edge(bench, "nadir", memory, READ_OUT.scan_clocks + 5)
+        assert data[1:][: len(horizontal)] == horizontal
+        assert data[1 + len(horizontal) + 1 :] == vertical + vertical[:5]
+        assert (await read_edge(bench, "nadir", memory, 4))[1:] == horizontal[:3]
+    await bench.check()
+
+
+@timed_test
+async def sun_window(dut: Any) -> None:
+    """Around Suns in the middle, at the borders and in the corners, from either memory."""
+    bench = await PairBench.start(dut)
+    columns, rows = (0, COLUMNS // 2, COLUMNS - 3), (0, ROWS // 2, ROWS - 1)
+    places = [(x, y) for x in columns for y in rows]
+    for x, y in random.sample(places, 5):
+        memory = random.choice(SIDES)
+        content = with_sun(x, y)
+        await bench.shoot("sun", memory, content)
+        left, top = READ_OUT.window_origin(x, y)
+        window = b"".join(
+            content[row * COLUMNS + left :][: READ_OUT.window]
+            for row in range(top, top + READ_OUT.window)
+        )
+        expected = bytes([x & 255, x >> 8, y & 255, y >> 8]) + window + window[:2]
+        assert await read_edge(bench, "sun", memory, len(expected)) == expected
+        assert await read_edge(bench, "sun", memory, 5) == expected[:5]
+    await bench.check()
+
+
+@timed_test
+async def orders_start_anew_without_standby(dut: Any) -> None:
+    """EDGE may change while an FPGA is enabled."""
+    bench = await PairBench.start(dut)
+    await bench.shoot("sun", "sun", with_sun(4, 2))
+    for side in SIDES:
+        await bench.mcu.read_picture(side)
+        for edge in (1, 0, 1, 0):
+            await bench.mcu.read(random.randrange(1, 9))
+            await bench.mcu.set(EDGE=edge)
+        await bench.mcu.read(3)
+        await bench.mcu.standby()
+    await bench.check()
+
+
+@timed_test
+async def while_cameras_send(dut: Any) -> None:
+    """No camera's clock reaches a read-out."""
+    bench = await PairBench.start(dut)
+    await bench.shoot("sun", "nadir", with_sun(6, 3))
+    await bench.shoot("sun", "sun", with_sun(3, 3))
+    for camera in bench.cameras.values():
+        for _ in range(20):
+            camera.send(frame(picture()))
+    for _ in range(12):
+        sensor, memory = random.choice(SIDES), random.choice(SIDES)
+        await read_edge(bench, sensor, memory, random.randrange(1, 40))
+        await bench.mcu.read_picture(OTHER[memory])
+        await bench.mcu.read(random.randrange(1, 20))
+        await bench.mcu.standby()
+    await bench.check()

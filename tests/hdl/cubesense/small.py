@@ -1,0 +1,27 @@
+"""What the simulation that imports this runs on, from its environment."""
+
+import json
+import os
+import random
+from typing import Any
+
+from cocotb.triggers import Timer
+
+from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+
+READ_OUT = ReadOut(**json.loads(os.environ["READ_OUT"]))
+
+
+async def some_time() -> None:
+    await Timer(random.randint(1, 50), unit="ns")
+
+
+async def clock(dut: Any, domain: str, reset: int = 0, **pins: int) -> None:
+    """Drive ``pins``, then one rising edge of the domain's clock; falls at the next call."""
+    getattr(dut, f"{domain}_clk").value = 0
+    getattr(dut, f"{domain}_rst").value = reset
+    for name, level in pins.items():
+        getattr(dut, name).value = level
+    await some_time()
+    getattr(dut, f"{domain}_clk").value = 1
+    await some_time()

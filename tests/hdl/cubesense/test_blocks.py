@@ -1,0 +1,69 @@
+"""CubeSense's blocks, each alone, on Icarus Verilog."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
+from amaranth.lib.wiring import Component, In
+
+from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+from cubestack.hdl.cubesense_dataflow import DataflowControl
+from cubestack.hdl.cubesense_top import CubeSenseFpga
+from cubestack.hdl.frame_gap import FrameGap
+from cubestack.hdl.gray_counter import GrayCounter
+from cubestack.hdl.nadir_scan import NadirScan
+from cubestack.hdl.sun_search import SunSearch
+from cubestack.hdl.sun_window import SunWindow
+
+
+class AsynchronousReset(Component):
+    """A block whose domain, ``pix``, is reset without a clock, as it is in the FPGA."""
+
+    def __init__(self, block: Component) -> None:
+        self._block = block
+        super().__init__({**block.signature.members, "pix_clk": In(1), "pix_rst": In(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.block = self._block
+        m.domains.pix = ClockDomain(async_reset=True)
+        m.d.comb += [
+            ClockSignal("pix").eq(self.pix_clk),
+            ResetSignal("pix").eq(self.pix_rst),
+        ]
+        for name, member in self._block.signature.members.items():
+            inside, outside = getattr(self._block, name), getattr(self, name)
+            m.d.comb += inside.eq(outside) if member.flow is In else outside.eq(inside)
+        return m
+
+
+BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
+    "frame_gap": lambda size: FrameGap(size.frame_gap, domain="pix"),
+    "nadir_scan": NadirScan,
+    "sun_search": lambda size: AsynchronousReset(SunSearch(size)),
+    "sun_window": SunWindow,
+    "gray_counter": lambda size: GrayCounter(size.pixels, domain="pix"),
+}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("block", BLOCKS)
+def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
+    simulate(BLOCKS[block], read_out, f"benches_{block}", name=block, seed=seed)
+
+
+@pytest.mark.parametrize("side", ["sun", "nadir"])
+def test_dataflow(simulate: Any, side: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SIDE", side)
+    module = "benches_dataflow"
+    simulate(lambda _: DataflowControl(side), ReadOut(), module, name=f"{side}_dataflow", seed=1)
+
+
+@pytest.mark.parametrize("side", ["sun", "nadir"])
+def test_fpga_alone(
+    simulate: Any, read_out: ReadOut, side: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SIDE", side)
+    module = "benches_fpga_alone"
+    simulate(lambda size: CubeSenseFpga(side, size), read_out, module, name=f"{side}_fpga", seed=1)
