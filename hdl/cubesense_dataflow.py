@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.cubesense_fpga import (
     COMMANDS,
     Action,
     Command,
+    actions,
     link_shows_enables,
 )
 
@@ -74,7 +75,8 @@ class DataflowControl(Component):
     def _fits(self, command: Command) -> Value:
         """Whether the lines are at the levels of a row.
 
-        Where the link can not show the other enable, it is no input at all: there the line itself
+        The other enable is no input at all where it makes no difference, so that it can not disturb
+        a picture that is being stored, nor where the link can not show it: there the line itself
         depends on the result.
         """
         own, other = command.sunen, command.naden
@@ -86,6 +88,16 @@ class DataflowControl(Component):
             (self.rnw, command.rnw),
             (self.en_n, own),
         ]
-        if link_shows_enables(bool(command.shift), bool(command.edge)):
+        if self._other_matters(command):
             levels.append((self.other_en_n, other))
         return Cat(line == level for line, level in levels if level is not None).all()
+
+    def _other_matters(self, command: Command) -> bool:
+        """Whether this FPGA sees the other enable, and would act otherwise at its other level."""
+        shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
+        enables = [command.sunen, command.naden]
+        enables[1 if self._side == "sun" else 0] ^= 1
+        changed = getattr(actions(shift, edge, rnw, *enables), self._side)
+        return link_shows_enables(shift, edge) and changed is not getattr(
+            command.actions, self._side
+        )

@@ -138,7 +138,8 @@ class CubeSenseFpga(Component):
             mode.rnw.eq(self.RNW),
             mode.edge.eq(self.EDGE),
             mode.shift.eq(self.SHIFT),
-            search.start.eq(~sun_writer.vsync),
+            # The gap after a complete picture starts no new search.
+            search.start.eq(~sun_writer.vsync & ~sun_writer.ack),
             search.store.eq(sun_writer.store),
             search.pixel.eq(sun_writer.data),
             search.address.eq(sun_writer.address),
