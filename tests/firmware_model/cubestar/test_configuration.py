@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.algorithms.detection import DetectionConfig
+from cubestack.firmware_model.algorithms.geometry import CameraParameters
+from cubestack.firmware_model.cubestar.configuration import (
+    camera_parameters,
+    detection_config,
+    field_radius_deg,
+)
+from cubestack.firmware_model.cubestar.settings import Settings
+
+
+def test_the_reset_values_are_the_published_ones() -> None:
+    assert detection_config(Settings()) == DetectionConfig()
+    # Figure 5.12, coefficients with inverted sign, and the focal length of section 5.4.
+    published = CameraParameters(
+        6.28, 1147.5, 1147.4, 539.0, 175.5, 0.32358, -0.12456, -0.00414, 0.00624
+    )
+    assert vars(camera_parameters(Settings())) == pytest.approx(vars(published), rel=1e-6)
+
+
+def test_every_setting_has_its_place() -> None:
+    settings = Settings()
+    region = {"StepSize": 4, "Xstart": 10, "Xend": 20, "Ystart": 30, "Yend": 40}
+    settings.put("setDetectionRegion", region)
+    settings.put("setDetectionThresholds", {"DetectionThreshold": 50, "StarThreshold": 51})
+    settings.put("setStarPixels", {"MinPixels": 7, "MaxPixels": 70})
+    limits = {"GridSize": 9, "MaxStars": 11, "MaxInvalidStars": 12, "MaxNoise": 13}
+    settings.put("setDetectionVariables", limits)
+    assert detection_config(settings) == DetectionConfig(
+        step=4,
+        x_start=10,
+        x_end=21,  # the telecommand includes the end
+        y_start=30,
+        y_end=41,
+        detection_threshold=50,
+        star_threshold=51,
+        min_pixels=7,
+        max_pixels=70,
+        grid_size=9,
+        max_stars=11,
+        max_invalid=12,
+        max_noise=13,
+    )
+    settings.put("setFocalLength", {"FocalLength": 8.0})
+    settings.put("setFocalLengthComponents", {"Fx": 1001.0, "Fy": 1002.0})
+    settings.put("setPrincipalPoint", {"Cx": 501.0, "Cy": 252.0})
+    settings.put("setRadialDistortionGains", {"K1": 0.1, "K2": 0.2})
+    settings.put("setTangentalDistortionGains", {"P1": 0.3, "P2": 0.4})
+    camera = camera_parameters(settings)
+    assert (camera.focal_length_mm, camera.fx, camera.fy) == (8.0, 1001.0, 1002.0)
+    assert (camera.cx, camera.cy) == (501.0, 252.0)
+    assert (camera.k1, camera.k2, camera.p1, camera.p2) == (0.1, 0.2, 0.3, 0.4)
+
+
+@pytest.mark.parametrize(("cx", "cy"), [(539.0, 175.5), (512.0, 256.0), (100.0, 500.0)])
+def test_the_field_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
+    settings = Settings()
+    settings.put("setPrincipalPoint", {"Cx": cx, "Cy": cy})
+    x, y = np.meshgrid([0, 1024], [0, 512])
+    farthest = np.hypot(x - cx, y - cy).max()
+    expected = np.degrees(np.arctan(farthest * 0.0056 / 6.28))
+    assert field_radius_deg(camera_parameters(settings)) == pytest.approx(expected, rel=1e-6)

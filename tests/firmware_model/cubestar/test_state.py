@@ -1,0 +1,160 @@
+"""RAM, retention registers and flash."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
+from cubestack.firmware_model.cubestar.state import Attitude, Retained, State
+from cubestack.firmware_model.hardware import FlashStore
+from cubestack.firmware_model.interface.cubestar import INTERFACE, MatchMode
+
+COUNTERS = [field.name for field in fields(Retained)]
+FLAGS = [field.name for field in INTERFACE.telemetry("ErrorFlags").fields]
+
+
+class Memories:
+    """What of the hardware the state uses."""
+
+    def __init__(self) -> None:
+        self.retention = bytearray(RETENTION_BYTES)
+        self.flash = FlashStore()
+
+
+def state(memories: Memories) -> State:
+    return State(memories)  # type: ignore[arg-type]
+
+
+# --- retention registers --------------------------------------------------------------------------
+
+
+def test_the_layout_fits_the_retention_registers() -> None:
+    assert State.RETENTION_SIZE <= RETENTION_BYTES
+    memories = Memories()
+    state(memories).retain()
+    assert len(memories.retention) == RETENTION_BYTES
+    assert not any(memories.retention[State.RETENTION_SIZE :])
+
+
+def test_settings_flags_and_counters_come_back() -> None:
+    memories = Memories()
+    before = state(memories)
+    before.settings.put("Exposure", {"exposure": 1234})
+    before.flags |= set(FLAGS[::3])
+    for number, name in enumerate(COUNTERS):
+        setattr(before.retained, name, 2**40 + number)
+    before.retain()
+    after = state(memories)
+    assert after.settings.get("Exposure", "exposure") == 1234
+    assert after.flags == set(FLAGS[::3])
+    assert after.retained == before.retained
+
+
+@pytest.mark.parametrize("name", COUNTERS)
+def test_a_counter_that_overflows_wraps(name: str) -> None:
+    memories = Memories()
+    before = state(memories)
+    setattr(before.retained, name, 2**64 + 3)
+    before.retain()
+    assert getattr(state(memories).retained, name) == 3
+
+
+def test_without_the_mark_the_retention_registers_mean_nothing() -> None:
+    memories = Memories()
+    memories.retention[:] = np.random.default_rng(7).bytes(RETENTION_BYTES)
+    fresh = state(memories)
+    assert fresh.retained == Retained()
+    assert fresh.flags == set()
+    assert fresh.settings.pack() == state(Memories()).settings.pack()
+
+
+def test_forgetting_returns_to_the_values_after_power_up() -> None:
+    memories = Memories()
+    before = state(memories)
+    before.settings.put("Exposure", {"exposure": 5})
+    before.save_config()
+    before.settings.put("Exposure", {"exposure": 6})
+    for name in COUNTERS:
+        setattr(before.retained, name, 1)
+    before.raise_flag("StatusError")
+    before.forget()
+    assert before.settings.get("Exposure", "exposure") == 5
+    assert before.retained == Retained(cut=1)  # a switch that is open must be closed again
+    assert before.flags == set()
+
+
+# --- flash ----------------------------------------------------------------------------------------
+
+
+def test_the_configuration() -> None:
+    memories = Memories()
+    first = state(memories)
+    first.settings.put("setIDMargin", {"Margin": 0.002})
+    first.save_config()
+    second = state(memories)
+    assert second.settings.get("setIDMargin", "Margin") == 0.002
+    second.erase_config()
+    assert second.settings.get("setIDMargin", "Margin") == 0.001
+    assert state(memories).settings.get("setIDMargin", "Margin") == 0.001
+
+
+def test_retention_registers_go_before_the_configuration() -> None:
+    memories = Memories()
+    first = state(memories)
+    first.save_config()
+    first.settings.put("Exposure", {"exposure": 8})
+    first.retain()
+    assert state(memories).settings.get("Exposure", "exposure") == 8
+
+
+def test_the_mode_flag() -> None:
+    memories = Memories()
+    assert state(memories).mode is MatchMode.LOST_IN_SPACE
+    for mode in MatchMode:
+        state(memories).mode = mode
+        assert state(memories).mode is mode
+    writes = dict(memories.flash.writes)
+    state(memories).mode = MatchMode.LOST_IN_SPACE
+    assert memories.flash.writes == writes  # it is that already
+
+
+def test_the_attitude_is_kept_in_single_precision() -> None:
+    memories = Memories()
+    assert state(memories).attitude is None
+    quaternion = np.array([0.1, -0.2, 0.3, 0.9], np.float32)
+    kept = Attitude(quaternion, 7, 123_456, 12, MatchMode.TRACKING)
+    state(memories).attitude = kept
+    found = state(memories).attitude
+    assert found is not None
+    assert found.quaternion.dtype == np.float32
+    assert np.array_equal(found.quaternion, quaternion)
+    assert (found.frame, found.image_ms, found.matched, found.mode) == (7, 123_456, 12, 0)
+
+
+def test_pictures_and_times_beyond_32_bits_wrap() -> None:
+    far = Attitude(np.array([0, 0, 0, 1], np.float32), 2**32 + 5, 2**33 + 6, 3, 2)
+    found = Attitude.unpack(far.pack())
+    assert (found.frame, found.image_ms) == (5, 6)
+
+
+def test_every_attitude_is_one_write() -> None:
+    memories = Memories()
+    for number in range(5):
+        state(memories).attitude = Attitude(np.zeros(4, np.float32), number, 0, 0, 0)
+    assert memories.flash.writes == {"attitude": 5}
+
+
+# --- flags ----------------------------------------------------------------------------------------
+
+
+def test_a_flag_that_is_not_declared_is_a_programming_error() -> None:
+    with pytest.raises(KeyError, match="declares no flag 'Oops'"):
+        state(Memories()).raise_flag("Oops")
+
+
+@pytest.mark.parametrize("name", FLAGS)
+def test_flags_are_shown_by_name(name: str) -> None:
+    shown = state(Memories())
+    shown.raise_flag(name)
+    assert [flag for flag, up in shown.flag_values().items() if up] == [name]
