@@ -4,6 +4,7 @@ Each runs the whole stack, reads the serial line and prints what it found::
 
     .venv/bin/python tests/system/experiments.py field          tables 4.4 and 4.5
     .venv/bin/python tests/system/experiments.py pairs          two pair limits beside each other
+    .venv/bin/python tests/system/experiments.py thresholds     the uncut sky
     .venv/bin/python tests/system/experiments.py times          figure 5.7
     .venv/bin/python tests/system/experiments.py repeatability  table 6.1
     .venv/bin/python tests/system/experiments.py slew           section 6.2
@@ -181,6 +182,18 @@ def times(frames: int) -> None:
         )
 
 
+def thresholds(frames: int) -> None:
+    """All stars that the camera sees, with higher detection thresholds."""
+    with closing(Stack()) as stack:
+        for threshold in (6, 8, 10, 13, 16, 20):
+            stack.cubestar.client.command(
+                "setDetectionThresholds", DetectionThreshold=threshold, StarThreshold=threshold
+            )
+            for mode in ("lost in space", "assisted 5 deg"):
+                found = rates(stack, frames, MODES[mode])
+                print(f"threshold {threshold:2} DN, {mode}: {found}", flush=True)
+
+
 def repeatability(frames: int) -> None:
     """Table 6.1: scatter of the attitude on a mount that turns with the Earth."""
     rng = np.random.default_rng(1)
@@ -262,7 +275,7 @@ def loop(frames: int) -> None:
 
 EXPERIMENTS = {
     experiment.__name__: experiment
-    for experiment in (field, pairs, times, repeatability, slew, loop)
+    for experiment in (field, pairs, thresholds, times, repeatability, slew, loop)
 }
 
 

@@ -103,3 +103,18 @@ def test_commands_of_the_readme_exist(root: Path) -> None:
     assert set(re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", readme, re.MULTILINE)) <= set(
         COMMANDS
     )
+
+
+def test_commands_of_the_fidelity_page_exist(root: Path) -> None:
+    from cubestack.host.cli.main import make_parser
+
+    page = (root / "docs" / "fidelity.md").read_text(encoding="utf-8")
+    experiments = (root / "tests" / "system" / "experiments.py").read_text(encoding="utf-8")
+    named = set(re.findall(r"`experiments\.py (\w+)", page))
+    assert named == set(re.findall(r"experiments\.py (\w+) ", experiments))
+    commands = re.findall(r"`measure (--[^`]+)`", page)
+    assert len(commands) >= 5
+    for command in commands:
+        make_parser().parse_args(["measure", "cubestar", "--json", *command.split()])
+    for file in re.findall(r"`(\w+/[\w/]+\.py)`", page):
+        assert (root / file).is_file(), file
