@@ -98,11 +98,8 @@ class HostLink:
         """Interrupt: a byte came."""
         self._meter.charge(uart_interrupt=1)
         match self._decoder.feed(byte):
-            case FrameEvent.FRAME:
+            case FrameEvent.FRAME | FrameEvent.TOO_LONG:  # the kept front is too long as well
                 self._uart_message(self._decoder.payload)
-            case FrameEvent.TOO_LONG:
-                self._state.raise_flag(_UART.too_many)
-                self._acknowledge(AckError.WRONG_LENGTH)
             case FrameEvent.INCOMPLETE:
                 self._state.raise_flag("UART_MsgIncomplete")
             case FrameEvent.PROTOCOL_ERROR:
@@ -117,10 +114,7 @@ class HostLink:
             if answer is not None:
                 self._uart_send(answer)
         else:
-            self._acknowledge(self._accept(payload[0], payload[1:], _UART))
-
-    def _acknowledge(self, error: AckError) -> None:
-        self._uart_send(bytes([error]))
+            self._uart_send(bytes([self._accept(payload[0], payload[1:], _UART)]))
 
     def _uart_send(self, payload: bytes) -> None:
         frame = encode_frame(payload)

@@ -25,7 +25,7 @@ class FrameEvent(Enum):
     FRAME = auto()
     """A whole frame: its payload is in ``FrameDecoder.payload``."""
     TOO_LONG = auto()
-    """The end of a frame whose payload exceeds the limit; it is dropped."""
+    """A whole frame whose payload exceeds the limit; only the front of it is kept."""
     INCOMPLETE = auto()
     """A start inside a frame: the unfinished one is dropped, the new one has begun."""
     PROTOCOL_ERROR = auto()
@@ -48,7 +48,7 @@ class FrameDecoder:
     after it is found. A silence on the line (``reset``) ends such a state too.
 
     Attributes:
-        payload: payload of the last whole frame.
+        payload: payload of the last whole frame, or the front of it.
     """
 
     def __init__(self, max_length: int) -> None:
@@ -116,7 +116,5 @@ class FrameDecoder:
         self._state = _State.OUTSIDE
         if byte != END:
             return FrameEvent.PROTOCOL_ERROR
-        if self._too_long:
-            return FrameEvent.TOO_LONG
         self.payload = bytes(self._buffer)
-        return FrameEvent.FRAME
+        return FrameEvent.TOO_LONG if self._too_long else FrameEvent.FRAME
