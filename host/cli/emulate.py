@@ -19,12 +19,16 @@ __all__ = ["add_arguments", "run"]
 
 LOOPBACK = "127.0.0.1"
 DEFAULT_POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+DEFAULT_MAG_LIMIT = 3.8
+"""Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("device", choices=DEVICES, help="device to emulate")
-    parser.add_argument("--scene", type=Path, metavar="FILE", help="TOML scene; default: Orion")
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="TOML scene; default: Orion, stars to V 3.8"
+    )
     parser.add_argument(
         "--pty",
         type=Path,
@@ -56,7 +60,9 @@ def run(args: argparse.Namespace) -> int:
 
     scene: Scene
     if args.scene is None:
-        scene = SkyScene(quaternion=quaternion_from_pointing(*DEFAULT_POINTING_DEG))
+        scene = SkyScene(
+            quaternion_from_pointing(*DEFAULT_POINTING_DEG), mag_limit=DEFAULT_MAG_LIMIT
+        )
     else:
         scene = load_scene(args.scene)
     if args.pty is not None and args.tcp is not None:
