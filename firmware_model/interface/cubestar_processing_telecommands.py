@@ -203,7 +203,7 @@ _OPERATION = (
     Message(35, "TestWDG", 0, "stop serving the watchdog, so that it resets the processor"),
     Message(36, "CaptureAndProcess", 0, "capture a picture, then detect, identify and estimate"),
     Message(37, "ProcessImage", 0, "detect, identify and estimate with the picture in memory"),
-    Message(38, "Trigger", 0, "start the 1 s loop; it runs until StopLoop or a reset"),
+    Message(38, "Trigger", 0, "start the 1 s loop; it runs until StopLoop or Reset"),
 )
 
 PROCESSING_TELECOMMANDS = _DETECTION + _IDENTIFICATION + _OPERATION

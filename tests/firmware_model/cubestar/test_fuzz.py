@@ -40,6 +40,7 @@ def test_random_bytes_on_the_uart(bench: Bench, sky: Sky, seed: int) -> None:
     for start in range(0, UART_BYTES, 1000):
         bench.uart(data[start : start + 1000].tobytes())
         bench.run(until_us=bench.now_us + 1000 * 174)
+    bench.program.link.uart_silence()
     assert bench.flags() >= {"UART_ProtocolError"}
     stays_sane(bench)
 
