@@ -10,7 +10,8 @@ How each asynchronous input is brought in:
   reset: asserted at once, without a clock, released through two flip-flops. For the DCLK domain,
   "not reading" is its reset without a synchroniser, because the same microcontroller makes ENABLE,
   RNW and DCLK one after the other, and a synchroniser would swallow its first two clocks.
-- BANK is latched by the rising edge of ENABLE and must be stable around it.
+- BANK is latched by the rising edge of ENABLE and must be stable around it. Standby retains it: an
+  address bit that fell with ENABLE could take a write pulse that ENABLE cuts off to the other bank.
 
 No clock is ever switched: each counter has its own, and only the SRAM address is multiplexed.
 """
@@ -56,8 +57,9 @@ class CubeStarTop(Component):
 
     The SRAM's data bus is an i / o / oe triple; its three strobes are low active.
 
-    ENABLE = 0: standby, every output at its reset value. ENABLE = 1, RNW = 0: store the next whole
-    frame, then raise ACK. ENABLE = 1, RNW = 1: each rising DCLK presents the next byte.
+    ENABLE = 0: standby, every output at its reset value but the top bit of SRAM_A, which keeps the
+    bank. ENABLE = 1, RNW = 0: store the next whole frame, then raise ACK. ENABLE = 1, RNW = 1: each
+    rising DCLK presents the next byte.
     """
 
     def __init__(self, columns: int = 1024, rows: int = 512) -> None:
@@ -117,7 +119,7 @@ class CubeStarTop(Component):
             self.ACK.eq(writer.ack),
             reader.memory.eq(self.SRAM_D_I),
             self.DATA.eq(reader.data),
-            self.SRAM_A.eq(Cat(Mux(self.RNW, reader.address, writer.address), bank & self.ENABLE)),
+            self.SRAM_A.eq(Cat(Mux(self.RNW, reader.address, writer.address), bank)),
             self.SRAM_D_O.eq(writer.data),
             self.SRAM_D_OE.eq(writer.store),
             self.SRAM_CE_N.eq(~self.ENABLE),

@@ -90,7 +90,7 @@ class FrameWriter(Component):
             self.store.eq(accept),
             between_lines_seen.eq(~self.hsync | (between_lines_seen & self.vsync)),
             line_open.eq(self.hsync & self.vsync & (line_open | accept)),
-            line_full.eq(self.hsync & self.vsync & (line_full | storing_last_column)),
+            line_full.eq(self.hsync & (line_full | storing_last_column)),
             frame_full.eq(self.vsync & (frame_full | (line_ends_short & counter.last_row))),
             self.ack.eq(self.ack | (storing_last_column & counter.last_row)),
         ]

@@ -15,9 +15,14 @@ class Geometry(NamedTuple):
         return self.columns * self.rows
 
     @property
+    def position_bits(self) -> int:
+        """Address bits below the bank."""
+        return (self.columns - 1).bit_length() + (self.rows - 1).bit_length()
+
+    @property
     def bank_size(self) -> int:
         """Addresses from one bank to the next."""
-        return 1 << ((self.columns - 1).bit_length() + (self.rows - 1).bit_length())
+        return 1 << self.position_bits
 
     def address(self, column: int, row: int, bank: int = 0) -> int:
         return bank * self.bank_size + (row << (self.columns - 1).bit_length()) + column
