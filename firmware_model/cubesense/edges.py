@@ -87,8 +87,7 @@ class EdgeList:
         self._meter.charge(f32_convert=2 * count, f32_add=2 * count)
         if self._config.sub_pixel:
             self._meter.charge(f32_mul=2 * count)
-        unit = np.float32(1 / EDGE_UNIT)
-        return self.points.astype(np.float32) * unit - np.float32(self._config.boresight)
+        return self._from_boresight(self.points)
 
     def add(self, line: int, vertical: bool, crossing: "Crossing") -> None:
         """Judge and keep an edge on scanned row, or column, ``line``."""
@@ -106,9 +105,14 @@ class EdgeList:
         else:
             self._points.append(point)
 
+    def _from_boresight(self, points: NDArray[np.int16]) -> NDArray[np.float32]:
+        """1/32 px (..., 2) to px from the boresight."""
+        unit = np.float32(1 / EDGE_UNIT)
+        return points.astype(np.float32) * unit - np.array(self._config.boresight, np.float32)
+
     def _outside(self, point: tuple[int, int]) -> bool:
         """Equation 6.5.1 against the rim; the listing converts each factor anew."""
-        x, y = np.float32(point) * np.float32(1 / EDGE_UNIT) - np.float32(self._config.boresight)
+        x, y = self._from_boresight(np.array(point, np.int16))
         self._meter.charge(
             i16_add=8, f32_convert=4, f32_mul=2, f32_add=1, f32_sqrt=1, f32_compare=1
         )

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.cubesense.arithmetic import HUNDREDTHS, to_int16
+from cubestack.firmware_model.cubesense.arithmetic import HUNDREDTHS, sequential_sum, to_int16
 from cubestack.firmware_model.cubesense.circle import Circle, LeastSquaresCircle
 from cubestack.firmware_model.cubesense.distortion import FOCAL_PX, Projection, RadiusTable
 from cubestack.firmware_model.cubesense.edges import EdgeList
@@ -137,7 +137,7 @@ def _fit(points: Values, config: NadirConfig, meter: Meter) -> tuple[Circle | No
         square = circle.residuals(points, meter) ** 2
         count = len(points)
         meter.charge(f32_mul=count + 1, f32_add=count, f32_compare=count + 1, f32_div=1)
-        if np.mean(square) <= limit:
+        if sequential_sum(square) / np.float32(count) <= limit:
             return circle, count
         if count == fewest:
             return None, count

@@ -121,7 +121,7 @@ def find_sun(
             ],
             np.float32,
         )
-        offset = mean + np.float32(origin) - np.float32(config.boresight)
+        offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
         meter.charge(f32_add=4, f32_div=2, f32_convert=4)
     with meter.phase("undistort"):
         centre = config.table.correct(offset[None], meter)[0]

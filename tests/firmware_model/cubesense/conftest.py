@@ -1,0 +1,20 @@
+import pytest
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.pic18_costs import PIC18F45K20
+
+
+@pytest.fixture
+def meter() -> Meter:
+    return Meter(PIC18F45K20)
+
+
+@pytest.fixture(scope="session")
+def equidistant() -> RadiusTable:
+    return fine_table(Meter(PIC18F45K20), Projection.EQUIDISTANT)
+
+
+@pytest.fixture(scope="session")
+def stereographic() -> RadiusTable:
+    return fine_table(Meter(PIC18F45K20), Projection.STEREOGRAPHIC)
