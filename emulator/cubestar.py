@@ -114,6 +114,7 @@ class CubeStarBoard:
         self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, _SatelliteTarget(self))
         self._pins = {"ENABLE": 0, "RNW": 0}
+        self._storing_since_ps = 0
         self._stored: RollingShutter | None = None
 
     @property
@@ -161,8 +162,12 @@ class CubeStarBoard:
         return self.camera.scene.truth(self._stored.mid_exposure_ps((ROWS - 1) / 2))
 
     def _pin_changed(self, pin: str, level: int) -> None:
-        if pin == "ENABLE" and not level and not self._pins["RNW"]:
-            self._stored = self.camera.frame_at(self.kernel.now)
+        if pin == "ENABLE" and not self._pins["RNW"]:
+            if level:
+                self._storing_since_ps = self.kernel.now
+            else:
+                # The first whole frame was stored, however long the program left ENABLE high.
+                self._stored = self.camera.frame_from(self._storing_since_ps)
         self._pins[pin] = level
         state = "standby"
         if self._pins["ENABLE"]:

@@ -204,12 +204,15 @@ class Mlx75412:
             pixels = self._renderer(span.frame)
         return StreamSegment(clock.edge_ps(span.first), span.clocks, span.vsync, span.rows, pixels)
 
-    def frame_at(self, time_ps: int) -> RollingShutter | None:
-        """Exposure of the last frame whose read-out had started by ``time_ps``, if remembered."""
+    def frame_from(self, time_ps: int) -> RollingShutter | None:
+        """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
+
+        None when its output was not announced yet; of long ago, only the last frames are known.
+        """
         if self._clock is not None:
             self.segment_at(time_ps)
-        started = [f.shutter for f in self._frames if f.shutter.readout_ps <= time_ps]
-        return started[-1] if started else None
+        later = (f.shutter for f in self._frames if f.shutter.readout_ps >= time_ps)
+        return next(later, None)
 
     def _end_ps(self, clock: PixelClock, span: _Span) -> int:
         """Where a consumer that counts from the span's first edge sees its end."""
