@@ -26,7 +26,7 @@ from cubestack.firmware_model.hardware import (
     Sleep,
     StrobeRead,
 )
-from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause
+from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause, TaskStatus
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.mlx75412 import REGISTERS
 from cubestack.firmware_model.star_catalogue import StarCatalogue
@@ -174,6 +174,26 @@ class Bench:
         message = INTERFACE.telemetry(name)
         (answer,) = self.uart(encode_frame(bytes([message.id])))
         return dict(message.unpack(answer))
+
+    def status(self) -> TaskStatus:
+        return TaskStatus(self.telemetry("TaskStatus")["taskStatus"])
+
+    def start_loop(self, seconds: float) -> int:
+        """Trigger the 1 Hz loop and run it so long; the time at which it was triggered."""
+        start_us = self.now_us
+        assert self.send("Trigger") == 0
+        self.run(until_us=start_us + round(seconds * 1e6))
+        return start_us
+
+    def stored_us(self) -> list[int]:
+        """When the FPGA was enabled to store a picture, since the log was cleared."""
+        times, rnw = [], 0
+        for now_us, request in self.log:
+            if isinstance(request, SetPin) and request.pin == "RNW":
+                rnw = request.level
+            if request == SetPin("ENABLE", 1) and not rnw:
+                times.append(now_us)
+        return times
 
     def flags(self) -> set[str]:
         return {name for name, up in self.telemetry("ErrorFlags").items() if up}

@@ -22,10 +22,6 @@ ENABLE = MODE_SELECT + b"\x21"
 DISABLE = MODE_SELECT + b"\x20"
 
 
-def status(bench: Bench) -> TaskStatus:
-    return TaskStatus(bench.telemetry("TaskStatus")["taskStatus"])
-
-
 def test_the_order_of_a_capture(bench: Bench) -> None:
     bench.command("CaptureImage")  # sets the camera up
     bench.log.clear()
@@ -90,13 +86,13 @@ def test_a_camera_that_does_not_answer(bench: Bench, sky: Sky, refused: object, 
     assert callable(refused)
     bench.camera_refuses = refused
     bench.command("CaptureImage")
-    assert status(bench) is TaskStatus.CAPTURE_FAILED
+    assert bench.status() is TaskStatus.CAPTURE_FAILED
     assert bench.flags() == {flag}
     assert not any(isinstance(request, SetPin) for _, request in bench.log)
     assert not bench.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
     bench.camera_refuses = lambda _data: False
     bench.command("CaptureAndProcess")
-    assert status(bench) is TaskStatus.CALCULATED
+    assert bench.status() is TaskStatus.CALCULATED
 
 
 def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(bench: Bench, sky: Sky) -> None:
@@ -104,7 +100,7 @@ def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(bench: Bench, sk
     bench.command("CaptureImage")
     bench.camera_refuses = lambda data: data == DISABLE
     bench.command("CaptureAndProcess")
-    assert status(bench) is TaskStatus.CALCULATED
+    assert bench.status() is TaskStatus.CALCULATED
     assert bench.flags() == {"ISDisableError"}
 
 
@@ -116,16 +112,16 @@ def test_a_frame_that_never_comes(bench: Bench, sky: Sky) -> None:
     start_us = bench.now_us
     bench.command("CaptureImage")
     assert bench.now_us - start_us == pytest.approx(ACK_TIMEOUT_US + 70_000, rel=0.01)
-    assert status(bench) is TaskStatus.CAPTURE_FAILED
+    assert bench.status() is TaskStatus.CAPTURE_FAILED
     assert bench.flags() == {"ImageCaptureError"}
     assert bench.pins == {"ENABLE": 0, "RNW": 0, "BANK": 0}
     assert bench.camera_writes[-1] == DISABLE
     assert not any(isinstance(request, StrobeRead) for _, request in bench.log)
     bench.command("DetectStars")  # the picture before is not taken for this one
-    assert status(bench) is TaskStatus.DETECTION_FAILED
+    assert bench.status() is TaskStatus.DETECTION_FAILED
     bench.frame_us = FRAME_US
     bench.command("CaptureAndProcess")
-    assert status(bench) is TaskStatus.CALCULATED
+    assert bench.status() is TaskStatus.CALCULATED
 
 
 def test_the_times_of_a_capture(bench: Bench) -> None:

@@ -98,7 +98,7 @@ def test_every_step_of_a_change_can_fail(bench: Bench, step: int) -> None:
     bench.command("CaptureImage")
     assert bench.camera_value("FRAMES_PER_SECOND") == 7
     assert written(bench)[-3:] == ["SYNC", "MODE_SELECT", "MODE_SELECT"]
-    assert TaskStatus(bench.telemetry("TaskStatus")["taskStatus"]) is TaskStatus.CAPTURED
+    assert bench.status() is TaskStatus.CAPTURED
 
 
 @pytest.mark.parametrize("name", ["WriteTo_IS_Register", "WriteCameraRegister"])

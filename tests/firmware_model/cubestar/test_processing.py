@@ -12,10 +12,6 @@ from .bench import Bench
 from .sky import Sky, attitude_of, error_deg, take
 
 
-def status(bench: Bench) -> TaskStatus:
-    return TaskStatus(bench.telemetry("TaskStatus")["taskStatus"])
-
-
 def mode_flag(bench: Bench) -> MatchMode:
     return MatchMode(bench.telemetry("LoopStatus")["ModeFlag"])
 
@@ -59,7 +55,7 @@ def test_a_picture_gives_its_attitude(bench: Bench, catalogue: StarCatalogue, se
     true = Rotation.random(rng=np.random.default_rng(seed))
     sky = take(catalogue, true)
     values = process(bench, sky.picture)
-    assert status(bench) is TaskStatus.CALCULATED
+    assert bench.status() is TaskStatus.CALCULATED
     assert values["Valid"]
     assert values["Mode"] == MatchMode.LOST_IN_SPACE
     assert error_deg(attitude_of(values), true) < 0.005
@@ -137,16 +133,16 @@ def test_the_attitude_survives_power_off_in_flash(bench: Bench, sky: Sky) -> Non
 )
 def test_a_step_without_its_input(bench: Bench, name: str, failed: TaskStatus, flag: str) -> None:
     bench.command(name)
-    assert status(bench) is failed
+    assert bench.status() is failed
     assert bench.flags() == {flag}
 
 
 def test_too_few_stars(bench: Bench, catalogue: StarCatalogue, pose: Rotation) -> None:
     process(bench, DARK)
-    assert status(bench) is TaskStatus.DETECTION_FAILED
+    assert bench.status() is TaskStatus.DETECTION_FAILED
     assert bench.flags() == {"LessThanThreeStarsDetected"}
     process(bench, take(catalogue, pose, most=2).picture)
-    assert status(bench) is TaskStatus.IDENTIFICATION_FAILED
+    assert bench.status() is TaskStatus.IDENTIFICATION_FAILED
     assert bench.flags() == {"LessThanThreeStarsDetected"}
     assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == 2
 
@@ -156,7 +152,7 @@ def test_stars_that_are_not_in_the_catalogue(bench: Bench) -> None:
     for x, y in ((200, 100), (500, 130), (820, 400), (300, 350)):
         picture[y : y + 4, x : x + 4] = 90
     process(bench, picture)
-    assert status(bench) is TaskStatus.IDENTIFICATION_FAILED
+    assert bench.status() is TaskStatus.IDENTIFICATION_FAILED
     assert bench.flags() >= {"LessThanThreeStarsID"} or bench.flags() >= {"IDError"}
     assert bench.telemetry("NumIdStars")["numIdStars"] == 0
 
@@ -169,7 +165,7 @@ def test_stars_that_determine_no_attitude(
 
     monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", refuse)
     process(bench, sky.picture)
-    assert status(bench) is TaskStatus.CALCULATION_FAILED
+    assert bench.status() is TaskStatus.CALCULATION_FAILED
     assert bench.flags() == {"QuestindexError"}
     assert mode_flag(bench) is MatchMode.LOST_IN_SPACE
     assert not bench.telemetry("AttitudeQuaternion")["Valid"]
@@ -323,7 +319,7 @@ def test_a_boresight_where_the_catalogue_is_empty(catalogue: StarCatalogue, sky:
     ):
         bench.command("setTrackingMode", RightAscension=0.3, Declination=declination)
         process(bench, sky.picture)
-        assert status(bench) is TaskStatus.IDENTIFICATION_FAILED
+        assert bench.status() is TaskStatus.IDENTIFICATION_FAILED
         known = {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}
         assert bench.flags() & known == flags
         performance = bench.telemetry("PerformanceParameters")

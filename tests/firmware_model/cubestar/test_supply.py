@@ -10,10 +10,6 @@ from .bench import Bench
 from .sky import Sky
 
 
-def status(bench: Bench) -> TaskStatus:
-    return TaskStatus(bench.telemetry("TaskStatus")["taskStatus"])
-
-
 @pytest.mark.parametrize("channel", CHANNELS)
 def test_the_interrupt_itself_opens_the_switch(bench: Bench, channel: str) -> None:
     bench.program.supply.overcurrent(channel)
@@ -57,7 +53,7 @@ def test_the_camera_is_set_up_again_after_its_power_cycle(bench: Bench) -> None:
     assert bench.camera == {}
     bench.run()
     bench.command("CaptureImage")
-    assert status(bench) is TaskStatus.CAPTURED
+    assert bench.status() is TaskStatus.CAPTURED
     assert bench.camera == set_up
 
 
@@ -76,7 +72,7 @@ def test_the_memory_channel_loses_the_picture(bench: Bench, sky: Sky) -> None:
     bench.program.supply.overcurrent("memory")
     assert not bench.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
     bench.command("ProcessImage")
-    assert status(bench) is TaskStatus.DETECTION_FAILED
+    assert bench.status() is TaskStatus.DETECTION_FAILED
     assert bench.flags() == {"OverCurrent", "StatusError"}
 
 
@@ -105,7 +101,7 @@ def test_a_latch_up_in_a_capture_spoils_it_and_the_next_one_works(
     assert not bench.telemetry("AttitudeQuaternion")["Valid"]
     assert bench.switches[channel]
     bench.command("CaptureAndProcess")
-    assert status(bench) is TaskStatus.CALCULATED
+    assert bench.status() is TaskStatus.CALCULATED
 
 
 def test_under_current(bench: Bench) -> None:
@@ -186,7 +182,7 @@ def test_opening_the_switch_of_a_channel_that_is_cut_leaves_it_open(bench: Bench
 def test_a_capture_with_the_switch_open_fails(bench: Bench) -> None:
     bench.command("TogglePowerSW")
     bench.command("CaptureImage")
-    assert status(bench) is TaskStatus.CAPTURE_FAILED
+    assert bench.status() is TaskStatus.CAPTURE_FAILED
     assert bench.flags() == {"ISSetupError"}
 
 
