@@ -30,7 +30,7 @@ FAINTEST_V = 8.0
 
 MIDDLE_ROW = (ROWS - 1) / 2
 SPOT_SIGMAS = 5.0
-SPOTS_AT_ONCE = 20_000  # bounds the memory of long streaks
+CELLS_AT_ONCE = 3_400_000  # of all spots: bounds the memory of long streaks and wide spots
 VELOCITY_STEP_S = 0.01
 
 _Z = np.arange(-8.0, 8.0, 1 / 512)
@@ -147,8 +147,9 @@ def _spots(
     height, width = ROWS + 2 * margin, COLUMNS + 2 * margin
     canvas = np.zeros(height * width)
     cells = np.arange(-half, half + 1)
-    for first in range(0, len(pixels), SPOTS_AT_ONCE):
-        some = slice(first, first + SPOTS_AT_ONCE)
+    at_once = CELLS_AT_ONCE // len(cells) ** 2
+    for first in range(0, len(pixels), at_once):
+        some = slice(first, first + at_once)
         nearest = np.rint(pixels[some]).astype(np.int64)
         shares = _shares(pixels[some] - nearest, half, sigma_px)
         shares[:, 1] *= electrons[some, None]

@@ -35,6 +35,9 @@ _CALIBRATION = {
 }
 """What the firmware is set to after power-up: the lens is calibrated."""
 
+WIDEST_PSF_PX = 20.0
+"""Standard deviation of a spot in px, at most (assumed): few stars would still show."""
+
 Pixels = NDArray[np.float64]
 
 
@@ -57,7 +60,7 @@ class Optics:
         k1, k2, p1, p2: distorted to undistorted, as in eqs. 4.1.3 and 4.1.4.
         distortion: INVERSE makes those equations exact; TOOLBOX has the calibration toolbox's
             model with the same coefficients in inverted sign.
-        psf_sigma_px: standard deviation of the Gaussian spot, px; defocus included.
+        psf_sigma_px: standard deviation of the Gaussian spot, px, at most 20; defocus included.
         vignetting: light falls off with this power of the cosine of the field angle; 4 is natural
             vignetting, 0 is none (nothing is published for this lens).
     """
@@ -81,9 +84,15 @@ class Optics:
         for name in ("focal_length_mm", "pixel_pitch_um", "fx", "fy", "psf_sigma_px"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
+        if self.psf_sigma_px > WIDEST_PSF_PX:
+            raise ValueError(
+                f"psf_sigma_px must be at most {WIDEST_PSF_PX:g}, not {self.psf_sigma_px}"
+            )
         x, y = np.meshgrid(np.linspace(-0.5, COLUMNS - 0.5, 9), np.linspace(-0.5, ROWS - 0.5, 5))
         sensor = np.stack([x.ravel(), y.ravel()], axis=1)
-        if not np.allclose(self.project(self.unproject(sensor)), sensor, rtol=0, atol=1e-9):
+        with np.errstate(all="ignore"):
+            there_and_back = self.project(self.unproject(sensor))
+        if not np.allclose(there_and_back, sensor, rtol=0, atol=1e-9):
             raise ValueError(
                 f"distortion k1={self.k1} k2={self.k2} p1={self.p1} p2={self.p2} folds the picture "
                 "within the sensor; smaller coefficients would be right"
@@ -158,8 +167,9 @@ class Optics:
             axis=1,
         )
 
+    @np.errstate(all="ignore")  # a search without a result may go anywhere
     def _inverse_polynomial(self, targets: Pixels, sign: int) -> Pixels:
-        """Points that ``_polynomial`` maps to ``targets``, by Newton's method; NaN if it fails."""
+        """Points that ``_polynomial`` maps to ``targets``, by Newton's method; NaN without any."""
         points = targets.copy()
         p1, p2 = sign * self.p1, sign * self.p2
         for _ in range(20):
@@ -175,9 +185,11 @@ class Optics:
             step = np.stack([jyy * ex - jxy * ey, jxx * ey - jxy * ex], axis=1)
             step /= determinant[:, None]
             points -= step
-            if not len(step) or np.abs(step).max() < 1e-14:
+            found = np.abs(step).max(axis=1) < 1e-14
+            if found.all():
                 return points
-        return np.full_like(points, np.nan)
+        points[~found] = np.nan
+        return points
 
 
 def _corners() -> Pixels:

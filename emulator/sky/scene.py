@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.camera.optics import Distortion, Optics
+from cubestack.emulator.camera.optics import COLUMNS, ROWS, Distortion, Optics
 from cubestack.emulator.sky.attitude import propagate, quaternion_from_pointing, unit_quaternion
 from cubestack.emulator.sky.picture import SceneError, load_picture
 from cubestack.emulator.sky.scene_file import (
@@ -42,7 +42,13 @@ from cubestack.emulator.sky.scene_file import (
 )
 from cubestack.emulator.virtual_time import PS_PER_S
 
-__all__ = ["PictureScene", "Pose", "Scene", "SceneError", "SkyScene", "load_scene"]
+__all__ = ["FASTEST_DEG_S", "PictureScene", "Pose", "Scene", "SceneError", "SkyScene", "load_scene"]
+
+FASTEST_DEG_S = 100.0
+"""Body rate about one axis, at most (assumed): a star smears over the picture's whole height.
+
+The time to render a frame grows with the rate; it is ten seconds there.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +57,7 @@ class Pose:
 
     Attributes:
         quaternion: (4,), scalar last, inertial to camera, at ``start_s``.
-        rate_deg_s: (3,), body rate in camera axes.
+        rate_deg_s: (3,), body rate in camera axes, each at most ``FASTEST_DEG_S`` in size.
         start_s: virtual time from which on it holds.
     """
 
@@ -61,14 +67,13 @@ class Pose:
 
     def __post_init__(self) -> None:
         """Refuse what is no attitude or no rate."""
-        try:
-            unit_quaternion(self.quaternion)
-        except ValueError as error:
-            raise SceneError(str(error)) from None
-        if np.shape(self.rate_deg_s) != (3,) or not np.all(
-            np.isfinite(np.asarray(self.rate_deg_s))
-        ):
-            raise SceneError(f"rate_deg_s must be 3 numbers in deg/s, not {self.rate_deg_s}")
+        _check_quaternion(self.quaternion)
+        rate = np.asarray(self.rate_deg_s)
+        if rate.shape != (3,) or not np.all(np.abs(rate) <= FASTEST_DEG_S):
+            raise SceneError(
+                f"rate_deg_s must be 3 numbers in deg/s, at most {FASTEST_DEG_S:g} each, "
+                f"not {self.rate_deg_s}"
+            )
 
     def at(self, time_s: float) -> NDArray[np.float64]:
         """Quaternion (4,) at ``time_s``."""
@@ -86,7 +91,7 @@ class SkyScene:
         epoch: Julian year of the stars' positions.
         mag_limit: stars with V strictly below it are seen; None for all that the camera resolves.
         false_stars: number of lights at random places of the picture that no catalogue has.
-        false_star_mag: range of their magnitudes, uniform (assumed).
+        false_star_mag: range of their magnitudes, brightest first, uniform (assumed).
         noise: False makes the sensor ideal: no noise, no dark current, no defects.
         seed: of noise, false stars and hot pixels.
         temperature_c: of the sensor.
@@ -115,8 +120,14 @@ class SkyScene:
         for name in ("false_stars", "hot_pixels", "seed"):
             if getattr(self, name) < 0:
                 raise SceneError(f"{name} must not be negative, not {getattr(self, name)}")
-        if not -60 <= self.temperature_c <= 125:
-            raise SceneError(f"temperature_c must be in -60..125, not {self.temperature_c}")
+        if self.hot_pixels > COLUMNS * ROWS:
+            raise SceneError(f"hot_pixels must be at most {COLUMNS * ROWS}, not {self.hot_pixels}")
+        brightest, faintest = self.false_star_mag
+        if not brightest <= faintest:
+            raise SceneError(
+                f"false_star_mag must not fall, not from {brightest:g} to {faintest:g}"
+            )
+        _check_temperature(self.temperature_c)
 
     @classmethod
     def pointing(cls, ra_deg: float, dec_deg: float, roll_deg: float = 0.0) -> "SkyScene":
@@ -176,7 +187,10 @@ class PictureScene:
     pixels: NDArray[np.uint8] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Load the picture; SceneError when there is none that fits."""
+        """Load the picture; SceneError when there is none that fits, or a value is wrong."""
+        if self.quaternion is not None:
+            _check_quaternion(self.quaternion)
+        _check_temperature(self.temperature_c)
         if self.exposure_ms is not None and not self.exposure_ms > 0:
             raise SceneError(f"exposure_ms must be above 0, not {self.exposure_ms}")
         object.__setattr__(self, "pixels", load_picture(Path(self.file), self.crop))
@@ -188,6 +202,18 @@ class PictureScene:
 
 
 Scene = SkyScene | PictureScene
+
+
+def _check_quaternion(quaternion: ArrayLike) -> None:
+    try:
+        unit_quaternion(quaternion)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+
+
+def _check_temperature(temperature_c: float) -> None:
+    if not -60 <= temperature_c <= 125:
+        raise SceneError(f"temperature_c must be in -60..125, not {temperature_c}")
 
 
 def load_scene(path: Path) -> Scene:

@@ -4,6 +4,7 @@ A reader takes what TOML gave for one key and returns the checked value; SceneEr
 must be. :func:`read_table` puts the key in front.
 """
 
+import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -52,8 +53,12 @@ def read_table(table: Mapping[str, Any], readers: Readers) -> dict[str, Any]:
 
 
 def number(value: Any) -> float:
-    """A number."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    """A finite number."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not abs(value) <= sys.float_info.max
+    ):
         raise SceneError(f"must be a number, not {value!r}")
     return float(value)
 

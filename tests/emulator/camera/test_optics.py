@@ -101,6 +101,18 @@ def test_what_the_lens_can_not_see_is_nan() -> None:
     assert lens.project(np.empty((0, 3))).shape == (0, 2)
 
 
+def test_one_direction_out_of_reach_does_not_hide_the_others() -> None:
+    lens = Optics(k1=-0.62, k2=0, p1=0, p2=0)  # folds right outside of the sensor
+    plane = np.linspace(0, 0.55, 200)
+    vectors = np.stack([plane, 0 * plane, np.ones(200)], axis=1)
+    seen = ~np.isnan(lens.project(vectors)).any(axis=1)
+    reach = int(seen.sum())
+    assert 150 < reach < 200
+    assert seen[:reach].all()
+    nearer = lens.project(vectors[:reach])
+    np.testing.assert_array_equal(lens.project(vectors)[:reach], nearer)
+
+
 def test_vignetting() -> None:
     vectors = np.array([[0, 0, 1.0], [np.sin(0.5), 0, np.cos(0.5)]])
     np.testing.assert_array_equal(Optics().transmission(vectors), [1, 1])
@@ -110,6 +122,8 @@ def test_vignetting() -> None:
 def test_impossible_lenses_are_refused() -> None:
     with pytest.raises(ValueError, match="psf_sigma_px must be above 0, not 0"):
         Optics(psf_sigma_px=0)
+    with pytest.raises(ValueError, match="psf_sigma_px must be at most 20, not 21"):
+        Optics(psf_sigma_px=21)
     for distortion, k1 in ((Distortion.INVERSE, -1.5), (Distortion.TOOLBOX, 1.5)):
         with pytest.raises(ValueError, match="folds the picture within the sensor"):
             Optics(k1=k1, distortion=distortion)

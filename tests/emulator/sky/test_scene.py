@@ -127,7 +127,12 @@ POSE = "ra_deg = 1\ndec_deg = 2\n"
         (f'kind = "sky"\n{POSE}epoch = "now"', "epoch must be a number, not 'now'"),
         (f'kind = "sky"\n{POSE}epoch = true', "epoch must be a number, not True"),
         (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2]', "rate_deg_s must be a list of 3 numbers"),
-        (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2, nan]', "rate_deg_s must be 3 numbers in deg/s"),
+        (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2, nan]', "rate_deg_s must be a number, not nan"),
+        (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2, -101]', "in deg/s, at most 100 each, not (1.0,"),
+        (f'kind = "sky"\n{POSE}mag_limit = inf', "mag_limit must be a number, not inf"),
+        (f'kind = "sky"\n{POSE}epoch = 1{"0" * 400}', "epoch must be a number, not 1000"),
+        (f'kind = "sky"\n{POSE}false_star_mag = [4, 2]', "must not fall, not from 4 to 2"),
+        (f'kind = "sky"\n{POSE}hot_pixels = 524289', "hot_pixels must be at most 524288"),
         (f'kind = "sky"\n{POSE}temperature_c = 300', "temperature_c must be in -60..125, not 300"),
         (f'kind = "sky"\n{POSE}optics = 1', "optics must be a table, not 1"),
         (f'kind = "sky"\n{POSE}[optics]\nf = 1', "optics: unknown key 'f'; allowed are focal_leng"),
@@ -141,6 +146,14 @@ POSE = "ra_deg = 1\ndec_deg = 2\n"
         ),
         ('kind = "sky"\nquaternion = [0, 0, 0, 0]', "a quaternion needs a finite length above 0"),
         ('kind = "picture"', "a picture needs the key file"),
+        (
+            'kind = "picture"\nfile = "x"\nquaternion = [0, 0, 0, 0]',
+            "a quaternion needs a finite length above 0",
+        ),
+        (
+            'kind = "picture"\nfile = "x"\ntemperature_c = 126',
+            "temperature_c must be in -60..125, not 126",
+        ),
         ('kind = "picture"\nfile = 1', "file must be text, not 1"),
         ('kind = "picture"\nfile = "none.png"', "none.png can not be read: No such file"),
         (
@@ -168,5 +181,7 @@ def test_missing_scene_file(tmp_path: Path) -> None:
 def test_wrong_values_in_python() -> None:
     with pytest.raises(SceneError, match="hot_pixels must not be negative"):
         SkyScene([0, 0, 0, 1], hot_pixels=-1)
+    with pytest.raises(SceneError, match="rate_deg_s must be 3 numbers"):
+        SkyScene([0, 0, 0, 1], rate_deg_s=(0, np.nan, 0))
     with pytest.raises(SceneError, match="a quaternion has 4 numbers"):
         SkyScene([0, 0, 1])
