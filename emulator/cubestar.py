@@ -21,6 +21,7 @@ from cubestack.emulator.sky.scene import Scene
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 from cubestack.firmware_model.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTION_BYTES
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.hardware import CameraTransfer, FlashStore
 from cubestack.firmware_model.interface.cubestar import INTERFACE
@@ -30,8 +31,6 @@ from cubestack.firmware_model.star_catalogue import StarCatalogue
 
 __all__ = ["CubeStarBoard"]
 
-EXTERNAL_RAM_BYTES = 1 << 20
-RETENTION_BYTES = 512
 BOOT_US = 3_000
 """Reset to main: "a few milliseconds" (section 5.3.6)."""
 
