@@ -32,10 +32,11 @@ __all__ = ["NadirConfig", "NadirResult", "angle_of", "find_nadir"]
 DROPPED_SHARE = 4
 """One edge in so many may be dropped."""
 
-MAX_RMS_PX = {Projection.EQUIDISTANT: 8.0, Projection.STEREOGRAPHIC: 1.5}
+MAX_RMS_PX = {Projection.EQUIDISTANT: 8.0, Projection.STEREOGRAPHIC: 0.5}
 """Largest root mean square distance of the edges from the circle, in px of the projection.
 
-In the published projection the limb itself leaves the circle by this much towards the rim.
+In the published projection the limb itself leaves the circle by this much towards the rim. In ours,
+edges of a sunlit limb stay below 0.35 px, and a looser limit lets fits to the terminator pass.
 """
 
 Values = NDArray[np.float32]
