@@ -38,6 +38,9 @@ class CubeSensePair(Component):
 
     CONTENTION is not 0 when both FPGAs drive the same wire: bit 0 DATA, bit 1 the link's data,
     bits 2 and 3 its control lines. The SRAMs' data buses are not among these.
+
+    In a linked store one FPGA's clock is an output of the other one. A simulator that works in
+    cycles, as CXXRTL does, must evaluate twice before it commits, or it misses that clock's edges.
     """
 
     def __init__(self, read_out: ReadOut = FULL_SIZE) -> None:

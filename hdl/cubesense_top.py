@@ -114,21 +114,20 @@ class CubeSenseFpga(Component):
     def elaborate(self, platform: object) -> Module:
         """Wire the blocks to the pins."""
         m = Module()
+        is_sun = self.side == "sun"
         m.submodules.dataflow = mode = DataflowControl(self.side)
         m.submodules.reader = reader = CubeSenseReader(self.read_out)
         own_writer = self._writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y)
         link_writer = self._writer(
             m, "link", mode.store_other, self.LINK_C_I[0], self.LINK_C_I[1], self.LINK_D_I
         )
-        sun_domain, sun_writer = (
-            ("pix", own_writer) if self.side == "sun" else ("link", link_writer)
-        )
-        m.submodules.search = search = SunSearch(self.read_out, domain=sun_domain)
+        # The Sun is looked for in the sun camera's picture, whichever memory it goes to.
+        m.submodules.search = search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
+        sun_writer = own_writer if is_sun else link_writer
 
-        own_line, other_line = (0, 1) if self.side == "sun" else (1, 0)
-        own_edge, other_edge = (
-            (reader.window, reader.scan) if self.side == "sun" else (reader.scan, reader.window)
-        )
+        own_line, other_line = (0, 1) if is_sun else (1, 0)
+        orders = (reader.window, reader.scan)
+        own_edge, other_edge = orders if is_sun else orders[::-1]
         reading = mode.read | mode.edge_data | mode.send_edge
         storing = ~ResetSignal("pix") | ~ResetSignal("link")
         shows_enable = ~self.EN & (self.EDGE | ~self.SHIFT)

@@ -1,5 +1,8 @@
 """Tile counts: known small designs by hand, and that every top fits its part."""
 
+import re
+from pathlib import Path
+
 import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
@@ -9,6 +12,8 @@ from cubestack.hdl.cubesense_top import CubeSenseFpga
 from cubestack.hdl.cubestar_top import CubeStarTop
 from cubestack.hdl.gray_counter import GrayCounter
 from cubestack.hdl.matrix_counter import MatrixCounter
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 class Function(Component):
@@ -93,3 +98,17 @@ def test_gray_counter_takes_more_tiles_than_the_matrix_one():
     gray, matrix = count_tiles(GrayCounter(640 * 480)), count_tiles(MatrixCounter(640, 480))
     assert gray.flip_flops == matrix.flip_flops + 1
     assert gray.total > matrix.total
+
+
+def test_documented_counts():
+    rows = re.findall(
+        r"^\| `(.+)` \| (\d+) \| (\d+) \| (\d+) \|$",
+        (DOCS / "gateware-cubesense.md").read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    assert len(rows) == 4
+    designs = (CubeSenseFpga, GrayCounter, MatrixCounter)
+    names = {design.__name__: design for design in designs}
+    for name, *numbers in rows:
+        tiles = count_tiles(eval(name, names))
+        assert [*tiles, tiles.total] == [int(number) for number in numbers], name

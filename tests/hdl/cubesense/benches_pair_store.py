@@ -18,11 +18,13 @@ def any_path() -> tuple[str, str]:
 
 
 async def join(bench: PairBench, camera: str, memory: str) -> None:
-    """From standby: store the next whole frame."""
+    """From standby to storing, in time for a frame that is sent from now on."""
     if camera == memory:
         await bench.mcu.store(camera)
     else:
         await bench.mcu.store_linked(camera)
+    source = bench.cameras[camera]
+    await source.reach(len(source.clocks) + 3)  # reset's two, and one more
 
 
 @timed_test
@@ -91,7 +93,6 @@ async def ack_stays_and_nothing_more_is_stored(dut: Any) -> None:
         content[2 * COLUMNS + 3 : 2 * COLUMNS + 6] = bytes([255] * 3)
         await join(bench, "sun", memory)
         sun = bench.cameras["sun"]
-        await sun.reach(len(sun.clocks) + 3)
         sun.send(frame(bytes(content)))
         assert await bench.mcu.acknowledged(memory)
         sun.send([*frame(picture()), *frame(bytes([255]) * GEOMETRY.pixels), *frame(picture())])
@@ -114,7 +115,6 @@ async def lines_too_long_and_too_short(dut: Any) -> None:
         camera, memory = any_path()
         await join(bench, camera, memory)
         source = bench.cameras[camera]
-        await source.reach(len(source.clocks) + 3)
         sizes = [COLUMNS, COLUMNS - 1, 1, COLUMNS + 1, 2 * COLUMNS]
         rows = [random.randbytes(random.choice(sizes)) for _ in range(ROWS - 1)]
         rows.append(random.randbytes(COLUMNS))

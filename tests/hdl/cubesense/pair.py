@@ -224,6 +224,7 @@ class PairBench:
             await self.mcu.store(camera)
         else:
             await self.mcu.store_linked(camera)
+        # Reset's two clocks, and one more.
         await self.cameras[camera].reach(len(self.cameras[camera].clocks) + 3)
         self.cameras[camera].send(frame(content))
         assert await self.mcu.acknowledged(memory)

@@ -1,0 +1,94 @@
+"""The cover against the best one of all, on networks small enough to try every one."""
+
+import random
+from itertools import combinations, product
+
+import pytest
+
+from cubestack.hdl.lut_cover import FALSE, TRUE, GateNetwork
+
+SOURCES, GATES = 4, 7
+
+
+class Recorder(GateNetwork):
+    """A network that tells its gates' inputs."""
+
+    def inputs(self, node: int) -> tuple[int, ...]:
+        return self._fan_in[node]
+
+
+def network(rng: random.Random) -> tuple[Recorder, list[int]]:
+    """A network of random gates, and the signals that are wanted."""
+    net = Recorder()
+    signals = [net.source() for _ in range(SOURCES)]
+    for _ in range(GATES):
+        a, b, c = (rng.choice(signals) ^ rng.getrandbits(1) for _ in range(3))
+        signals.append(rng.choice([net.and_(a, b), net.xor(a, b), net.mux(a, b, c)]))
+    wanted = [s for s in rng.sample(signals[SOURCES:], 2) if s > 2 * SOURCES + 1]
+    return net, [signal & ~1 for signal in wanted]
+
+
+def cuts(net: Recorder, node: int) -> set[frozenset[int]]:
+    """All sets of nodes that a gate is a function of."""
+    choices = [{frozenset([child])} | cuts(net, child) for child in net.inputs(node)]
+    return {frozenset().union(*parts) for parts in product(*choices)} if choices else set()
+
+
+def best(net: Recorder, wanted: list[int]) -> int:
+    """Fewest gates that can all be tables of three inputs and make what is wanted."""
+    roots = {signal >> 1 for signal in wanted}
+    gates = range(SOURCES + 1, max(roots, default=0) + 1)
+    options = {node: [cut for cut in cuts(net, node) if len(cut) <= 3] for node in gates}
+    for size in range(len(gates) + 1):
+        for chosen in combinations(gates, size):
+            allowed = {*chosen, *range(1, SOURCES + 1)}
+            if roots <= set(chosen) and all(
+                any(cut <= allowed for cut in options[node]) for node in chosen
+            ):
+                return size
+    raise AssertionError("each gate alone is a table")
+
+
+def test_nearly_always_the_best_and_never_better():
+    rng = random.Random(1)
+    excess = []
+    for _ in range(300):
+        net, wanted = network(rng)
+        excess.append(net.tables(wanted) - best(net, wanted))
+    assert min(excess) == 0
+    assert sum(excess) <= 0.02 * len(excess)
+
+
+def test_constants_fold():
+    net = GateNetwork()
+    a, b = net.source(), net.source()
+    assert net.and_(a, FALSE) == FALSE
+    assert net.and_(TRUE, b) == b
+    assert net.and_(a, net.not_(a)) == FALSE
+    assert net.or_(a, net.not_(a)) == TRUE
+    assert net.xor(a, a) == FALSE
+    assert net.xor(net.not_(a), a) == TRUE
+    assert net.xor(TRUE, b) == net.not_(b)
+    assert net.mux(a, TRUE, FALSE) == net.not_(a)
+    assert net.mux(a, b, b) == b
+    assert net.mux(TRUE, a, b) == b
+    assert net.tables([TRUE, FALSE, a]) == 0
+
+
+@pytest.mark.parametrize("width", [1, 4, 6])
+def test_addition(width):
+    """Of all numbers, by folding constants only."""
+    net = GateNetwork()
+    for x, y, carry in product(range(2**width), range(2**width), (FALSE, TRUE)):
+        a, b = ([TRUE if n >> i & 1 else FALSE for i in range(width)] for n in (x, y))
+        total = sum((bit == TRUE) << i for i, bit in enumerate(net.add(a, b, carry)))
+        assert total == x + y + (carry == TRUE)
+
+
+def test_inverses_cost_where_they_leave_a_table():
+    net = GateNetwork()
+    a, b = net.source(), net.source()
+    gate = net.and_(a, b)
+    assert net.tables([net.not_(a)]) == 1
+    assert net.tables([net.not_(gate)]) == 1
+    assert net.tables([gate, net.not_(gate)]) == 2
