@@ -22,7 +22,8 @@ def load_picture(file: Path, crop: Sequence[int]) -> NDArray[np.uint8]:
     """Grey values of ``file`` from column and row ``crop`` on, shape (512, 1024), read-only.
 
     Raises:
-        SceneError: when the file is missing, of another format, or too small.
+        SceneError: when the file is missing, damaged, of another format, too small, or so large
+            that Pillow refuses it.
     """
     try:
         with Image.open(file) as image:
@@ -33,12 +34,15 @@ def load_picture(file: Path, crop: Sequence[int]) -> NDArray[np.uint8]:
             _check_size(file, image.size, crop)
             box = (crop[0], crop[1], crop[0] + COLUMNS, crop[1] + ROWS)
             pixels = _grey(file, image.crop(box))
+    except SceneError:
+        raise
     except UnidentifiedImageError:
         raise SceneError(
             f"{file.name} is no picture; right would be {', '.join(FORMATS)}"
         ) from None
-    except OSError as error:
-        raise SceneError(f"{file.name} can not be read: {error.strerror or error}") from None
+    except Exception as error:  # Pillow's decoders raise whatever damaged data lead them to
+        reason = getattr(error, "strerror", None) or error
+        raise SceneError(f"{file.name} can not be read: {reason}") from None
     pixels.flags.writeable = False
     return pixels
 

@@ -81,3 +81,20 @@ def test_damaged_picture(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(data[: len(data) // 2])
     with pytest.raises(SceneError, match=r"a\.jpg can not be read"):
         load_picture(tmp_path / "a.jpg", (0, 0))
+
+
+def test_damaged_past_what_pillow_expects(tmp_path: Path, values: np.ndarray) -> None:
+    Image.fromarray(values).save(tmp_path / "a.png")
+    data = bytearray((tmp_path / "a.png").read_bytes())
+    second = data.index(b"IDAT", data.index(b"IDAT") + 4)
+    data[second : second + 4] = b"\x00\xff\x00\xff"  # Pillow raises SyntaxError
+    (tmp_path / "a.png").write_bytes(data)
+    with pytest.raises(SceneError, match=r"a\.png can not be read: broken PNG file"):
+        load_picture(tmp_path / "a.png", (0, 0))
+
+
+def test_larger_than_pillow_permits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Image.new("L", (1024, 512)).save(tmp_path / "a.png")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    with pytest.raises(SceneError, match=r"a\.png can not be read: Image size .* exceeds limit"):
+        load_picture(tmp_path / "a.png", (0, 0))
