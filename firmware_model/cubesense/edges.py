@@ -25,7 +25,16 @@ from cubestack.firmware_model.cubesense.distortion import RIM_PX
 from cubestack.firmware_model.cubesense.masks import Mask, masked
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
 
-__all__ = ["EDGE_UNIT", "MAX_EDGES", "EdgeConfig", "EdgeList", "NadirLines", "answered", "bisect"]
+__all__ = [
+    "EDGE_UNIT",
+    "MAX_EDGES",
+    "Crossing",
+    "EdgeConfig",
+    "EdgeList",
+    "NadirLines",
+    "answered",
+    "bisect",
+]
 
 EDGE_UNIT = 32
 """Edge coordinates are ints of 1/32 px: 639 px then fit."""
