@@ -12,6 +12,7 @@ from cubestack.firmware_model.interface.cubesense_fpga import (
     Actions,
     ReadOut,
     actions,
+    link_shows_enables,
 )
 
 # SHIFT EDGE RNW SUNEN NADEN, then what the sun's and the nadir's FPGA do.
@@ -42,8 +43,16 @@ def test_no_levels_are_listed_twice() -> None:
         assert sum(command.fits(*levels) for command in COMMANDS) <= 1
 
 
-@pytest.mark.parametrize("drivers", [{Action.READ, Action.EDGE, Action.PASS_EDGE}])
-def test_one_fpga_at_most_drives_the_microcontrollers_bus(drivers: set[Action]) -> None:
+def test_a_picture_on_the_link_hides_the_enables() -> None:
+    hidden = [pair for pair in product((0, 1), repeat=2) if not link_shows_enables(*pair)]
+    assert hidden == [(1, 0)]
+    crosses = {Action.SEND_PICTURE, Action.STORE_OTHER}
+    for command in COMMANDS:
+        assert ((command.shift, command.edge) in hidden) == (crosses == set(command.actions))
+
+
+def test_one_fpga_at_most_drives_the_microcontrollers_bus() -> None:
+    drivers = {Action.READ, Action.EDGE, Action.PASS_EDGE}
     for command in COMMANDS:
         assert len([action for action in command.actions if action in drivers]) <= 1
 
