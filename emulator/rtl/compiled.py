@@ -119,20 +119,27 @@ class CompiledEngine(SteppingEngine):
         self.close()
 
     @property
+    def _handle(self) -> int:
+        """The driver; without this check a closed one would end the process."""
+        if self._driver is None:
+            raise RuntimeError("the engine is closed: make a new one")
+        return self._driver
+
+    @property
     def violation_log(self) -> ViolationLog:
         """What the SRAM model recorded."""
         for number, kind in enumerate(_KINDS):
-            count = self._library.driver_violation_count(self._driver, number)
+            count = self._library.driver_violation_count(self._handle, number)
             if count:
                 self._log.counts[kind] = count
         return self._log
 
     def _set(self, name: str, value: int) -> None:
-        self._library.driver_set(self._driver, self._pins[name], value, self.now_ps)
+        self._library.driver_set(self._handle, self._pins[name], value, self.now_ps)
         self._collect_violations()
 
     def _get(self, name: str) -> int:
-        return int(self._library.driver_get(self._driver, self._pins[name]))
+        return int(self._library.driver_get(self._handle, self._pins[name]))
 
     def _load(self, loaded: LoadedSegment | None, edge: int) -> None:
         if loaded is None:
@@ -141,7 +148,7 @@ class CompiledEngine(SteppingEngine):
             return
         segment = loaded.segment
         self._library.driver_load(
-            self._driver,
+            self._handle,
             _Segment(
                 segment.start_ps,
                 loaded.half_period.numerator,
@@ -157,12 +164,12 @@ class CompiledEngine(SteppingEngine):
 
     def _use_pixels(self, pixels: NDArray[np.uint8]) -> None:
         # The loaded segment keeps the array alive while the driver reads it.
-        self._library.driver_use_pixels(self._driver, pixels.ctypes.data)
+        self._library.driver_use_pixels(self._handle, pixels.ctypes.data)
 
     def _burst(self, until_ps: int, stop_level: int | None) -> tuple[int, Outcome]:
         self._reached.value = self.now_ps
         outcome = self._library.driver_burst(
-            self._driver, until_ps, -1 if stop_level is None else stop_level, self._reached
+            self._handle, until_ps, -1 if stop_level is None else stop_level, self._reached
         )
         self._collect_violations()
         return max(self.now_ps, self._reached.value), _OUTCOMES[outcome]
@@ -172,7 +179,7 @@ class CompiledEngine(SteppingEngine):
             raise ValueError("the target of a transfer must be contiguous uint8")
         half = period / 2
         self._library.driver_strobe(
-            self._driver,
+            self._handle,
             out.ctypes.data,
             len(out),
             self.now_ps,
@@ -184,11 +191,11 @@ class CompiledEngine(SteppingEngine):
 
     def _collect_violations(self) -> None:
         known = len(self._log.kept)
-        kept = self._library.driver_violations(self._driver, known, None)
+        kept = self._library.driver_violations(self._handle, known, None)
         if kept == known:
             return
         new = (_Violation * (kept - known))()
-        self._library.driver_violations(self._driver, known, new)
+        self._library.driver_violations(self._handle, known, new)
         for item in new:
             kind = _KINDS[item.kind]
             self._log.add(

@@ -303,3 +303,11 @@ def test_segments_that_do_not_fit_are_refused(engine, make_camera):
     engine.set_pin("ENABLE", 1)
     with pytest.raises(ValueError, match="48 clocks, not 49"):
         engine.run(FRAME)
+
+
+def test_closed_compiled_engine_says_so():
+    engine = make_engine(CubeStarTop(COLUMNS, ROWS), "compiled")
+    engine.close()
+    with pytest.raises(RuntimeError, match="the engine is closed"):
+        engine.get_pin("ACK")
+    engine.close()
