@@ -1,1 +1,1 @@
-"""emulator."""
+"""Emulated boards: virtual time, scenes, cameras, FPGA and memory, supplies, buses, ports."""

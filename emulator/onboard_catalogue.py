@@ -12,12 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from cubestack.emulator.sky.hipparcos import load_sky
+from cubestack.emulator.sky.hipparcos import DEFAULT_EPOCH, load_sky
 from cubestack.firmware_model.star_catalogue import StarCatalogue
 
-__all__ = ["EPOCH", "MAG_LIMIT", "PAIR_LIMIT_DEG", "onboard_catalogue"]
+__all__ = ["MAG_LIMIT", "PAIR_LIMIT_DEG", "onboard_catalogue"]
 
-EPOCH = 2026.0
 MAG_LIMIT = 3.8
 PAIR_LIMIT_DEG = 57.3
 ALPHA_CENTAURI_B = 71681
@@ -27,7 +26,7 @@ ALPHA_CENTAURI_B = 71681
 def onboard_catalogue(
     mag_limit: float = MAG_LIMIT,
     pair_limit_deg: float = PAIR_LIMIT_DEG,
-    epoch: float = EPOCH,
+    epoch: float = DEFAULT_EPOCH,
 ) -> StarCatalogue:
     """Stars brighter than ``mag_limit`` (V) and their pairs, at the Julian year ``epoch``."""
     sky = load_sky(epoch, mag_limit)

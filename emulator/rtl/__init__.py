@@ -1,1 +1,1 @@
-"""emulator/rtl."""
+"""The FPGA in virtual time: compiled to C++, or in Amaranth's simulator."""

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.build import library_for
 from cubestack.emulator.rtl.engine import RtlEngine, make_engine
-from cubestack.firmware_model.interface.mlx75412 import LINE_CLOCKS
+from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
 from cubestack.hdl.cubestar_top import CubeStarTop
 
 __all__ = ["cold_build_s", "rtl_clocks_per_s", "strobes_per_s"]
 
-PERIOD = Fraction(100_000)  # 10 MHz
+PERIOD = Fraction(PS_PER_S, CRYSTAL_HZ)
 ROUNDS = 5  # the best one counts: the others were disturbed
 
 

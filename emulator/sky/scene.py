@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.optics import COLUMNS, ROWS, Distortion, Optics
 from cubestack.emulator.sky.attitude import propagate, quaternion_from_pointing, unit_quaternion
+from cubestack.emulator.sky.hipparcos import DEFAULT_EPOCH
 from cubestack.emulator.sky.picture import SceneError, load_picture
 from cubestack.emulator.sky.scene_file import (
     Readers,
@@ -102,7 +103,7 @@ class SkyScene:
     quaternion: ArrayLike
     rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
     poses: tuple[Pose, ...] = ()
-    epoch: float = 2026.0
+    epoch: float = DEFAULT_EPOCH
     mag_limit: float | None = None
     false_stars: int = 0
     false_star_mag: tuple[float, float] = (2.0, 3.8)
