@@ -11,6 +11,7 @@ from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 __all__ = ["BITS_PER_BYTE", "Uart"]
 
 BITS_PER_BYTE = 10  # start bit, 8 data bits, stop bit
+FASTEST_BAUD = 12_000_000  # of the EFM32GG: 48 MHz with fourfold oversampling
 
 
 class Uart:
@@ -38,9 +39,9 @@ class Uart:
         *,
         silence_bytes: int,
     ) -> None:
-        """Connect a UART at ``baud`` bits a second (positive, else ValueError)."""
-        if baud <= 0:
-            raise ValueError(f"a UART needs a positive baud rate, not {baud}")
+        """Connect a UART at ``baud`` bits a second (1..``FASTEST_BAUD``, else ValueError)."""
+        if not 0 < baud <= FASTEST_BAUD:
+            raise ValueError(f"a UART needs a baud rate in 1..{FASTEST_BAUD}, not {baud}")
         self._env = env
         self.byte_ps = BITS_PER_BYTE * PS_PER_S // baud
         self.on_byte = on_byte
