@@ -4,8 +4,9 @@ CubeStar thesis, section 4.3.2. The published number of pairs is that of a pair 
 degrees; the default here is the true diagonal of the calibrated camera, distortion included, which
 solves more pictures (docs/fidelity.md compares both).
 
-Alpha Centauri B is left out, which makes the published 405 stars of 406: it is 0.0001 rad from A,
-and the two pairs that the thesis names as its closest are 0.0017 and 0.0067 rad apart.
+The published 405 stars are 406 without alpha Centauri B, which is 0.0001 rad from A: the list
+leaves out stars that close. The two pairs that the thesis names as its closest are 0.0017 and
+0.0067 rad apart.
 """
 
 from functools import lru_cache
@@ -19,7 +20,6 @@ __all__ = ["MAG_LIMIT", "PAIR_LIMIT_DEG", "onboard_catalogue"]
 
 MAG_LIMIT = 3.8
 PAIR_LIMIT_DEG = 57.3
-ALPHA_CENTAURI_B = 71681
 
 
 @lru_cache(maxsize=4)
@@ -28,13 +28,11 @@ def onboard_catalogue(
     pair_limit_deg: float = PAIR_LIMIT_DEG,
     epoch: float = DEFAULT_EPOCH,
 ) -> StarCatalogue:
-    """Stars brighter than ``mag_limit`` (V) and their pairs, at the Julian year ``epoch``."""
+    """Stars brighter than ``mag_limit`` (V) and their pairs, at the Julian year ``epoch``.
+
+    Raises what ``load_sky`` and ``StarCatalogue.build`` do.
+    """
     sky = load_sky(epoch, mag_limit)
-    kept = np.flatnonzero(sky.hip != ALPHA_CENTAURI_B)
     return StarCatalogue.build(
-        sky.hip[kept].astype(np.int64),
-        sky.vectors[kept],
-        sky.v_mag[kept],
-        mag_limit,
-        pair_limit_deg,
+        sky.hip.astype(np.int64), sky.vectors, sky.v_mag, mag_limit, pair_limit_deg
     )
