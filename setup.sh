@@ -52,3 +52,8 @@ if ! .venv/bin/python -m pip install --disable-pip-version-check -e ".${extras:+
     tail -n 5 "$log" >&2
     fail "pip failed; the whole log is in $log"
 fi
+
+if [ "$kind" = dev ] && ! .venv/bin/python -m find_libpython >/dev/null 2>&1; then
+    need "Python's shared library, for cocotb" \
+        "libpython$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')"
+fi
