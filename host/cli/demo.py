@@ -1,8 +1,9 @@
 """The whole stack in about a minute: boot, capture, download and solve, with pictures.
 
-An emulator process serves a CubeStar on a pseudo-terminal; a client in this process talks to it
-through pyserial and nothing else. First a rendered sky, then a photograph: one of --photographs if
-that folder has any, else a picture that this project rendered itself.
+An emulator process serves a CubeStar on a pseudo-terminal; a client in this
+process talks to it through pyserial and nothing else. First a rendered sky,
+then a photograph: one of --photographs if that folder has any, else a picture
+that this project rendered itself.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.calibration import calibrate, load_camera
+from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.frames import compare
 from cubestack.host.cli.terminal import console, progress_bar, say
 from cubestack.host.cubestar import CubeStar
@@ -31,9 +33,9 @@ from cubestack.host.transport import open_transport
 
 __all__ = ["add_arguments", "run"]
 
-POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius and Procyon
+POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius
 BOOT_TIMEOUT_S = 120.0  # the first start compiles the FPGA
-RENDERED = Path("docs/images/rendered-sky.png")
+RENDERED = Path(__file__).parent / "rendered-sky.png"
 PUBLISHED_TIMES = (
     "discard 68 ms, capture 388 ms, transfer 404 ms; "
     "detect and match 320 ms together for 20 stars; attitude below 10 ms"
@@ -71,7 +73,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder with JPEG photographs of the sky and their truth.json",
     )
-    parser.add_argument("--seed", type=int, default=1, help="of the sensor's noise (default 1)")
+    parser.add_argument(
+        "--seed", type=whole(0), default=1, help="seed of the sensor's noise (default 1)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
