@@ -20,14 +20,13 @@ from difflib import get_close_matches
 from enum import IntEnum
 from typing import SupportsFloat
 
-__all__ = ["Field", "InterfaceError", "Value", "suggestion"]
+__all__ = ["Choices", "Field", "InterfaceError", "Value", "suggestion"]
 
 #: A field's value: bool for bool1, bytes for bytesN, a number for all others.
 Value = int | float | bool | bytes
 
 _WIDTHS = {"bool1": 1, "u8": 8, "enum8": 8, "u16": 16, "i16": 16, "u32": 32, "f32": 32}
 _BYTES = re.compile(r"bytes([1-9][0-9]*)")
-
 
 #: The allowed values of a field, with their names.
 Choices = type[IntEnum]
