@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from typing import NoReturn
 
-__all__ = ["Parser", "angle", "corner", "whole"]
+__all__ = ["Parser", "angle", "corner", "number", "whole"]
 
 
 class Parser(argparse.ArgumentParser):
@@ -40,6 +40,17 @@ def angle(text: str) -> float:
         value = math.nan
     if not 0 <= value <= 180:
         raise argparse.ArgumentTypeError(f"{text!r} is not an angle in 0..180 degrees")
+    return value
+
+
+def number(text: str) -> float:
+    """Type of a number, of either sign."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
     return value
 
 

@@ -1,8 +1,8 @@
 """Measure the cost of the hot paths on this machine, on one core.
 
-rtl_clocks_per_s  pixel clocks a second through the compiled FPGA, nothing skipped
+rtl_clocks_per_s  pixel clocks a second through the compiled FPGA, none skipped
 capture_wall_ms   wall time of one capture: exposure, read-out, FPGA store
-readout_wall_ms   wall time of one transfer from the FPGA's SRAM to the processor
+readout_wall_ms   wall time of one transfer, FPGA's SRAM to processor
 realtime_ratio    simulated seconds per wall second of the full 1 Hz loop
 cold_build_s      translating and compiling the FPGA with an empty cache
 """

@@ -1,7 +1,7 @@
 """Compile the onboard star catalogue from Hipparcos and say what is in it.
 
 examples:
-  cubestack catalogue                                  as flown: V < 3.8, pairs within the default
+  cubestack catalogue                                  as flown: V < 3.8
   cubestack catalogue --pair-limit 42.1                the published number of pairs
   cubestack catalogue --mag-limit 4 --json
 """
@@ -9,6 +9,7 @@ examples:
 import argparse
 import json
 
+from cubestack.host.cli.arguments import number
 from cubestack.host.cli.terminal import console
 
 __all__ = ["add_arguments", "run"]
@@ -16,9 +17,9 @@ __all__ = ["add_arguments", "run"]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("--mag-limit", type=float, default=3.8, metavar="V", help="default 3.8")
-    parser.add_argument("--pair-limit", type=float, metavar="DEG", help="default: as flown")
-    parser.add_argument("--epoch", type=float, default=2026.0, metavar="YEAR", help="default 2026")
+    parser.add_argument("--mag-limit", type=number, default=3.8, metavar="V", help="default 3.8")
+    parser.add_argument("--pair-limit", type=number, metavar="DEG", help="default: as flown")
+    parser.add_argument("--epoch", type=number, default=2026.0, metavar="YEAR", help="default 2026")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 

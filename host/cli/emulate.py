@@ -1,8 +1,9 @@
 """Serve an emulated device until Ctrl-C; any program can open its ports.
 
 examples:
-  cubestack emulate cubestar --pty ./ttyCUBESTAR            then, in a second terminal:
-      python examples/plain_pyserial.py ./ttyCUBESTAR
+  cubestack emulate cubestar --pty ./ttyCUBESTAR
+      then, in a second terminal:
+      .venv/bin/python examples/plain_pyserial.py ./ttyCUBESTAR
   cubestack emulate cubestar --scene sky.toml --tcp 4000 --pace fast
 """
 
@@ -39,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tcp", type=whole(0, 65535), metavar="PORT", help="serial line on a local TCP port"
     )
     parser.add_argument("--baud", type=whole(1), default=INTERFACE.baud, help="default 57600")
-    parser.add_argument("--seed", type=whole(0), default=0, help="of everything random (default 0)")
+    parser.add_argument(
+        "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
+    )
     add_engine_arguments(parser)
     parser.add_argument(
         "--pace",

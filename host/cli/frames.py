@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 from cubestack.host.calibration import calibrate, load_camera
 from cubestack.host.cli.session import Session, open_session
+from cubestack.host.errors import CameraFileError
 from cubestack.host.operator import find_threshold
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ MODE_NAMES = {
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3
+UNIT_TOLERANCE = 1e-3
 SAME_STAR_DEG = 0.2
 """A kept star further than this from where the truth puts it has a wrong identity."""
 
@@ -107,9 +109,14 @@ def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | No
     if camera is None:
         return None
     content = json.loads(camera.read_text(encoding="utf-8"))
-    entry = content.get("images", {}).get(image.name, {}) if isinstance(content, dict) else {}
-    quaternion = entry.get("quaternion_xyzw_inertial_to_camera")
-    return None if quaternion is None else np.array(quaternion, np.float64)
+    try:
+        quaternion = content["images"][image.name]["quaternion_xyzw_inertial_to_camera"]
+    except (KeyError, TypeError):  # a camera file need not know the picture
+        return None
+    truth = np.array(quaternion, np.float64)
+    if truth.shape != (4,) or not abs(np.linalg.norm(truth) - 1) < UNIT_TOLERANCE:
+        raise CameraFileError(f"{camera}: {image.name}'s quaternion must be four of unit length")
+    return truth
 
 
 def _measure_frame(

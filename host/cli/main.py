@@ -31,7 +31,7 @@ def make_parser() -> Parser:
     parser = Parser(
         prog="cubestack",
         description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
-        epilog="Try: cubestack measure cubestar --frames 3    |    cubestack COMMAND --help",
+        epilog="Try: cubestack measure cubestar --mag-limit 3.8, or cubestack COMMAND --help",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
@@ -60,6 +60,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return WRONG_CALL
     except OSError as error:
+        print(f"cubestack {args.command}: {error}", file=sys.stderr)
+        return FAILED
+    except RuntimeError as error:
+        from cubestack.emulator.rtl.build import CompilerError
+
+        if not isinstance(error, CompilerError):
+            raise
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return FAILED
 

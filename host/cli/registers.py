@@ -1,4 +1,5 @@
-"""List a device's telecommands, telemetry and registers, from the tables that all sides share.
+"""List a device's telecommands, telemetry and registers, from the tables that
+firmware and host share.
 
 examples:
   cubestack registers cubestar

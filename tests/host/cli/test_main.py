@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from cubestack.host.cli.demo import RENDERED
 from cubestack.host.cli.main import COMMANDS, main
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
@@ -71,6 +72,12 @@ def test_help(run: Run, command: str | None) -> None:
         (("measure", "cubestar", "--camera", "c.json"), ("--camera", "--image")),
         (("measure", "cubestar", "--image", "a.png", "--scene", "b.toml"), ("--scene", "--image")),
         (("measure", "cubestar", "--false-stars", "-1"), ("false", "-1")),
+        (("measure", "cubestar", "--mag-limit", "nan"), ("mag-limit", "nan", "number")),
+        (("measure", "cubestar", "--scene", "a.toml", "--mag-limit", "3"), ("scene", "mag_limit")),
+        (("measure", "cubestar", "--image", "a.png", "--false-stars", "1"), ("--false-stars",)),
+        (("measure", "cubestar", "--image", "a.png", "--no-noise"), ("--no-noise",)),
+        (("catalogue", "--epoch", "inf"), ("epoch", "inf", "number")),
+        (("demo", "--seed", "-1"), ("seed", "-1")),
         (("measure", "cubestar", "--seed", "-1"), ("seed", "-1")),
         (("measure", "cubestar", "--hint-error", "-5", "--mode", "assisted"), ("hint", "-5")),
         (("measure", "cubestar", "--mode", "guessing"), ("guessing", "tracking")),
@@ -134,7 +141,16 @@ def test_a_wrong_picture_format(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("{", ("not JSON",)), ("{}", ("f_px",)), ('{"f_px": 1071, "cx_px": 5}', ("cy_px",))],
+    [
+        ("{", ("not JSON",)),
+        ("{}", ("f_px",)),
+        ('{"f_px": 1071, "cx_px": 5}', ("cy_px",)),
+        (
+            '{"f_px": 1071, "cx_px": 512, "cy_px": 256, '
+            '"images": {"sky.png": {"quaternion_xyzw_inertial_to_camera": [1, 2]}}}',
+            ("sky.png", "four"),
+        ),
+    ],
 )
 def test_wrong_cameras(run: Run, tmp_path: Path, text: str, words: tuple[str, ...]) -> None:
     picture, camera = tmp_path / "sky.png", tmp_path / "camera.json"
@@ -142,6 +158,34 @@ def test_wrong_cameras(run: Run, tmp_path: Path, text: str, words: tuple[str, ..
     camera.write_text(text, encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera)
     check_one_line(outcome, "camera.json", *words)
+
+
+@pytest.mark.parametrize("images", ["[]", "{}", '{"sky.png": 1}', '{"other.png": {}}'])
+def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, images: str) -> None:
+    picture, camera = tmp_path / "sky.png", tmp_path / "camera.json"
+    Image.fromarray(np.zeros((512, 1024), np.uint8)).save(picture)
+    camera.write_text(
+        f'{{"f_px": 1071, "cx_px": 512, "cy_px": 256, "images": {images}}}', encoding="utf-8"
+    )
+    outcome = run("measure", "cubestar", "--image", picture, "--camera", camera, "--json")
+    assert outcome.code == DONE
+    assert json.loads(outcome.out)["truth"] is None
+
+
+def test_no_compiler(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cubestack.emulator.rtl.build.find_compiler", lambda: None)
+    outcome = run("measure", "cubestar", "--engine", "compiled")
+    assert (outcome.code, outcome.out) == (FAILED, "")
+    (line,) = outcome.err.splitlines()
+    assert "no C++ compiler" in line
+
+
+def test_the_shipped_picture_is_found_from_anywhere(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert RENDERED.is_file()
+    assert RENDERED.with_suffix(".json").is_file()
 
 
 def test_a_path_that_is_taken(run: Run, tmp_path: Path) -> None:
