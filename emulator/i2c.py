@@ -1,7 +1,7 @@
 """The satellite's I2C bus: messages with their time on the wire, and targets that answer.
 
-Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR. Not modelled: clock
-stretching, and the acknowledge of a byte that the host reads.
+Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR. A target that has no byte
+ready stretches the clock. Not modelled: the acknowledge of a byte that the host reads.
 """
 
 import errno
@@ -17,6 +17,9 @@ __all__ = ["I2cBus", "I2cMessage", "I2cNackError", "I2cTarget"]
 
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
+LONGEST_STRETCH_PS = PS_PER_S
+"""A host gives up a transfer whose clock is held low for longer, as Linux's drivers do."""
+
 
 @dataclass
 class I2cMessage:
@@ -31,7 +34,10 @@ class I2cMessage:
 
 
 class I2cNackError(OSError):
-    """No acknowledge; errno is ENXIO for an address and EIO for a byte, as on Linux."""
+    """A transfer failed; errno as on Linux.
+
+    ENXIO: no acknowledge of an address; EIO: of a byte; ETIMEDOUT: the clock was held low too long.
+    """
 
 
 class I2cTarget(Protocol):
@@ -43,8 +49,8 @@ class I2cTarget(Protocol):
     def i2c_write(self, byte: int) -> bool:
         """A byte came; returns whether it is acknowledged."""
 
-    def i2c_read(self) -> int:
-        """The next byte to send, 0..255."""
+    def i2c_read(self) -> int | None:
+        """The next byte to send, 0..255; None stretches the clock: asked again a bit later."""
 
     def i2c_stop(self) -> None:
         """The transfer ended, or went on with another target."""
@@ -110,7 +116,7 @@ class I2cBus:
         if message.read:
             message.data = bytearray()
             for _ in range(message.read):
-                byte = target.i2c_read()
+                byte = yield from self._next_byte(target, message.address)
                 yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
                 message.data.append(byte)
             return
@@ -120,3 +126,14 @@ class I2cBus:
                 raise I2cNackError(
                     errno.EIO, f"I2C device {message.address:#04x} refused byte {byte:#04x}"
                 )
+
+    def _next_byte(self, target: I2cTarget, address: int) -> Generator[simpy.Event, Any, int]:
+        """Wait while ``target`` stretches the clock."""
+        give_up_ps = self._env.now + LONGEST_STRETCH_PS
+        while (byte := target.i2c_read()) is None:
+            if self._env.now >= give_up_ps:
+                raise I2cNackError(
+                    errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s"
+                )
+            yield self._env.timeout(self.bit_ps)
+        return byte

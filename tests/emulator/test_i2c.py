@@ -159,3 +159,22 @@ def test_address_is_taken_once():
 def test_bit_rate_must_be_positive():
     with pytest.raises(ValueError, match="positive bit rate, not 0 Hz"):
         make(0)
+
+
+def test_target_stretches_the_clock_until_it_has_a_byte():
+    kernel, bus = make(x1A=(target := Memory()))
+    ready, read = 50 * BIT_PS[100_000], target.i2c_read
+    target.i2c_read = lambda: read() if kernel.now >= ready else None
+    reading = I2cMessage(0x1A, read=2)
+    perform(kernel, bus, reading)
+    assert reading.data == bytes([0, 1])
+    assert kernel.now == ready + (2 * 9 + 1) * BIT_PS[100_000]
+
+
+def test_clock_held_low_for_ever_ends_the_transfer():
+    kernel, bus = make(x1A=(target := Memory()))
+    target.i2c_read = lambda: None
+    with pytest.raises(I2cNackError, match="held the clock low") as raised:
+        perform(kernel, bus, I2cMessage(0x1A, read=1))
+    assert raised.value.errno == errno.ETIMEDOUT
+    assert target.calls[-1] == "stop"
