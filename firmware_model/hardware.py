@@ -20,6 +20,7 @@ __all__ = [
     "FlashStore",
     "Hardware",
     "Pay",
+    "ReadPin",
     "ReadTimer",
     "Request",
     "Reset",
@@ -42,10 +43,17 @@ class ReadTimer:
 
 @dataclass(frozen=True)
 class SetPin:
-    """Drive the output pin ``pin`` to ``level`` (0 or 1)."""
+    """Drive the output pin ``pin`` to ``level``: 0 or 1, or the number on a port of many lines."""
 
     pin: str
     level: int
+
+
+@dataclass(frozen=True)
+class ReadPin:
+    """Read the input pin ``pin``; the answer is its level."""
+
+    pin: str
 
 
 @dataclass(frozen=True)
@@ -103,7 +111,9 @@ class Reset:
     cause: int
 
 
-Request = Pay | ReadTimer | SetPin | AwaitPin | Sleep | StrobeRead | CameraTransfer | Reset
+Request = (
+    Pay | ReadTimer | SetPin | ReadPin | AwaitPin | Sleep | StrobeRead | CameraTransfer | Reset
+)
 
 T = TypeVar("T")
 Routine = Generator[Request, Any, T]

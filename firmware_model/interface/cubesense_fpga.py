@@ -1,7 +1,8 @@
 """CubeSense's FPGAs as the microcontroller sees them: commands, read-out order, Sun coordinates.
 
 CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), section 6.5.1 and figure
-6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window).
+6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window), section 9.2.2 (address
+control from the microcontroller).
 """
 
 from collections.abc import Iterator
@@ -10,6 +11,8 @@ from enum import Enum
 from typing import NamedTuple
 
 __all__ = [
+    "ADDRESSING_COMMANDS",
+    "ADDRESS_BYTES",
     "COMMANDS",
     "FULL_SIZE",
     "SUN_NOT_FOUND",
@@ -20,6 +23,7 @@ __all__ = [
     "Command",
     "ReadOut",
     "actions",
+    "address_bytes",
     "link_shows_enables",
 ]
 
@@ -35,6 +39,8 @@ class Action(Enum):
     STORE_OTHER = "other camera's picture to own memory"
     SEND_EDGE = "other sensor's edge data in own memory to the other FPGA"
     PASS_EDGE = "edge data from the other FPGA to the microcontroller"
+    TAKE_ADDRESS = "address in own memory from the microcontroller"
+    READ_FROM = "picture in own memory to the microcontroller, from the taken address on"
 
 
 class Actions(NamedTuple):
@@ -83,10 +89,26 @@ COMMANDS = (
     Command(0, 0, 0, 0, 0, Actions(Action.STORE, Action.STORE)),
 )
 
+#: Rows that a board with address control from the microcontroller has besides, out of those that
+#: table 6.4 leaves open; section 9.2.2 wishes for it, the protocol is ours. Only SHIFT moves
+#: between the two, with an enable low: no other row is crossed, and the address is kept. The
+#: microcontroller may drive the data bus while SHIFT is low.
+ADDRESSING_COMMANDS = (
+    Command(0, 1, 0, 0, 1, Actions(Action.TAKE_ADDRESS, _IDLE)),
+    Command(0, 1, 0, 1, 0, Actions(_IDLE, Action.TAKE_ADDRESS)),
+    Command(1, 1, 0, 0, 1, Actions(Action.READ_FROM, _IDLE)),
+    Command(1, 1, 0, 1, 0, Actions(_IDLE, Action.READ_FROM)),
+)
 
-def actions(shift: int, edge: int, rnw: int, sunen: int, naden: int) -> Actions:
-    """What both FPGAs do at these levels; an unlisted row is standby for both."""
-    for command in COMMANDS:
+
+def actions(
+    shift: int, edge: int, rnw: int, sunen: int, naden: int, *, mcu_addressing: bool = False
+) -> Actions:
+    """What both FPGAs do at these levels; an unlisted row is standby for both.
+
+    ``mcu_addressing`` lists ADDRESSING_COMMANDS too.
+    """
+    for command in COMMANDS + ADDRESSING_COMMANDS * mcu_addressing:
         if command.fits(shift, edge, rnw, sunen, naden):
             return command.actions
     return Actions(_IDLE, _IDLE)
@@ -100,6 +122,9 @@ def link_shows_enables(shift: int, edge: int) -> bool:
     """
     return not (shift and not edge)
 
+
+#: Data clocks that take an address, one byte each.
+ADDRESS_BYTES = 3
 
 #: Lowest value of a bright pixel; figure 6.15.
 SUN_THRESHOLD = 200
@@ -199,3 +224,14 @@ class ReadOut:
 
 #: The OV7620's picture and the published read-outs.
 FULL_SIZE = ReadOut()
+
+
+def address_bytes(x: int, y: int, size: ReadOut = FULL_SIZE) -> bytes:
+    """What takes the address of pixel (x, y): row : column, highest byte first.
+
+    ValueError when the pixel is not inside of the picture.
+    """
+    if not (0 <= x < size.columns and 0 <= y < size.rows):
+        raise ValueError(f"pixel ({x}, {y}) is not inside of {size.columns} x {size.rows} pixels")
+    address = y << (size.columns - 1).bit_length() | x
+    return address.to_bytes(ADDRESS_BYTES, "big")

@@ -3,7 +3,7 @@
 CubeSpace family of nodes with two cameras, interface generation 2: IDs, lengths and parameters as
 hosts use them; names, limits and reset values are ours. Reset values follow the CubeSense thesis:
 thresholds section 4.3, boresights Table 5.1, distortion equation 5.2.3, exposure of the Sun's
-camera section 3.2.
+camera section 3.2; that of the nadir camera is assumed.
 """
 
 from cubestack.firmware_model.interface.cubesense_codes import (
@@ -33,7 +33,7 @@ _HIGH, _MEDIUM, _LOW = Confidence.HIGH, Confidence.MEDIUM, Confidence.LOW
 
 _NAMES = {Camera.SUN: "the Sun camera", Camera.NADIR: "the nadir camera"}
 _THRESHOLDS = {Camera.SUN: 225, Camera.NADIR: 70}
-_EXPOSURES = {Camera.SUN: 1, Camera.NADIR: 127}
+_EXPOSURES = {Camera.SUN: 1, Camera.NADIR: 4}
 _BORESIGHTS = {Camera.SUN: (369.0, 250.0), Camera.NADIR: (371.0, 236.0)}
 
 

@@ -1,0 +1,49 @@
+"""What CubeSense's program sees of its PIC18F45K20 beside the requests that take time.
+
+Pins have the names of :mod:`cubestack.firmware_model.interface.cubesense_pins` and of the FPGAs'
+command table (RNW, CLK, EDGE, SHIFT; SUNACK and NADACK are inputs). At reset the enables are high
+and every other output is low.
+"""
+
+from enum import StrEnum
+from typing import Protocol
+
+from cubestack.firmware_model.interface.cubesense_pins import Monitor
+
+__all__ = ["CubeSenseHardware", "Port"]
+
+
+class Port(StrEnum):
+    """A serial port; the part has one, so either is in use, and the model serves both."""
+
+    NODE = "node"
+    BENCH = "bench"
+
+
+class CubeSenseHardware(Protocol):
+    """Peripherals that the program uses without waiting for them.
+
+    Attributes:
+        mcu_addressing: the FPGAs are built with the option that lets the program choose addresses.
+        serial_number: ASCII, at most 6 characters.
+        reset_cause: why the processor started: 0 power-up, 1 the program's own reset.
+    """
+
+    mcu_addressing: bool
+    serial_number: str
+    reset_cause: int
+
+    def uart_send(self, port: Port, data: bytes) -> None:
+        """Queue ``data`` for ``port``; the peripheral sends at its own pace."""
+
+    def uart_backlog(self, port: Port) -> int:
+        """Bytes that ``port`` still has to send."""
+
+    def wake(self) -> None:
+        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
+
+    def adc_counts(self, monitor: Monitor) -> int:
+        """Result of a conversion, 0 to 1023; the program charges its time."""
+
+    def uptime_ms(self) -> int:
+        """Time since power-up in ms, read in an interrupt."""

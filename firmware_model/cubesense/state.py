@@ -1,0 +1,156 @@
+"""What the node remembers: settings, the latest result of each camera, flags and counters.
+
+All of it is in RAM and starts anew with every reset. Settings start with the reset values that the
+telecommands declare.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from cubestack.firmware_model.cubesense.masks import Mask
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import (
+    MASK_AREAS,
+    Camera,
+    CaptureResult,
+    DetectResult,
+    NadirSearch,
+    Sram,
+    coefficient,
+)
+from cubestack.firmware_model.interface.cubesense_telecommands import DISTORTION_TERMS
+from cubestack.firmware_model.interface.node_codes import AckError
+
+__all__ = ["CameraSettings", "Result", "State", "distortion_of"]
+
+
+def distortion_of(values: Mapping[str, Any]) -> tuple[float, ...]:
+    """Factors of the polynomial from the parameters of telecommand Distortion."""
+    return tuple(
+        coefficient(values[f"Mantissa{power}"], values[f"Exponent{power}"])
+        for power in range(DISTORTION_TERMS)
+    )
+
+
+@dataclass
+class CameraSettings:
+    """Settings of one camera, in the units of the telecommands.
+
+    Attributes:
+        threshold: detection threshold in DN.
+        auto_adjust: 1: the camera adjusts itself.
+        exposure: as sent, u16; the camera gets at most 255.
+        gain: as sent; the camera gets at most 63.
+        blue_gain, red_gain: as sent.
+        boresight: (x, y) in px.
+        masks: areas that detection ignores; five, all 0 where there is none.
+        distortion: factors of the polynomial.
+    """
+
+    threshold: int
+    auto_adjust: int
+    exposure: int
+    gain: int
+    blue_gain: int
+    red_gain: int
+    boresight: tuple[float, float]
+    distortion: tuple[float, ...]
+    masks: list[Mask] = field(default_factory=lambda: [Mask()] * MASK_AREAS)
+
+    @classmethod
+    def at_reset(cls, camera: Camera) -> "CameraSettings":
+        """The declared reset values."""
+        number = camera + 1
+
+        def reset(name: str) -> dict[str, Any]:
+            return dict(INTERFACE.telecommand(f"{name}{number}").reset_values())
+
+        settings, boresight = reset("CameraSettings"), reset("Boresight")
+        return cls(
+            threshold=reset("DetectionThreshold")["Threshold"],
+            auto_adjust=reset("AutoAdjust")["Enabled"],
+            exposure=settings["Exposure"],
+            gain=settings["Gain"],
+            blue_gain=settings["BlueGain"],
+            red_gain=settings["RedGain"],
+            boresight=(boresight["X"], boresight["Y"]),
+            distortion=distortion_of(reset("Distortion")),
+        )
+
+
+@dataclass
+class Result:
+    """The latest measurement of one camera.
+
+    Attributes:
+        capture, detect: what became of it.
+        alpha, beta: 1/100 deg; they count with SUCCESS only.
+        x, y: centre from the boresight, undistorted, 1/100 px.
+        radius: of the fitted circle, undistorted, 1/100 px; 0 for the Sun.
+        points: edges of the fit, or Sun pixels of the mean.
+        sram: memory that held the picture.
+        first: first Sun pixel (x, y); (0, 0) for the nadir camera.
+        pixels_read: pixels that the processor read from the FPGA.
+        wait_us, store_us, search_us, centroid_us, total_us: as telemetry PhaseTimes has them.
+    """
+
+    capture: CaptureResult = CaptureResult.START_UP
+    detect: DetectResult = DetectResult.START_UP
+    alpha: int = 0
+    beta: int = 0
+    x: int = 0
+    y: int = 0
+    radius: int = 0
+    points: int = 0
+    sram: Sram = Sram.SRAM1
+    first: tuple[int, int] = (0, 0)
+    pixels_read: int = 0
+    wait_us: int = 0
+    store_us: int = 0
+    search_us: int = 0
+    centroid_us: int = 0
+    total_us: int = 0
+
+
+class State:
+    """RAM of the program.
+
+    Attributes:
+        cameras: settings of each camera.
+        results: latest measurement of each camera.
+        over_current: by memory, drew too much since the flag was cleared; it is then kept off.
+        nadir_search: how the nadir camera's edges are looked for.
+        image_sram: memory that register IMAGE streams.
+        telecommands, telemetries: received, for CommunicationStatus.
+        flags: error flags of CommunicationStatus by field name.
+        last_command, last_processed, last_error: for telemetry TcmdProcessed.
+    """
+
+    def __init__(self) -> None:
+        """Start with the declared reset values."""
+        self.cameras = {camera: CameraSettings.at_reset(camera) for camera in Camera}
+        self.results = {camera: Result(sram=Sram(camera)) for camera in Camera}
+        self.over_current = dict.fromkeys(Sram, False)
+        self.nadir_search = NadirSearch.LINES
+        self.image_sram = Sram.SRAM1
+        self.reset_communication()
+
+    def reset_communication(self) -> None:
+        """Clear counters and error flags, as telecommand Reset of the communication does."""
+        self.telecommands = 0
+        self.telemetries = 0
+        self.flags: set[str] = set()
+        self.last_command = 0
+        self.last_processed = 1
+        self.last_error = AckError.OK
+
+    def schedule(self, camera: Camera, sram: Sram, *, detect: bool) -> None:
+        """Mark the results of a measurement that was accepted and has not begun."""
+        result = self.results[camera]
+        result.capture = CaptureResult.PENDING
+        result.sram = sram
+        if detect:
+            result.detect = DetectResult.PENDING
+        else:
+            result.detect = DetectResult.NONE_SCHEDULED
