@@ -14,7 +14,8 @@ from cubestack.emulator.camera.optics import ROWS
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.i2c import I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
-from cubestack.emulator.power import SUPPLY_VOLTS, PowerModel
+from cubestack.emulator.power import PowerModel
+from cubestack.emulator.power_tables import CUBESTAR
 from cubestack.emulator.processor import Processor
 from cubestack.emulator.rtl.engine import make_engine
 from cubestack.emulator.sky.scene import Scene
@@ -78,7 +79,7 @@ class CubeStarBoard:
         self._rng = np.random.default_rng(seed)
         self.engine = make_engine(kind=engine)
         self.camera = Mlx75412(scene, seed=seed)
-        self.power = PowerModel(self.kernel)
+        self.power = PowerModel(self.kernel, CUBESTAR)
         self.uart = Uart(
             self.kernel,
             baud,
@@ -134,10 +135,6 @@ class CubeStarBoard:
     def busy(self) -> bool:
         """Whether anything is under way that does not wait for the host."""
         return self.uart.busy or not self.processor.waiting
-
-    def mean_power_mw(self) -> float:
-        """Mean power of the stack since power-up, in mW, as a meter in its supply line shows."""
-        return self.power.charge_mas() * SUPPLY_VOLTS * PS_PER_S / max(1, self.kernel.now)
 
     def close(self) -> None:
         """Release the engine."""

@@ -2,10 +2,12 @@
 
 import pytest
 
-from cubestack.emulator.power import CHANNELS, COMPARATOR_US, PARTS, PowerModel
+from cubestack.emulator.power import COMPARATOR_US, PowerModel
+from cubestack.emulator.power_tables import CUBESENSE, CUBESTAR
 from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_US, Kernel
 
 TRIP_PS = COMPARATOR_US * PS_PER_US
+PARTS, CHANNELS = CUBESTAR.parts, CUBESTAR.channels
 
 # CubeStar thesis, table 6.2: current in mA, duration in ms, and what the parts do then.
 MODES = {
@@ -28,7 +30,7 @@ def kernel() -> Kernel:
 
 @pytest.fixture
 def power(kernel) -> PowerModel:
-    return PowerModel(kernel)
+    return PowerModel(kernel, CUBESTAR)
 
 
 @pytest.fixture
@@ -60,16 +62,15 @@ def test_charge_of_a_published_iteration(kernel, power):
 
 def test_channels_and_unswitched_parts_add_up(power):
     enter(power, MODES[3][2])
-    always_on = PARTS["leds"][1]["on"] + PARTS["processor"][1]["run"]
+    always_on = PARTS["leds"].ma["on"] + PARTS["processor"].ma["run"]
     channels = sum(power.current_ma(channel) for channel in CHANNELS)
     assert power.current_ma() == pytest.approx(channels + always_on)
 
 
 def test_no_regular_state_trips_a_comparator(power):
     for channel, limit in CHANNELS.items():
-        highest = sum(
-            max(states.values()) for supply, states in PARTS.values() if supply == channel
-        )
+        highest = sum(max(part.ma.values()) for part in PARTS.values() if part.channel == channel)
+        assert limit is not None
         assert highest < limit
 
 
@@ -113,7 +114,7 @@ def test_switching_off_ends_a_latch_up(kernel, power, tripped):
     power.switch("memory", False)
     assert power.current_ma("memory") == 0
     power.switch("memory", True)
-    assert power.current_ma("memory") == PARTS["memory"][1]["standby"]
+    assert power.current_ma("memory") == PARTS["memory"].ma["standby"]
     kernel.advance_to(2 * PS_PER_MS)
     power.latch_up("memory")  # and the comparator is ready for the next
     kernel.advance_to(3 * PS_PER_MS)
@@ -150,7 +151,7 @@ def test_channel_that_is_off_can_not_latch_up(kernel, power, tripped):
     power.switch("memory", True)
     kernel.advance_to(PS_PER_MS)
     assert tripped == []
-    assert power.current_ma("memory") == PARTS["memory"][1]["standby"]
+    assert power.current_ma("memory") == PARTS["memory"].ma["standby"]
 
 
 @pytest.mark.parametrize(
@@ -174,3 +175,49 @@ def test_unknown_part_and_state(power):
     ):
         power.set_state("memory", "on")
     assert power.current_ma() == pytest.approx(71.2, abs=0.005)
+
+
+def test_lasting_latch_up_comes_back_with_each_switching_on(kernel, power, tripped):
+    power.latch_up("memory", lasting=True)
+    kernel.advance_to(PS_PER_MS)
+    power.switch("memory", False)
+    assert power.current_ma("memory") == 0
+    power.switch("memory", True)
+    kernel.advance_to(2 * PS_PER_MS)
+    assert [channel for _, channel in tripped] == ["memory", "memory"]
+
+
+# CubeSense thesis, table 7.1: power in mW, and what the parts do then.
+CUBESENSE_STATES = [
+    (41.9, "reset", 0, 0, 0),
+    (62.2, "on", 0, 0, 0),
+    (84.2, "on", 1, 0, 0),
+    (108.1, "on", 2, 0, 0),
+    (246.8, "on", 2, 1, 0),
+    (359.5, "on", 2, 2, 0),
+    (396.4, "on", 2, 2, 1),
+    (432.4, "on", 2, 2, 2),
+]
+
+
+@pytest.mark.parametrize(
+    ("published_mw", "processor", "memories", "cameras", "sides"), CUBESENSE_STATES
+)
+def test_published_power_of_cubesense(kernel, published_mw, processor, memories, cameras, sides):
+    power = PowerModel(kernel, CUBESENSE)
+    power.set_state("processor", processor)
+    for half, (memory, side) in enumerate((("1", "sun"), ("2", "nadir"))):
+        power.switch(f"SRAM{memory}", half < memories)
+        power.switch(f"{side}_camera", half < cameras)
+        if half < sides:
+            power.set_state(f"sram{memory}", "active")
+            power.set_state(f"{side}_fpga", "imaging")
+    assert power.current_ma() * CUBESENSE.volts == pytest.approx(published_mw, rel=0.06)
+
+
+def test_channel_without_a_comparator_is_never_told(kernel):
+    power = PowerModel(kernel, CUBESENSE)
+    power.on_overcurrent = lambda channel: pytest.fail(f"{channel} has no comparator")
+    power.latch_up("SRAM1")
+    kernel.advance_to(PS_PER_MS)
+    assert power.current_ma("SRAM1") > 300

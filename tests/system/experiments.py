@@ -24,7 +24,7 @@ import numpy as np
 from cubestack.emulator.camera.optics import Optics
 from cubestack.emulator.cubestar import CubeStarBoard
 from cubestack.emulator.onboard_catalogue import PAIR_LIMIT_DEG, onboard_catalogue
-from cubestack.emulator.power import SUPPLY_VOLTS
+from cubestack.emulator.power_tables import CUBESTAR
 from cubestack.emulator.sky.attitude import (
     attitude_error_deg,
     matrix_from_quaternion,
@@ -267,7 +267,7 @@ def loop(frames: int) -> None:
             if turn >= 3:
                 rows.append(stack.cubestar.phase_times())
         seconds = (board.kernel.now - started) / PS_PER_S
-        power = (board.power.charge_mas() - charge) * SUPPLY_VOLTS / seconds
+        power = (board.power.charge_mas() - charge) * CUBESTAR.volts / seconds
     for name in rows[0]:
         print(f"{name}: {np.mean([row[name] for row in rows]):.1f} ms")
     print(f"mean power {power:.1f} mW over {seconds:.0f} s")
