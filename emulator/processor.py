@@ -18,6 +18,7 @@ from cubestack.firmware_model.hardware import (
     AwaitPin,
     CameraTransfer,
     Pay,
+    ReadPin,
     ReadTimer,
     Request,
     Reset,
@@ -27,7 +28,7 @@ from cubestack.firmware_model.hardware import (
     StrobeRead,
 )
 
-__all__ = ["LOOK_AHEAD_PS", "CameraBus", "Processor", "Program"]
+__all__ = ["LOOK_AHEAD_PS", "CameraBus", "Pins", "Processor", "Program"]
 
 LOOK_AHEAD_PS = 10 * PS_PER_MS
 
@@ -51,6 +52,19 @@ class CameraBus(Protocol):
         """Perform ``request``, which ends at ``now_ps``; None when not acknowledged."""
 
 
+class Pins(Protocol):
+    """Pins of the processor that do not lead to the FPGA."""
+
+    def __contains__(self, pin: object) -> bool:
+        """Whether this is one of them."""
+
+    def set(self, pin: str, level: int) -> None:
+        """Drive an output pin from now on."""
+
+    def get(self, pin: str) -> int:
+        """Level of a pin now."""
+
+
 class Processor:
     """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
 
@@ -58,6 +72,7 @@ class Processor:
         program: the running program, for the interrupt lines of the peripherals.
         resets: number of resets since power-up.
         waiting: asleep until an interrupt, with no deadline.
+        dozing: asleep until an interrupt, with or without a deadline.
     """
 
     def __init__(
@@ -65,11 +80,12 @@ class Processor:
         env: Kernel,
         meter: Meter,
         engine: RtlEngine,
-        camera_bus: CameraBus,
+        camera_bus: CameraBus | None,
         boot: Callable[[int], Program],
         *,
         power_on_cause: int,
         boot_us: int,
+        other_pins: Pins | None = None,
         on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
         on_activity: Callable[[bool], None] = lambda _busy: None,
     ) -> None:
@@ -79,10 +95,11 @@ class Processor:
             env: kernel; its time is in ps.
             meter: what the program charges its cycles to; its table gives the clock.
             engine: the FPGA board.
-            camera_bus: the camera's control bus.
+            camera_bus: the camera's control bus; None where the program drives its lines as pins.
             boot: makes the program after a reset; its argument is the cause (see ``Reset``).
             power_on_cause: cause of the first start.
             boot_us: time from reset to the first instruction of ``main``.
+            other_pins: pins that do not lead to the FPGA.
             on_pin: told about every output pin change, after it happened.
             on_activity: told when the processor falls asleep (False), starts or awakes (True).
         """
@@ -92,12 +109,13 @@ class Processor:
         self._camera_bus = camera_bus
         self._boot = boot
         self._boot_us = boot_us
+        self._other_pins = other_pins
         self._on_pin = on_pin
         self._on_activity = on_activity
         self._clock = CycleClock(meter.table.clock_hz)
         self._wake = env.event()
         self.resets = 0
-        self.waiting = False
+        self.waiting = self.dozing = False
         self.program = boot(power_on_cause)
         env.process(self._run())
 
@@ -144,10 +162,19 @@ class Processor:
                 return self._env.now // PS_PER_US
             case SetPin(pin, level):
                 self._engine.run(self._env.now)
-                self._engine.set_pin(pin, level)
+                if self._other_pins is not None and pin in self._other_pins:
+                    self._other_pins.set(pin, level)
+                else:
+                    self._engine.set_pin(pin, level)
                 self._meter.charge(port_write=1)
                 self._on_pin(pin, level)
                 return None
+            case ReadPin(pin):
+                self._engine.run(self._env.now)
+                self._meter.charge(port_read=1)
+                if self._other_pins is not None and pin in self._other_pins:
+                    return self._other_pins.get(pin)
+                return self._engine.get_pin(pin)
             case AwaitPin():
                 return (yield from self._await_pin(request))
             case Sleep():
@@ -155,6 +182,7 @@ class Processor:
             case StrobeRead():
                 return (yield from self._strobe_read(request))
             case CameraTransfer():
+                assert self._camera_bus is not None
                 yield self._env.timeout(self._camera_bus.transfer_ps(request))
                 self._engine.run(self._env.now)
                 return self._camera_bus.transfer(request, self._env.now)
@@ -191,11 +219,11 @@ class Processor:
         alternatives: list[simpy.Event] = [self._wake] if request.wakeable else []
         if deadline is not None:
             alternatives.append(self._env.timeout(deadline - self._env.now))
-        self.waiting = deadline is None
+        self.waiting, self.dozing = deadline is None, request.wakeable
         self._on_activity(False)
         yield simpy.AnyOf(self._env, alternatives)
         self._on_activity(True)
-        self.waiting = False
+        self.waiting = self.dozing = False
         if request.wakeable and self._wake.triggered:
             self._wake = self._env.event()
             return True

@@ -84,6 +84,22 @@ class FakeCameraBus:
         return self.answer
 
 
+class FakePins:
+    """One line that is not the FPGA's; it reads as the other level than it was driven to."""
+
+    def __init__(self) -> None:
+        self.driven = 0
+
+    def __contains__(self, pin: object) -> bool:
+        return pin == "LINE"
+
+    def set(self, pin: str, level: int) -> None:
+        self.driven = level
+
+    def get(self, pin: str) -> int:
+        return 1 - self.driven
+
+
 class Program:
     """Runs the body it was given; the program of a later start sleeps for ever."""
 
@@ -101,6 +117,7 @@ class Desk:
 
     def __init__(self, *bodies: Body, hz: int = 1_000_000) -> None:
         costs = {"work": Cost(1, "assumed", "a test"), "port_write": Cost(2, "assumed", "a test")}
+        costs["port_read"] = Cost(3, "assumed", "a test")
         self.kernel = Kernel()
         self.meter = Meter(CostTable("test", hz, costs))
         self.engine = FakeEngine()
@@ -118,6 +135,7 @@ class Desk:
             self._boot,
             power_on_cause=POWER_ON,
             boot_us=BOOT_US,
+            other_pins=FakePins(),
             on_pin=lambda pin, level: self.pins_told.append((pin, level)),
             on_activity=lambda busy: self.activity.append((self.us, busy)),
         )

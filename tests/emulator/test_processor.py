@@ -8,6 +8,7 @@ from cubestack.firmware_model.hardware import (
     AwaitPin,
     CameraTransfer,
     Pay,
+    ReadPin,
     ReadTimer,
     Reset,
     SetPin,
@@ -16,6 +17,7 @@ from cubestack.firmware_model.hardware import (
 
 BOOT_US = 100
 PORT_WRITE = 2
+PORT_READ = 3
 POWER_ON = 1
 
 
@@ -84,6 +86,31 @@ def test_pin_is_driven_when_the_work_before_it_is_done(desk_of):
     assert rises == [(10, "ENABLE", 1), (10 + PORT_WRITE, "RNW", 1)]
     assert desk.pins_told == [("ENABLE", 1), ("RNW", 1)]
     assert desk.log == [(10, None)]
+
+
+def test_pin_that_does_not_lead_to_the_fpga(desk_of):
+    def body(desk):
+        yield SetPin("LINE", 1)
+        desk.note((yield ReadPin("LINE")))
+        yield SetPin("LINE", 0)
+        desk.note((yield ReadPin("LINE")))
+
+    desk = desk_of(body).run()
+    first = PORT_WRITE
+    assert desk.log == [(first, 0), (first + PORT_READ + PORT_WRITE, 1)]
+    assert desk.engine.pins == []
+    assert desk.pins_told == [("LINE", 1), ("LINE", 0)]
+
+
+def test_pin_of_the_fpga_is_read_when_the_work_before_it_is_done(desk_of):
+    def body(desk):
+        desk.note((yield ReadPin("ACK")))
+        desk.work(10)
+        desk.note((yield ReadPin("ACK")))
+
+    desk = desk_of(body)
+    desk.ack_at(5)
+    assert desk.run().log == [(0, 0), (PORT_READ + 10, 1)]
 
 
 POLL = 7

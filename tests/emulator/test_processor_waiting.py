@@ -96,6 +96,16 @@ def test_waiting_means_a_sleep_without_deadline(desk_of):
     assert desk.processor.waiting
 
 
+def test_dozing_means_a_sleep_that_an_interrupt_ends(desk_of):
+    def body(desk):
+        yield Sleep(BOOT_US + 500, wakeable=False)
+        yield Sleep(BOOT_US + 900)
+
+    desk = desk_of(body)
+    for us, dozing in ((499, False), (501, True), (899, True)):
+        assert desk.run(us).processor.dozing is dozing
+
+
 def test_interrupts_during_a_sleep_are_paid_afterwards(desk_of):
     def body(desk):
         yield Sleep(500 + BOOT_US)
