@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.optics import COLUMNS, ROWS
+from cubestack.emulator.camera.optics import Optics
 from cubestack.emulator.camera.photometry import electrons_per_second
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.sky.attitude import matrix_from_quaternion
@@ -28,7 +28,6 @@ __all__ = ["FAINTEST_V", "star_light", "star_pixels"]
 FAINTEST_V = 8.0
 """Stars beyond it are left out: at the longest exposure their peak is below one count of 8 bits."""
 
-MIDDLE_ROW = (ROWS - 1) / 2
 SPOT_SIGMAS = 5.0
 CELLS_AT_ONCE = 3_400_000  # of all spots: bounds the memory of long streaks and wide spots
 VELOCITY_STEP_S = 0.01
@@ -39,7 +38,7 @@ _PHI = np.array([0.5 * (1 + math.erf(z / math.sqrt(2))) for z in _Z])
 
 
 def star_light(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float32]:
-    """Mean number of electrons that starlight frees in each pixel, shape (512, 1024)."""
+    """Mean number of electrons that starlight frees in each pixel, shape (rows, columns)."""
     vectors, rates = _stars(scene, shutter)
     phases = _phases(scene, shutter)
     pixels, light = [], []
@@ -52,7 +51,7 @@ def star_light(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float32]:
         pixels.append(false_pixels)
         light.append(false_rates)
     electrons = np.concatenate(light) * shutter.exposure_s
-    return _spots(np.concatenate(pixels), electrons, scene.optics.psf_sigma_px)
+    return _spots(np.concatenate(pixels), electrons, scene.optics)
 
 
 def star_pixels(
@@ -65,9 +64,15 @@ def star_pixels(
     """
     sky = load_sky(scene.epoch, _limit(scene))
     pixels, _ = _instant(scene, shutter, sky.vectors, 0.5)
+    columns, rows = scene.optics.columns, scene.optics.rows
     x, y = pixels.T
-    seen = (np.abs(x - (COLUMNS - 1) / 2) <= COLUMNS / 2) & (np.abs(y - MIDDLE_ROW) <= ROWS / 2)
+    seen = (np.abs(x - (columns - 1) / 2) <= columns / 2) & (np.abs(y - (rows - 1) / 2) <= rows / 2)
     return sky.hip[seen], pixels[seen]
+
+
+def _rate(scene: SkyScene, v_mag: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Electrons per second (n,) through the scene's lens."""
+    return electrons_per_second(v_mag, scene.optics.aperture_mm, scene.optics.effective_width_a)
 
 
 def _limit(scene: SkyScene) -> float:
@@ -79,19 +84,20 @@ def _stars(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit vectors (n, 3) and electrons per second (n,) of the stars that may come into view."""
     sky = load_sky(scene.epoch, _limit(scene))
-    seconds = shutter.exposure_s + ROWS * shutter.line_s
+    seconds = shutter.exposure_s + scene.optics.rows * shutter.line_s
     reach = scene.optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
-    boresight = matrix_from_quaternion(scene.truth(_time_ps(shutter, 0.5)))[2]
+    boresight = matrix_from_quaternion(scene.truth(_time_ps(scene, shutter, 0.5)))[2]
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
-    return sky.vectors[near], electrons_per_second(sky.v_mag[near])
+    return sky.vectors[near], _rate(scene, sky.v_mag[near])
 
 
 def _false_stars(scene: SkyScene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Pixels (n, 2) and electrons per second (n,) of lights that no catalogue has."""
     generator = np.random.default_rng([scene.seed, 0xFA15E])
-    pixels = generator.uniform([0, 0], [COLUMNS - 1, ROWS - 1], (scene.false_stars, 2))
+    last = [scene.optics.columns - 1, scene.optics.rows - 1]
+    pixels = generator.uniform([0, 0], last, (scene.false_stars, 2))
     v_mag = generator.uniform(*scene.false_star_mag, scene.false_stars)
-    return pixels, electrons_per_second(v_mag)
+    return pixels, _rate(scene, v_mag)
 
 
 def _phases(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float64]:
@@ -103,10 +109,11 @@ def _phases(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float64]:
     return (np.arange(samples) + 0.5) / samples
 
 
-def _time_ps(shutter: RollingShutter, phase: float) -> int:
+def _time_ps(scene: SkyScene, shutter: RollingShutter, phase: float) -> int:
     """The instant ``phase`` of the middle row's exposure."""
     exposure_ps = shutter.exposure_lines * shutter.line_ps
-    return shutter.mid_exposure_ps(MIDDLE_ROW) + round((phase - 0.5) * exposure_ps)
+    middle_row = (scene.optics.rows - 1) / 2
+    return shutter.mid_exposure_ps(middle_row) + round((phase - 0.5) * exposure_ps)
 
 
 def _instant(
@@ -118,7 +125,7 @@ def _instant(
         Pixels (n, 2), and weights (n,) of the light there: a star that moves down with the
         read-out is exposed by more rows, each for the full time.
     """
-    now = _time_ps(shutter, phase)
+    now = _time_ps(scene, shutter, phase)
     optics = scene.optics
     in_camera = vectors @ matrix_from_quaternion(scene.truth(now)).T
     pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
@@ -130,21 +137,23 @@ def _instant(
     per_line = (moved - pixels) * (shutter.line_s / VELOCITY_STEP_S)
     # y + vy * (row - middle) = row, solved for the row, counted from the middle one.
     stretch = 1 / (1 - per_line[:, 1])
-    lines = (pixels[:, 1] - MIDDLE_ROW) * stretch
+    lines = (pixels[:, 1] - (optics.rows - 1) / 2) * stretch
     return pixels + per_line * lines[:, None], weights * stretch
 
 
 def _spots(
-    pixels: NDArray[np.float64], electrons: NDArray[np.float64], sigma_px: float
+    pixels: NDArray[np.float64], electrons: NDArray[np.float64], optics: Optics
 ) -> NDArray[np.float32]:
-    """Sum of Gaussian spots at ``pixels`` (n, 2), NaN left out, on the sensor's (512, 1024)."""
+    """Sum of Gaussian spots at ``pixels`` (n, 2), NaN left out, on the sensor's (rows, columns)."""
+    sigma_px = optics.psf_sigma_px
     half = math.ceil(SPOT_SIGMAS * sigma_px) + 1
+    columns, rows = optics.columns, optics.rows
     with np.errstate(invalid="ignore"):
-        seen = np.all((pixels > -half) & (pixels < (COLUMNS - 1 + half, ROWS - 1 + half)), axis=1)
+        seen = np.all((pixels > -half) & (pixels < (columns - 1 + half, rows - 1 + half)), axis=1)
     pixels, electrons = pixels[seen], electrons[seen]
     # A canvas with a margin, so that the spots of all these stars lie on it.
     margin = 2 * half + 1
-    height, width = ROWS + 2 * margin, COLUMNS + 2 * margin
+    height, width = rows + 2 * margin, columns + 2 * margin
     canvas = np.zeros(height * width)
     cells = np.arange(-half, half + 1)
     at_once = CELLS_AT_ONCE // len(cells) ** 2
@@ -154,8 +163,8 @@ def _spots(
         shares = _shares(pixels[some] - nearest, half, sigma_px)
         shares[:, 1] *= electrons[some, None]
         spots = shares[:, 1, :, None] * shares[:, 0, None, :]
-        rows = (nearest[:, 1, None] + margin + cells) * width
-        index = rows[:, :, None] + (nearest[:, 0, None] + margin + cells)[:, None, :]
+        starts = (nearest[:, 1, None] + margin + cells) * width
+        index = starts[:, :, None] + (nearest[:, 0, None] + margin + cells)[:, None, :]
         canvas += np.bincount(index.ravel(), spots.ravel(), canvas.size)
     image = canvas.reshape(height, width)[margin:-margin, margin:-margin]
     return image.astype(np.float32)

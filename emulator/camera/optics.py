@@ -1,4 +1,4 @@
-"""CubeStar's lens: directions to pixels and back.
+"""A lens in front of a sensor, by default CubeStar's: directions to pixels and back.
 
 CubeStar thesis, section 4.1.4 (Brown's model, equations 4.1.3 to 4.1.5), section 4.1.5 (equation
 4.1.6) and section 5.4 (calibration, figure 5.12; focal length by star pairs).
@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.camera.photometry import APERTURE_MM, EFFECTIVE_WIDTH_A
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
@@ -37,6 +38,19 @@ _CALIBRATION = {
 
 WIDEST_PSF_PX = 20.0
 """Standard deviation of a spot in px, at most (assumed): few stars would still show."""
+
+_POSITIVE = (
+    "focal_length_mm",
+    "pixel_pitch_um",
+    "fx",
+    "fy",
+    "psf_sigma_px",
+    "columns",
+    "rows",
+    "aperture_mm",
+    "effective_width_a",
+    "field_stop_deg",
+)
 
 Pixels = NDArray[np.float64]
 
@@ -63,6 +77,10 @@ class Optics:
         psf_sigma_px: standard deviation of the Gaussian spot, px, at most 20; defocus included.
         vignetting: light falls off with this power of the cosine of the field angle; 4 is natural
             vignetting, 0 is none (nothing is published for this lens).
+        columns, rows: pixels of the sensor.
+        aperture_mm: diameter of the entrance pupil.
+        effective_width_a: bandwidth in Angstrom times transmission times quantum efficiency.
+        field_stop_deg: diameter of the round field that a light shade lets through; 360 is none.
     """
 
     focal_length_mm: float = _CALIBRATION["FocalLength"]
@@ -78,17 +96,24 @@ class Optics:
     distortion: Distortion = Distortion.INVERSE
     psf_sigma_px: float = 0.9
     vignetting: float = 0.0
+    columns: int = COLUMNS
+    rows: int = ROWS
+    aperture_mm: float = APERTURE_MM
+    effective_width_a: float = EFFECTIVE_WIDTH_A
+    field_stop_deg: float = 360.0
 
     def __post_init__(self) -> None:
         """Refuse a lens that can not make pictures."""
-        for name in ("focal_length_mm", "pixel_pitch_um", "fx", "fy", "psf_sigma_px"):
+        for name in _POSITIVE:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
         if self.psf_sigma_px > WIDEST_PSF_PX:
             raise ValueError(
                 f"psf_sigma_px must be at most {WIDEST_PSF_PX:g}, not {self.psf_sigma_px}"
             )
-        x, y = np.meshgrid(np.linspace(-0.5, COLUMNS - 0.5, 9), np.linspace(-0.5, ROWS - 0.5, 5))
+        x, y = np.meshgrid(
+            np.linspace(-0.5, self.columns - 0.5, 9), np.linspace(-0.5, self.rows - 0.5, 5)
+        )
         sensor = np.stack([x.ravel(), y.ravel()], axis=1)
         with np.errstate(all="ignore"):
             there_and_back = self.project(self.unproject(sensor))
@@ -132,12 +157,21 @@ class Optics:
     def transmission(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Relative light (n,) of directions (n, 3) in camera axes, 1 on the axis."""
         cosine = np.clip(vectors[:, 2], 0, 1)
-        return np.asarray(cosine**self.vignetting, np.float64)
+        light = np.asarray(cosine**self.vignetting, np.float64)
+        if self.field_stop_deg < 180:
+            light[cosine < np.cos(np.radians(self.field_stop_deg / 2))] = 0
+        return light
 
     @property
     def half_field_deg(self) -> float:
         """Angle between the boresight and the farthest corner of the sensor."""
-        return float(np.degrees(np.arccos(self.unproject(_corners())[:, 2].min())))
+        return float(np.degrees(np.arccos(self.unproject(self._corners)[:, 2].min())))
+
+    @property
+    def _corners(self) -> Pixels:
+        """The sensor's outer corners, px."""
+        x, y = self.columns - 0.5, self.rows - 0.5
+        return np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]])
 
     @property
     def _focal_px(self) -> float:
@@ -150,7 +184,7 @@ class Optics:
     @cached_property
     def _edge_of_field(self) -> float:
         """Tangent of the field angle beyond which nothing is projected."""
-        corners = self.unproject(_corners())
+        corners = self.unproject(self._corners)
         return 1.1 * float((np.hypot(corners[:, 0], corners[:, 1]) / corners[:, 2]).max())
 
     def _polynomial(self, points: Pixels, sign: int) -> Pixels:
@@ -190,9 +224,3 @@ class Optics:
                 return points
         points[~found] = np.nan
         return points
-
-
-def _corners() -> Pixels:
-    """The sensor's outer corners, px."""
-    x, y = COLUMNS - 0.5, ROWS - 0.5
-    return np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]])

@@ -41,8 +41,15 @@ DN12_PER_DN8 = 16
 """Only the upper 8 of 12 bits are wired (appendix C)."""
 
 
-def electrons_per_second(v_mag: ArrayLike) -> NDArray[np.float64]:
-    """Electrons a second that a star of magnitude ``v_mag`` gives on the axis, same shape."""
-    area_cm2 = np.pi * (APERTURE_MM / 20) ** 2
+def electrons_per_second(
+    v_mag: ArrayLike,
+    aperture_mm: float = APERTURE_MM,
+    effective_width_a: float = EFFECTIVE_WIDTH_A,
+) -> NDArray[np.float64]:
+    """Electrons a second that a star of magnitude ``v_mag`` gives on the axis, same shape.
+
+    The lens' aperture and the effective width are CubeStar's unless given.
+    """
+    area_cm2 = np.pi * (aperture_mm / 20) ** 2
     flux = PHOTONS_V0 * 10 ** (-0.4 * np.asarray(v_mag, np.float64))
-    return np.asarray(area_cm2 * EFFECTIVE_WIDTH_A * flux, np.float64)
+    return np.asarray(area_cm2 * effective_width_a * flux, np.float64)

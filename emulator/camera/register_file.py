@@ -1,4 +1,6 @@
-"""A camera's registers behind its control bus: address pointer, bytes, and the wait for a sync.
+"""A camera's registers behind its control bus: address pointer, values, and the wait for a sync.
+
+An address holds a byte, or a wider word where the camera's table says so.
 
 What is declared as not modelled, or not declared at all, is stored and logged when accessed.
 """
@@ -17,7 +19,7 @@ logger = logging.getLogger(__name__)
 
 
 class RegisterFile:
-    """The register bytes of one camera.
+    """The registers of one camera.
 
     Reading gives what was written. What is *active* is the same for registers that act at once,
     and the state at the last sync for the others.
@@ -38,7 +40,7 @@ class RegisterFile:
             address: byte
             for register in self._table
             for address, byte in zip(
-                register.addresses, register.reset.to_bytes(register.width, "big"), strict=True
+                register.addresses, register.units(register.reset), strict=True
             )
         }
         self._active = dict(self._written)
@@ -84,14 +86,15 @@ class RegisterFile:
 
     def active(self, name: str) -> int:
         """Value of register ``name`` that is in effect."""
-        return int.from_bytes(self._active[a] for a in self._table[name].addresses)
+        register, value = self._table[name], 0
+        for address in register.addresses:
+            value = value << register.unit_bits | self._active[address]
+        return value
 
     def store(self, name: str, value: int) -> None:
         """Set a register from the camera's side, active at once."""
         register = self._table[name]
-        for address, byte in zip(
-            register.addresses, value.to_bytes(register.width, "big"), strict=True
-        ):
+        for address, byte in zip(register.addresses, register.units(value), strict=True):
             self._written[address] = self._active[address] = byte
 
     def _step(self) -> tuple[int, CameraRegister | None]:
@@ -105,7 +108,7 @@ class RegisterFile:
         if not register.modelled:
             logger.info("%s: wrote %s, which is not modelled", camera, register.name)
             return
-        value = byte << (8 * (register.addresses[-1] - address))
+        value = byte << (register.unit_bits * (register.addresses[-1] - address))
         for field in register.fields:
             if value & field.mask and not field.modelled:
                 logger.info(

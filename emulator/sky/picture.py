@@ -18,8 +18,12 @@ class SceneError(ValueError):
     """A scene that can not be: a wrong value, key, file or picture. The text is one line."""
 
 
-def load_picture(file: Path, crop: Sequence[int]) -> NDArray[np.uint8]:
-    """Grey values of ``file`` from column and row ``crop`` on, shape (512, 1024), read-only.
+def load_picture(
+    file: Path, crop: Sequence[int], size: tuple[int, int] = (COLUMNS, ROWS)
+) -> NDArray[np.uint8]:
+    """Grey values of ``file`` from column and row ``crop`` on, read-only.
+
+    ``size`` is columns and rows of the sensor, CubeStar's unless given; the shape is its reverse.
 
     Raises:
         SceneError: when the file is missing, damaged, of another format, too small, or so large
@@ -31,8 +35,8 @@ def load_picture(file: Path, crop: Sequence[int]) -> NDArray[np.uint8]:
                 raise SceneError(
                     f"{file.name} is a {image.format} picture; right would be {', '.join(FORMATS)}"
                 )
-            _check_size(file, image.size, crop)
-            box = (crop[0], crop[1], crop[0] + COLUMNS, crop[1] + ROWS)
+            _check_size(file, image.size, crop, size)
+            box = (crop[0], crop[1], crop[0] + size[0], crop[1] + size[1])
             pixels = _grey(file, image.crop(box))
     except SceneError:
         raise
@@ -47,14 +51,17 @@ def load_picture(file: Path, crop: Sequence[int]) -> NDArray[np.uint8]:
     return pixels
 
 
-def _check_size(file: Path, size: tuple[int, int], crop: Sequence[int]) -> None:
+def _check_size(
+    file: Path, size: tuple[int, int], crop: Sequence[int], sensor: tuple[int, int]
+) -> None:
     x, y = crop
+    columns, rows = sensor
     if x < 0 or y < 0:
         raise SceneError(f"crop must not be negative, not {x},{y}")
-    if size[0] < x + COLUMNS or size[1] < y + ROWS:
+    if size[0] < x + columns or size[1] < y + rows:
         raise SceneError(
             f"{file.name} is {size[0]} x {size[1]} pixels; with crop {x},{y} it would have to be "
-            f"at least {x + COLUMNS} x {y + ROWS}"
+            f"at least {x + columns} x {y + rows}"
         )
 
 

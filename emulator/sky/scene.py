@@ -18,7 +18,7 @@ Only the undefined first frame of the camera differs, in proportion to its expos
 ``exposure_ms``, the exposure that the picture was taken with, it scales with any exposure.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -121,8 +121,9 @@ class SkyScene:
         for name in ("false_stars", "hot_pixels", "seed"):
             if getattr(self, name) < 0:
                 raise SceneError(f"{name} must not be negative, not {getattr(self, name)}")
-        if self.hot_pixels > COLUMNS * ROWS:
-            raise SceneError(f"hot_pixels must be at most {COLUMNS * ROWS}, not {self.hot_pixels}")
+        pixels = self.optics.columns * self.optics.rows
+        if self.hot_pixels > pixels:
+            raise SceneError(f"hot_pixels must be at most {pixels}, not {self.hot_pixels}")
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:
             raise SceneError(
@@ -178,6 +179,7 @@ class PictureScene:
         exposure_ms: exposure that it was taken with; None: grey values do not scale.
         quaternion: its attitude (4,) if known.
         temperature_c: of the sensor.
+        size: columns and rows of the sensor.
     """
 
     file: Path
@@ -185,6 +187,7 @@ class PictureScene:
     exposure_ms: float | None = None
     quaternion: ArrayLike | None = None
     temperature_c: float = 20.0
+    size: tuple[int, int] = (COLUMNS, ROWS)
     pixels: NDArray[np.uint8] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -194,7 +197,7 @@ class PictureScene:
         _check_temperature(self.temperature_c)
         if self.exposure_ms is not None and not self.exposure_ms > 0:
             raise SceneError(f"exposure_ms must be above 0, not {self.exposure_ms}")
-        object.__setattr__(self, "pixels", load_picture(Path(self.file), self.crop))
+        object.__setattr__(self, "pixels", load_picture(Path(self.file), self.crop, self.size))
 
     def truth(self, time_ps: int) -> NDArray[np.float64] | None:
         """The picture's attitude if known, whatever the time."""
@@ -217,24 +220,33 @@ def _check_temperature(temperature_c: float) -> None:
         raise SceneError(f"temperature_c must be in -60..125, not {temperature_c}")
 
 
-def load_scene(path: Path) -> Scene:
-    """The scene that a TOML file describes; SceneError names the key that is wrong."""
+def load_scene(path: Path, lens: Optics | None = None) -> Scene:
+    """The scene that a TOML file describes; SceneError names the key that is wrong.
+
+    ``lens`` stands for what the file leaves open of lens and sensor, CubeStar's unless given.
+    """
+    lens = Optics() if lens is None else lens
     table = load_toml(path)
     try:
         kind = table.pop("kind", None)
         if kind == "sky":
-            return _sky(table)
+            return _sky(table, lens)
         if kind == "picture":
-            return _picture(table, Path(path).parent)
+            return _picture(table, Path(path).parent, lens)
         raise SceneError(f'kind must be "sky" or "picture", not {kind!r}')
     except ValueError as error:
         raise SceneError(f"{path}: {error}") from None
 
 
-def _optics(value: Any) -> Optics:
-    if not isinstance(value, dict):
-        raise SceneError(f"must be a table, not {value!r}")
-    return Optics(**read_table(value, _OPTICS))
+def _optics(lens: Optics) -> Callable[[Any], Optics]:
+    """Reader of the table "optics", which changes ``lens``."""
+
+    def read(value: Any) -> Optics:
+        if not isinstance(value, dict):
+            raise SceneError(f"must be a table, not {value!r}")
+        return replace(lens, **read_table(value, _OPTICS))
+
+    return read
 
 
 def _distortion(value: Any) -> Distortion:
@@ -244,8 +256,11 @@ def _distortion(value: Any) -> Distortion:
         raise SceneError(f"must be one of {[d.value for d in Distortion]}, not {value!r}") from None
 
 
+#: Keys of the table "optics"; the sensor's size is the device's.
 _OPTICS: Readers = {
-    f.name: _distortion if f.name == "distortion" else number for f in fields(Optics)
+    f.name: _distortion if f.name == "distortion" else number
+    for f in fields(Optics)
+    if f.name not in ("columns", "rows")
 }
 _POSE: Readers = {
     "ra_deg": number,
@@ -264,7 +279,6 @@ _SKY: Readers = _POSE | {
     "seed": whole,
     "temperature_c": number,
     "hot_pixels": whole,
-    "optics": _optics,
 }
 _PICTURE: Readers = {
     "file": text,
@@ -275,8 +289,8 @@ _PICTURE: Readers = {
 }
 
 
-def _sky(table: Mapping[str, Any]) -> SkyScene:
-    values = read_table(table, _SKY)
+def _sky(table: Mapping[str, Any], lens: Optics) -> SkyScene:
+    values = {"optics": lens} | read_table(table, _SKY | {"optics": _optics(lens)})
     later = values.pop("poses", [])
     if not isinstance(later, list) or not all(isinstance(pose, dict) for pose in later):
         raise SceneError("poses must be tables, each under [[poses]]")
@@ -297,8 +311,9 @@ def _pose(values: dict[str, Any]) -> Pose:
     return Pose(**values)
 
 
-def _picture(table: Mapping[str, Any], folder: Path) -> PictureScene:
+def _picture(table: Mapping[str, Any], folder: Path, lens: Optics) -> PictureScene:
     values = read_table(table, _PICTURE)
+    values["size"] = lens.columns, lens.rows
     if "file" not in values:
         raise SceneError("a picture needs the key file")
     return PictureScene(folder / values.pop("file"), **values)

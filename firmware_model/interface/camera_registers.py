@@ -65,14 +65,15 @@ class CameraRegister:
     Attributes:
         address: of its first, most significant byte.
         name: unique within the map.
-        width: number of bytes.
+        width: number of addresses that it takes.
         access: what the control bus may do.
-        reset: value after power-up and reset, ``width`` bytes, unsigned.
+        reset: value after power-up and reset, unsigned.
         meaning: what the value does.
         fields: declared bits; none when the value is one number.
         needs_sync: a written value waits for the sync register before it takes effect.
         modelled: False when the camera model stores the value and does nothing with it.
         assumed: what here is our choice because nothing is published; empty when all is published.
+        unit_bits: bits behind one address.
     """
 
     address: int
@@ -85,18 +86,25 @@ class CameraRegister:
     needs_sync: bool = False
     modelled: bool = True
     assumed: str = ""
+    unit_bits: int = 8
 
     @property
     def addresses(self) -> range:
-        """Addresses of its bytes."""
+        """Addresses of its bytes, or of what else stands behind an address."""
         return range(self.address, self.address + self.width)
 
     @property
     def bits(self) -> int:
         """Mask of the declared bits: the whole register when it has no fields."""
         if not self.fields:
-            return (1 << (8 * self.width)) - 1
+            return (1 << (self.unit_bits * self.width)) - 1
         return sum(field.mask for field in self.fields)
+
+    def units(self, value: int) -> list[int]:
+        """``value`` cut up by addresses, most significant part first."""
+        part = (1 << self.unit_bits) - 1
+        shifts = reversed(range(self.width))
+        return [value >> (self.unit_bits * shift) & part for shift in shifts]
 
     def field(self, name: str) -> BitField:
         """The bit field ``name``; UnknownRegisterError when there is none."""
