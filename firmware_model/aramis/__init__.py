@@ -1,0 +1,1 @@
+"""AraMiS' star tracker firmware for the ADSP-BF533."""
