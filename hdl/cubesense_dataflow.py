@@ -1,15 +1,18 @@
 """Dataflow control: what one of CubeSense's FPGAs does at the levels of the control lines.
 
 CubeSense thesis, section 6.4.2 and table 6.4. The rows are those of the command table in
-:mod:`cubestack.firmware_model.interface.cubesense_fpga`; every other one is standby.
+:mod:`cubestack.firmware_model.interface.cubesense_fpga`; every other one is standby. The rows of
+its second table are an option.
 """
 
+from dataclasses import replace
 from typing import Literal
 
 from amaranth.hdl import Cat, Module, Value
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense_fpga import (
+    ADDRESSING_COMMANDS,
     COMMANDS,
     Action,
     Command,
@@ -31,11 +34,15 @@ class DataflowControl(Component):
         rnw, edge, shift: the other control lines.
         store, read, edge_data, send_picture, store_other, send_edge, pass_edge: one is high, the
             one with the name of the action to be taken (``edge_data`` is EDGE); none in standby.
+        take_address, read_from: the same, with ``mcu_addressing`` only.
+        addressing: one of these two, without a glitch while SHIFT moves from one to the other.
     """
 
-    def __init__(self, side: Side) -> None:
+    def __init__(self, side: Side, *, mcu_addressing: bool = False) -> None:
         """Make the control of the sun sensor's or the nadir sensor's FPGA."""
         self._side = side
+        self._mcu_addressing = mcu_addressing
+        names = ("take_address", "read_from", "addressing") * mcu_addressing
         super().__init__(
             {
                 "en_n": In(1),
@@ -50,6 +57,7 @@ class DataflowControl(Component):
                 "store_other": Out(1),
                 "send_edge": Out(1),
                 "pass_edge": Out(1),
+                **dict.fromkeys(names, Out(1)),
             }
         )
 
@@ -65,7 +73,13 @@ class DataflowControl(Component):
             Action.SEND_EDGE: self.send_edge,
             Action.PASS_EDGE: self.pass_edge,
         }
-        for command in COMMANDS:
+        commands = COMMANDS
+        if self._mcu_addressing:
+            commands += ADDRESSING_COMMANDS
+            outputs[Action.TAKE_ADDRESS] = self.take_address
+            outputs[Action.READ_FROM] = self.read_from
+            m.d.comb += self.addressing.eq(self._addressing())
+        for command in commands:
             action = getattr(command.actions, self._side)
             if action is not Action.STANDBY:
                 with m.If(self._fits(command)):
@@ -92,12 +106,19 @@ class DataflowControl(Component):
             levels.append((self.other_en_n, other))
         return Cat(line == level for line, level in levels if level is not None).all()
 
+    def _addressing(self) -> Value:
+        """The rows of address control with SHIFT left out, which makes one condition of them."""
+        rows = [replace(command, shift=None) for command in ADDRESSING_COMMANDS]
+        own = [row for row in rows if getattr(row.actions, self._side) is not Action.STANDBY]
+        return Cat(self._fits(row) for row in own).any()
+
     def _other_matters(self, command: Command) -> bool:
         """Whether this FPGA sees the other enable, and would act otherwise at its other level."""
         shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
         enables = [command.sunen, command.naden]
         enables[1 if self._side == "sun" else 0] ^= 1
-        changed = getattr(actions(shift, edge, rnw, *enables), self._side)
+        flipped = actions(shift, edge, rnw, *enables, mcu_addressing=self._mcu_addressing)
+        changed = getattr(flipped, self._side)
         return link_shows_enables(shift, edge) and changed is not getattr(
             command.actions, self._side
         )

@@ -34,7 +34,8 @@ class CubeSensePair(Component):
 
     SUNEN and NADEN are low active; RNW, CLK, EDGE and SHIFT go to both FPGAs. DATA is the
     microcontroller's bus, 0 while nobody drives it, which DATA_OE tells. A data line of the link
-    that nobody drives is 0, and a control line 1.
+    that nobody drives is 0, and a control line 1. With ``mcu_addressing`` DATA_I is what the
+    microcontroller drives on its bus; it must drive nothing while DATA_OE is high.
 
     CONTENTION is not 0 when both FPGAs drive the same wire: bit 0 DATA, bit 1 the link's data,
     bits 2 and 3 its control lines. The SRAMs' data buses are not among these.
@@ -43,17 +44,18 @@ class CubeSensePair(Component):
     cycles, as CXXRTL does, must evaluate twice before it commits, or it misses that clock's edges.
     """
 
-    def __init__(self, read_out: ReadOut = FULL_SIZE) -> None:
+    def __init__(self, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False) -> None:
         """Make the pair."""
         self.read_out = read_out
-        self._sun = CubeSenseFpga("sun", read_out)
-        self._nadir = CubeSenseFpga("nadir", read_out)
+        self._sun = CubeSenseFpga("sun", read_out, mcu_addressing)
+        self._nadir = CubeSenseFpga("nadir", read_out, mcu_addressing)
+        self._common = (*_COMMON, *("DATA_I",) * mcu_addressing)
         members = self._sun.signature.members
         super().__init__(
             {
                 **{f"SUN_{name}": members[name] for name in _OWN},
                 **{f"NAD_{name}": members[name] for name in _OWN},
-                **{name: members[name] for name in _COMMON},
+                **{name: members[name] for name in self._common},
                 "SUNEN": In(1, init=1),
                 "NADEN": In(1, init=1),
                 "SUNACK": Out(1),
@@ -70,7 +72,8 @@ class CubeSensePair(Component):
         m.submodules.sun = sun = self._sun
         m.submodules.nadir = nadir = self._nadir
         for prefix, fpga in (("SUN_", sun), ("NAD_", nadir)):
-            ports = [(name, prefix + name) for name in _OWN] + [(name, name) for name in _COMMON]
+            own = [(name, prefix + name) for name in _OWN]
+            ports = own + [(name, name) for name in self._common]
             for name, port in ports:
                 if fpga.signature.members[name].flow is In:
                     m.d.comb += getattr(fpga, name).eq(getattr(self, port))

@@ -1,6 +1,6 @@
 """One of CubeSense's two FPGAs: an AGLN030 between camera, SRAM, microcontroller and its twin.
 
-CubeSense thesis, tables 3.4, 6.3 and 6.4, sections 6.4 to 6.6 and figure 6.5.
+CubeSense thesis, tables 3.4, 6.3 and 6.4, sections 6.4 to 6.6 and figure 6.5; section 9.2.2.
 
 How each asynchronous input is brought in:
 
@@ -12,6 +12,7 @@ How each asynchronous input is brought in:
   clock, "not reading" is reset without a synchroniser, because the same microcontroller makes
   control lines and CLK one after the other. Picture, scan and window have one such reset each, so
   each starts from its first byte however it was reached.
+- DATA_I, where there is one, is used with CLK only: the microcontroller makes both.
 - The other FPGA's enable comes over the link and is used like the own one.
 
 The coordinates of the first Sun pixel outlive the reset: they are written by a pixel clock while a
@@ -32,7 +33,7 @@ from cubestack.hdl.frame_writer import FrameWriter
 from cubestack.hdl.matrix_counter import MatrixCounter
 from cubestack.hdl.sun_search import SunSearch
 
-__all__ = ["PINS", "CubeSenseFpga", "FpgaPins"]
+__all__ = ["ADDRESSING_PINS", "PINS", "CubeSenseFpga", "FpgaPins"]
 
 
 class FpgaPins(NamedTuple):
@@ -68,20 +69,34 @@ PINS = (
     ),
 )
 
+#: What is other with address control from the microcontroller: 64 pins too.
+ADDRESSING_PINS = FpgaPins(
+    8,
+    ("DATA_I", "DATA_O", "DATA_OE"),
+    "bytes to the microcontroller and addresses from it, on a bus for both FPGAs",
+)
+
 
 class CubeSenseFpga(Component):
     """The sun sensor's or the nadir sensor's FPGA with the pins of table 3.4.
 
     Bidirectional pins are i / o / oe triples. LINK_C_OE has one bit for each of its two lines.
     With EN high every output is at its reset value, all drivers off, whatever the other pins do.
+
+    ``mcu_addressing`` makes the microcontroller's data bus bidirectional and adds the rows in which
+    it sets the address. No FPGA drives the bus while SHIFT and RNW are both low, so that is when
+    the microcontroller may.
     """
 
-    def __init__(self, side: Side, read_out: ReadOut = FULL_SIZE) -> None:
+    def __init__(
+        self, side: Side, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False
+    ) -> None:
         """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
         if side not in ("sun", "nadir"):
             raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
         self.side = side
         self.read_out = read_out
+        self.mcu_addressing = mcu_addressing
         super().__init__(
             {
                 "Y": In(8),
@@ -108,6 +123,7 @@ class CubeSenseFpga(Component):
                 "SRAM_CE_N": Out(1, init=1),
                 "SRAM_OE_N": Out(1, init=1),
                 "SRAM_WE_N": Out(1, init=1),
+                **({"DATA_I": In(8)} if mcu_addressing else {}),
             }
         )
 
@@ -115,8 +131,9 @@ class CubeSenseFpga(Component):
         """Wire the blocks to the pins."""
         m = Module()
         is_sun = self.side == "sun"
-        m.submodules.dataflow = mode = DataflowControl(self.side)
-        m.submodules.reader = reader = CubeSenseReader(self.read_out)
+        addressing = self.mcu_addressing
+        m.submodules.dataflow = mode = DataflowControl(self.side, mcu_addressing=addressing)
+        m.submodules.reader = reader = CubeSenseReader(self.read_out, mcu_addressing=addressing)
         own_writer = self._writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y)
         link_writer = self._writer(
             m, "link", mode.store_other, self.LINK_C_I[0], self.LINK_C_I[1], self.LINK_D_I
@@ -128,7 +145,16 @@ class CubeSenseFpga(Component):
         own_line, other_line = (0, 1) if is_sun else (1, 0)
         orders = (reader.window, reader.scan)
         own_edge, other_edge = orders if is_sun else orders[::-1]
-        reading = mode.read | mode.edge_data | mode.send_edge
+        presenting = mode.read | mode.edge_data
+        if addressing:
+            presenting |= mode.read_from
+            m.d.comb += [
+                reader.addressing.eq(mode.addressing),
+                reader.take_address.eq(mode.take_address),
+                reader.read_from.eq(mode.read_from),
+                reader.address_byte.eq(self.DATA_I),
+            ]
+        reading = presenting | mode.send_edge
         storing = ~ResetSignal("pix") | ~ResetSignal("link")
         shows_enable = ~self.EN & (self.EDGE | ~self.SHIFT)
         m.d.comb += [
@@ -151,7 +177,7 @@ class CubeSenseFpga(Component):
             reader.memory.eq(self.SRAM_D_I),
             self.ACK.eq(own_writer.ack | link_writer.ack),
             self.DATA_O.eq(reader.data | (self.LINK_D_I & mode.pass_edge.replicate(8))),
-            self.DATA_OE.eq(mode.read | mode.edge_data | mode.pass_edge),
+            self.DATA_OE.eq(presenting | mode.pass_edge),
             self.LINK_D_O.eq(reader.data | (self.Y & mode.send_picture.replicate(8))),
             self.LINK_D_OE.eq(mode.send_picture | mode.send_edge),
             # An enable is shown by pulling the line low, so an FPGA without power shows none.

@@ -17,7 +17,8 @@ class MatrixCounter(Component):
 
     The three commands are sampled at the domain's rising edge; ``clear`` wins over ``next_row``,
     which wins over ``next_column``. The position never leaves the frame: past the last column
-    comes the next row, past the last row the first one.
+    comes the next row, past the last row the first one. Only ``load`` can take it elsewhere; where
+    it steps to from there is not defined.
 
     Ports:
         next_column: step to the next pixel.
@@ -25,9 +26,12 @@ class MatrixCounter(Component):
         clear: go to column 0 of row 0.
         last_column, last_row: high on the last one.
         address: row : column.
+        load, position: go to this row : column; wins over the others. With ``loadable`` only.
     """
 
-    def __init__(self, columns: int, rows: int, *, domain: str = "sync") -> None:
+    def __init__(
+        self, columns: int, rows: int, *, domain: str = "sync", loadable: bool = False
+    ) -> None:
         """Make a counter; ``columns`` and ``rows`` are at least 2, else ValueError."""
         for name, value in (("columns", columns), ("rows", rows)):
             if value < 2:
@@ -35,6 +39,8 @@ class MatrixCounter(Component):
         self._columns = columns
         self._rows = rows
         self._domain = domain
+        self._loadable = loadable
+        width = self.address_width(columns, rows)
         super().__init__(
             {
                 "next_column": In(1),
@@ -42,7 +48,8 @@ class MatrixCounter(Component):
                 "clear": In(1),
                 "last_column": Out(1),
                 "last_row": Out(1),
-                "address": Out(self.address_width(columns, rows)),
+                "address": Out(width),
+                **({"load": In(1), "position": In(width)} if loadable else {}),
             }
         )
 
@@ -70,4 +77,7 @@ class MatrixCounter(Component):
             m.d[self._domain] += row.eq(0)
         with m.Elif(row_over):
             m.d[self._domain] += row.eq(row + 1)
+        if self._loadable:
+            with m.If(self.load):
+                m.d[self._domain] += Cat(column, row).eq(self.position)
         return m

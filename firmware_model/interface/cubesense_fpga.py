@@ -1,8 +1,8 @@
 """CubeSense's FPGAs as the microcontroller sees them: commands, read-out order, Sun coordinates.
 
 CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), section 6.5.1 and figure
-6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window), section 9.2.2 (address
-control from the microcontroller).
+6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window), section 9.2.2
+(address control from the microcontroller).
 """
 
 from collections.abc import Iterator
@@ -92,7 +92,7 @@ COMMANDS = (
 #: Rows that a board with address control from the microcontroller has besides, out of those that
 #: table 6.4 leaves open; section 9.2.2 wishes for it, the protocol is ours. Only SHIFT moves
 #: between the two, with an enable low: no other row is crossed, and the address is kept. The
-#: microcontroller may drive the data bus while SHIFT is low.
+#: microcontroller may drive the data bus while SHIFT and RNW are both low: no FPGA does then.
 ADDRESSING_COMMANDS = (
     Command(0, 1, 0, 0, 1, Actions(Action.TAKE_ADDRESS, _IDLE)),
     Command(0, 1, 0, 1, 0, Actions(_IDLE, Action.TAKE_ADDRESS)),

@@ -85,8 +85,14 @@ def test_unknown_cell_is_refused():
 
 @pytest.mark.parametrize(
     "make",
-    [CubeStarTop, lambda: CubeSenseFpga("sun"), lambda: CubeSenseFpga("nadir")],
-    ids=["cubestar", "cubesense-sun", "cubesense-nadir"],
+    [
+        CubeStarTop,
+        lambda: CubeSenseFpga("sun"),
+        lambda: CubeSenseFpga("nadir"),
+        lambda: CubeSenseFpga("sun", mcu_addressing=True),
+        lambda: CubeSenseFpga("nadir", mcu_addressing=True),
+    ],
+    ids=["cubestar", "sun", "nadir", "sun-addressing", "nadir-addressing"],
 )
 def test_top_fits_its_part(make):
     tiles = count_tiles(make())
@@ -106,7 +112,7 @@ def test_documented_counts():
         (DOCS / "gateware-cubesense.md").read_text(encoding="utf-8"),
         re.MULTILINE,
     )
-    assert len(rows) == 4
+    assert len(rows) == 6
     designs = (CubeSenseFpga, GrayCounter, MatrixCounter)
     names = {design.__name__: design for design in designs}
     for name, *numbers in rows:

@@ -5,6 +5,7 @@ from itertools import product
 import pytest
 
 from cubestack.firmware_model.interface.cubesense_fpga import (
+    ADDRESSING_COMMANDS,
     COMMANDS,
     FULL_SIZE,
     SUN_NOT_FOUND,
@@ -12,6 +13,7 @@ from cubestack.firmware_model.interface.cubesense_fpga import (
     Actions,
     ReadOut,
     actions,
+    address_bytes,
     link_shows_enables,
 )
 
@@ -29,6 +31,12 @@ PRINTED = {
     "11100": (Action.SEND_EDGE, Action.PASS_EDGE),
 }
 OURS = {"00000": (Action.STORE, Action.STORE)}
+ADDRESSING = {
+    "01001": (Action.TAKE_ADDRESS, Action.STANDBY),
+    "01010": (Action.STANDBY, Action.TAKE_ADDRESS),
+    "11001": (Action.READ_FROM, Action.STANDBY),
+    "11010": (Action.STANDBY, Action.READ_FROM),
+}
 
 
 def test_printed_rows_and_standby_in_all_others() -> None:
@@ -38,9 +46,38 @@ def test_printed_rows_and_standby_in_all_others() -> None:
         assert actions(*map(int, levels)) == expected, levels
 
 
+def test_address_control_adds_rows_that_are_standby_without_it() -> None:
+    listed = PRINTED | OURS | ADDRESSING
+    for levels in product("01", repeat=5):
+        expected = listed.get("".join(levels), (Action.STANDBY, Action.STANDBY))
+        assert actions(*map(int, levels), mcu_addressing=True) == expected, levels
+
+
 def test_no_levels_are_listed_twice() -> None:
     for levels in product((0, 1), repeat=5):
-        assert sum(command.fits(*levels) for command in COMMANDS) <= 1
+        commands = COMMANDS + ADDRESSING_COMMANDS
+        assert sum(command.fits(*levels) for command in commands) <= 1
+
+
+def test_address_control_sees_the_other_enable_and_moves_shift_only() -> None:
+    for command in ADDRESSING_COMMANDS:
+        assert link_shows_enables(command.shift or 0, command.edge or 0)
+    rows = {(c.edge, c.rnw) for c in ADDRESSING_COMMANDS}
+    assert len(rows) == 1
+
+
+@pytest.mark.parametrize(
+    ("pixel", "sent"),
+    [((0, 0), "000000"), ((639, 0), "00027f"), ((0, 1), "000400"), ((639, 479), "077e7f")],
+)
+def test_address_is_row_and_column_highest_byte_first(pixel: tuple[int, int], sent: str) -> None:
+    assert address_bytes(*pixel).hex() == sent
+
+
+@pytest.mark.parametrize("pixel", [(640, 0), (0, 480), (-1, 0), (0, -1)])
+def test_address_of_a_pixel_outside_is_refused(pixel: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="not inside of 640 x 480 pixels"):
+        address_bytes(*pixel)
 
 
 def test_a_picture_on_the_link_hides_the_enables() -> None:
@@ -52,9 +89,11 @@ def test_a_picture_on_the_link_hides_the_enables() -> None:
 
 
 def test_one_fpga_at_most_drives_the_microcontrollers_bus() -> None:
-    drivers = {Action.READ, Action.EDGE, Action.PASS_EDGE}
-    for command in COMMANDS:
-        assert len([action for action in command.actions if action in drivers]) <= 1
+    drivers = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
+    for command in COMMANDS + ADDRESSING_COMMANDS:
+        driving = [action for action in command.actions if action in drivers]
+        assert len(driving) <= 1
+        assert command.shift or command.rnw or not driving, "the microcontroller may drive here"
 
 
 def test_both_ends_of_the_link_fit() -> None:

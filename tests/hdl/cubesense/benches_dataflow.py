@@ -7,6 +7,7 @@ from typing import Any
 import cocotb
 from cocotb.triggers import Timer
 from cocotb.types import LogicArray
+from small import MCU_ADDRESSING
 
 from cubestack.firmware_model.interface.cubesense_fpga import Action, actions, link_shows_enables
 
@@ -20,6 +21,8 @@ OUTPUTS = {
     "send_edge": Action.SEND_EDGE,
     "pass_edge": Action.PASS_EDGE,
 }
+if MCU_ADDRESSING:
+    OUTPUTS |= {"take_address": Action.TAKE_ADDRESS, "read_from": Action.READ_FROM}
 
 
 @cocotb.test()
@@ -31,11 +34,15 @@ async def every_row_and_every_unlisted_row(dut: Any) -> None:
         await Timer(1, unit="ns")
         other = other if link_shows_enables(shift, edge) else 0
         sunen, naden = (own, other) if SIDE == "sun" else (other, own)
-        expected = getattr(actions(shift, edge, rnw, sunen, naden), SIDE)
+        listed = actions(shift, edge, rnw, sunen, naden, mcu_addressing=MCU_ADDRESSING)
+        expected = getattr(listed, SIDE)
         taken = [action for name, action in OUTPUTS.items() if int(getattr(dut, name).value)]
         assert taken == ([] if expected is Action.STANDBY else [expected])
         done.add(expected)
-    assert done == set(Action)
+        if MCU_ADDRESSING:
+            addressing = expected in (Action.TAKE_ADDRESS, Action.READ_FROM)
+            assert int(dut.addressing.value) == addressing
+    assert done == {Action.STANDBY, *OUTPUTS.values()}
 
 
 @cocotb.test()

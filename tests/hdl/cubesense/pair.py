@@ -11,7 +11,7 @@ from geometry import GEOMETRY
 from instants import ODD, now, wait
 from pair_reference import SIDES, Controls, Half, behaviour
 from reference import Tick
-from small import READ_OUT
+from small import MCU_ADDRESSING, READ_OUT
 from sram import SLOWEST_ACCESS, UNKNOWN, Sram
 
 PREFIXES = {"sun": "SUN", "nadir": "NAD"}
@@ -76,6 +76,11 @@ class CubeSenseMcu:
         self._levels = dict.fromkeys(self.LINES, 0) | {"SUNEN": 1, "NADEN": 1}
         self.controls = [Controls(now(), *self._levels.values())]
         self.bytes: dict[int, int] = {}  # by the time of their clock
+        self.sent: dict[int, int] = {}  # what is on its data bus then
+        self.drives = False  # its data bus; at first that floats at some level
+        self._data: int | None = random.getrandbits(8)
+        if MCU_ADDRESSING:
+            dut.DATA_I.value = self._data
         dut.CLK.value = 0
         for name, level in self._levels.items():
             getattr(dut, name).value = level
@@ -126,6 +131,26 @@ class CubeSenseMcu:
         """From standby: ready to read a sensor's edge data in the other one's memory."""
         await self.command(1, 1, 0 if sensor == "sun" else 1, 0, 0)
 
+    async def open_address(self, side: str) -> None:
+        """From standby: ready to take an address."""
+        await self.command(0, 1, 0, *enables(side))
+
+    async def take(self, address: bytes) -> None:
+        """From taking an address, or from reading there: take one, and go on to read there."""
+        await self.set(SHIFT=0)
+        for byte in address:
+            await wait(random.randrange(60_000), ODD)
+            self.drive(byte)
+            await self.clock()
+        await wait(random.randrange(60_000), ODD)
+        self.drive(None)
+        await self.set(SHIFT=1)
+
+    def drive(self, byte: int | None) -> None:
+        """Drive the data bus; None lets go of it, at no known level."""
+        self.drives, self._data = byte is not None, byte
+        self._dut.DATA_I.value = UNKNOWN if byte is None else byte
+
     async def acknowledged(self, side: str, patience: int = 10**9) -> bool:
         """Poll an FPGA's ACK for at most ``patience`` ps."""
         ack = getattr(self._dut, f"{PREFIXES[side]}ACK")
@@ -141,6 +166,8 @@ class CubeSenseMcu:
         await wait(SLOWEST_ACCESS + random.randrange(4_000, 60_000), ODD)
         self._dut.CLK.value = 1
         time = now()
+        if self._data is not None:
+            self.sent[time] = self._data
         await wait(random.randrange(4_000, 60_000), ODD)
         self._dut.CLK.value = 0
         self.bytes[time] = int(self._dut.DATA.value)
@@ -202,6 +229,7 @@ class PairBench:
             else:
                 cocotb.start_soon(bench.cameras[side].run())
         cocotb.start_soon(bench._watch_contention())
+        cocotb.start_soon(bench._watch_data_bus())
         return bench
 
     async def _watch_ack(self, side: str) -> None:
@@ -217,6 +245,13 @@ class PairBench:
             await self.dut.CONTENTION.value_change
             await ReadOnly()
             assert not int(self.dut.CONTENTION.value), "two drivers on one wire"
+
+    async def _watch_data_bus(self) -> None:
+        while True:
+            await self.dut.DATA_OE.value_change
+            await ReadOnly()
+            both = self.mcu.drives and int(self.dut.DATA_OE.value)
+            assert not both, "the microcontroller and an FPGA drive the data bus"
 
     async def shoot(self, camera: str, memory: str, content: bytes) -> None:
         """From standby: one picture from a camera to a memory, to ACK, and to standby."""
@@ -247,6 +282,7 @@ class PairBench:
             [self.cameras[side].clocks for side in SIDES],
             self.mcu.controls,
             list(self.mcu.bytes),
+            self.mcu.sent,
         )
         for side, half in halves.items():
             assert self.srams[side].pulses == half.pulses, side

@@ -4,14 +4,14 @@ Follows the command table and the wording of the blocks' docstrings; whole frame
 read-outs at once, not clock by clock.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, islice, pairwise
 from typing import NamedTuple
 
 from geometry import GEOMETRY
 from reference import Clock, Pulse, Tick, taken
-from small import READ_OUT
+from small import MCU_ADDRESSING, READ_OUT
 
 from cubestack.firmware_model.interface.cubesense_fpga import (
     SUN_RUN,
@@ -23,6 +23,7 @@ from cubestack.firmware_model.interface.cubesense_fpga import (
 
 SIDES = ("sun", "nadir")
 NEVER = 1 << 62
+ADDRESSING = (Action.TAKE_ADDRESS, Action.READ_FROM)
 NOT_FOUND = (
     (1 << (GEOMETRY.columns - 1).bit_length()) - 1,
     (1 << (GEOMETRY.rows - 1).bit_length()) - 1,
@@ -78,7 +79,8 @@ def action_of(side: str, controls: Controls) -> Action:
     _, shift, edge, rnw, sunen, naden = controls
     if not link_shows_enables(shift, edge):
         sunen, naden = (sunen, 0) if side == "sun" else (0, naden)
-    return getattr(actions(shift, edge, rnw, sunen, naden), side)
+    levels = (shift, edge, rnw, sunen, naden)
+    return getattr(actions(*levels, mcu_addressing=MCU_ADDRESSING), side)
 
 
 def windows(side: str, controls: Sequence[Controls]) -> list[Window]:
@@ -185,6 +187,30 @@ def sun_window(half: Half) -> Iterator[int]:
                 yield half.memory[GEOMETRY.address(left + column, top + row)]
 
 
+def addressed(
+    half: Half, start: Window, data_clocks: Sequence[int], sent: Mapping[int, int]
+) -> dict[int, int]:
+    """Bytes from when ``start`` takes an address for the first time until another action follows.
+
+    ``sent`` is what the microcontroller drives, by the time of its clock.
+    """
+    address, end = 0, start.start
+    data: dict[int, int] = {}
+    for window in half.windows[half.windows.index(start) :]:
+        if window.action not in ADDRESSING or window.start != end:
+            break
+        end = window.end
+        for time in data_clocks:
+            if window.start < time < end and window.action is Action.TAKE_ADDRESS:
+                address = (address << 8 | sent[time]) % GEOMETRY.bank_size
+            elif window.start < time < end:
+                data[time] = half.memory[address]
+                y, x = divmod(address, GEOMETRY.address(0, 1))
+                pixel = (y * GEOMETRY.columns + x + 1) % GEOMETRY.pixels
+                address = GEOMETRY.address(pixel % GEOMETRY.columns, pixel // GEOMETRY.columns)
+    return data
+
+
 def read(half: Half, side: str, window: Window, data_clocks: Sequence[int]) -> dict[int, int]:
     """Byte on the microcontroller's bus after each data clock of one read-out."""
     if window.action is Action.READ:
@@ -201,6 +227,7 @@ def behaviour(
     cameras: Sequence[Sequence[Clock]],
     controls: Sequence[Controls],
     data_clocks: Sequence[int],
+    sent: Mapping[int, int],
 ) -> tuple[dict[str, Half], dict[int, int]]:
     """Both halves, and the bytes read, from the memories at first and what the inputs did since."""
     halves = {
@@ -212,6 +239,7 @@ def behaviour(
         own, other = SIDES.index(side), 1 - SIDES.index(side)
         sending = [w for w in halves[SIDES[other]].windows if w.action is Action.SEND_PICTURE]
         link = link_clocks(sending, cameras[other])
+        ended, before = -1, Action.STANDBY
         for window in half.windows:
             if window.action is Action.STORE:
                 store(half, window, cameras[own], side == "sun")
@@ -219,4 +247,9 @@ def behaviour(
                 store(half, window, link, side == "nadir")
             elif window.action in (Action.READ, Action.EDGE, Action.SEND_EDGE):
                 data |= read(half, side, window, data_clocks)
+            elif window.action in ADDRESSING and not (
+                before in ADDRESSING and ended == window.start
+            ):
+                data |= addressed(half, window, data_clocks, sent)
+            ended, before = window.end, window.action
     return halves, data

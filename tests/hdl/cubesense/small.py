@@ -11,6 +11,9 @@ from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
 
 READ_OUT = ReadOut(**json.loads(os.environ["READ_OUT"]))
 
+#: Whether the design has address control from the microcontroller.
+MCU_ADDRESSING = os.environ.get("MCU_ADDRESSING") == "1"
+
 
 async def some_time() -> None:
     await Timer(random.randint(1, 50), unit="ns")

@@ -53,11 +53,20 @@ def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
     simulate(BLOCKS[block], read_out, f"benches_{block}", name=block, seed=seed)
 
 
+@pytest.mark.parametrize("addressing", [False, True], ids=["published", "addressing"])
 @pytest.mark.parametrize("side", ["sun", "nadir"])
-def test_dataflow(simulate: Any, side: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dataflow(
+    simulate: Any, side: Any, addressing: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SIDE", side)
-    module = "benches_dataflow"
-    simulate(lambda _: DataflowControl(side), ReadOut(), module, name=f"{side}_dataflow", seed=1)
+    monkeypatch.setenv("MCU_ADDRESSING", str(int(addressing)))
+    simulate(
+        lambda _: DataflowControl(side, mcu_addressing=addressing),
+        ReadOut(),
+        "benches_dataflow",
+        name=f"{side}_dataflow_{addressing}",
+        seed=1,
+    )
 
 
 @pytest.mark.parametrize("side", ["sun", "nadir"])

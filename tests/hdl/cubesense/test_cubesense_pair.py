@@ -8,6 +8,7 @@ import pytest
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense_pair import CubeSensePair
 
+SMALLEST = ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1)
 MODULES = ["benches_pair_store", "benches_pair_read", "benches_pair_modes", "benches_pair_failures"]
 
 
@@ -22,8 +23,33 @@ def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
     """Standby alone makes the state: the parts' flip-flops come up as they like."""
     modules = MODULES.copy()
     random.Random(seed).shuffle(modules)
-    read_out = ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1)
-    simulate(CubeSensePair, read_out, *modules, seed=seed, initialised=False)
+    simulate(CubeSensePair, SMALLEST, *modules, seed=seed, initialised=False)
+
+
+def addressable(read_out: ReadOut) -> CubeSensePair:
+    """The pair with address control from the microcontroller."""
+    return CubeSensePair(read_out, mcu_addressing=True)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_addressing(
+    simulate: Any, read_out: ReadOut, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MCU_ADDRESSING", "1")
+    simulate(addressable, read_out, "benches_pair_addressing", seed=seed)
+
+
+def test_addressing_at_full_size(simulate: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MCU_ADDRESSING", "1")
+    simulate(addressable, FULL_SIZE, "benches_pair_addressing", seed=1)
+
+
+@pytest.mark.parametrize("initialised", [True, False])
+def test_addressing_changes_nothing_else(
+    simulate: Any, initialised: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MCU_ADDRESSING", "1")
+    simulate(addressable, SMALLEST, *MODULES, seed=1, initialised=initialised)
 
 
 def test_full_size(simulate: Any) -> None:

@@ -8,7 +8,7 @@ from amaranth.hdl import Shape
 from amaranth.lib.wiring import Component
 
 from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubesense_top import PINS, CubeSenseFpga
+from cubestack.hdl.cubesense_top import ADDRESSING_PINS, PINS, CubeSenseFpga
 from cubestack.hdl.frame_gap import FrameGap
 from cubestack.hdl.generate import rtlil_text
 from cubestack.hdl.gray_counter import GrayCounter
@@ -22,6 +22,16 @@ def test_published_pins() -> None:
     assert sorted(port for pins in PINS for port in pins.ports) == sorted(members)
     for pins in PINS:
         assert max(Shape.cast(members[port].shape).width for port in pins.ports) == pins.number
+
+
+def test_address_control_takes_no_further_pin() -> None:
+    published, top = CubeSenseFpga("nadir"), CubeSenseFpga("nadir", mcu_addressing=True)
+    for design in (published, top):
+        rtlil_text(design)
+    assert set(top.signature.members) - set(published.signature.members) == {"DATA_I"}
+    (data,) = [pins for pins in PINS if "DATA_O" in pins.ports]
+    assert set(ADDRESSING_PINS.ports) == {*data.ports, "DATA_I"}
+    assert ADDRESSING_PINS.number == data.number
 
 
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
