@@ -172,15 +172,16 @@ class Ov7620:
                 first += clocks
             number += 1
 
-    def frame_at(self, time_ps: int) -> RollingShutter | None:
-        """Exposure of the last frame whose read-out had started by ``time_ps``; None before."""
+    def frame_from(self, time_ps: int) -> RollingShutter:
+        """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
+
+        Only a part with power has frames, and only the last few are remembered as they were.
+        """
         clock = self._clock
-        if clock is None:
-            return None
-        number = max(0, clock.first_edge(time_ps + 1) - 1) // FRAME_CLOCKS
-        shutter = self._frame(clock, number).shutter
-        if shutter.readout_ps > time_ps:
-            return self._frame(clock, number - 1).shutter if number else None
+        assert clock is not None
+        number = max(0, clock.first_edge(time_ps) - LINES_BEFORE * CLOCKS_PER_LINE) // FRAME_CLOCKS
+        while (shutter := self._frame(clock, number).shutter).readout_ps < time_ps:
+            number += 1
         return shutter
 
     @staticmethod
