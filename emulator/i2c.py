@@ -1,7 +1,9 @@
 """The satellite's I2C bus: messages with their time on the wire, and targets that answer.
 
 Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR. A target that has no byte
-ready stretches the clock. Not modelled: the acknowledge of a byte that the host reads.
+ready stretches the clock. Targets may also listen to the general call, address 0. Not modelled: the
+acknowledge of a byte that the host reads, 10-bit addresses, and several hosts at one time: whole
+transfers queue for the wire.
 """
 
 import errno
@@ -20,23 +22,43 @@ BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 LONGEST_STRETCH_PS = PS_PER_S
 """A host gives up a transfer whose clock is held low for longer, as Linux's drivers do."""
 
+GENERAL_CALL = 0x00
+
+MAX_BLOCK_BYTES = 32
+"""Length that a target may send in front of a block; SMBus 2.0, section 5.5.7."""
+
 
 @dataclass
 class I2cMessage:
     """A message to a 7-bit ``address``: ``data`` to write, or ``read`` bytes to fetch into it.
 
     With neither, only the address goes out, for writing: a probe.
+
+    Attributes:
+        address: 7-bit address.
+        data: bytes to write, or the bytes read.
+        read: bytes to read.
+        block: a read whose first byte says how many follow it, beside the ``read`` ones.
+        probe_read: only the address goes out, for reading.
     """
 
     address: int
     data: bytearray = field(default_factory=bytearray)
     read: int = 0
+    block: bool = False
+    probe_read: bool = False
+
+    @property
+    def reading(self) -> bool:
+        """Whether the address goes out for reading."""
+        return self.read > 0 or self.probe_read
 
 
 class I2cNackError(OSError):
     """A transfer failed; errno as on Linux.
 
-    ENXIO: no acknowledge of an address; EIO: of a byte; ETIMEDOUT: the clock was held low too long.
+    ENXIO: no acknowledge of an address; EIO: of a byte; ETIMEDOUT: the clock was held low too long;
+    EPROTO: a target sent a block length that is none.
     """
 
 
@@ -69,16 +91,22 @@ class I2cBus:
             raise ValueError(f"an I2C bus needs a positive bit rate, not {hz} Hz")
         self._env = env
         self._targets: dict[int, I2cTarget] = {}
+        self._general = _GeneralCall()
         self._wire = simpy.Resource(env)
         self.bit_ps = PS_PER_S // hz
 
-    def attach(self, address: int, target: I2cTarget) -> None:
-        """Put ``target`` on the bus at a free 7-bit ``address`` (else ValueError)."""
+    def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
+        """Put ``target`` on the bus at a free 7-bit ``address`` (else ValueError).
+
+        With ``general_call`` it also hears what is written to address 0.
+        """
         if not 0x08 <= address <= 0x77:
             raise ValueError(f"I2C address {address:#04x} is not in 0x08..0x77")
         if address in self._targets:
             raise ValueError(f"I2C address {address:#04x} is taken already")
         self._targets[address] = target
+        if general_call:
+            self._general.listeners.append(target)
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         """Perform one transfer, behind those already under way.
@@ -92,11 +120,11 @@ class I2cBus:
             try:
                 for message in messages:
                     yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
-                    target = self._find(message.address)
+                    target = self._find(message)
                     if addressed is not None and addressed is not target:
                         addressed.i2c_stop()
                     addressed = target
-                    target.i2c_start(message.read > 0)
+                    target.i2c_start(message.reading)
                     yield from self._bytes(target, message)
             except I2cNackError as error:
                 failure = error
@@ -106,18 +134,24 @@ class I2cBus:
             if failure is not None:
                 raise failure
 
-    def _find(self, address: int) -> I2cTarget:
+    def _find(self, message: I2cMessage) -> I2cTarget:
+        address = message.address
+        if address == GENERAL_CALL and self._general.listeners and not message.reading:
+            return self._general
         target = self._targets.get(address)
         if target is None:
             raise I2cNackError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
         return target
 
     def _bytes(self, target: I2cTarget, message: I2cMessage) -> Generator[simpy.Event, Any, None]:
-        if message.read:
+        if message.reading:
             message.data = bytearray()
-            for _ in range(message.read):
+            wanted = message.read
+            while len(message.data) < wanted:
                 byte = yield from self._next_byte(target, message.address)
                 yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+                if message.block and not message.data:
+                    wanted += _block_length(byte, message.address)
                 message.data.append(byte)
             return
         for byte in message.data:
@@ -137,3 +171,33 @@ class I2cBus:
                 )
             yield self._env.timeout(self.bit_ps)
         return byte
+
+
+def _block_length(byte: int, address: int) -> int:
+    if not 1 <= byte <= MAX_BLOCK_BYTES:
+        raise I2cNackError(
+            errno.EPROTO,
+            f"I2C device {address:#04x} sent block length {byte}, not 1..{MAX_BLOCK_BYTES}",
+        )
+    return byte
+
+
+class _GeneralCall:
+    """Those that listen to address 0, as one target: one acknowledge is enough."""
+
+    def __init__(self) -> None:
+        self.listeners: list[I2cTarget] = []
+
+    def i2c_start(self, read: bool) -> None:
+        for target in self.listeners:
+            target.i2c_start(read)
+
+    def i2c_write(self, byte: int) -> bool:
+        return any([target.i2c_write(byte) for target in self.listeners])
+
+    def i2c_read(self) -> int:
+        raise AssertionError("nobody answers a read from the general call address")
+
+    def i2c_stop(self) -> None:
+        for target in self.listeners:
+            target.i2c_stop()

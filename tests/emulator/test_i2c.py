@@ -178,3 +178,50 @@ def test_clock_held_low_for_ever_ends_the_transfer():
         perform(kernel, bus, I2cMessage(0x1A, read=1))
     assert raised.value.errno == errno.ETIMEDOUT
     assert target.calls[-1] == "stop"
+
+
+def test_probe_for_reading_addresses_only():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    perform(kernel, bus, I2cMessage(0x1A, probe_read=True))
+    assert target.calls == ["read", "stop"]
+    assert kernel.now == (1 + 9 + 1) * BIT_PS[100_000]
+
+
+def test_general_call_reaches_those_that_listen():
+    kernel, bus = make(x1A=(deaf := Memory()))
+    listeners = [Memory(refuse=6), Memory(refuse=7)]
+    for address, target in enumerate(listeners, 0x20):
+        bus.attach(address, target, general_call=True)
+    perform(kernel, bus, I2cMessage(0, bytearray([6, 7])))  # one acknowledge is enough
+    assert deaf.calls == []
+    assert [target.calls for target in listeners] == [["write", 6, 7, "stop"]] * 2
+    with pytest.raises(I2cNackError, match="no I2C device answers at 0x00"):
+        perform(kernel, bus, I2cMessage(0, read=1))
+
+
+def test_general_call_without_listeners():
+    kernel, bus = make(x1A=Memory())
+    with pytest.raises(I2cNackError, match="no I2C device answers at 0x00"):
+        perform(kernel, bus, I2cMessage(0, bytearray([6])))
+
+
+@pytest.mark.parametrize("length", [1, 32])
+@pytest.mark.parametrize("rest", [1, 2])  # the length alone, or a checksum as well
+def test_block_brings_its_length(length, rest):
+    kernel, bus = make(x1A=(target := Memory()))
+    target.i2c_read = iter([length, *range(100, 200)]).__next__
+    reading = I2cMessage(0x1A, read=rest, block=True)
+    perform(kernel, bus, reading)
+    assert reading.data == bytes([length, *range(100, 100 + length + rest - 1)])
+    assert kernel.now == (1 + 9 + 9 * (length + rest) + 1) * BIT_PS[100_000]
+
+
+@pytest.mark.parametrize("length", [0, 33, 255])
+def test_block_length_must_make_sense(length):
+    kernel, bus = make(x1A=(target := Memory()))
+    target.i2c_read = lambda: length
+    with pytest.raises(I2cNackError, match=rf"block length {length}, not 1\.\.32") as raised:
+        perform(kernel, bus, I2cMessage(0x1A, read=1, block=True))
+    assert raised.value.errno == errno.EPROTO
+    assert target.calls[-1] == "stop"
