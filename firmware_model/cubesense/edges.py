@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.distortion import RIM_PX
 from cubestack.firmware_model.cubesense.masks import Mask, masked
+from cubestack.firmware_model.interface.cubesense_codes import EDGE_UNIT, EDGES_PER_FRAME
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
 
 __all__ = [
-    "EDGE_UNIT",
     "MAX_EDGES",
     "Crossing",
     "EdgeConfig",
@@ -36,10 +36,7 @@ __all__ = [
     "bisect",
 ]
 
-EDGE_UNIT = 32
-"""Edge coordinates are ints of 1/32 px: 639 px then fit."""
-
-MAX_EDGES = 40
+MAX_EDGES = 2 * EDGES_PER_FRAME
 """Edges that the part keeps: ours. The widest Earth has 28, the rest is for false ones."""
 
 Asked = TypeVar("Asked")

@@ -60,8 +60,8 @@ def budget() -> tuple[Buffer, ...]:
     ram = {
         "scanned pixels": FULL_SIZE.scan_step,
         "samples of the row above": len(FULL_SIZE.scan_columns),
-        # Each edge is undistorted in its own place.
         "edges": MAX_EDGES * 2 * INT,
+        "edges, undistorted": MAX_EDGES * 2 * INT,
         "normal equations, their inverse, right side": (9 + 9 + 3) * FLOAT,
         "Sun window": window_bytes(),
         "sums of the window's columns and of a row": (FULL_SIZE.window + 1) * (FLOAT + INT),

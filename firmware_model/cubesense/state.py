@@ -8,6 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cubestack.firmware_model.cubesense.masks import Mask
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense_codes import (
@@ -79,7 +82,7 @@ class CameraSettings:
         )
 
 
-@dataclass
+@dataclass(eq=False)
 class Result:
     """The latest measurement of one camera.
 
@@ -89,6 +92,7 @@ class Result:
         x, y: centre from the boresight, undistorted, 1/100 px.
         radius: of the fitted circle, undistorted, 1/100 px; 0 for the Sun.
         points: edges of the fit, or Sun pixels of the mean.
+        edges: pixels (n, 2) of the edges that the search found, in 1/32 px; none for the Sun.
         sram: memory that held the picture.
         first: first Sun pixel (x, y); (0, 0) for the nadir camera.
         pixels_read: pixels that the processor read from the FPGA.
@@ -103,6 +107,7 @@ class Result:
     y: int = 0
     radius: int = 0
     points: int = 0
+    edges: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 2), np.int16))
     sram: Sram = Sram.SRAM1
     first: tuple[int, int] = (0, 0)
     pixels_read: int = 0

@@ -12,6 +12,8 @@ from operator import xor
 
 __all__ = [
     "COLUMNS",
+    "EDGES_PER_FRAME",
+    "EDGE_UNIT",
     "EMPTY_FRAME",
     "FRAME_BYTES",
     "IMAGE_BYTES",
@@ -47,6 +49,10 @@ EMPTY_FRAME = 0xFFFF
 
 #: Areas of a camera's mask.
 MASK_AREAS = 5
+
+#: Coordinates of an edge are in 1/32 px, and so many edges fill a telemetry frame; both ours.
+EDGE_UNIT = 32
+EDGES_PER_FRAME = 20
 
 #: Undistorted pixels for one degree of field angle.
 PIXELS_PER_DEGREE = 2.9

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 
 from cubestack.firmware_model.interface.cubesense_codes import (
     COLUMNS,
+    EDGE_UNIT,
+    EDGES_PER_FRAME,
     EMPTY_FRAME,
     FRAME_BYTES,
     MASK_AREAS,
@@ -167,6 +169,31 @@ def _times(camera: Camera) -> Message:
     )
 
 
+def _edges(part: int) -> Message:
+    first = part * EDGES_PER_FRAME + 1
+    last = first + EDGES_PER_FRAME - 1
+    coordinates = [
+        Field(
+            f"{axis}{first + index}",
+            "i16",
+            8 + 32 * index + 16 * offset,
+            f"{line} of edge {first + index} in the picture; 0 where there is none",
+            "px",
+            EDGE_UNIT,
+        )
+        for index in range(EDGES_PER_FRAME)
+        for offset, (axis, line) in enumerate((("X", "column"), ("Y", "row")))
+    ]
+    return Message(
+        225 + part,
+        f"NadirEdges{part + 1}",
+        1 + 4 * EDGES_PER_FRAME,
+        f"edges {first} to {last} that the latest search in the nadir picture found",
+        (Field("Count", "u8", 0, "edges found in all, false ones left out"), *coordinates),
+        ours=True,
+    )
+
+
 _NODE = (
     Message(
         TELEMETRY_BIT,
@@ -277,6 +304,7 @@ _EXTENSIONS = (
         (Field("Search", "u8", 0, "way of the search", choices=NadirSearch),),
         ours=True,
     ),
+    *(_edges(part) for part in range(2)),
 )
 
 TELEMETRIES = (
