@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "BETWEEN_FPGAS",
     "MAX_VIOLATIONS",
     "RULES",
     "Sram",
@@ -32,9 +33,11 @@ ViolationKind = Literal[
     "read-access",
     "bus-contention",
     "turnaround",
+    "wire-contention",
 ]
 
 #: Each violation with what its measured time means; the order is that of the C++ model's enum.
+#: The last one is no memory's: the engine finds it between two FPGAs.
 RULES: dict[ViolationKind, str] = {
     "short-write-pulse": "write pulse of {} ps, at least {} ps needed",
     "address-changed-during-write": "address moved {} ps into the write pulse",
@@ -42,7 +45,11 @@ RULES: dict[ViolationKind, str] = {
     "read-access": "data used {} ps after its cause, valid after {} ps",
     "bus-contention": "memory and FPGA both drive the data bus",
     "turnaround": "FPGA drives the bus {} ps after the memory let go, {} ps needed",
+    "wire-contention": "two FPGAs drive the same wires, CONTENTION is {}",
 }
+
+#: Where a wire contention is: no memory's.
+BETWEEN_FPGAS = "wires"
 
 MAX_VIOLATIONS = 64  # of each kind are kept; all are counted
 
@@ -67,22 +74,30 @@ class SramTiming:
 
 
 class Violation(NamedTuple):
-    """One broken rule of the memory's data sheet.
+    """One broken rule of the memory's data sheet, or two drivers on one wire.
 
-    The model goes on as a good part at room temperature might; a real part may not.
+    The model goes on as a good part at room temperature might; a real part may not. ``where`` is
+    the memory's name, or ``BETWEEN_FPGAS``.
     """
 
     kind: ViolationKind
     time_ps: int
     address: int
     detail: str
+    where: str = "SRAM"
 
     @classmethod
     def measured(
-        cls, kind: ViolationKind, time_ps: int, address: int, found_ps: int, needed_ps: int
+        cls,
+        kind: ViolationKind,
+        time_ps: int,
+        address: int,
+        found: int,
+        needed: int,
+        where: str = "SRAM",
     ) -> "Violation":
-        """Make one whose detail tells the time found and the time needed."""
-        return cls(kind, time_ps, address, RULES[kind].format(found_ps, needed_ps))
+        """Make one whose detail tells the time found and the time needed, both in ps."""
+        return cls(kind, time_ps, address, RULES[kind].format(found, needed), where)
 
 
 class ViolationLog:
@@ -100,7 +115,8 @@ class ViolationLog:
         """Record one violation."""
         if not self.counts[violation.kind]:
             _log.warning(
-                "SRAM %s at %d ps, address 0x%05X: %s",
+                "%s %s at %d ps, address 0x%05X: %s",
+                violation.where,
                 violation.kind,
                 violation.time_ps,
                 violation.address,
@@ -144,13 +160,32 @@ class Sram:
         memory: the stored bytes, shape (size,); a live view.
         timing: the limits that are checked.
         violations: what was broken so far.
+        name: what violations call it.
     """
 
-    def __init__(self, memory: NDArray[np.uint8], timing: SramTiming | None = None) -> None:
-        """Make a memory on top of ``memory``; all pins are inactive since long ago."""
+    def __init__(
+        self,
+        memory: NDArray[np.uint8],
+        timing: SramTiming | None = None,
+        violations: ViolationLog | None = None,
+        name: str = "SRAM",
+    ) -> None:
+        """Make a memory on top of ``memory``; all pins are inactive since long ago.
+
+        ``violations`` is a log that several memories share.
+        """
         self.memory = memory
         self.timing = timing or SramTiming()
-        self.violations = ViolationLog()
+        self.violations = ViolationLog() if violations is None else violations
+        self.name = name
+        self.power(True)
+
+    def power(self, on: bool) -> None:
+        """Turn the supply on or off; what the pins are then is yet to be told, by ``drive``.
+
+        Without supply the memory takes no writes, offers 0 and breaks no rules.
+        """
+        self._powered = on
         self._pins = SramPins()
         long_ago = -(10**12)
         self._write_since = long_ago
@@ -169,6 +204,8 @@ class Sram:
 
     def drive(self, time_ps: int, pins: SramPins) -> None:
         """Settled pin levels from ``time_ps`` on, which is not before the previous call's."""
+        if not self._powered:
+            return
         old, self._pins = self._pins, pins
         moved = pins.address != old.address
         if old.writes and (moved or not pins.writes):
@@ -225,4 +262,6 @@ class Sram:
     def _report(
         self, kind: ViolationKind, time_ps: int, address: int, found_ps: int = 0, needed_ps: int = 0
     ) -> None:
-        self.violations.add(Violation.measured(kind, time_ps, address, found_ps, needed_ps))
+        self.violations.add(
+            Violation.measured(kind, time_ps, address, found_ps, needed_ps, self.name)
+        )

@@ -1,8 +1,9 @@
 """Builds the compiled engine's library once, and keeps it in the user's cache folder.
 
-The key covers everything that the result depends on: the design, the driver, the CXXRTL runtime,
-the compiler and its flags. A library's file name carries the hash of its own bytes, so that a
-damaged one is noticed, and it appears by renaming, so that two processes may build at once.
+The key covers everything that the result depends on: the design and its wiring, the driver, the
+CXXRTL runtime, the compiler and its flags. A library's file name carries the hash of its own bytes,
+so that a damaged one is noticed, and it appears by renaming, so that two processes may build at
+once.
 """
 
 import hashlib
@@ -18,8 +19,8 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from amaranth.lib.wiring import Component
-
+from cubestack.emulator.rtl.pins_header import pins_header
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.generate import cxxrtl_headers, cxxrtl_text, design_hash
 
 __all__ = [
@@ -31,7 +32,7 @@ __all__ = [
     "library_for",
 ]
 
-SOURCES = ("driver.cpp", "sram_model.h")
+SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py")
 FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-fno-semantic-interposition", "-shared")
 
 
@@ -73,8 +74,8 @@ def cache_folder() -> Path:
     return (Path(base) if base else Path.home() / ".cache") / "cubestack"
 
 
-def library_for(component: Component, folder: Path | None = None) -> Path:
-    """Shared library of the driver with ``component``, from the cache or built now.
+def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
+    """Shared library of the driver with ``wiring``, from the cache or built now.
 
     ``folder`` replaces :func:`cache_folder`.
 
@@ -82,7 +83,7 @@ def library_for(component: Component, folder: Path | None = None) -> Path:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
-    design = design_hash(component)
+    design = design_hash(wiring.component) + pins_header(wiring, "")
     compiler = find_compiler()
     if compiler is None:
         raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
@@ -96,7 +97,7 @@ def library_for(component: Component, folder: Path | None = None) -> Path:
             candidate.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            built = _compile(component, compiler, Path(scratch), folder / f"{key}.log")
+            built = _compile(wiring, compiler, Path(scratch), folder / f"{key}.log")
             library = folder / _library_name(key, built.read_bytes())
             built.replace(library)
     except OSError as error:
@@ -126,8 +127,10 @@ def _source(name: str) -> Path:
     return Path(__file__).parent / name
 
 
-def _compile(component: Component, compiler: Compiler, scratch: Path, log: Path) -> Path:
-    (scratch / "design.cpp").write_text(cxxrtl_text(component))
+def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Path:
+    design = cxxrtl_text(wiring.component)
+    (scratch / "design.cpp").write_text(design)
+    (scratch / "pins.h").write_text(pins_header(wiring, design))
     library = scratch / "library.so"
     command = [
         *compiler.command,

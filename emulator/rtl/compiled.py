@@ -1,6 +1,7 @@
 """The compiled engine: CXXRTL's C++ of the design with driver.cpp around it, through ctypes."""
 
 import ctypes
+from collections.abc import Sequence
 from dataclasses import astuple, fields
 from fractions import Fraction
 from pathlib import Path
@@ -10,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.build import library_for
-from cubestack.emulator.rtl.engine import CAMERA_PINS, MCU_PINS, OUTPUT_PINS
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sram import (
+    BETWEEN_FPGAS,
     MAX_VIOLATIONS,
     RULES,
     SramTiming,
     Violation,
     ViolationLog,
 )
-from cubestack.hdl.cubestar_top import CubeStarTop
 
 __all__ = ["CompiledEngine"]
 
@@ -49,19 +50,25 @@ class _Timing(ctypes.Structure):
 
 
 class _Violation(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_int64) for name in ("kind", "time", "address", "found", "needed")]
+    _fields_ = [
+        (name, ctypes.c_int64) for name in ("kind", "time", "address", "found", "needed", "where")
+    ]
 
 
 _INT, _LONG, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "driver_new": (_POINTER, (_POINTER, ctypes.POINTER(_Timing), _LONG, _INT)),
+    "driver_new": (_POINTER, (ctypes.POINTER(_POINTER), ctypes.POINTER(_Timing), _LONG, _INT)),
     "driver_delete": (None, (_POINTER,)),
     "driver_pin": (_INT, (ctypes.c_char_p,)),
     "driver_set": (None, (_POINTER, _INT, ctypes.c_uint32, _LONG)),
     "driver_get": (ctypes.c_uint32, (_POINTER, _INT)),
-    "driver_load": (None, (_POINTER, ctypes.POINTER(_Segment), _LONG)),
-    "driver_use_pixels": (None, (_POINTER, _POINTER)),
-    "driver_burst": (_INT, (_POINTER, _LONG, _INT, ctypes.POINTER(_LONG))),
+    "driver_power": (None, (_POINTER, _INT, _INT, _LONG)),
+    "driver_load": (None, (_POINTER, _INT, ctypes.POINTER(_Segment), _LONG)),
+    "driver_use_pixels": (None, (_POINTER, _INT, _POINTER)),
+    "driver_burst": (
+        _INT,
+        (_POINTER, _LONG, ctypes.c_uint32, ctypes.POINTER(_LONG), ctypes.POINTER(_INT)),
+    ),
     "driver_strobe": (None, (_POINTER, _POINTER, _LONG, _LONG, _LONG, _LONG, _LONG)),
     "driver_violations": (_LONG, (_POINTER, _LONG, _POINTER)),
     "driver_violation_count": (_LONG, (_POINTER, _INT)),
@@ -81,32 +88,31 @@ def load_library(path: Path) -> ctypes.CDLL:
 class CompiledEngine(SteppingEngine):
     """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` at tens of millions of clocks a second.
 
-    With ``skipping``, a clock in the low part of HSYNC that changed no register is not repeated.
+    With ``skipping``, a clock outside of lines that changed no register is not repeated.
     """
 
     def __init__(
-        self, top: CubeStarTop, sram_timing: SramTiming | None = None, *, skipping: bool = True
+        self, wiring: Wiring, sram_timing: SramTiming | None = None, *, skipping: bool = True
     ) -> None:
-        """Load the library of ``top``, building it first where the cache has none.
+        """Load the library of ``wiring``, building it first where the cache has none.
 
         Raises:
             CompilerError: there is no C++ compiler, or it failed.
         """
-        super().__init__(1 << len(top.SRAM_A), skipping=skipping)
+        super().__init__(wiring, skipping=skipping)
         self._driver: int | None = None
-        self._library = load_library(library_for(top))
+        self._library = load_library(library_for(wiring))
+        addresses = [memory.ctypes.data for memory in self.memories.values()]
         self._driver = self._library.driver_new(
-            self.sram.ctypes.data,
+            (_POINTER * len(addresses))(*addresses),
             _Timing(*astuple(sram_timing or SramTiming())),
             MAX_VIOLATIONS,
             skipping,
         )
-        self._pins = {
-            name: self._library.driver_pin(name.encode())
-            for name in (*CAMERA_PINS, *MCU_PINS, *OUTPUT_PINS)
-        }
+        self._pins = {name: self._library.driver_pin(name.encode()) for name in wiring.widths}
         self._log = ViolationLog()
-        self._reached = ctypes.c_int64()
+        self._where = [*self.memories, BETWEEN_FPGAS]  # the driver's -1 is the last one
+        self._reached, self._camera = ctypes.c_int64(), ctypes.c_int32()
 
     def close(self) -> None:
         """Release the driver."""
@@ -141,14 +147,19 @@ class CompiledEngine(SteppingEngine):
     def _get(self, name: str) -> int:
         return int(self._library.driver_get(self._handle, self._pins[name]))
 
-    def _load(self, loaded: LoadedSegment | None, edge: int) -> None:
+    def _power(self, memory: int, on: bool) -> None:
+        self._library.driver_power(self._handle, memory, on, self.now_ps)
+        self._collect_violations()
+
+    def _load(self, camera: int, loaded: LoadedSegment | None, edge: int) -> None:
         if loaded is None:
-            for name in CAMERA_PINS:
+            for name in self.wiring.cameras[camera].pins:
                 self._set(name, 0)
             return
         segment = loaded.segment
         self._library.driver_load(
             self._handle,
+            camera,
             _Segment(
                 segment.start_ps,
                 loaded.half_period.numerator,
@@ -162,17 +173,18 @@ class CompiledEngine(SteppingEngine):
             edge,
         )
 
-    def _use_pixels(self, pixels: NDArray[np.uint8]) -> None:
+    def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
         # The loaded segment keeps the array alive while the driver reads it.
-        self._library.driver_use_pixels(self._handle, pixels.ctypes.data)
+        self._library.driver_use_pixels(self._handle, camera, pixels.ctypes.data)
 
-    def _burst(self, until_ps: int, stop_level: int | None) -> tuple[int, Outcome]:
+    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, Outcome, int]:
         self._reached.value = self.now_ps
+        running = sum(1 << camera for camera in cameras)
         outcome = self._library.driver_burst(
-            self._handle, until_ps, -1 if stop_level is None else stop_level, self._reached
+            self._handle, until_ps, running, self._reached, self._camera
         )
         self._collect_violations()
-        return max(self.now_ps, self._reached.value), _OUTCOMES[outcome]
+        return max(self.now_ps, self._reached.value), _OUTCOMES[outcome], self._camera.value
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
         if not out.flags.c_contiguous or out.dtype != np.uint8:
@@ -197,7 +209,7 @@ class CompiledEngine(SteppingEngine):
         new = (_Violation * (kept - known))()
         self._library.driver_violations(self._handle, known, new)
         for item in new:
-            kind = _KINDS[item.kind]
+            kind, where = _KINDS[item.kind], self._where[item.where]
             self._log.add(
-                Violation.measured(kind, item.time, item.address, item.found, item.needed)
+                Violation.measured(kind, item.time, item.address, item.found, item.needed, where)
             )

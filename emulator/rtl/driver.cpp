@@ -1,15 +1,21 @@
-// Drives the compiled FPGA: pixel clock edges in, data clock cycles in, SRAM beside it.
+// Drives the compiled FPGA: pixel clock edges in, data clock cycles in, SRAMs beside it.
 // One of these is behind every CompiledEngine; stepping.py says what is asked of it and when.
 //
 // design.cpp is CXXRTL's output. Its eval() computes outputs and the registers' next values,
 // commit() makes those current and tells whether any changed. Outputs lag a register change by
-// one eval(), and an asynchronous reset takes one more, hence settle().
+// one eval(), and an asynchronous reset takes one more, hence settle(). Edges are found before
+// anything is computed, so one that eval() itself makes, on a clock that is no pin, needs another
+// eval() before the commit.
+//
+// pins.h is made of the wiring; pins_header.py says what is in it.
 
 #include "design.cpp"
+#include "pins.h"
 #include "sram_model.h"
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -54,35 +60,47 @@ private:
 
 struct Pin {
     const char *name;
+    uint32_t initial;
     void (*set)(Top &, uint32_t);
     uint32_t (*get)(const Top &);
 };
 
 #define GETTER(port) [](const Top &top) { return top.port.template get<uint32_t>(); }
-#define INPUT(name, port) \
-    {name, [](Top &top, uint32_t value) { top.port.template set<uint32_t>(value); }, GETTER(port)}
-#define OUTPUT(name, port) {name, nullptr, GETTER(port)}
+#define INPUT(name, port, initial) \
+    {name, initial, [](Top &top, uint32_t value) { top.port.template set<uint32_t>(value); }, \
+     GETTER(port)},
+#define OUTPUT(name, port) {name, 0, nullptr, GETTER(port)},
 
-const Pin PINS[] = {
-    INPUT("PIXCLK", p_PIXCLK),
-    INPUT("PIXDATA", p_PIXDATA),
-    INPUT("HSYNC", p_HSYNC),
-    INPUT("VSYNC", p_VSYNC),
-    INPUT("ENABLE", p_ENABLE),
-    INPUT("RNW", p_RNW),
-    INPUT("BANK", p_BANK),
-    INPUT("DCLK", p_DCLK),
-    OUTPUT("ACK", p_ACK),
-    OUTPUT("DATA", p_DATA),
-    OUTPUT("SRAM_A", p_SRAM__A),
-    OUTPUT("SRAM_D_O", p_SRAM__D__O),
-    OUTPUT("SRAM_D_OE", p_SRAM__D__OE),
-    OUTPUT("SRAM_CE_N", p_SRAM__CE__N),
-    OUTPUT("SRAM_OE_N", p_SRAM__OE__N),
-    OUTPUT("SRAM_WE_N", p_SRAM__WE__N),
-};
+const Pin PIN_TABLE[] = {PINS};
 
-// A segment of the camera's stream as pixel_clock.py describes it; edge k is at
+// The lines of camera number N.
+template <int N> struct Camera;
+
+#define CAMERA(number, clock_, data_, line_, frame_) \
+    template <> struct Camera<number> { \
+        static void clock(Top &top, bool level) { top.clock_.set<bool>(level); } \
+        static bool clock(const Top &top) { return top.clock_.get<bool>(); } \
+        static void data(Top &top, uint8_t value) { top.data_.set<uint8_t>(value); } \
+        static void line(Top &top, bool level) { top.line_.set<bool>(level); } \
+        static bool line(const Top &top) { return top.line_.get<bool>(); } \
+        static void frame(Top &top, bool level) { (void)top, frame_; } \
+    };
+CAMERAS
+
+// The lines of memory number N.
+template <int N> struct Memory;
+
+#define MEMORY(number, a, d_i, d_o, d_oe, ce_n, oe_n, we_n) \
+    template <> struct Memory<number> { \
+        static SramPins pins(const Top &top) { \
+            return SramPins(top.a.get<uint32_t>(), top.ce_n.get<bool>(), top.oe_n.get<bool>(), \
+                            top.we_n.get<bool>(), top.d_oe.get<bool>(), top.d_o.get<uint8_t>()); \
+        } \
+        static void offer(Top &top, uint8_t value) { top.d_i.set<uint8_t>(value); } \
+    };
+MEMORIES
+
+// A segment of a camera's stream as pixel_clock.py describes it; edge k is at
 // start + floor(k * half_numerator / half_denominator).
 struct Segment {
     int64_t start;
@@ -95,121 +113,29 @@ struct Segment {
     int64_t vsync;
 };
 
-// In the order of Outcome.
-enum Outcome : int32_t { TIME_REACHED, ACK_REACHED, SEGMENT_OVER };
-
-class Driver {
-public:
-    Driver(uint8_t *memory, const SramTiming &timing, int64_t keep, bool skipping)
-        : sram(memory, timing, keep), skipping(skipping) { settle(0); }
-
-    Top top;
-    Sram sram;
-
-    void set(const Pin &pin, uint32_t value, int64_t now) {
-        if (strcmp(pin.name, "DCLK") == 0 && value && !top.p_DCLK.get<bool>())
-            sram.sample(now);
-        pin.set(top, value);
-        settle(now);
-    }
-
-    void load(const Segment &next, int64_t next_edge) {
-        segment = next;
-        pixels = nullptr;
-        edge = next_edge;
-        times = Steps(segment.half_numerator, segment.half_denominator, 0);
-        times.go_to(edge);
-        top.p_VSYNC.set<bool>(segment.vsync);
-        find_sample(edge / 2);
-        put_sample();
-    }
-
-    void use_pixels(const uint8_t *rendered) {
-        pixels = rendered;
-        put_sample();
-    }
-
-    // Makes the segment's edges up to `until`, or up to the rising edge that brings ACK to
-    // `stop_level` (-1: none); `reached` is the time when it returns.
-    __attribute__((flatten)) Outcome burst(int64_t until, int32_t stop_level, int64_t &reached) {
-        while (edge < segment.edges) {
-            const int64_t time = segment.start + times.value();
-            if (time > until) {
-                reached = until;
-                return TIME_REACHED;
-            }
-            reached = time;
-            if (edge % 2 == 0) {
-                const bool wrote = sram.writes();
-                top.p_PIXCLK.set<bool>(true);
-                const bool changed = settle(time);
-                next_edge();
-                if (skipping && !changed && !wrote && !top.p_HSYNC.get<bool>())
-                    skip_low_samples(until);
-                if (top.p_ACK.get<uint32_t>() == (uint32_t)stop_level)
-                    return ACK_REACHED;
-            } else {
-                top.p_PIXCLK.set<bool>(false);
-                if (edge + 1 < segment.edges) {
-                    next_sample();
-                    put_sample();
-                }
-                settle(time);
-                next_edge();
-            }
-        }
-        return SEGMENT_OVER;
-    }
-
-    // The microcontroller's transfer loop; cycle edges are at start + floor of `halves`.
-    __attribute__((flatten)) void strobe(uint8_t *out, int64_t count, int64_t start, Steps halves) {
-        for (int64_t i = 0; i < count; i++) {
-            const int64_t rise = start + halves.value();
-            if (!top.p_DCLK.get<bool>())
-                sram.sample(rise);
-            top.p_DCLK.set<bool>(true);
-            settle(rise);
-            halves.next();
-            out[i] = top.p_DATA.get<uint8_t>();
-            top.p_DCLK.set<bool>(false);
-            settle(start + halves.value());
-            halves.next();
-        }
-    }
-
-private:
-    const bool skipping;
-
+// What a camera sends, and how far it is.
+struct Stream {
     Segment segment = {};
     const uint8_t *pixels = nullptr;  // rows x active_columns, or null: all 0
     int64_t edge = 0;                 // the next one to be made
     Steps times{1, 1, 0};             // of that edge, from the segment's start
     int64_t row = 0, column = 0;      // of the sample on the lines
 
-    // Lets everything follow the inputs, as of `time`; tells whether any register changed.
-    bool settle(int64_t time) {
-        bool changed = false;
-        top.Top::eval(nullptr);
-        while (top.Top::commit()) {
-            changed = true;
-            top.Top::eval(nullptr);
-        }
-        sram.drive(time, SramPins(top.p_SRAM__A.get<uint32_t>(), top.p_SRAM__CE__N.get<bool>(),
-                                  top.p_SRAM__OE__N.get<bool>(), top.p_SRAM__WE__N.get<bool>(),
-                                  top.p_SRAM__D__OE.get<bool>(), top.p_SRAM__D__O.get<uint8_t>()));
-        // Only a register listens to the bus, so nothing else has to follow it.
-        top.p_SRAM__D__I.set<uint8_t>(sram.bus());
-        return changed;
-    }
+    int64_t time() const { return segment.start + times.value(); }
+
+    bool over() const { return edge >= segment.edges; }
 
     void next_edge() {
         edge++;
         times.next();
     }
 
-    void find_sample(int64_t n) {
-        row = n / segment.line_clocks;
-        column = n % segment.line_clocks;
+    // Continue with that edge; the sample on the lines is what the edges before it left there.
+    void go_to(int64_t next) {
+        edge = next;
+        times.go_to(edge);
+        row = edge / 2 / segment.line_clocks;
+        column = edge / 2 % segment.line_clocks;
     }
 
     void next_sample() {
@@ -219,23 +145,236 @@ private:
         }
     }
 
-    void put_sample() {
-        const bool inside = segment.rows && column < segment.active_columns;
-        top.p_HSYNC.set<bool>(inside);
-        const bool rendered = inside && pixels;
-        top.p_PIXDATA.set<uint8_t>(rendered ? pixels[row * segment.active_columns + column] : 0);
+    bool inside() const { return segment.rows && column < segment.active_columns; }
+
+    uint8_t pixel() const {
+        return inside() && pixels ? pixels[row * segment.active_columns + column] : 0;
     }
 
+    // First edge after `time`.
+    int64_t edge_after(int64_t time) const { return times.last_within(time - segment.start) + 1; }
+
     // A clock that changed no register changes none the next time either, while its inputs stay:
-    // go on with the falling edge of the last such clock. The SRAM sees no pulse meanwhile.
+    // go on with the falling edge of the last such clock. The SRAMs see no pulse meanwhile.
     void skip_low_samples(int64_t until) {
         const int64_t end = segment.rows ? (row + 1) * segment.line_clocks : segment.edges / 2;
         const int64_t last = std::min(end - 1, times.last_within(until - segment.start) / 2);
-        if (last > edge / 2) {
-            edge = 2 * last + 1;
-            times.go_to(edge);
-            find_sample(last);
+        if (last > edge / 2)
+            go_to(2 * last + 1);
+    }
+};
+
+// In the order of Outcome.
+enum Outcome : int32_t { TIME_REACHED, ACKNOWLEDGE_CHANGED, SEGMENT_OVER };
+
+class Driver {
+public:
+    Driver(uint8_t *const *memories, const SramTiming &timing, int64_t keep, bool skipping)
+        : log(keep), skipping(skipping) {
+        for (int n = 0; n < MEMORY_COUNT; n++)
+            srams.emplace_back(memories[n], timing, log, n);
+        for (const Pin &pin : PIN_TABLE)
+            if (pin.set)
+                pin.set(top, pin.initial);
+        settle(0);
+    }
+
+    Top top;
+    ViolationLog log;
+
+    void set(const Pin &pin, uint32_t value, int64_t now) {
+        if (strcmp(pin.name, DATA_CLOCK_NAME) == 0 && value && !top.DATA_CLOCK.get<bool>())
+            sample(now);
+        pin.set(top, value);
+        settle(now);
+    }
+
+    void power(int memory, bool on, int64_t now) {
+        srams[memory].power(on);
+        settle(now);
+    }
+
+    void load(int camera, const Segment &next, int64_t edge) {
+        Stream &stream = streams[camera];
+        stream.segment = next;
+        stream.pixels = nullptr;
+        stream.times = Steps(next.half_numerator, next.half_denominator, 0);
+        stream.go_to(edge);
+        with(camera, [&](auto n) {
+            Camera<n()>::frame(top, next.vsync);
+            put_sample<n()>();
+        });
+    }
+
+    void use_pixels(int camera, const uint8_t *rendered) {
+        streams[camera].pixels = rendered;
+        with(camera, [&](auto n) { put_sample<n()>(); });
+    }
+
+    // Makes the edges of the cameras in the mask `running` up to `until`, or up to the one that
+    // changes an acknowledge, or that is the last of a segment. `reached` is the time then,
+    // `camera` the one whose segment is over.
+    Outcome burst(int64_t until, uint32_t running, int64_t &reached, int32_t &camera) {
+        Outcome outcome = TIME_REACHED;
+        if (running & (running - 1))
+            return burst_of_several(until, running, reached, camera);
+        for (camera = 0; running >> (camera + 1); camera++) {}
+        with(camera, [&](auto n) { outcome = burst_of_one<n()>(until, reached); });
+        return outcome;
+    }
+
+    // The microcontroller's transfer loop; cycle edges are at start + floor of `halves`.
+    __attribute__((flatten)) void strobe(uint8_t *out, int64_t count, int64_t start, Steps halves) {
+        for (int64_t i = 0; i < count; i++) {
+            const int64_t rise = start + halves.value();
+            if (!top.DATA_CLOCK.get<bool>())
+                sample(rise);
+            top.DATA_CLOCK.set<bool>(true);
+            settle(rise);
+            halves.next();
+            out[i] = top.DATA.get<uint8_t>();
+            top.DATA_CLOCK.set<bool>(false);
+            settle(start + halves.value());
+            halves.next();
         }
+    }
+
+private:
+    const bool skipping;
+    std::vector<Sram> srams;
+    Stream streams[CAMERA_COUNT];
+    uint32_t contention = 0;
+
+    // Calls `act` with the camera's number as a constant.
+    template <int N = 0, class Act> void with(int camera, Act act) {
+        if (camera == N)
+            act(std::integral_constant<int, N>());
+        else if constexpr (N + 1 < CAMERA_COUNT)
+            with<N + 1>(camera, act);
+    }
+
+    // Lets everything follow the inputs, as of `time`; tells whether any register changed.
+    bool settle(int64_t time) {
+        bool changed = false;
+        eval();
+        while (top.Top::commit()) {
+            changed = true;
+            eval();
+        }
+        drive_memories(time, std::make_integer_sequence<int, MEMORY_COUNT>());
+        const uint32_t now_contended = CONTENTION;
+        if (now_contended & ~contention)
+            log.add({WIRE_CONTENTION, time, 0, now_contended, 0, -1});
+        contention = now_contended;
+        return changed;
+    }
+
+    void eval() {
+        top.Top::eval(nullptr);
+        if (DERIVED_EDGE)
+            top.Top::eval(nullptr);
+    }
+
+    // Only registers listen to the memories, so nothing else has to follow them.
+    template <int... N> void drive_memories(int64_t time, std::integer_sequence<int, N...>) {
+        (srams[N].drive(time, Memory<N>::pins(top)), ...);
+        (Memory<N>::offer(top, srams[N].bus()), ...);
+    }
+
+    void sample(int64_t time) {
+        for (Sram &sram : srams)
+            sram.sample(time);
+    }
+
+    bool writes() const {
+        bool any = false;
+        for (const Sram &sram : srams)
+            any |= sram.writes();
+        return any;
+    }
+
+    uint32_t acknowledges() const { return ACKNOWLEDGES; }
+
+    template <int N> void put_sample() {
+        Camera<N>::line(top, streams[N].inside());
+        Camera<N>::data(top, streams[N].pixel());
+    }
+
+    template <int N> void make_edge(int64_t time, int64_t until) {
+        Stream &stream = streams[N];
+        if (stream.edge % 2 == 0) {
+            const bool wrote = writes();
+            Camera<N>::clock(top, true);
+            const bool changed = settle(time);
+            stream.next_edge();
+            if (skipping && !changed && !wrote && !Camera<N>::line(top))
+                stream.skip_low_samples(until);
+        } else {
+            Camera<N>::clock(top, false);
+            if (stream.edge + 1 < stream.segment.edges) {
+                stream.next_sample();
+                put_sample<N>();
+            }
+            settle(time);
+            stream.next_edge();
+        }
+    }
+
+    template <int N>
+    __attribute__((flatten)) Outcome burst_of_one(int64_t until, int64_t &reached) {
+        const uint32_t before = acknowledges();
+        while (!streams[N].over()) {
+            const int64_t time = streams[N].time();
+            if (time > until) {
+                reached = until;
+                return TIME_REACHED;
+            }
+            reached = time;
+            make_edge<N>(time, until);
+            if (acknowledges() != before)
+                return ACKNOWLEDGE_CHANGED;
+        }
+        return SEGMENT_OVER;
+    }
+
+    // At one instant the first camera's edge comes first.
+    Outcome burst_of_several(int64_t until, uint32_t running, int64_t &reached, int32_t &camera) {
+        const uint32_t before = acknowledges();
+        Outcome outcome = TIME_REACHED;
+        for (;;) {
+            camera = -1;
+            for (int n = 0; n < CAMERA_COUNT; n++)
+                if (running >> n & 1 && (camera < 0 || streams[n].time() < streams[camera].time()))
+                    camera = n;
+            const int64_t time = streams[camera].time();
+            if (time > until) {
+                reached = until;
+                return TIME_REACHED;
+            }
+            reached = time;
+            with(camera, [&](auto n) { make_edge<n()>(time, until); });
+            if (acknowledges() != before)
+                outcome = ACKNOWLEDGE_CHANGED;
+            else if (streams[camera].over())
+                outcome = SEGMENT_OVER;
+            else
+                continue;
+            for (int n = 0; n < CAMERA_COUNT; n++)
+                if (running >> n & 1)
+                    with(n, [&](auto constant) { come_back<constant()>(time); });
+            return outcome;
+        }
+    }
+
+    // Takes back what was skipped beyond `now`: the pins may change before that.
+    template <int N> void come_back(int64_t now) {
+        Stream &stream = streams[N];
+        const int64_t next = stream.edge_after(now);
+        if (stream.edge <= next)
+            return;
+        stream.go_to(next);
+        Camera<N>::clock(top, next % 2);
+        settle(now);
     }
 };
 
@@ -243,34 +382,42 @@ private:
 
 extern "C" {
 
-Driver *driver_new(uint8_t *memory, const SramTiming *timing, int64_t keep, int32_t skipping) {
-    return new Driver(memory, *timing, keep, skipping != 0);
+Driver *driver_new(uint8_t *const *memories, const SramTiming *timing, int64_t keep,
+                   int32_t skipping) {
+    return new Driver(memories, *timing, keep, skipping != 0);
 }
 
 void driver_delete(Driver *driver) { delete driver; }
 
 // Number of the pin of that name, -1 when there is none.
 int32_t driver_pin(const char *name) {
-    for (size_t i = 0; i < sizeof PINS / sizeof *PINS; i++)
-        if (strcmp(PINS[i].name, name) == 0)
+    for (size_t i = 0; i < sizeof PIN_TABLE / sizeof *PIN_TABLE; i++)
+        if (strcmp(PIN_TABLE[i].name, name) == 0)
             return (int32_t)i;
     return -1;
 }
 
 void driver_set(Driver *driver, int32_t pin, uint32_t value, int64_t now) {
-    driver->set(PINS[pin], value, now);
+    driver->set(PIN_TABLE[pin], value, now);
 }
 
-uint32_t driver_get(const Driver *driver, int32_t pin) { return PINS[pin].get(driver->top); }
+uint32_t driver_get(const Driver *driver, int32_t pin) { return PIN_TABLE[pin].get(driver->top); }
 
-void driver_load(Driver *driver, const Segment *segment, int64_t edge) {
-    driver->load(*segment, edge);
+void driver_power(Driver *driver, int32_t memory, int32_t on, int64_t now) {
+    driver->power(memory, on != 0, now);
 }
 
-void driver_use_pixels(Driver *driver, const uint8_t *pixels) { driver->use_pixels(pixels); }
+void driver_load(Driver *driver, int32_t camera, const Segment *segment, int64_t edge) {
+    driver->load(camera, *segment, edge);
+}
 
-int32_t driver_burst(Driver *driver, int64_t until, int32_t stop_level, int64_t *reached) {
-    return driver->burst(until, stop_level, *reached);
+void driver_use_pixels(Driver *driver, int32_t camera, const uint8_t *pixels) {
+    driver->use_pixels(camera, pixels);
+}
+
+int32_t driver_burst(Driver *driver, int64_t until, uint32_t running, int64_t *reached,
+                     int32_t *camera) {
+    return driver->burst(until, running, *reached, *camera);
 }
 
 // The half period is numerator / denominator, the first edge at start + offset / denominator.
@@ -281,7 +428,7 @@ void driver_strobe(Driver *driver, uint8_t *out, int64_t count, int64_t start, i
 
 // Number of violations kept; `out`, unless null, receives those from number `first` on.
 int64_t driver_violations(const Driver *driver, int64_t first, Violation *out) {
-    const std::vector<Violation> &kept = driver->sram.kept;
+    const std::vector<Violation> &kept = driver->log.kept;
     if (out)
         std::copy(kept.begin() + first, kept.end(), out);
     return (int64_t)kept.size();
@@ -289,7 +436,7 @@ int64_t driver_violations(const Driver *driver, int64_t first, Violation *out) {
 
 // Number of violations of one kind, kept or not.
 int64_t driver_violation_count(const Driver *driver, int32_t kind) {
-    return driver->sram.counts[kind];
+    return driver->log.counts[kind];
 }
 
 }

@@ -1,5 +1,7 @@
 """The reference engine: the design in Amaranth's own simulator, the SRAM in Python."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -9,41 +11,64 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
-from cubestack.emulator.sram import Sram, SramPins, SramTiming, ViolationLog
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
+from cubestack.emulator.sram import (
+    BETWEEN_FPGAS,
+    Sram,
+    SramPins,
+    SramTiming,
+    Violation,
+    ViolationLog,
+)
 
-__all__ = ["SETTLING_CLOCKS", "SimulatedEngine"]
+__all__ = ["SimulatedEngine"]
 
-#: After as many clocks with HSYNC low no further one changes a register: two release the reset,
-#: one ends the store, one the line.
-SETTLING_CLOCKS = 8
+
+@dataclass
+class _Stream:
+    """What a camera sends, and how far it is."""
+
+    pins: CameraPins
+    loaded: LoadedSegment | None = None
+    edge: int = 0  # the next one
+    low_clocks: int = 0  # clocks in a row with the line pin low
+
+    @property
+    def time_ps(self) -> int:
+        """Time of the next edge."""
+        assert self.loaded is not None
+        return self.loaded.time_of(self.edge)
 
 
 class SimulatedEngine(SteppingEngine):
     """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` at some ten thousand clocks a second.
 
-    With ``skipping``, of a longer low part of HSYNC only ``SETTLING_CLOCKS`` clocks are made.
+    With ``skipping``, of longer time outside of lines only the clocks are made that the wiring says
+    the design needs to settle.
     """
 
     def __init__(
-        self, top: CubeStarTop, sram_timing: SramTiming | None = None, *, skipping: bool = True
+        self, wiring: Wiring, sram_timing: SramTiming | None = None, *, skipping: bool = True
     ) -> None:
-        """Elaborate ``top``."""
-        super().__init__(1 << len(top.SRAM_A), skipping=skipping)
-        self._top = top
-        self._sram = Sram(self.sram, sram_timing)
-        self._edge = 0
-        self._low_clocks = 0  # clocks in a row with HSYNC low
+        """Elaborate the wiring's design."""
+        super().__init__(wiring, skipping=skipping)
+        self._log = ViolationLog()
+        self._srams = [
+            Sram(memory, sram_timing, self._log, name) for name, memory in self.memories.items()
+        ]
+        self._streams = [_Stream(pins) for pins in wiring.cameras]
+        self._contention = 0
         contexts: list[Any] = []
 
         async def lend_context(context: Any) -> None:
             contexts.append(context)
 
-        simulator = Simulator(top)
+        simulator = Simulator(wiring.component)
         simulator.add_testbench(lend_context)
         simulator.advance()
         # All time is ours, the simulator only has to settle: its context does that in every set().
         self._context = contexts[0]
+        self._settle(0)
 
     def close(self) -> None:
         """Nothing to release."""
@@ -51,79 +76,120 @@ class SimulatedEngine(SteppingEngine):
     @property
     def violation_log(self) -> ViolationLog:
         """What the SRAM model recorded."""
-        return self._sram.violations
+        return self._log
 
     def _get(self, name: str) -> int:
-        return int(self._context.get(getattr(self._top, name)))
+        return int(self._context.get(getattr(self.wiring.component, name)))
+
+    def _put(self, name: str, value: int) -> None:
+        self._context.set(getattr(self.wiring.component, name), value)
 
     def _set(self, name: str, value: int) -> None:
         self._drive(self.now_ps, name, value)
 
     def _drive(self, time_ps: int, name: str, value: int) -> None:
-        if name == "DCLK" and value and not self._get("DCLK"):
-            self._sram.sample(time_ps)
-        self._context.set(getattr(self._top, name), value)
-        pins = SramPins(
-            self._get("SRAM_A"),
-            self._get("SRAM_CE_N"),
-            self._get("SRAM_OE_N"),
-            self._get("SRAM_WE_N"),
-            self._get("SRAM_D_O") if self._get("SRAM_D_OE") else None,
+        if name == self.wiring.data_clock and value and not self._get(name):
+            for sram in self._srams:
+                sram.sample(time_ps)
+        self._put(name, value)
+        self._settle(time_ps)
+
+    def _settle(self, time_ps: int) -> None:
+        """Let the memories follow the pins."""
+        for sram, memory in zip(self._srams, self.wiring.memories, strict=True):
+            sram.drive(time_ps, self._memory_pins(memory))
+        for sram, memory in zip(self._srams, self.wiring.memories, strict=True):
+            self._put(memory["D_I"], sram.bus)
+        if self.wiring.contention is not None:
+            contention = self._get(self.wiring.contention)
+            if contention & ~self._contention:
+                self._log.add(
+                    Violation.measured("wire-contention", time_ps, 0, contention, 0, BETWEEN_FPGAS)
+                )
+            self._contention = contention
+
+    def _memory_pins(self, memory: MemoryPins) -> SramPins:
+        return SramPins(
+            self._get(memory["A"]),
+            self._get(memory["CE_N"]),
+            self._get(memory["OE_N"]),
+            self._get(memory["WE_N"]),
+            self._get(memory["D_O"]) if self._get(memory["D_OE"]) else None,
         )
-        self._sram.drive(time_ps, pins)
-        self._context.set(self._top.SRAM_D_I, self._sram.bus)
 
-    def _load(self, loaded: LoadedSegment | None, edge: int) -> None:
-        self._edge = edge
-        self._low_clocks = 0
-        if loaded is None:
-            self._put_lines(0, 0)
-            self._context.set(self._top.VSYNC, 0)
-            return
-        self._context.set(self._top.VSYNC, loaded.segment.vsync)
-        self._put_lines(*loaded.sample(edge // 2))
+    def _power(self, memory: int, on: bool) -> None:
+        self._srams[memory].power(on)
+        self._settle(self.now_ps)
 
-    def _put_lines(self, hsync: int, pixel: int) -> None:
+    def _load(self, camera: int, loaded: LoadedSegment | None, edge: int) -> None:
+        stream = self._streams[camera]
+        stream.loaded, stream.edge, stream.low_clocks = loaded, edge, 0
+        if stream.pins.frame is not None:
+            self._put(stream.pins.frame, 0 if loaded is None else loaded.segment.vsync)
+        self._put_sample(stream)
+
+    def _put_sample(self, stream: _Stream) -> None:
         # Registers' inputs only: nothing but the next rising edge can show them.
-        self._context.set(self._top.HSYNC, hsync)
-        self._context.set(self._top.PIXDATA, pixel)
+        loaded = stream.loaded
+        line, pixel = (0, 0) if loaded is None else loaded.sample(stream.edge // 2)
+        self._put(stream.pins.line, line)
+        self._put(stream.pins.data, pixel)
 
-    def _use_pixels(self, pixels: NDArray[np.uint8]) -> None:
-        if self._loaded is not None:
-            self._put_lines(*self._loaded.sample(self._edge // 2))
+    def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
+        self._put_sample(self._streams[camera])
 
-    def _burst(self, until_ps: int, stop_level: int | None) -> tuple[int, Outcome]:
-        loaded = self._loaded
-        assert loaded is not None
-        time_ps = self.now_ps
-        while self._edge < loaded.edges:
-            if loaded.time_of(self._edge) > until_ps:
-                return until_ps, Outcome.TIME_REACHED
-            time_ps = loaded.time_of(self._edge)
-            sample, falling = divmod(self._edge, 2)
-            self._edge += 1
-            if falling:
-                if self._edge < loaded.edges:
-                    self._put_lines(*loaded.sample(sample + 1))
-                self._drive(time_ps, "PIXCLK", 0)
-                continue
-            self._drive(time_ps, "PIXCLK", 1)
-            self._low_clocks = 0 if self._get("HSYNC") else self._low_clocks + 1
-            if self._skipping and self._low_clocks >= SETTLING_CLOCKS:
-                self._skip_low_samples(loaded, sample, until_ps)
-            if self._get("ACK") == stop_level:
-                return time_ps, Outcome.ACK_REACHED
-        return time_ps, Outcome.SEGMENT_OVER
+    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, Outcome, int]:
+        before = self._acknowledges()
+        while True:
+            camera = min(cameras, key=lambda number: self._streams[number].time_ps)
+            stream = self._streams[camera]
+            assert stream.loaded is not None
+            time_ps = stream.time_ps
+            if time_ps > until_ps:
+                return until_ps, Outcome.TIME_REACHED, camera
+            self._make_edge(stream, stream.loaded, time_ps, until_ps)
+            outcome = Outcome.TIME_REACHED
+            if self._acknowledges() != before:
+                outcome = Outcome.ACKNOWLEDGE_CHANGED
+            elif stream.edge == stream.loaded.edges:
+                outcome = Outcome.SEGMENT_OVER
+            if outcome is not Outcome.TIME_REACHED:
+                for number in cameras:
+                    self._come_back(self._streams[number], time_ps)
+                return time_ps, outcome, camera
 
-    def _skip_low_samples(self, loaded: LoadedSegment, sample: int, until_ps: int) -> None:
-        """Go on with the falling edge of the last sample of this low part that is in reach."""
-        in_reach = (loaded.first_edge(until_ps + 1) - 1) // 2
-        last = min(loaded.low_until(sample) - 1, in_reach)
-        self._edge = max(self._edge, 2 * last + 1)
+    def _acknowledges(self) -> list[int]:
+        return [self._get(name) for name in self.wiring.acknowledges]
+
+    def _make_edge(
+        self, stream: _Stream, loaded: LoadedSegment, time_ps: int, until_ps: int
+    ) -> None:
+        falling = stream.edge % 2
+        stream.edge += 1
+        if falling:
+            if stream.edge < loaded.edges:
+                self._put_sample(stream)
+            self._drive(time_ps, stream.pins.clock, 0)
+            return
+        self._drive(time_ps, stream.pins.clock, 1)
+        stream.low_clocks = 0 if self._get(stream.pins.line) else stream.low_clocks + 1
+        if self._skipping and stream.low_clocks >= self.wiring.settling_clocks:
+            # Go on with the falling edge of the last sample of this low part that is in reach.
+            in_reach = (loaded.first_edge(until_ps + 1) - 1) // 2
+            last = min(loaded.low_until(stream.edge // 2) - 1, in_reach)
+            stream.edge = max(stream.edge, 2 * last + 1)
+
+    def _come_back(self, stream: _Stream, now_ps: int) -> None:
+        """Take back what was skipped beyond ``now_ps``: the pins may change before that."""
+        assert stream.loaded is not None
+        edge = stream.loaded.first_edge(now_ps + 1)
+        if stream.edge > edge:
+            stream.edge = edge
+            self._drive(now_ps, stream.pins.clock, edge % 2)
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
         for i in range(len(out)):
-            self._drive(self.now_ps + int(fraction + i * period), "DCLK", 1)
-            out[i] = self._get("DATA")
+            self._drive(self.now_ps + int(fraction + i * period), self.wiring.data_clock, 1)
+            out[i] = self._get(self.wiring.data)
             fall_ps = self.now_ps + int(fraction + (i + Fraction(1, 2)) * period)
-            self._drive(fall_ps, "DCLK", 0)
+            self._drive(fall_ps, self.wiring.data_clock, 0)

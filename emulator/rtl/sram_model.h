@@ -22,6 +22,7 @@ enum ViolationKind : int64_t {
     READ_ACCESS,
     BUS_CONTENTION,
     TURNAROUND,
+    WIRE_CONTENTION,
     VIOLATION_KINDS,
 };
 
@@ -31,6 +32,26 @@ struct Violation {
     int64_t address;
     int64_t found;
     int64_t needed;
+    int64_t where;  // number of the memory
+};
+
+// What all memories of an engine report, in the order of time.
+class ViolationLog {
+public:
+    // Of each kind, the first `keep` are kept.
+    explicit ViolationLog(int64_t keep) : keep(keep) {}
+
+    std::vector<Violation> kept;
+    int64_t counts[VIOLATION_KINDS] = {};
+
+    void add(const Violation &violation) {
+        counts[violation.kind]++;
+        if (counts[violation.kind] <= keep)
+            kept.push_back(violation);
+    }
+
+private:
+    const int64_t keep;
 };
 
 // Settled levels at the memory's pins. One word, because a structure of small fields that is
@@ -50,6 +71,7 @@ public:
     bool writes() const { return (word & 5) == 0; }
     bool reads() const { return (word & 7) == 1; }
     bool same_data(const SramPins &other) const { return ((word ^ other.word) & 0xFF08) == 0; }
+    bool operator==(const SramPins &other) const { return word == other.word; }
 
 private:
     uint64_t word;
@@ -57,18 +79,25 @@ private:
 
 class Sram {
 public:
-    // Of each kind of violation, the first `keep` are kept.
-    Sram(uint8_t *memory, const SramTiming &timing, int64_t keep)
-        : memory(memory), timing(timing), keep(keep) {}
-
-    std::vector<Violation> kept;
-    int64_t counts[VIOLATION_KINDS] = {};
+    // `number` is what violations in `log` call it.
+    Sram(uint8_t *memory, const SramTiming &timing, ViolationLog &log, int64_t number)
+        : memory(memory), timing(timing), log(log), number(number) {}
 
     uint8_t bus() const { return pins.reads() ? memory[pins.address()] : pins.data(); }
 
     bool writes() const { return pins.writes(); }
 
+    // Without supply it takes no writes, offers 0 and breaks no rules.
+    void power(bool on) {
+        powered = on;
+        pins = SramPins();
+        write_since = data_since = address_since = selected_since = LONG_AGO;
+        reads_since = released_at = LONG_AGO;
+    }
+
     void drive(int64_t time, SramPins next) {
+        if (next == pins || !powered)
+            return;
         const SramPins old = pins;
         pins = next;
         const bool moved = pins.address() != old.address();
@@ -105,7 +134,9 @@ private:
 
     uint8_t *const memory;
     const SramTiming timing;
-    const int64_t keep;
+    ViolationLog &log;
+    const int64_t number;
+    bool powered = true;
     SramPins pins;
     int64_t write_since = LONG_AGO;
     int64_t data_since = LONG_AGO;
@@ -137,8 +168,6 @@ private:
     }
 
     void report(ViolationKind kind, int64_t time, uint32_t address, int64_t found, int64_t needed) {
-        counts[kind]++;
-        if (counts[kind] <= keep)
-            kept.push_back({kind, time, address, found, needed});
+        log.add({kind, time, address, found, needed, number});
     }
 };

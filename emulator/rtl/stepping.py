@@ -1,27 +1,22 @@
-"""What both engines share: segments of the camera's stream, idle time, and virtual time.
+"""What both engines share: segments of the cameras' streams, idle time, and virtual time.
 
-CubeStar's FPGA is idle when it is not storing, or has stored a frame: its pixel clock domain is
-in reset, or waits for one. Pixel clocks then change nothing (SRAM_D_O, not driven, apart), so
-time may pass without making them.
+A camera whose pixel clock changes nothing is idle; the wiring tells when that is. Time may pass
+without making its clocks (the data output to a memory, not driven, apart).
 """
 
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum, auto
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.engine import (
-    CAMERA_PINS,
-    MCU_PINS,
-    OUTPUT_PINS,
-    PinEvent,
-    PixelSource,
-)
+from cubestack.emulator.rtl.engine import PinEvent, PixelSource
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
+from cubestack.emulator.rtl.wiring import CameraPins, Wiring
 from cubestack.emulator.sram import Violation, ViolationKind, ViolationLog
 
 __all__ = ["Outcome", "SteppingEngine"]
@@ -31,33 +26,50 @@ class Outcome(Enum):
     """Why a burst of pixel clock edges ended."""
 
     TIME_REACHED = auto()
-    ACK_REACHED = auto()
+    ACKNOWLEDGE_CHANGED = auto()
     SEGMENT_OVER = auto()
+
+
+@dataclass
+class _Camera:
+    """A camera's place at the FPGA, and what is connected there."""
+
+    number: int
+    pins: CameraPins
+    source: PixelSource | None = None
+    loaded: LoadedSegment | None = None
+    entered: tuple[int, int] = (0, 0)  # start of the loaded segment, and its first edge made
+    skipped: bool = False  # the pixel clock stands at an earlier time
 
 
 class SteppingEngine(ABC):
     """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` on top of a design that can be stepped.
 
     Attributes:
+        wiring: design and surroundings.
         now_ps: virtual time.
-        sram: the memory's bytes.
+        memories: each memory's bytes, by its name.
+        sram: those of the first one.
     """
 
-    def __init__(self, sram_size: int, *, skipping: bool) -> None:
-        """Start at time 0 with no camera, all inputs low and the memory zero."""
+    def __init__(self, wiring: Wiring, *, skipping: bool) -> None:
+        """Start at time 0 with no camera, all inputs as the design has them, memories zero."""
+        self.wiring = wiring
         self.now_ps = 0
-        self.sram: NDArray[np.uint8] = np.zeros(sram_size, np.uint8)
+        self.memories: dict[str, NDArray[np.uint8]] = {
+            memory.name: np.zeros(1 << wiring.widths[memory["A"]], np.uint8)
+            for memory in wiring.memories
+        }
+        self.sram = self.memories[wiring.memories[0].name]
         self._skipping = skipping
-        self._source: PixelSource | None = None
-        self._loaded: LoadedSegment | None = None
-        self._entered = (0, 0)  # start of the loaded segment, and its edge that was made first
-        self._clocks_skipped = False  # the pixel clock stands at an earlier time
+        self._cameras = [_Camera(number, pins) for number, pins in enumerate(wiring.cameras)]
+        self._camera_of = {pin: camera for camera in self._cameras for pin in camera.pins.pins}
         self._next_strobe: tuple[int, Fraction, Fraction] | None = None  # time, period, fraction
 
     @property
     @abstractmethod
     def violation_log(self) -> ViolationLog:
-        """What the SRAM model recorded."""
+        """What the memories' models recorded."""
 
     @abstractmethod
     def _set(self, name: str, value: int) -> None:
@@ -68,53 +80,72 @@ class SteppingEngine(ABC):
         """Settled level of any pin."""
 
     @abstractmethod
-    def _load(self, loaded: LoadedSegment | None, edge: int) -> None:
+    def _power(self, memory: int, on: bool) -> None:
+        """Switch a memory's supply at ``now_ps``."""
+
+    @abstractmethod
+    def _load(self, camera: int, loaded: LoadedSegment | None, edge: int) -> None:
         """Continue with ``edge`` of a segment, whose sample now stands on the lines."""
 
     @abstractmethod
-    def _use_pixels(self, pixels: NDArray[np.uint8]) -> None:
+    def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
         """The lines of the loaded segment have been rendered."""
 
     @abstractmethod
-    def _burst(self, until_ps: int, stop_level: int | None) -> tuple[int, Outcome]:
-        """Make the loaded segment's edges up to ``until_ps``; return the time reached and why."""
+    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, Outcome, int]:
+        """Make the edges of the loaded segments up to ``until_ps``.
+
+        Edges are made in the order of time, then of ``cameras``. Returns the time reached, why,
+        and the camera whose segment is over.
+        """
 
     @abstractmethod
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
-        """Fill ``out`` by DCLK cycles from ``now_ps + fraction`` on, with no other clock."""
+        """Fill ``out`` by data clocks from ``now_ps + fraction`` on, with no other clock."""
 
     @property
     def violations(self) -> list[Violation]:
-        """The first broken rules of the SRAM."""
+        """The first broken rules of each kind."""
         return self.violation_log.kept
 
     @property
     def violation_counts(self) -> Counter[ViolationKind]:
-        """How often each rule of the SRAM was broken."""
+        """How often each rule was broken."""
         return self.violation_log.counts
 
-    def attach(self, source: PixelSource | None) -> None:
+    def attach(self, source: PixelSource | None, camera: str | None = None) -> None:
         """Connect a camera, or disconnect it."""
-        self._source = source
-        self.stream_changed()
+        self._named(camera).source = source
+        self.stream_changed(camera)
 
-    def stream_changed(self) -> None:
+    def stream_changed(self, camera: str | None = None) -> None:
         """Ask the source again from ``now_ps`` on, an edge at this very instant included."""
-        self._follow_source(self.now_ps)
+        self._follow_source(self._named(camera), self.now_ps)
+
+    def power_memory(self, name: str, on: bool) -> None:
+        """Switch a memory's supply."""
+        if name not in self.memories:
+            raise ValueError(f"the memories are {', '.join(self.memories)}, not {name}")
+        self.run(self.now_ps)
+        self._power(list(self.memories).index(name), on)
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive one of the microcontroller's pins."""
-        if name not in MCU_PINS:
-            raise ValueError(f"the microcontroller drives {', '.join(MCU_PINS)}, not {name}")
+        if name not in self.wiring.mcu_pins:
+            names = ", ".join(self.wiring.mcu_pins)
+            raise ValueError(f"the microcontroller drives {names}, not {name}")
+        if value >> self.wiring.widths[name]:
+            raise ValueError(f"{name} has {self.wiring.widths[name]} bits, too few for {value}")
         self.run(self.now_ps)
-        self._catch_up()
+        for camera in self._cameras:
+            self._catch_up(camera)
         self._set(name, value)
 
     def get_pin(self, name: str) -> int:
         """Settled level of any pin."""
-        if name in CAMERA_PINS:
-            self._catch_up()
-        elif name not in MCU_PINS and name not in OUTPUT_PINS:
+        if name in self._camera_of:
+            self._catch_up(self._camera_of[name])
+        elif name not in self.wiring.widths:
             raise ValueError(f"the FPGA has no pin {name!r}")
         return self._get(name)
 
@@ -122,25 +153,27 @@ class SteppingEngine(ABC):
         """Advance to ``until_ps`` or to ``stop_on``."""
         if until_ps < self.now_ps:
             raise ValueError(f"can not run back from {self.now_ps} ps to {until_ps} ps")
-        stop_level = None
         if stop_on is not None:
-            pin, stop_level = stop_on
-            if pin != "ACK":
-                raise ValueError(f"can stop on ACK only, not on {pin}")
-            if self._get("ACK") == stop_level:
+            if stop_on[0] not in self.wiring.acknowledges:
+                names = " or ".join(self.wiring.acknowledges)
+                raise ValueError(f"can stop on {names} only, not on {stop_on[0]}")
+            if self._get(stop_on[0]) == stop_on[1]:
                 return self.now_ps
         while True:
-            if self._source is None or self._loaded is None or self._may_skip():
-                self._clocks_skipped = self._loaded is not None
+            running = self._running()
+            for camera in self._cameras:
+                if camera not in running:
+                    camera.skipped = camera.loaded is not None
+            if not running:
                 self.now_ps = until_ps
                 return self.now_ps
-            if self._loaded.segment.rows and self._loaded.pixels is None and not self._idle():
-                self._use_pixels(self._loaded.render())
-            # A frame stored is where idle time begins, so it ends the burst in any case.
-            self.now_ps, outcome = self._burst(until_ps, 1 if self._skipping else stop_level)
+            # An acknowledge is where idle time begins, so it ends the burst in any case.
+            self.now_ps, outcome, number = self._burst(until_ps, [c.number for c in running])
             if outcome is Outcome.SEGMENT_OVER:
-                self._follow_segment(self._source, self._loaded)
-            elif outcome is Outcome.TIME_REACHED or self._get("ACK") == stop_level:
+                self._follow_segment(self._cameras[number])
+            elif outcome is Outcome.TIME_REACHED or (
+                stop_on is not None and self._get(stop_on[0]) == stop_on[1]
+            ):
                 return self.now_ps
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
@@ -154,7 +187,7 @@ class SteppingEngine(ABC):
         # Cycle n ends at floor(fraction + n * period): the largest n that keeps it within reach.
         reach = (until_ps - self.now_ps + 1 - fraction) / period
         cycles = max(0, min(len(out), -(-reach.numerator // reach.denominator) - 1))
-        if self._loaded is None or self._may_skip():
+        if not self._running():
             self._strobe(out[:cycles], period, fraction)
         else:
             self._strobe_beside_pixels(out[:cycles], period, fraction)
@@ -165,81 +198,106 @@ class SteppingEngine(ABC):
 
     def apply(self, events: Sequence[PinEvent]) -> NDArray[np.int64]:
         """Drive input pins one event after the other; returns the outputs after each."""
-        outputs = np.zeros((len(events), len(OUTPUT_PINS)), np.int64)
+        pins = self.wiring.output_pins
+        outputs = np.zeros((len(events), len(pins)), np.int64)
         for row, (time_ps, pin, level) in enumerate(events):
             self.run(time_ps)
-            if pin in CAMERA_PINS and self._source is None:
+            if pin in self._camera_of and self._camera_of[pin].source is None:
                 self._set(pin, level)
             else:
                 self.set_pin(pin, level)
-            outputs[row] = [self._get(name) for name in OUTPUT_PINS]
+            outputs[row] = [self._get(name) for name in pins]
         return outputs
 
-    def _may_skip(self) -> bool:
-        return self._skipping and self._idle()
+    def _named(self, name: str | None) -> _Camera:
+        if name is None:
+            return self._cameras[0]
+        for camera in self._cameras:
+            if camera.pins.name == name:
+                return camera
+        names = ", ".join(camera.pins.name for camera in self._cameras)
+        raise ValueError(f"the cameras are {names}, not {name}")
 
-    def _idle(self) -> bool:
-        storing = self._get("ENABLE") and not self._get("RNW")
-        return not storing or bool(self._get("ACK"))
+    def _running(self) -> list[_Camera]:
+        """The cameras whose clocks are to be made, their pixels rendered where they may be stored.
 
-    def _catch_up(self) -> None:
+        None of them has skipped a clock: a camera becomes one of these by ``set_pin`` only.
+        """
+        storing = self.wiring.storing(self._get)
+        running = []
+        for camera in self._cameras:
+            loaded, stores = camera.loaded, camera.pins.name in storing
+            if loaded is None or (self._skipping and not stores):
+                continue
+            if stores and loaded.segment.rows and loaded.pixels is None:
+                self._use_pixels(camera.number, loaded.render())
+            running.append(camera)
+        return running
+
+    def _catch_up(self, camera: _Camera) -> None:
         """Put the pixel clock where it would be, had no clock been skipped."""
-        if self._clocks_skipped:
-            self._clocks_skipped = False
-            entered = self._entered
+        if camera.skipped:
+            camera.skipped = False
+            entered = camera.entered
             # The edges up to now, now included, are those that were skipped.
-            self._follow_source(self.now_ps + 1)
-            if self._entered != entered and self._entered[1] % 2 == 1:
-                self._set("PIXCLK", 1)
+            self._follow_source(camera, self.now_ps + 1)
+            if camera.entered != entered and camera.entered[1] % 2 == 1:
+                self._set(camera.pins.clock, 1)
 
-    def _follow_source(self, first_ps: int) -> None:
+    def _follow_source(self, camera: _Camera, first_ps: int) -> None:
         """Continue with the source's first edge at ``first_ps`` or later."""
-        segment = None if self._source is None else self._source.segment_at(self.now_ps)
-        if self._source is None or segment is None:
-            self._go_to(None, 0)
+        source, clock = camera.source, camera.pins.clock
+        segment = None if source is None else source.segment_at(self.now_ps)
+        if source is None or segment is None:
+            self._go_to(camera, None, 0)
             return
-        loaded = LoadedSegment.of(self._source, segment)
+        loaded = LoadedSegment.of(source, segment)
         edge = loaded.first_edge(first_ps)
-        # A rising edge at this instant was made already if PIXCLK is high; again it does nothing.
+        # A rising edge at this instant was made already if the clock is high; again it does
+        # nothing.
         at_rise = edge < loaded.edges and loaded.time_of(edge) == self.now_ps
-        if edge % 2 == 0 and self._get("PIXCLK") and not at_rise:
-            self._set("PIXCLK", 0)
+        if edge % 2 == 0 and self._get(clock) and not at_rise:
+            self._set(clock, 0)
         if edge == loaded.edges:
-            self._follow_segment(self._source, loaded)
+            camera.loaded = loaded
+            self._follow_segment(camera)
         else:
-            self._go_to(loaded, edge)
+            self._go_to(camera, loaded, edge)
 
-    def _follow_segment(self, source: PixelSource, over: LoadedSegment) -> None:
-        """Continue with what comes after a segment whose edges are all made."""
+    def _follow_segment(self, camera: _Camera) -> None:
+        """Continue with what comes after the loaded segment, whose edges are all made."""
+        source, over = camera.source, camera.loaded
+        assert source is not None
+        assert over is not None
         segment = source.segment_at(over.end_ps)
         if segment is not None and segment.start_ps == over.segment.start_ps:
             # Where both starts are rounded down, the gap between them may be one longer.
             segment = source.segment_at(over.end_ps + 1)
         if segment is None:
-            self._go_to(None, 0)
+            self._go_to(camera, None, 0)
             return
         if segment.start_ps < over.end_ps:
             raise ValueError(
                 f"the source's next segment starts at {segment.start_ps} ps, "
                 f"before the last one's end at {over.end_ps} ps"
             )
-        self._go_to(LoadedSegment.of(source, segment), 0)
+        self._go_to(camera, LoadedSegment.of(source, segment), 0)
 
-    def _go_to(self, loaded: LoadedSegment | None, edge: int) -> None:
-        self._loaded = loaded
-        self._entered = (loaded.segment.start_ps if loaded else self.now_ps, edge)
-        if loaded is None and self._get("PIXCLK"):
-            self._set("PIXCLK", 0)
-        self._load(loaded, edge)
+    def _go_to(self, camera: _Camera, loaded: LoadedSegment | None, edge: int) -> None:
+        camera.loaded = loaded
+        camera.entered = (loaded.segment.start_ps if loaded else self.now_ps, edge)
+        if loaded is None and self._get(camera.pins.clock):
+            self._set(camera.pins.clock, 0)
+        self._load(camera.number, loaded, edge)
 
     def _strobe_beside_pixels(
         self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction
     ) -> None:
-        """Do as ``_strobe`` does, with the pixel clock running."""
-        start = self.now_ps
+        """Do as ``_strobe`` does, with pixel clocks running."""
+        start, clock = self.now_ps, self.wiring.data_clock
         for i in range(len(out)):
             self.run(start + int(fraction + i * period))
-            self._set("DCLK", 1)
+            self._set(clock, 1)
             self.run(start + int(fraction + (i + Fraction(1, 2)) * period))
-            out[i] = self._get("DATA")
-            self._set("DCLK", 0)
+            out[i] = self._get(self.wiring.data)
+            self._set(clock, 0)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from cubestack.emulator.rtl import build
 from cubestack.emulator.rtl.compiled import CompiledEngine
 from cubestack.emulator.rtl.engine import make_engine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
+from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
 from cubestack.hdl.cubestar_top import CubeStarTop
 
 needs_compiler = pytest.mark.skipif(build.find_compiler() is None, reason="no C++ compiler")
@@ -44,6 +46,10 @@ def top() -> CubeStarTop:
     return CubeStarTop(3, 2)
 
 
+def wiring() -> Wiring:
+    return cubestar_wiring(top())
+
+
 @pytest.fixture
 def quick_compiler(tmp_path, monkeypatch) -> None:
     """Makes a file of the right name, its content telling the options."""
@@ -52,30 +58,31 @@ def quick_compiler(tmp_path, monkeypatch) -> None:
 
 
 def test_built_once_then_taken_from_the_cache(quick_compiler, cache, monkeypatch):
-    library = build.library_for(top())
+    library = build.library_for(wiring())
     assert library.parent == cache
     monkeypatch.setattr(build, "_compile", lambda *_: pytest.fail("built again"))
-    assert build.library_for(top()) == library
+    assert build.library_for(wiring()) == library
     assert sorted(path.suffix for path in cache.iterdir()) == [".log", ".so"]
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed"])
 def test_damaged_library_is_built_again(quick_compiler, cache, damage):
-    library = build.library_for(top())
+    library = build.library_for(wiring())
     content = library.read_bytes()
     library.write_bytes(content[:9] if damage == "cut" else content[:-1] + b"\x55")
-    again = build.library_for(top())
+    again = build.library_for(wiring())
     assert again.read_bytes().startswith(b"options -std=c++17")
     assert list(cache.glob("*.so")) == [again]
 
 
-def test_other_design_flags_or_driver_make_another_library(quick_compiler, cache, monkeypatch):
-    libraries = [build.library_for(top()), build.library_for(CubeStarTop(2, 3))]
+def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypatch):
+    libraries = [build.library_for(wiring()), build.library_for(cubestar_wiring(CubeStarTop(2, 3)))]
     monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-g"))
-    libraries.append(build.library_for(top()))
+    libraries.append(build.library_for(wiring()))
     monkeypatch.setattr(build, "SOURCES", ("driver.cpp",))
-    libraries.append(build.library_for(top()))
-    assert len(set(libraries)) == 4
+    libraries.append(build.library_for(wiring()))
+    libraries.append(build.library_for(replace(wiring(), data="SRAM_A")))
+    assert len(set(libraries)) == 5
 
 
 @needs_compiler

@@ -5,13 +5,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import OUTPUT_PINS, PinEvent, RtlEngine, make_engine
+from cubestack.emulator.rtl.engine import PinEvent, RtlEngine, make_engine
+from cubestack.emulator.rtl.wiring import cubestar_wiring
 from cubestack.hdl.cubestar_top import CubeStarTop
 
 PERIOD = 100_000
 LINE = 12
 BLANK = 30
 ROWS, COLUMNS = 4, 8
+OUTPUT_PINS = cubestar_wiring().output_pins
 # The last pixel is taken by the rising edge of its own clock, stored during that clock, and
 # acknowledged by the next rising edge.
 FIRST_ACK = (BLANK + (ROWS - 1) * LINE + COLUMNS) * PERIOD

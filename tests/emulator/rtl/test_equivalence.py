@@ -6,17 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import (
-    CAMERA_PINS,
-    MCU_PINS,
-    OUTPUT_PINS,
-    PinEvent,
-    RtlEngine,
-    make_engine,
-)
+from cubestack.emulator.rtl.engine import PinEvent, RtlEngine, make_engine
+from cubestack.emulator.rtl.wiring import cubestar_wiring
 from cubestack.emulator.sram import SramTiming
 from cubestack.hdl.cubestar_top import CubeStarTop
 
+WIRING = cubestar_wiring()
+CAMERA_PINS, MCU_PINS, OUTPUT_PINS = WIRING.camera_pins, WIRING.mcu_pins, WIRING.output_pins
 SIZES = [(8, 4), (5, 3)]
 Step = Callable[[RtlEngine], object]
 
