@@ -190,7 +190,8 @@ def _source(name: str) -> bytes:
 
 
 def _declinations(step_deg: float) -> NDArray[np.float64]:
-    return np.radians(np.append(np.arange(-90.0, 90.0, step_deg), 90.0))
+    declinations: NDArray[np.float64] = np.append(np.arange(-90.0, 90.0, step_deg), 90.0)
+    return np.radians(declinations)
 
 
 def _fields(declination: float, step_deg: float) -> NDArray[np.float64]:

@@ -13,10 +13,15 @@ quaternion's scalar part, so the one of the four choices with the largest determ
 (The trace would not do: in a narrow field it hardly depends on the rotation about the boresight.)
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
+
+#: Largest eigenvalue of Davenport's matrix from the profile (3, 3) of weights that add up to 1.
+Eigenvalue = Callable[[NDArray[np.float32], Meter], np.float32]
 
 #: Smallest determinant for weights that add up to 1. Two vectors an angle apart give half its
 #: square, so this is 0.1 deg; below, rounding in single precision would decide the roll angle.
@@ -35,6 +40,8 @@ def quest(
     reference: NDArray[np.float32],
     weights: NDArray[np.float32],
     meter: Meter,
+    *,
+    eigenvalue: Eigenvalue | None = None,
 ) -> NDArray[np.float32]:
     """Quaternion (4,), scalar last and not negative, of the rotation reference to measured.
 
@@ -43,6 +50,7 @@ def quest(
         reference: (n, 3) unit vectors of the same stars in inertial axes.
         weights: (n,) not negative, not all zero; verification votes on CubeStar.
         meter: charged with every operation.
+        eigenvalue: finds the largest eigenvalue; None takes 1, as CubeStar does.
 
     Raises:
         AttitudeError: for fewer than two vectors, weights without weight, or vectors that all point
@@ -57,7 +65,8 @@ def quest(
     if total <= 0:
         raise AttitudeError("the weights of the vectors add up to 0")
     profile /= total
-    choices = [_system(profile * signs, meter) for signs in _TURNS]
+    largest = np.float32(1) if eigenvalue is None else eigenvalue(profile, meter)
+    choices = [_system(profile * signs, largest, meter) for signs in _TURNS]
     determinants = [_determinant(matrix, meter) for matrix, _ in choices]
     turn = int(np.argmax(determinants))
     meter.charge(f32_add=len(weights), f32_div=9, f32_compare=5, loop=len(weights))
@@ -111,11 +120,11 @@ def _profile(
 
 
 def _system(
-    profile: NDArray[np.float32], meter: Meter
+    profile: NDArray[np.float32], eigenvalue: np.float32, meter: Meter
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Matrix (3, 3) and right side (3,) of equation 4.4.9, for weights that add up to 1."""
     sigma = profile[0, 0] + profile[1, 1] + profile[2, 2]
-    matrix = (np.float32(1) + sigma) * np.eye(3, dtype=np.float32) - (profile + profile.T)
+    matrix = (eigenvalue + sigma) * np.eye(3, dtype=np.float32) - (profile + profile.T)
     right = np.array(
         [
             profile[1, 2] - profile[2, 1],

@@ -1,0 +1,371 @@
+"""From measured stars to an attitude: triples, pivots, identities, QUEST and the outcome.
+
+AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
+the main triangle, the next three the pivots, and a unique triangle is believed. With verification
+(ours), an attitude must be confirmed by further stars; then any triangle that is left after the
+pivots is tried with both ways of telling its stars apart, and further triples of stars follow when
+none is confirmed. The confirmed attitude is solved again with all stars that confirm it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.algorithms.geometry import unit_vectors
+from cubestack.firmware_model.algorithms.quest import AttitudeError, dcm, quest
+from cubestack.firmware_model.aramis.assignment import assign
+from cubestack.firmware_model.aramis.database import Database
+from cubestack.firmware_model.aramis.eigenvalue import largest_eigenvalue
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.matching import Match, MatchEnd, match_triple
+from cubestack.firmware_model.aramis.verification import confirm, sides_agree
+from cubestack.firmware_model.costs import Meter
+
+__all__ = ["NONE", "Outcome", "Profile", "Reason", "Solution", "StarList", "identify"]
+
+NONE = -1
+"""Mark of a measured star without identity."""
+
+
+class Outcome(Enum):
+    """The three outcomes of section 5.7."""
+
+    CONCLUSIVE = "conclusive"
+    AMBIGUOUS = "ambiguous"
+    NONE = "none"
+
+
+class Reason(Enum):
+    """Why an identification ended as it did."""
+
+    UNIQUE = "one triangle of the database was left"
+    CONFIRMED = "further stars confirm the attitude"
+    SEVERAL = "several triangles of the database were left after the last pivot"
+    TOO_FEW_STARS = "there were fewer than three stars"
+    TOO_MANY_PIXELS = "too many pixels were lit to be stars"
+    DEGENERATE = "the stars stand on a line"
+    NO_TRIANGLE = "no triangle of the database has that area and moment"
+    NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
+    UNCONFIRMED = "no attitude was confirmed by further stars"
+    FAR_FROM_HINT = "the boresight is far from the rough direction"
+
+
+_REASONS = {
+    MatchEnd.UNIQUE: Reason.UNIQUE,
+    MatchEnd.SEVERAL: Reason.SEVERAL,
+    MatchEnd.DEGENERATE: Reason.DEGENERATE,
+    MatchEnd.NO_TRIANGLE: Reason.NO_TRIANGLE,
+    MatchEnd.NO_SHARED_PAIR: Reason.NO_SHARED_PAIR,
+}
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Settings of the identification; the defaults are the published ones.
+
+    Attributes:
+        sigma_rad: noise of a measured direction per axis, in rad. The thesis' appendix E settles on
+            0.26 px of its simulator, 0.3759 rad / 582.
+        pivots: pivot triangles at most, 0 to 3.
+        verify: whether an attitude must be confirmed by further stars.
+        tolerance_rad: distance within which a star confirms.
+        side_tolerance_rad: largest difference of a side, with verification.
+        largest_chance: an attitude is confirmed when chance would do it less often.
+        triples: triples tried at most, with verification.
+        triple_stars: triples are made of so many of the brightest stars, with verification.
+        candidates: with verification, so many candidates of a triple are tried at most.
+        hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (ours).
+    """
+
+    sigma_rad: float = 0.26 * 0.3759 / 582
+    pivots: int = 3
+    verify: bool = False
+    tolerance_rad: float = 1.2e-3
+    side_tolerance_rad: float = 5e-4
+    largest_chance: float = 1e-4
+    triples: int = 60
+    triple_stars: int = 10
+    candidates: int = 8
+    hint_tolerance_deg: float = 6.0
+
+    def __post_init__(self) -> None:
+        """Refuse settings with which nothing can be found."""
+        bounds = {
+            "sigma_rad": (1e-7, 1e-2),
+            "pivots": (0, 3),
+            "tolerance_rad": (1e-5, 0.05),
+            "side_tolerance_rad": (1e-6, 0.05),
+            "largest_chance": (0, 1),
+            "triples": (1, 1000),
+            "triple_stars": (3, 64),
+            "candidates": (1, 1000),
+            "hint_tolerance_deg": (0, 180),
+        }
+        for name, (low, high) in bounds.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} must be {low} to {high}, not {value}")
+
+
+@dataclass(frozen=True, eq=False)
+class StarList:
+    """Stars of a picture, the brightest first.
+
+    Attributes:
+        centroids: (n, 2) x and y in px, float32.
+        brightness: (n,) sum of grey levels, falling, float32.
+    """
+
+    centroids: NDArray[np.float32]
+    brightness: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        """Number of stars."""
+        return len(self.centroids)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What became of one picture.
+
+    Attributes:
+        outcome: conclusive, ambiguous or none.
+        reason: why.
+        quaternion: (4,) inertial to camera, scalar last and not negative; None unless conclusive.
+        stars: (n,) index into the database's star list for each measured star, -1 for none.
+        measured: the stars that were found.
+        candidates: triangles left when matching ended.
+        pivots: pivot triangles used for the last triple.
+        triples: triples tried.
+        expected: catalogue stars in the field by the attitude, 0 without verification.
+    """
+
+    outcome: Outcome
+    reason: Reason
+    quaternion: NDArray[np.float32] | None
+    stars: NDArray[np.int32]
+    measured: StarList
+    candidates: int = 0
+    pivots: int = 0
+    triples: int = 0
+    expected: int = 0
+
+
+def identify(
+    measured: StarList,
+    field: Field,
+    profile: Profile,
+    database: Database,
+    meter: Meter,
+    hint: NDArray[np.float32] | None = None,
+) -> Solution:
+    """Identify measured stars and solve the attitude.
+
+    Args:
+        measured: stars of the picture in the field, the brightest first.
+        field: the camera.
+        profile: settings.
+        database: stars and triangles.
+        meter: charged; phases `faces`, `triangles`, `search`, `pivoting`, `identities`, `attitude`
+            and `verification`.
+        hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
+    """
+    if len(measured) < 3:
+        return unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, measured)
+    vectors = unit_vectors(measured.centroids, field.camera, meter)
+    faces = None
+    if hint is not None:
+        with meter.phase("faces"):
+            faces = database.sphere.around(hint, meter)
+    search = _Search(measured, vectors, field, profile, database, hint, faces, meter)
+    return search.verified() if profile.verify else search.published()
+
+
+def unsolved(outcome: Outcome, reason: Reason, measured: StarList, **counts: int) -> Solution:
+    """A solution without attitude."""
+    return Solution(
+        outcome, reason, None, np.full(len(measured), NONE, dtype=np.int32), measured, **counts
+    )
+
+
+@dataclass(frozen=True)
+class _Search:
+    """One picture's identification."""
+
+    measured: StarList
+    vectors: NDArray[np.float32]
+    field: Field
+    profile: Profile
+    database: Database
+    hint: NDArray[np.float32] | None
+    faces: NDArray[np.bool_] | None
+    meter: Meter
+
+    def published(self) -> Solution:
+        """The three brightest stars, and nothing that contradicts."""
+        main = (0, 1, 2)
+        match = self._match(main)
+        counts = {"candidates": len(match.candidates), "pivots": match.pivots, "triples": 1}
+        reason = _REASONS[match.end]
+        if match.end is MatchEnd.SEVERAL:
+            return unsolved(Outcome.AMBIGUOUS, reason, self.measured, **counts)
+        if match.end is not MatchEnd.UNIQUE:
+            return unsolved(Outcome.NONE, reason, self.measured, **counts)
+        identities = self._identities(main, match, int(match.candidates[0]))[0]
+        quaternion = self._attitude(np.array(main), identities)
+        if quaternion is None:
+            return unsolved(Outcome.NONE, Reason.DEGENERATE, self.measured, **counts)
+        if self._far_from_hint(quaternion):
+            return unsolved(Outcome.NONE, Reason.FAR_FROM_HINT, self.measured, **counts)
+        return self._solution(reason, quaternion, np.array(main), identities, **counts)
+
+    def verified(self) -> Solution:
+        """Triples until the attitude of one is confirmed."""
+        hypotheses = triples = 0
+        reason = None
+        for main in self._triples():
+            triples += 1
+            match = self._match(main)
+            if len(match.candidates):
+                reason = Reason.UNCONFIRMED
+            reason = reason or _REASONS[match.end]
+            for triangle in match.candidates[: self.profile.candidates].tolist():
+                for identities in self._identities(main, match, triangle):
+                    if not self._sides_agree(main, identities):
+                        continue
+                    hypotheses += 1
+                    quaternion = self._attitude(np.array(main), identities)
+                    if quaternion is None or self._far_from_hint(quaternion):
+                        continue
+                    found = self._confirm(quaternion, hypotheses)
+                    if found is not None:
+                        quaternion, stars, identities, expected = found
+                        return self._solution(
+                            Reason.CONFIRMED,
+                            quaternion,
+                            stars,
+                            identities,
+                            candidates=len(match.candidates),
+                            pivots=match.pivots,
+                            triples=triples,
+                            expected=expected,
+                        )
+        return unsolved(
+            Outcome.NONE, reason or Reason.TOO_FEW_STARS, self.measured, triples=triples
+        )
+
+    def _triples(self) -> Iterator[tuple[int, int, int]]:
+        """Triples of the brightest stars, by the sum of their ranks."""
+        count = min(len(self.measured), self.profile.triple_stars)
+        triples = sorted(combinations(range(count), 3), key=lambda triple: (sum(triple), triple))
+        yield from triples[: self.profile.triples]
+
+    def _match(self, main: tuple[int, int, int]) -> Match:
+        others = [star for star in range(len(self.measured)) if star not in main]
+        return match_triple(
+            self.vectors,
+            main,
+            others[: self.profile.pivots],
+            self.profile.sigma_rad,
+            self.database,
+            self.faces,
+            self.meter,
+        )
+
+    def _identities(
+        self, main: tuple[int, int, int], match: Match, triangle: int
+    ) -> list[NDArray[np.intp]]:
+        """Star of the database for each of the three, by the score; then by the other criterion."""
+        assert match.main is not None
+        database, stars = self.database, self.database.stars[triangle].astype(np.intp)
+        with self.meter.phase("identities"):
+            found = assign(
+                self.measured.brightness[list(main)],
+                match.main.sides,
+                database.v_mag[stars],
+                database.vectors[stars],
+                self.meter,
+            )
+        orders = [found.order]
+        if (found.order != found.other).any():
+            orders.append(found.other)
+        return [stars[order] for order in orders]
+
+    def _sides_agree(self, main: tuple[int, int, int], identities: NDArray[np.intp]) -> bool:
+        with self.meter.phase("verification"):
+            return sides_agree(
+                self.vectors[list(main)],
+                self.database.vectors[identities],
+                self.profile.side_tolerance_rad,
+                self.meter,
+            )
+
+    def _attitude(
+        self, measured: NDArray[np.intp], identities: NDArray[np.intp]
+    ) -> NDArray[np.float32] | None:
+        with self.meter.phase("attitude"):
+            try:
+                return quest(
+                    self.vectors[measured],
+                    self.database.vectors[identities],
+                    np.ones(len(measured), dtype=np.float32),
+                    self.meter,
+                    eigenvalue=largest_eigenvalue,
+                )
+            except AttitudeError:
+                return None
+
+    def _far_from_hint(self, quaternion: NDArray[np.float32]) -> bool:
+        if self.hint is None:
+            return False
+        with self.meter.phase("faces"):
+            boresight = dcm(quaternion, self.meter)[2]
+            self.meter.charge(f32_mul=3, f32_add=2, f32_compare=1)
+        limit = np.cos(np.radians(self.profile.hint_tolerance_deg))
+        return bool(np.dot(boresight, self.hint.astype(np.float32)) < np.float32(limit))
+
+    def _confirm(
+        self, quaternion: NDArray[np.float32], hypotheses: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.intp], NDArray[np.intp], int] | None:
+        """Confirmed attitude of all stars that agree, those stars, and how many were expected."""
+        for _ in range(2):
+            found = confirm(
+                quaternion,
+                self.vectors,
+                self.database,
+                self.field,
+                self.profile.tolerance_rad,
+                hypotheses,
+                self.meter,
+            )
+            if found.chance > self.profile.largest_chance:
+                return None
+            refined = self._attitude(found.measured, found.stars)
+            if refined is None:
+                return None
+            quaternion = refined
+        return quaternion, found.measured, found.stars, found.expected
+
+    def _solution(
+        self,
+        reason: Reason,
+        quaternion: NDArray[np.float32],
+        measured: NDArray[np.intp],
+        identities: NDArray[np.intp],
+        **counts: int,
+    ) -> Solution:
+        stars = np.full(len(self.measured), NONE, dtype=np.int32)
+        stars[measured] = identities
+        return Solution(
+            Outcome.CONCLUSIVE,
+            reason,
+            quaternion,
+            stars,
+            self.measured,
+            expected=expected,
+            **counts,
+        )

@@ -1,0 +1,152 @@
+"""From a picture to an attitude: the whole of the star tracker's processing.
+
+AraMiS thesis, figure 8.1 and section 7.3: threshold over five pictures, spike removal, centroids,
+identification and attitude.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.background import Background
+from cubestack.firmware_model.aramis.database import Database
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.identification import (
+    Outcome,
+    Profile,
+    Reason,
+    Solution,
+    StarList,
+    identify,
+    unsolved,
+)
+from cubestack.firmware_model.aramis.regions import find_regions, locate_stars
+from cubestack.firmware_model.aramis.spikes import HALF, SpikeRemoval, remove_spikes
+from cubestack.firmware_model.costs import Meter
+
+__all__ = ["PUBLISHED", "VERIFIED", "Configuration", "Detection", "detect", "solve"]
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Settings of the search for stars; the defaults are the published ones.
+
+    Attributes:
+        sigmas: a bright pixel is above the mean by so many standard deviations, 0 to 20.
+        spikes: how noise is removed.
+        needed: bright pixels that a window of 25 must have, 1 to 25.
+        min_pixels, max_pixels: size of a star (ours; the thesis has no limits).
+        max_stars: the brightest are kept, 3 to 255 (ours).
+        subtract: whether the mean level is taken off before weighing (ours).
+    """
+
+    sigmas: float = 2.0
+    spikes: SpikeRemoval = SpikeRemoval.WINDOW
+    needed: int = HALF
+    min_pixels: int = 1
+    max_pixels: int = 2500
+    max_stars: int = 30
+    subtract: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse settings with which nothing can be found."""
+        bounds = {
+            "sigmas": (0, 20),
+            "needed": (1, 25),
+            "min_pixels": (1, self.max_pixels),
+            "max_pixels": (1, 1_000_000),
+            "max_stars": (3, 255),
+        }
+        for name, (low, high) in bounds.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} must be {low} to {high}, not {value}")
+
+
+_FIELD, _DETECTION, _PROFILE = Field(), Detection(), Profile()
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Everything that is set before flight."""
+
+    field: Field = _FIELD
+    detection: Detection = _DETECTION
+    profile: Profile = _PROFILE
+
+
+PUBLISHED = Configuration()
+"""As the thesis runs it: a unique triangle is believed."""
+
+VERIFIED = replace(
+    PUBLISHED,
+    detection=Detection(spikes=SpikeRemoval.CENTRE, subtract=True),
+    profile=Profile(sigma_rad=5.6e-5, verify=True),
+)
+"""Ours: further stars must confirm the attitude; noise of 0.15 px is expected."""
+
+
+def detect(
+    picture: NDArray[np.uint8],
+    background: Background,
+    field: Field,
+    settings: Detection,
+    meter: Meter,
+) -> StarList | None:
+    """Stars of a picture (rows, columns) in the field; None when too many pixels are lit.
+
+    The picture is added to `background`. Phases: `threshold`, `spikes`, `centroids`.
+
+    Raises:
+        ValueError: for a picture of another size than the field's.
+    """
+    if picture.shape != (field.rows, field.columns):
+        raise ValueError(
+            f"a picture must have {field.rows} rows of {field.columns} pixels, not {picture.shape}"
+        )
+    with meter.phase("threshold"):
+        background.add(picture, field, meter)
+        level = background.threshold(settings.sigmas, meter)
+        mask = (picture > level) & field.mask
+        pixels = field.pixels
+        meter.charge(table_byte=pixels, i32_add=pixels, ram_write=picture.size // 4, loop=pixels)
+    mask = remove_spikes(mask, settings.spikes, settings.needed, meter)
+    with meter.phase("centroids"):
+        regions = find_regions(mask, meter)
+        if regions is None:
+            return None
+        floor = background.mean(meter) if settings.subtract else 0
+        stars = locate_stars(
+            picture, regions, floor, settings.min_pixels, settings.max_pixels, meter
+        )
+        inside = np.flatnonzero(field.inside(stars.centroids, meter))[: settings.max_stars]
+    return StarList(stars.centroids[inside], stars.brightness[inside])
+
+
+def solve(
+    picture: NDArray[np.uint8],
+    background: Background,
+    configuration: Configuration,
+    database: Database,
+    meter: Meter,
+    hint: NDArray[np.float32] | None = None,
+) -> Solution:
+    """Attitude of a picture, or why there is none.
+
+    Args:
+        picture: (rows, columns) grey levels.
+        background: the pictures before; this one is added.
+        configuration: settings.
+        database: stars and triangles.
+        meter: charged.
+        hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
+
+    Raises:
+        ValueError: for a picture of another size than the configuration's.
+    """
+    stars = detect(picture, background, configuration.field, configuration.detection, meter)
+    if stars is None:
+        nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
+        return unsolved(Outcome.NONE, Reason.TOO_MANY_PIXELS, nothing)
+    return identify(stars, configuration.field, configuration.profile, database, meter, hint)
