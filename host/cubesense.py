@@ -288,6 +288,14 @@ class CubeSense:
         """What a camera's latest measurement rests on: the fields of our telemetry Details."""
         return self.client.telemetry(f"Details{camera + 1}")
 
+    def edges(self) -> NDArray[np.float64]:
+        """Pixels (n, 2), column and row, of the edges that the latest nadir search found."""
+        parts = [self.client.telemetry(f"NadirEdges{part}") for part in (1, 2)]
+        count = int(parts[0]["Count"])
+        values = {name: value for part in parts for name, value in part.items()}
+        found = [[float(values[f"{axis}{n}"]) for axis in "XY"] for n in range(1, count + 1)]
+        return np.array(found, np.float64).reshape(-1, 2)
+
     def _measurement(self, camera: Camera, identifier: int) -> Measurement:
         message = self.client.interface.telemetry(identifier)
         values = self.client.telemetry(message.name)
