@@ -162,7 +162,7 @@ class Database:
         arrays: dict[str, NDArray[Any]] = {}
         offset = HEADER.size
         for count, (name, kind, width) in zip(counts, LAYOUT, strict=True):
-            flat = np.frombuffer(image, kind, count * width, offset)
+            flat: NDArray[Any] = np.frombuffer(image, kind, count * width, offset)
             offset += flat.nbytes
             arrays[name] = flat.reshape(count, width) if width > 1 else flat
         _check(arrays, stars, triangles, faces)

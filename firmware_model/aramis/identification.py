@@ -9,7 +9,6 @@ none is confirmed. The confirmed attitude is solved again with all stars that co
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
 from itertools import combinations
 
 import numpy as np
@@ -22,137 +21,19 @@ from cubestack.firmware_model.aramis.database import Database
 from cubestack.firmware_model.aramis.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching import Match, MatchEnd, match_triple
+from cubestack.firmware_model.aramis.solution import (
+    NONE,
+    Outcome,
+    Profile,
+    Reason,
+    Solution,
+    StarList,
+    unsolved,
+)
 from cubestack.firmware_model.aramis.verification import confirm, sides_agree
 from cubestack.firmware_model.costs import Meter
 
-__all__ = ["NONE", "Outcome", "Profile", "Reason", "Solution", "StarList", "identify"]
-
-NONE = -1
-"""Mark of a measured star without identity."""
-
-
-class Outcome(Enum):
-    """The three outcomes of section 5.7."""
-
-    CONCLUSIVE = "conclusive"
-    AMBIGUOUS = "ambiguous"
-    NONE = "none"
-
-
-class Reason(Enum):
-    """Why an identification ended as it did."""
-
-    UNIQUE = "one triangle of the database was left"
-    CONFIRMED = "further stars confirm the attitude"
-    SEVERAL = "several triangles of the database were left after the last pivot"
-    TOO_FEW_STARS = "there were fewer than three stars"
-    TOO_MANY_PIXELS = "too many pixels were lit to be stars"
-    DEGENERATE = "the stars stand on a line"
-    NO_TRIANGLE = "no triangle of the database has that area and moment"
-    NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
-    UNCONFIRMED = "no attitude was confirmed by further stars"
-    FAR_FROM_HINT = "the boresight is far from the rough direction"
-
-
-_REASONS = {
-    MatchEnd.UNIQUE: Reason.UNIQUE,
-    MatchEnd.SEVERAL: Reason.SEVERAL,
-    MatchEnd.DEGENERATE: Reason.DEGENERATE,
-    MatchEnd.NO_TRIANGLE: Reason.NO_TRIANGLE,
-    MatchEnd.NO_SHARED_PAIR: Reason.NO_SHARED_PAIR,
-}
-
-
-@dataclass(frozen=True)
-class Profile:
-    """Settings of the identification; the defaults are the published ones.
-
-    Attributes:
-        sigma_rad: noise of a measured direction per axis, in rad. The thesis' appendix E settles on
-            0.26 px of its simulator, 0.3759 rad / 582.
-        pivots: pivot triangles at most, 0 to 3.
-        verify: whether an attitude must be confirmed by further stars.
-        tolerance_rad: distance within which a star confirms.
-        side_tolerance_rad: largest difference of a side, with verification.
-        largest_chance: an attitude is confirmed when chance would do it less often.
-        triples: triples tried at most, with verification.
-        triple_stars: triples are made of so many of the brightest stars, with verification.
-        candidates: with verification, so many candidates of a triple are tried at most.
-        hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (ours).
-    """
-
-    sigma_rad: float = 0.26 * 0.3759 / 582
-    pivots: int = 3
-    verify: bool = False
-    tolerance_rad: float = 1.2e-3
-    side_tolerance_rad: float = 5e-4
-    largest_chance: float = 1e-4
-    triples: int = 60
-    triple_stars: int = 10
-    candidates: int = 8
-    hint_tolerance_deg: float = 6.0
-
-    def __post_init__(self) -> None:
-        """Refuse settings with which nothing can be found."""
-        bounds = {
-            "sigma_rad": (1e-7, 1e-2),
-            "pivots": (0, 3),
-            "tolerance_rad": (1e-5, 0.05),
-            "side_tolerance_rad": (1e-6, 0.05),
-            "largest_chance": (0, 1),
-            "triples": (1, 1000),
-            "triple_stars": (3, 64),
-            "candidates": (1, 1000),
-            "hint_tolerance_deg": (0, 180),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be {low} to {high}, not {value}")
-
-
-@dataclass(frozen=True, eq=False)
-class StarList:
-    """Stars of a picture, the brightest first.
-
-    Attributes:
-        centroids: (n, 2) x and y in px, float32.
-        brightness: (n,) sum of grey levels, falling, float32.
-    """
-
-    centroids: NDArray[np.float32]
-    brightness: NDArray[np.float32]
-
-    def __len__(self) -> int:
-        """Number of stars."""
-        return len(self.centroids)
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """What became of one picture.
-
-    Attributes:
-        outcome: conclusive, ambiguous or none.
-        reason: why.
-        quaternion: (4,) inertial to camera, scalar last and not negative; None unless conclusive.
-        stars: (n,) index into the database's star list for each measured star, -1 for none.
-        measured: the stars that were found.
-        candidates: triangles left when matching ended.
-        pivots: pivot triangles used for the last triple.
-        triples: triples tried.
-        expected: catalogue stars in the field by the attitude, 0 without verification.
-    """
-
-    outcome: Outcome
-    reason: Reason
-    quaternion: NDArray[np.float32] | None
-    stars: NDArray[np.int32]
-    measured: StarList
-    candidates: int = 0
-    pivots: int = 0
-    triples: int = 0
-    expected: int = 0
+__all__ = ["identify"]
 
 
 def identify(
@@ -185,13 +66,6 @@ def identify(
     return search.verified() if profile.verify else search.published()
 
 
-def unsolved(outcome: Outcome, reason: Reason, measured: StarList, **counts: int) -> Solution:
-    """A solution without attitude."""
-    return Solution(
-        outcome, reason, None, np.full(len(measured), NONE, dtype=np.int32), measured, **counts
-    )
-
-
 @dataclass(frozen=True)
 class _Search:
     """One picture's identification."""
@@ -210,7 +84,7 @@ class _Search:
         main = (0, 1, 2)
         match = self._match(main)
         counts = {"candidates": len(match.candidates), "pivots": match.pivots, "triples": 1}
-        reason = _REASONS[match.end]
+        reason = Reason.of(match.end)
         if match.end is MatchEnd.SEVERAL:
             return unsolved(Outcome.AMBIGUOUS, reason, self.measured, **counts)
         if match.end is not MatchEnd.UNIQUE:
@@ -232,7 +106,7 @@ class _Search:
             match = self._match(main)
             if len(match.candidates):
                 reason = Reason.UNCONFIRMED
-            reason = reason or _REASONS[match.end]
+            reason = reason or Reason.of(match.end)
             for triangle in match.candidates[: self.profile.candidates].tolist():
                 for identities in self._identities(main, match, triangle):
                     if not self._sides_agree(main, identities):
@@ -366,6 +240,5 @@ class _Search:
             quaternion,
             stars,
             self.measured,
-            expected=expected,
             **counts,
         )

@@ -93,4 +93,5 @@ class KVector:
         scale = _ONE / span if span > 0 else _ZERO
         below = np.clip((self.highest - values) * scale, _ZERO, _ONE)
         bins = len(self.starts) - 1
-        return ((_ONE - below * below) * np.float32(bins - 1)).astype(np.intp)
+        numbers: NDArray[np.float32] = (_ONE - below * below) * np.float32(bins - 1)
+        return numbers.astype(np.intp)

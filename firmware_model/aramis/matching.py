@@ -157,12 +157,12 @@ def _share_pair(
         i32_add=2 * (listed.size + wanted.size) + steps,
         loop=steps,
     )
-    shared: NDArray[np.bool_] = np.isin(wanted, listed).any(axis=1)
-    return shared
+    shared: NDArray[np.bool_] = np.isin(wanted, listed)
+    return shared[:, 0] | shared[:, 1] | shared[:, 2]
 
 
 def _pairs(triangles: NDArray[np.uint16]) -> NDArray[np.uint32]:
     """Three words (n, 3) for the pairs of star triples (n, 3) in rising order."""
     stars = triangles.astype(np.uint32)
-    words: NDArray[np.uint32] = (stars[:, _FIRST] << 16) | stars[:, _SECOND]
-    return words
+    words = (stars[:, _FIRST] << np.uint32(16)) | stars[:, _SECOND]
+    return words.astype(np.uint32)

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.background import Background
 from cubestack.firmware_model.aramis.database import Database
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.identification import (
+from cubestack.firmware_model.aramis.identification import identify
+from cubestack.firmware_model.aramis.regions import find_regions, locate_stars
+from cubestack.firmware_model.aramis.solution import (
     Outcome,
     Profile,
     Reason,
     Solution,
     StarList,
-    identify,
     unsolved,
 )
-from cubestack.firmware_model.aramis.regions import find_regions, locate_stars
 from cubestack.firmware_model.aramis.spikes import HALF, SpikeRemoval, remove_spikes
 from cubestack.firmware_model.costs import Meter
 

@@ -12,7 +12,7 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.identification import StarList
+from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.costs import Meter
 
 __all__ = ["MOST_RUNS", "Regions", "find_regions", "locate_stars"]
