@@ -15,7 +15,7 @@ from cubestack.emulator.camera.pixel_array import (
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.sky.scene import PictureScene, Scene, SkyScene
 
-__all__ = ["Imager"]
+__all__ = ["Imager", "photograph"]
 
 
 class Imager:
@@ -33,7 +33,7 @@ class Imager:
             case SkyScene():
                 return self._sky(scene, shutter, corrections)
             case PictureScene():
-                return _photograph(scene, shutter)
+                return photograph(scene, shutter)
 
     def _sky(
         self, scene: SkyScene, shutter: RollingShutter, corrections: Corrections
@@ -56,7 +56,8 @@ class Imager:
 _grown = lru_cache(maxsize=8)(grown_hot_pixels)
 
 
-def _photograph(scene: PictureScene, shutter: RollingShutter) -> NDArray[np.uint8]:
+def photograph(scene: PictureScene, shutter: RollingShutter) -> NDArray[np.uint8]:
+    """A picture's grey values (rows, columns), scaled where its own exposure is known."""
     scale = shutter.relative_exposure
     if scene.exposure_ms is not None:
         scale = 1000 * shutter.exposure_s / scene.exposure_ms

@@ -1,0 +1,65 @@
+"""What AraMiS' program sees of its ADSP-BF533 beside the requests that take time.
+
+A frame comes by DMA while the processor does something else: the program starts the parallel
+peripheral interface, and the end of the frame is an interrupt (``AramisProgram.frame_ended``).
+"""
+
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.hardware import FlashStore
+
+__all__ = ["AramisHardware", "FrameEnd"]
+
+
+class FrameEnd(IntEnum):
+    """How a frame's transfer ended, as the interface's status register tells it."""
+
+    STORED = 0
+    TOO_SHORT = 1
+    """The frame ended before all lines came."""
+    WRONG_LINES = 2
+    """Lines were longer or shorter than programmed."""
+
+
+class AramisHardware(Protocol):
+    """Peripherals that the program uses without waiting for them.
+
+    Attributes:
+        sdram: the external dynamic memory, shape (bytes,), uint8.
+        catalogue_flash: the flash chips of the coded catalogue, shape (bytes,), uint8, a live view.
+        flash: pages of settings in the boot flash.
+        reset_cause: ``ResetCause`` of :mod:`cubestack.firmware_model.interface.aramis_codes`.
+    """
+
+    sdram: NDArray[np.uint8]
+    catalogue_flash: NDArray[np.uint8]
+    flash: FlashStore
+    reset_cause: int
+
+    def start_capture(self, target: NDArray[np.uint8]) -> None:
+        """Let the next whole frame come into ``target``, shape (rows, columns), part of SDRAM."""
+
+    def stop_capture(self) -> None:
+        """Give up the frame that is waited for; no interrupt comes."""
+
+    def switch_camera(self, on: bool) -> None:
+        """Turn the camera unit's supply on or off."""
+
+    def camera_current_ma(self) -> float:
+        """Current of the camera unit's supply, in mA."""
+
+    def uart_send(self, data: bytes) -> None:
+        """Queue ``data`` for the satellite's UART; the peripheral sends at its own pace."""
+
+    def uart_backlog(self) -> int:
+        """Bytes that the UART still has to send."""
+
+    def wake(self) -> None:
+        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
+
+    def uptime_ms(self) -> int:
+        """Time since power-up in ms, read in an interrupt."""
