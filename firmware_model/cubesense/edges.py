@@ -193,14 +193,23 @@ class NadirLines:
         edges: found so far.
     """
 
-    def __init__(self, config: EdgeConfig, meter: Meter, read_out: ReadOut = FULL_SIZE) -> None:
-        """Wait for the first clock of a scan that ``read_out`` describes."""
+    def __init__(
+        self,
+        config: EdgeConfig,
+        meter: Meter,
+        read_out: ReadOut = FULL_SIZE,
+        buffer: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Wait for the first clock of a scan that ``read_out`` describes.
+
+        ``buffer`` is what the part buffers pixels in, (scan_step,); None makes one.
+        """
         self.edges = EdgeList(config, meter)
         self._threshold = config.threshold
         self._meter = meter
         self._pieces = iter(_pieces(read_out))
         self._piece: _Piece | None = next(self._pieces)
-        self._buffer = np.zeros(read_out.scan_step, np.uint8)
+        self._buffer = np.zeros(read_out.scan_step, np.uint8) if buffer is None else buffer
         self._filled = 0
         self._previous = 0
 
@@ -208,6 +217,15 @@ class NadirLines:
     def wanted(self) -> int:
         """Bytes until the buffer is full and the part looks into it; 0 after the last one."""
         return 0 if self._piece is None else self._piece.size - self._filled
+
+    @property
+    def space(self) -> NDArray[np.uint8]:
+        """Where the next `wanted` bytes go; `filled` says that they are there."""
+        return self._buffer[self._filled : self._filled + self.wanted]
+
+    def filled(self) -> None:
+        """`space` is full: look into it."""
+        self._take(self.wanted)
 
     def feed(self, data: NDArray[np.uint8]) -> None:
         """Take the next bytes (n,).
@@ -220,11 +238,14 @@ class NadirLines:
             if not wanted:
                 raise ValueError(f"the scan is through; {len(data)} bytes are too many")
             taken, data = data[:wanted], data[wanted:]
-            self._buffer[self._filled : self._filled + len(taken)] = taken
-            self._filled += len(taken)
-            if not self.wanted:
-                self._examine()
-                self._piece, self._filled = next(self._pieces, None), 0
+            self.space[: len(taken)] = taken
+            self._take(len(taken))
+
+    def _take(self, count: int) -> None:
+        self._filled += count
+        if not self.wanted:
+            self._examine()
+            self._piece, self._filled = next(self._pieces, None), 0
 
     def _examine(self) -> None:
         """The buffer is full: compare its last pixel, the sample, with the one before."""

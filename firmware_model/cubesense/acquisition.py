@@ -1,0 +1,266 @@
+"""Pictures and read-outs: commands to the FPGAs, the wait for ACK, bytes over the data lines.
+
+CubeSense thesis, tables 6.3 and 6.4, sections 6.4.2, 6.5.1 and 6.6.2. The control lines are set in
+standby and the enables follow; standby lies between any two commands. A camera's picture goes to
+its own memory, or over the FPGAs' link to the other one; edge data come back the same way.
+
+With address control from the microcontroller (section 9.2.2) single pixels can be read, from the
+memory of the FPGA that is enabled only.
+"""
+
+from collections.abc import Callable, Generator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.edges import EdgeList, NadirLines
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
+from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
+from cubestack.firmware_model.hardware import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
+from cubestack.firmware_model.interface.cubesense_codes import (
+    IMAGE_BYTES,
+    Camera,
+    CaptureResult,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense_fpga import (
+    ADDRESS_BYTES,
+    ADDRESSING_COMMANDS,
+    COMMANDS,
+    FULL_SIZE,
+    Action,
+    Actions,
+    address_bytes,
+)
+from cubestack.firmware_model.interface.cubesense_pins import ENABLE
+
+__all__ = ["ACK_POLL_CYCLES", "ACK_TIMEOUT_US", "CHUNK", "Acquisition"]
+
+ACK_POLL_CYCLES = 9
+"""Port read (2) and loop step (7) of the cost table."""
+
+ACK_TIMEOUT_US = 70_000
+"""Longer than ACK can take, two frames of 33.37 ms less the gap between them: ours."""
+
+CHUNK = FULL_SIZE.scan_step
+"""Bytes that a picture is read in at most: those of the scan's buffer."""
+
+SAMPLE_BYTES = FULL_SIZE.columns
+"""So many bytes are read from one look at the memories' currents to the next."""
+
+SAMPLE_PIXELS = 64
+"""The same for pixels that are addressed one by one."""
+
+_ACK = {Sram.SRAM1: "SUNACK", Sram.SRAM2: "NADACK"}
+
+_ROWS = {command.actions: command for command in COMMANDS + ADDRESSING_COMMANDS}
+
+
+def _actions(half: Camera | Sram, action: Action, other: Action = Action.STANDBY) -> Actions:
+    """``action`` for one half's FPGA and ``other`` for the other one."""
+    return Actions(action, other) if half == Camera.SUN else Actions(other, action)
+
+
+class Acquisition:
+    """The pins that both FPGAs share with the program, and its buffers for their bytes."""
+
+    def __init__(self, hardware: CubeSenseHardware, meter: Meter, supply: Supply) -> None:
+        """Both FPGAs are in standby, as at reset."""
+        self._mcu_addressing = hardware.mcu_addressing
+        self._meter = meter
+        self._supply = supply
+        self._buffer = np.zeros(CHUNK, np.uint8)
+        self._window = np.zeros(window_bytes(), np.uint8)
+        self._strobe_cycles = meter.table.operations["strobe_byte"].cycles
+        self._scan_cycles = meter.table.operations["scan_byte"].cycles
+        self._open: Sram | None = None
+        self._position = 0
+        self._unwatched = 0
+
+    @property
+    def buffers(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """For scanned pixels, which a search may use meanwhile, and for the Sun window."""
+        return self._buffer, self._window
+
+    def can_address(self, camera: Camera, sram: Sram) -> bool:
+        """Whether the program can choose the pixels that it reads of ``camera``'s picture."""
+        return self._mcu_addressing and sram is Sram(camera)
+
+    def store(self, camera: Camera, sram: Sram) -> Routine[CaptureResult]:
+        """Store the next whole picture of ``camera`` in ``sram``.
+
+        What ``sram`` holds stays as it is when the camera sends none.
+        """
+        if not self._supply.available(sram):
+            return CaptureResult.SRAM_OVER_CURRENT
+        own = sram is Sram(camera)
+        if own:
+            yield from self._enter(_actions(camera, Action.STORE))
+        else:
+            yield from self._enter(_actions(camera, Action.SEND_PICTURE, Action.STORE_OTHER))
+        stored = yield from self._await_ack(sram)
+        yield from self._standby()
+        if not self._supply.available(sram):
+            return CaptureResult.SRAM_OVER_CURRENT
+        if not stored:
+            return CaptureResult.CAMERA_TIMEOUT
+        return CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
+
+    def scan(self, sram: Sram, lines: NadirLines) -> Routine[bool]:
+        """Let ``lines`` see the nadir camera's picture in ``sram``.
+
+        False when that memory was cut off meanwhile.
+        """
+        yield from self._enter_edge(Camera.NADIR, sram)
+        read = 0
+        while lines.wanted and self._supply.available(sram):
+            space = lines.space
+            yield StrobeRead(space, self._scan_cycles)
+            lines.filled()
+            read += len(space)
+            if read >= SAMPLE_BYTES:
+                read = 0
+                yield from self._supply.sample()
+        yield from self._standby()
+        return self._supply.available(sram)
+
+    def window(self, sram: Sram) -> Routine[NDArray[np.uint8] | None]:
+        """Coordinates and window of the Sun camera's picture in ``sram``; None as for ``scan``.
+
+        The bytes (229,) count until the next call.
+        """
+        yield from self._enter_edge(Camera.SUN, sram)
+        yield StrobeRead(self._window, self._strobe_cycles)
+        yield from self._supply.sample()
+        yield from self._standby()
+        return self._window if self._supply.available(sram) else None
+
+    # --- pictures in sequence -------------------------------------------------------------------
+
+    @property
+    def picture_open(self) -> bool:
+        """Whether the FPGA still presents the picture of ``open_picture``, where reading ended."""
+        return self._open is not None and self._supply.available(self._open)
+
+    def open_picture(self, sram: Sram) -> Routine[bool]:
+        """Begin with the first pixel of the picture in ``sram``; False when the memory is off."""
+        if not self._supply.available(sram):
+            return False
+        if self._mcu_addressing:
+            yield from self._enter(_actions(sram, Action.TAKE_ADDRESS))
+            yield from self._send_address(0)
+        else:
+            yield from self._enter(_actions(sram, Action.READ))
+        self._open, self._position, self._unwatched = sram, 0, 0
+        return True
+
+    def read_bytes(self, target: NDArray[np.uint8]) -> Routine[None]:
+        """Read on into ``target`` (n,), for as long as ``picture_open``."""
+        yield from self._strobe_all(len(target), lambda at: target[at], self._scan_cycles)
+
+    def skip_bytes(self, count: int) -> Routine[None]:
+        """Pass ``count`` bytes: at once if the program can choose the address, else clocked."""
+        if self._mcu_addressing and count > ADDRESS_BYTES and self.picture_open:
+            self._position += count
+            yield SetPin("SHIFT", 0)
+            yield from self._send_address(self._position % IMAGE_BYTES)
+            return
+        buffer = self._buffer
+        yield from self._strobe_all(
+            count, lambda at: buffer[: at.stop - at.start], self._strobe_cycles
+        )
+
+    def _strobe_all(
+        self, count: int, target: Callable[[slice], NDArray[np.uint8]], cycles: int
+    ) -> Routine[None]:
+        """Clock ``count`` bytes in chunks, and look at the memories now and then."""
+        done = 0
+        while done < count and self.picture_open:
+            size = min(CHUNK, count - done)
+            yield StrobeRead(target(slice(done, done + size)), cycles)
+            done += size
+            self._position += size
+            self._unwatched += size
+            if self._unwatched >= SAMPLE_BYTES:
+                self._unwatched = 0
+                yield from self._supply.sample()
+
+    # --- single pixels --------------------------------------------------------------------------
+
+    def answer(
+        self, sram: Sram, search: Generator[tuple[int, int], int, EdgeList]
+    ) -> Routine[tuple[EdgeList, int] | None]:
+        """Read the pixels that ``search`` asks for, of the picture in ``sram``.
+
+        Returns what it found, and how many pixels it took; None as for ``scan``. Only for
+        FPGAs that ``can_address``.
+        """
+        yield from self._enter(_actions(sram, Action.TAKE_ADDRESS))
+        found: EdgeList | None = None
+        pixels = 0
+        pixel = self._buffer[:1]
+        asked = next(search)
+        while found is None and self._supply.available(sram):
+            x, y = asked
+            yield from self._send_address(y * FULL_SIZE.columns + x)
+            yield StrobeRead(pixel, self._strobe_cycles)
+            yield SetPin("SHIFT", 0)
+            pixels += 1
+            if pixels % SAMPLE_PIXELS == 0:
+                yield from self._supply.sample()
+            try:
+                asked = search.send(int(pixel[0]))
+            except StopIteration as end:
+                found = end.value
+        yield from self._standby()
+        if found is None or not self._supply.available(sram):
+            return None
+        return found, pixels
+
+    def _send_address(self, pixel: int) -> Routine[None]:
+        """Give the FPGA a pixel's address; the data lines are inputs again before it answers."""
+        y, x = divmod(pixel, FULL_SIZE.columns)
+        self._meter.charge(i16_add=2, port_write=2)
+        for byte in address_bytes(x, y):
+            yield SetPin("DATA_I", byte)
+            yield SetPin("CLK", 1)
+            yield SetPin("CLK", 0)
+        yield SetPin("SHIFT", 1)
+
+    def _await_ack(self, sram: Sram) -> Routine[bool]:
+        """Whether ACK came in time; returns at once when the memory is cut off."""
+        now_us: int = yield ReadTimer()
+        deadline_us = now_us + ACK_TIMEOUT_US
+        stored = False
+        while not stored and now_us < deadline_us and self._supply.available(sram):
+            timeout_us = min(SAMPLE_US, deadline_us - now_us)
+            stored = yield AwaitPin(_ACK[sram], 1, timeout_us, ACK_POLL_CYCLES)
+            yield from self._supply.sample()
+            now_us = yield ReadTimer()
+        return stored
+
+    def _enter_edge(self, camera: Camera, sram: Sram) -> Routine[None]:
+        if sram is Sram(camera):
+            yield from self._enter(_actions(camera, Action.EDGE))
+        else:
+            yield from self._enter(_actions(camera, Action.PASS_EDGE, Action.SEND_EDGE))
+
+    def _enter(self, wanted: Actions) -> Routine[None]:
+        """Through standby to the command that makes the FPGAs do ``wanted``."""
+        if self._open is not None:
+            yield from self._standby()
+        row = _ROWS[wanted]
+        self._meter.charge(call=1)
+        for pin, level in (("SHIFT", row.shift), ("EDGE", row.edge), ("RNW", row.rnw)):
+            assert level is not None
+            yield SetPin(pin, level)
+        for pin, level in zip(ENABLE, (row.sunen, row.naden), strict=True):
+            if not level:
+                yield SetPin(pin, 0)
+
+    def _standby(self) -> Routine[None]:
+        self._open = None
+        for pin in ENABLE:
+            yield SetPin(pin, 1)

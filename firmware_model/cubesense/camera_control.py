@@ -1,0 +1,175 @@
+"""Cameras: their supplies, and their registers over two pins each.
+
+CubeSense thesis, sections 3.2.1.1 and 6.4.1, appendix C.1: the program drives the serial bus itself
+and only ever writes: start, eight bits, a ninth in which the camera may answer, stop. Each line is
+pulled up; level 1 releases it. Charged cycles keep the clock below the bus' 400 kHz.
+
+The published program sets the nadir camera's exposure once. Ours sets all registers again when a
+setting changed, or the camera lost its supply, before the next picture is taken.
+"""
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.state import CameraSettings, State
+from cubestack.firmware_model.cubesense.supply import OFF_TIME_US, Supply
+from cubestack.firmware_model.hardware import ReadPin, ReadTimer, Routine, SetPin
+from cubestack.firmware_model.interface.cubesense_codes import COLUMNS, ROWS, Camera
+from cubestack.firmware_model.interface.cubesense_pins import (
+    CAMERA_POWER,
+    CAMERA_SCL,
+    CAMERA_SDA,
+)
+from cubestack.firmware_model.interface.ov7620 import (
+    CLOCKS_PER_LINE,
+    LINES_PER_FRAME,
+    PIXEL_CLOCK_HZ,
+    REGISTERS,
+    window_column,
+    window_row,
+)
+
+__all__ = ["EXPOSURE_SETTLE_US", "CameraControl", "register_values"]
+
+START_UP_US = 2_000
+"""From a camera's switch to the first write; assumed."""
+
+_BLANKING_LINES = LINES_PER_FRAME - ROWS
+_SETTLE_CLOCKS = (LINES_PER_FRAME + _BLANKING_LINES) * CLOCKS_PER_LINE
+
+EXPOSURE_SETTLE_US = _SETTLE_CLOCKS * 1_000_000 // PIXEL_CLOCK_HZ + 100
+"""From a write to when the FPGA may look for a frame: the frame that runs then, and the next one,
+still have the exposure of before. The latter's blanking must be over, or it would be stored."""
+
+_BITS = 8
+_LARGEST = dict.fromkeys(("EXPOSURE", "BLUE_GAIN", "RED_GAIN"), (1 << _BITS) - 1) | {
+    "GAIN": REGISTERS["GAIN"].bits
+}
+
+
+def register_values(settings: CameraSettings) -> dict[str, int]:
+    """What the camera's registers shall hold: the whole picture, one byte of grey for a pixel."""
+    automatic = settings.auto_adjust
+    numbers = {
+        "EXPOSURE": settings.exposure,
+        "GAIN": settings.gain,
+        "BLUE_GAIN": settings.blue_gain,
+        "RED_GAIN": settings.red_gain,
+    }
+    return {
+        "COMMON_A": _bits("COMMON_A", AUTO_WHITE_BALANCE=automatic, AUTO_GAIN=automatic),
+        "COMMON_B": _bits("COMMON_B", AUTO_ADJUST=automatic),
+        "COMMON_C": REGISTERS["COMMON_C"].reset,
+        "COMMON_H": _bits("COMMON_H", PROGRESSIVE=1, BLACK_AND_WHITE=1),
+        "COMMON_I": _bits("COMMON_I", MANUAL_EXPOSURE=1 - automatic),
+        "HSTART": window_column(0),
+        "HSTOP": window_column(COLUMNS),
+        "VSTART": window_row(0),
+        "VSTOP": window_row(ROWS),
+        **{name: min(value, _LARGEST[name]) for name, value in numbers.items()},
+    }
+
+
+def _bits(register: str, **fields: int) -> int:
+    """Value of ``register`` with the named bit fields and all others 0."""
+    return sum(value << REGISTERS[register].field(name).lsb for name, value in fields.items())
+
+
+class CameraControl:
+    """Both cameras' supplies and registers.
+
+    Attributes:
+        acknowledged: by camera, whether it answered every byte of its latest set-up.
+    """
+
+    def __init__(self, meter: Meter, state: State, supply: Supply) -> None:
+        """Both cameras are off, as at reset."""
+        self._meter = meter
+        self._state = state
+        self._supply = supply
+        self._written: dict[Camera, dict[str, int] | None] = dict.fromkeys(Camera)
+        self._settled_us = dict.fromkeys(Camera, 0)
+        self.acknowledged = dict.fromkeys(Camera, False)
+
+    def start(self) -> Routine[None]:
+        """Switch both cameras on and set them up."""
+        for camera in Camera:
+            yield SetPin(CAMERA_SCL[camera], 1)
+            yield SetPin(CAMERA_SDA[camera], 1)
+            yield SetPin(CAMERA_POWER[camera], 1)
+        yield from self._pause(START_UP_US)
+        for camera in Camera:
+            yield from self._configure(camera)
+
+    def restart(self) -> Routine[None]:
+        """Cycle both cameras' power and set them up, as telecommand Reset of the cameras does."""
+        for camera in Camera:
+            yield SetPin(CAMERA_POWER[camera], 0)
+            self._written[camera] = None
+        yield from self._pause(OFF_TIME_US)
+        yield from self.start()
+
+    def prepare(self, camera: Camera) -> Routine[None]:
+        """Bring ``camera`` to its settings before a picture, and wait until they count.
+
+        A camera that does not answer is tried once for each picture; the picture shows whether it
+        is alive.
+        """
+        yield from self._configure(camera)
+        yield from self._supply.watch_until(self._settled_us[camera])
+
+    def _configure(self, camera: Camera) -> Routine[None]:
+        values = register_values(self._state.cameras[camera])
+        self._meter.charge(i8=len(values))
+        if self._written[camera] == values:
+            return
+        self._written[camera] = None
+        self.acknowledged[camera] = False
+        for name, value in values.items():
+            if not (yield from self._write(camera, REGISTERS[name].address, value)):
+                return
+        now_us: int = yield ReadTimer()
+        self._settled_us[camera] = now_us + EXPOSURE_SETTLE_US
+        self._written[camera] = values
+        self.acknowledged[camera] = True
+
+    def _write(self, camera: Camera, address: int, value: int) -> Routine[bool]:
+        """One register; False when the camera left a byte unanswered."""
+        scl, sda = CAMERA_SCL[camera], CAMERA_SDA[camera]
+        self._meter.charge(call=1)
+        yield SetPin(sda, 0)  # start
+        self._meter.charge(i8=1)
+        yield SetPin(scl, 0)
+        answered = True
+        for byte in (REGISTERS.i2c_address << 1, address, value):
+            answered = answered and (yield from self._send(scl, sda, byte))
+        yield SetPin(sda, 0)  # stop
+        self._meter.charge(i8=1, loop=1)
+        yield SetPin(scl, 1)
+        self._meter.charge(i8=1)
+        yield SetPin(sda, 1)
+        return answered
+
+    def _send(self, scl: str, sda: str, byte: int) -> Routine[bool]:
+        """Eight bits, highest first, and the answer; SCL is low before and after."""
+        level = None
+        for bit in reversed(range(_BITS)):
+            if level != byte >> bit & 1:
+                level = byte >> bit & 1
+                yield SetPin(sda, level)
+            yield from self._clock(scl)
+            yield SetPin(scl, 0)
+        if not level:
+            yield SetPin(sda, 1)
+        yield from self._clock(scl)
+        refused: int = yield ReadPin(sda)
+        yield SetPin(scl, 0)
+        return not refused
+
+    def _clock(self, scl: str) -> Routine[None]:
+        """Raise SCL after its low phase; the program goes on when its high phase may end."""
+        self._meter.charge(i8=1, loop=1)
+        yield SetPin(scl, 1)
+        self._meter.charge(i8=1)
+
+    def _pause(self, us: int) -> Routine[None]:
+        now_us: int = yield ReadTimer()
+        yield from self._supply.watch_until(now_us + us)

@@ -1,0 +1,189 @@
+"""One measurement: take a picture, find the Earth's or the Sun's centre in it, and note the times.
+
+CubeSense thesis, sections 6.5, 6.6 and 7.4. What a picture holds is looked at in the memory; it
+stays whole until the next one is stored there.
+
+Times are those of the part's timer, in steps of 51.2 us, from the command to the FPGAs on. The FPGA
+shows a picture's end only. So the first row's time is ACK's, less the time in which a camera sends
+480 rows.
+"""
+
+from functools import cache
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.acquisition import Acquisition
+from cubestack.firmware_model.cubesense.camera_control import CameraControl
+from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.cubesense.edges import EdgeConfig, EdgeList, NadirLines
+from cubestack.firmware_model.cubesense.nadir import NadirConfig, find_nadir
+from cubestack.firmware_model.cubesense.sample_search import around_samples
+from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
+from cubestack.firmware_model.cubesense.sun_centroid import (
+    COORDINATE_BYTES,
+    SunConfig,
+    find_sun,
+)
+from cubestack.firmware_model.cubesense.timer import (
+    microseconds,
+    read_ticks,
+    ticks_of,
+    ticks_since,
+)
+from cubestack.firmware_model.hardware import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.interface.cubesense_codes import (
+    PIXELS_PER_DEGREE,
+    ROWS,
+    Camera,
+    CaptureResult,
+    DetectResult,
+    NadirSearch,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
+from cubestack.firmware_model.interface.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
+from cubestack.firmware_model.pic18_costs import PIC18F45K20
+
+__all__ = ["READ_OUT_TICKS", "Measurement"]
+
+READ_OUT_TICKS = ticks_of(ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
+"""From a picture's first row to its end: 30.5 ms."""
+
+PROJECTIONS = {Camera.SUN: Projection.EQUIDISTANT, Camera.NADIR: Projection.STEREOGRAPHIC}
+
+SCANNED_PIXELS = (
+    len(FULL_SIZE.scan_rows) * FULL_SIZE.columns + len(FULL_SIZE.scan_columns) * FULL_SIZE.rows
+)
+
+FLASH_ERASE_BYTES, FLASH_WRITE_BYTES, FLASH_STEP_US = 64, 32, 2_000
+"""The part erases and writes its flash in such blocks, and stops for each: 2 ms, assumed."""
+
+
+@cache
+def _constant_table(camera: Camera) -> RadiusTable:
+    """Made of the reset values, by the compiler."""
+    factors = CameraSettings.at_reset(camera).distortion
+    return fine_table(Meter(PIC18F45K20), PROJECTIONS[camera], factors)
+
+
+class Measurement:
+    """Measures with either camera, into ``State.results``."""
+
+    def __init__(
+        self, meter: Meter, state: State, cameras: CameraControl, acquisition: Acquisition
+    ) -> None:
+        """Measure as the settings in ``state`` say."""
+        self._meter = meter
+        self._state = state
+        self._cameras = cameras
+        self._acquisition = acquisition
+        self._tables = {
+            camera: (CameraSettings.at_reset(camera).distortion, _constant_table(camera))
+            for camera in Camera
+        }
+
+    def measure(self, camera: Camera, sram: Sram, *, detect: bool = True) -> Routine[None]:
+        """Take a picture of ``camera`` into ``sram`` and, with ``detect``, measure in it."""
+        result = Result(CaptureResult.PENDING, DetectResult.PENDING, sram=sram)
+        if not detect:
+            result.detect = DetectResult.NONE_SCHEDULED
+        self._state.results[camera] = result
+        if detect:
+            yield from self._update_table(camera)
+        yield from self._cameras.prepare(camera)
+        started = yield from read_ticks()
+        capture = yield from self._acquisition.store(camera, sram)
+        yield from self._stored(result, capture, started)
+        if detect and capture.stored:
+            measured = self._measure_nadir if camera == Camera.NADIR else self._measure_sun
+            found = yield from measured(result, started)
+            if not found:  # the memory was cut off under the search
+                result.capture = CaptureResult.SRAM_OVER_CURRENT
+                result.detect = DetectResult.NONE_SCHEDULED
+
+    def _stored(self, result: Result, capture: CaptureResult, started: int) -> Routine[None]:
+        """The picture is there, or will not come."""
+        ticks = yield from ticks_since(started)
+        reading = min(READ_OUT_TICKS, ticks) if capture.stored else 0
+        result.wait_us = microseconds(ticks - reading)
+        result.store_us = microseconds(reading)
+        result.total_us = microseconds(ticks)
+        result.capture = capture
+        if not capture.stored:
+            result.detect = DetectResult.NONE_SCHEDULED
+
+    def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
+        """The Earth; False when the memory was cut off."""
+        settings = self._state.cameras[Camera.NADIR]
+        config = EdgeConfig(settings.threshold, settings.boresight, masks=tuple(settings.masks))
+        stored = yield from read_ticks()
+        edges = yield from self._find_edges(result, config)
+        if edges is None:
+            return False
+        searched = yield from read_ticks()
+        result.search_us = microseconds((yield from ticks_since(stored)))
+        _, table = self._tables[Camera.NADIR]
+        found = find_nadir(edges, NadirConfig(table), self._meter)
+        self._meter.charge(f32_mul=1, f32_convert=1)
+        result.centroid_us = microseconds((yield from ticks_since(searched)))
+        result.total_us = microseconds((yield from ticks_since(started)))
+        result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
+        result.radius = round(found.radius_deg * PIXELS_PER_DEGREE * 100)
+        result.points = found.edges
+        result.edges = edges.points
+        result.detect = found.detect
+        return True
+
+    def _find_edges(self, result: Result, config: EdgeConfig) -> Routine[EdgeList | None]:
+        acquisition, sram = self._acquisition, result.sram
+        by_address = self._state.nadir_search is NadirSearch.AROUND_SAMPLES
+        if by_address and acquisition.can_address(Camera.NADIR, sram):
+            answer = yield from acquisition.answer(sram, around_samples(config, self._meter))
+            if answer is None:
+                return None
+            edges, result.pixels_read = answer
+            return edges
+        lines = NadirLines(config, self._meter, buffer=acquisition.buffers[0])
+        if not (yield from acquisition.scan(sram, lines)):
+            return None
+        result.pixels_read = SCANNED_PIXELS
+        return lines.edges
+
+    def _measure_sun(self, result: Result, started: int) -> Routine[bool]:
+        """The Sun; False when the memory was cut off."""
+        settings = self._state.cameras[Camera.SUN]
+        stored = yield from read_ticks()
+        data = yield from self._acquisition.window(result.sram)
+        if data is None:
+            return False
+        searched = yield from read_ticks()
+        result.search_us = microseconds((yield from ticks_since(stored)))
+        _, table = self._tables[Camera.SUN]
+        config = SunConfig(
+            table, settings.threshold, settings.boresight, masks=tuple(settings.masks)
+        )
+        found = find_sun(data, config, self._meter)
+        result.centroid_us = microseconds((yield from ticks_since(searched)))
+        result.total_us = microseconds((yield from ticks_since(started)))
+        x_low, x_high, y_low, y_high = (int(byte) for byte in data[:COORDINATE_BYTES])
+        result.first = (x_low + 256 * x_high, y_low + 256 * y_high)
+        result.pixels_read = len(data) - COORDINATE_BYTES
+        result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
+        result.points = found.pixels
+        result.detect = found.detect
+        return True
+
+    def _update_table(self, camera: Camera) -> Routine[None]:
+        """Make the distortion table anew, in flash, when its coefficients have changed."""
+        factors = self._state.cameras[camera].distortion
+        if self._tables[camera][0] == factors:
+            return
+        reset = CameraSettings.at_reset(camera).distortion
+        if factors == reset:
+            table = _constant_table(camera)
+        else:
+            table = fine_table(self._meter, PROJECTIONS[camera], factors)
+            yield Pay()
+            blocks = -(-table.size // FLASH_ERASE_BYTES) + -(-table.size // FLASH_WRITE_BYTES)
+            now_us: int = yield ReadTimer()
+            yield Sleep(now_us + blocks * FLASH_STEP_US, wakeable=False)
+        self._tables[camera] = factors, table
