@@ -1,0 +1,67 @@
+"""CubeSense's main program: what the links ask for, one job after the other.
+
+CubeSense thesis, section 6.4: the satellite's computer asks for a picture and for its measurement,
+nothing runs by itself. While nothing is asked for, the program watches the memories' currents.
+"""
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.acquisition import Acquisition
+from cubestack.firmware_model.cubesense.bench_link import BenchLink
+from cubestack.firmware_model.cubesense.camera_control import CameraControl
+from cubestack.firmware_model.cubesense.commands import Commands
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.jobs import JobQueue
+from cubestack.firmware_model.cubesense.measurement import Measurement
+from cubestack.firmware_model.cubesense.node_link import NodeLink
+from cubestack.firmware_model.cubesense.register_link import RegisterLink
+from cubestack.firmware_model.cubesense.state import State
+from cubestack.firmware_model.cubesense.supply import Supply
+from cubestack.firmware_model.cubesense.telemetry import Telemetry
+from cubestack.firmware_model.hardware import Pay, Reset, Routine
+
+__all__ = ["CubeSenseProgram"]
+
+
+class CubeSenseProgram:
+    """One life of the program, from reset to reset.
+
+    Attributes:
+        node: the node protocol; its methods are the interrupts of its UART and I2C address.
+        registers: the register protocol; the same of its I2C address.
+        bench: the bench protocol; the same of its UART.
+        commands: what jobs do.
+        idle: nothing waits to be done.
+    """
+
+    def __init__(self, hardware: CubeSenseHardware, meter: Meter) -> None:
+        """Reset: RAM starts with the declared reset values."""
+        self.idle = False
+        state = State()
+        self._supply = Supply(hardware, meter, state)
+        self._cameras = CameraControl(meter, state, self._supply)
+        acquisition = Acquisition(hardware, meter, self._supply)
+        measurement = Measurement(meter, state, self._cameras, acquisition)
+        self._jobs = jobs = JobQueue()
+        self.commands = Commands(
+            hardware, meter, state, self._supply, self._cameras, acquisition, measurement
+        )
+        reader, download = self.commands.reader, self.commands.download
+        telemetry = Telemetry(hardware, meter, state, self._supply, download)
+        self.node = NodeLink(hardware, meter, state, jobs, telemetry, download)
+        self.registers = RegisterLink(hardware, meter, state, jobs, reader)
+        self.bench = BenchLink(hardware, meter, state, jobs, reader, measurement)
+
+    def main(self) -> Routine[None]:
+        """Run until a reset."""
+        yield from self._supply.start()
+        yield from self._cameras.start()
+        while True:
+            self.idle = not self._jobs
+            if self.idle:
+                yield from self._supply.idle()
+                continue
+            yield from self._supply.sample()
+            cause = yield from self.commands.execute(self._jobs.pop())
+            if cause is not None:
+                yield Pay()
+                yield Reset(cause)

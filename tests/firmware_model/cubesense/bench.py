@@ -1,0 +1,433 @@
+"""Runs CubeSense's program without an emulator, in bench time.
+
+A request is performed as a whole; only a sleep can be left half-way. Cameras, FPGAs, memories and
+supplies are as simple as the program can tell them apart; what the FPGAs do follows from the
+levels of their pins alone, by the command table.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.cubesense.program import CubeSenseProgram
+from cubestack.firmware_model.hardware import (
+    AwaitPin,
+    Pay,
+    ReadPin,
+    ReadTimer,
+    Request,
+    Reset,
+    SetPin,
+    Sleep,
+    StrobeRead,
+)
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import COLUMNS, ROWS, Camera, Sram
+from cubestack.firmware_model.interface.cubesense_fpga import Action, actions
+from cubestack.firmware_model.interface.cubesense_pins import (
+    CAMERA_POWER,
+    CAMERA_SCL,
+    CAMERA_SDA,
+    ENABLE,
+    MA_PER_COUNT,
+    SRAM_POWER,
+    Monitor,
+)
+from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.ov7620 import REGISTERS
+from cubestack.firmware_model.pic18_costs import PIC18F45K20
+
+from .scenery import scan, window
+
+CYCLE_NS = 200
+FRAME_US = 33_367
+READ_OUT_US = 30_507
+BOOT_US = 5_000
+HANG_US = 200_000_000  # no job takes longer: a whole picture on the bench UART takes 27 s
+LATCH_UP_MA = 120.0
+LOST = 0xA5  # what a memory holds after its supply was off
+
+ACK = {"SUNACK": Sram.SRAM1, "NADACK": Sram.SRAM2}
+EDGE_ACTIONS = {Action.EDGE, Action.PASS_EDGE}
+ADDRESSING = {Action.TAKE_ADDRESS, Action.READ_FROM}
+LINES = ("SHIFT", "EDGE", "RNW")
+
+
+class SccbCamera:
+    """A camera's registers behind its two lines.
+
+    Attributes:
+        writes: (address, value) of every register written.
+        registers: values by name, as far as written since power-up.
+        answers: whether it acknowledges.
+        phases_ns: shortest time that SCL was low, and high, inside of transmissions.
+    """
+
+    def __init__(self) -> None:
+        self.writes: list[tuple[int, int]] = []
+        self.answers = True
+        self.phases_ns = [10**9, 10**9]
+        self.power_up()
+
+    def power_up(self) -> None:
+        self.registers: dict[str, int] = {}
+        self.levels = {"SCL": 1, "SDA": 1}
+        self.bits: list[int] | None = None
+        self.edge_ns = 0
+        self.bus: set[str] = set()
+
+    def set(self, line: str, level: int, now_ns: int) -> None:
+        was, self.levels[line] = self.levels[line], level
+        if was == level:
+            return
+        if line == "SDA" and self.levels["SCL"]:
+            self.bits = None if level else []
+            if level:
+                return
+            self.edge_ns = 0
+        elif line == "SCL":
+            if self.edge_ns:
+                phase = int(not level)  # the one that ends now: low is 0
+                self.phases_ns[phase] = min(self.phases_ns[phase], now_ns - self.edge_ns)
+            self.edge_ns = now_ns
+            if level and self.bits is not None:
+                self._bit(self.bits)
+
+    def _bit(self, bits: list[int]) -> None:
+        bits.append(self.levels["SDA"])
+        if len(bits) % 9 == 0:
+            assert bits[-1] == 1, "the ninth bit is the camera's"
+        if len(bits) == 27 and self.answers:
+            device, address, value = (
+                int("".join(map(str, bits[at : at + 8])), 2) for at in (0, 9, 18)
+            )
+            assert device == REGISTERS.i2c_address << 1
+            self.writes.append((address, value))
+            register = REGISTERS.at(address)
+            assert register is not None
+            self.registers[register.name] = value
+
+    @property
+    def sda(self) -> int:
+        """0 while the camera pulls the line low in the ninth bit."""
+        ninth = self.bits is not None and len(self.bits) % 9 == 0 and len(self.bits) > 0
+        return 0 if ninth and self.answers else self.levels["SDA"]
+
+
+class Bench:
+    """A program on fake hardware.
+
+    Attributes:
+        scenes: what each camera sends, (480, 640); None: it is dead.
+        memories: what each memory holds.
+        wait_us: from the store command to a picture's first row.
+        latched: memories that draw ``LATCH_UP_MA`` until their supply is off.
+        cameras: control bus of each camera.
+        pins: output pins.
+        sent: bytes that the program sent to each port.
+        backlog: bytes that each port still has to send.
+        resets: causes of all resets.
+        on_request: called with every request before it is performed.
+        log: (time in us, request) of every request but those that only take time.
+        now_ns: bench time.
+    """
+
+    def __init__(self, *, mcu_addressing: bool = False) -> None:
+        self.mcu_addressing = mcu_addressing
+        self.serial_number = "CS0042"
+        dark = np.full((ROWS, COLUMNS), 34, np.uint8)
+        self.scenes: dict[Camera, NDArray[np.uint8] | None] = dict.fromkeys(Camera, dark)
+        self.wait_us = 17_500
+        self.supply_ma = {Monitor.SUPPLY_3V3: 31.4, Monitor.SUPPLY_5V: 12.0}
+        self.memory_ma = 5.0
+        self.on_request: Callable[[Request], None] = lambda _request: None
+        self.resets: list[int] = []
+        self.log: list[tuple[int, Request]] = []
+        self.power_on()
+
+    def power_on(self) -> None:
+        """Power up, or off and on again."""
+        self.memories = {sram: np.full((ROWS, COLUMNS), LOST, np.uint8) for sram in Sram}
+        self.latched: set[Sram] = set()
+        self.cameras = {camera: SccbCamera() for camera in Camera}
+        self.sent = {port: bytearray() for port in Port}
+        self.backlog = dict.fromkeys(Port, 0)
+        self.pins: dict[str, int] = {}
+        self.reset_cause = 0
+        self.now_ns = 0
+        self.meter = Meter(PIC18F45K20)
+        self._boot()
+        self.run()
+
+    # --- what the program uses ------------------------------------------------------------------
+
+    def uart_send(self, port: Port, data: bytes) -> None:
+        self.sent[port] += data
+
+    def uart_backlog(self, port: Port) -> int:
+        return self.backlog[port]
+
+    def wake(self) -> None:
+        self._woken = True
+
+    def adc_counts(self, monitor: Monitor) -> int:
+        memory = {Monitor.SRAM1: Sram.SRAM1, Monitor.SRAM2: Sram.SRAM2}
+        if monitor not in memory:
+            return round(self.supply_ma[monitor] / MA_PER_COUNT)
+        sram = memory[monitor]
+        drawn = LATCH_UP_MA if sram in self.latched else self.memory_ma
+        return round(drawn * self.pins[SRAM_POWER[sram]] / MA_PER_COUNT)
+
+    def uptime_ms(self) -> int:
+        return self.now_us // 1000
+
+    # --- what a test uses -----------------------------------------------------------------------
+
+    @property
+    def now_us(self) -> int:
+        """Bench time in us; the timer of the program."""
+        return self.now_ns // 1000
+
+    def run(self, until_us: int | None = None) -> None:
+        """Run until bench time ``until_us``; without it, until the program has nothing to do."""
+        hang_us = self.now_us + HANG_US
+        while until_us is None or self.now_us < until_us:
+            assert self.now_us < hang_us, f"still busy: {self._request}"
+            if self._request is None:
+                self._request = self._routine.send(self._answer)
+                self._pay()
+                self.on_request(self._request)
+            request = self._request
+            if isinstance(request, Reset):
+                self.resets.append(request.cause)
+                self.reset_cause = request.cause
+                self._boot()
+                continue
+            if isinstance(request, Sleep):
+                if not self._slept(request, until_us):
+                    return
+            else:
+                self._answer = self._perform(request)
+            self._request = None
+
+    def perform(self, routine: Any) -> Any:
+        """Run a routine of the program by itself, to its end; what it returns."""
+        answer: object = None
+        while True:
+            try:
+                request = routine.send(answer)
+            except StopIteration as end:
+                self._pay()
+                return end.value
+            self._pay()
+            self.on_request(request)
+            answer = None
+            if isinstance(request, Sleep):
+                self.now_ns = max(self.now_ns, 1000 * (request.deadline_us or 0))
+            else:
+                answer = self._perform(request)
+
+    def uart(self, data: bytes, port: Port = Port.NODE) -> None:
+        """Bytes arrive at a port."""
+        link = self.program.node if port is Port.NODE else self.program.bench
+        for byte in data:
+            link.uart_byte(byte)
+
+    def received(self) -> list[bytes]:
+        """Payloads of the frames that the node sent since the last call."""
+        decoder, frames = FrameDecoder(1024), []
+        for byte in self.sent[Port.NODE]:
+            event = decoder.feed(byte)
+            assert event in (None, FrameEvent.FRAME), f"the node sent {self.sent[Port.NODE]!r}"
+            if event is FrameEvent.FRAME:
+                frames.append(decoder.payload)
+        assert not decoder.unfinished
+        self.sent[Port.NODE].clear()
+        return frames
+
+    def send(self, name: str, **values: object) -> int:
+        """Send a telecommand and do not run it; its acknowledge's error byte."""
+        message = INTERFACE.telecommand(name)
+        values = {**message.reset_values(), **values}
+        self.uart(encode_frame(bytes([message.id]) + message.pack(**values)))
+        (answer,) = self.received()
+        (error,) = answer
+        return error
+
+    def command(self, name: str, **values: object) -> None:
+        """Send a telecommand, which must be accepted, and run it to its end."""
+        assert self.send(name, **values) == 0
+        self.run()
+
+    def telemetry(self, name: str) -> dict[str, Any]:
+        message = INTERFACE.telemetry(name)
+        self.uart(encode_frame(bytes([message.id])))
+        (answer,) = self.received()
+        return dict(message.unpack(answer))
+
+    def i2c_write(self, data: bytes, *, registers: bool = False) -> int:
+        """A write transfer; how many bytes were acknowledged before the first that was not."""
+        link = self.program.registers if registers else self.program.node
+        link.i2c_start(False)
+        count = 0
+        for byte in data:
+            if not link.i2c_write(byte):
+                break
+            count += 1
+        link.i2c_stop()
+        return count
+
+    def i2c_read(self, count: int, pointer: int | None = None, *, registers: bool = False) -> bytes:
+        """A read transfer, with a write of ``pointer`` and a repeated start before if given."""
+        link = self.program.registers if registers else self.program.node
+        if pointer is not None:
+            link.i2c_start(False)
+            assert link.i2c_write(pointer)
+        link.i2c_start(True)
+        data = bytes(link.i2c_read() or 0 for _ in range(count))
+        link.i2c_stop()
+        return data
+
+    def cut(self) -> set[Sram]:
+        """Memories whose supply is off."""
+        return {sram for sram in Sram if not self.pins[SRAM_POWER[sram]]}
+
+    # --- pins -----------------------------------------------------------------------------------
+
+    def _boot(self) -> None:
+        self.now_ns += 1000 * BOOT_US
+        outputs = (*LINES, "CLK", "DATA_I", *CAMERA_SCL.values(), *CAMERA_SDA.values())
+        self.pins = {**dict.fromkeys(outputs, 0), **dict.fromkeys(ENABLE, 1)}
+        self._doing = actions(0, 0, 0, 1, 1)
+        self._ack_ns: dict[Sram, int] = {}
+        self._position = 0
+        for pin in (*CAMERA_POWER.values(), *SRAM_POWER.values()):
+            self._set_pin(pin, 0)
+        self._woken = False
+        self._request: Request | None = None
+        self._answer: object = None
+        self.program = CubeSenseProgram(self, self.meter)
+        self._routine = self.program.main()
+
+    def _pay(self) -> None:
+        self.now_ns += self.meter.take() * CYCLE_NS
+
+    def _perform(self, request: Request) -> object:
+        if not isinstance(request, Pay | ReadTimer):
+            self.log.append((self.now_us, request))
+        match request:
+            case ReadTimer():
+                return self.now_us
+            case SetPin(pin, level):
+                self.meter.charge(port_write=1)
+                self._set_pin(pin, level)
+            case ReadPin(pin):
+                self.meter.charge(port_read=1)
+                return {name: self.cameras[c].sda for c, name in CAMERA_SDA.items()}[pin]
+            case AwaitPin():
+                return self._await(request)
+            case StrobeRead():
+                self._strobe(request)
+            case Pay():
+                pass
+            case _:
+                raise AssertionError(f"the part has nothing for {request}")
+        return None
+
+    def _set_pin(self, pin: str, level: int) -> None:
+        was, self.pins[pin] = self.pins.get(pin), level
+        for camera in Camera:
+            powered = self.pins.get(CAMERA_POWER[camera])
+            if pin in (CAMERA_SCL[camera], CAMERA_SDA[camera]) and powered:
+                self.cameras[camera].set(pin[-3:], level, self.now_ns)
+            if pin == CAMERA_POWER[camera] and was != level:
+                self.cameras[camera].power_up()
+        for sram in Sram:
+            if pin == SRAM_POWER[sram] and not level:
+                self.memories[sram] = np.full((ROWS, COLUMNS), LOST, np.uint8)
+                self.latched.discard(sram)
+        if was == level or pin not in (*LINES, *ENABLE, "CLK"):
+            return
+        if pin == "CLK":
+            self._clock(level)
+            return
+        enabled = not all(self.pins.get(name, 1) for name in ENABLE)
+        if pin in LINES and enabled:
+            addressing = pin == "SHIFT" and ADDRESSING & {*self._doing}
+            assert addressing, f"{pin} set while an FPGA is enabled"
+        levels = [self.pins.get(name, 0) for name in (*LINES, *ENABLE)]
+        self._enter(actions(*levels, mcu_addressing=self.mcu_addressing))
+
+    def _enter(self, doing: Any) -> None:
+        moved = ADDRESSING & {*doing} and ADDRESSING & {*self._doing}
+        self._doing = doing
+        self._position = self._position if moved else 0
+        self._ack_ns = {}
+        for half, action in zip(Sram, doing, strict=True):
+            camera = Camera(1 - half if action is Action.STORE_OTHER else half)
+            if action in (Action.STORE, Action.STORE_OTHER) and self.scenes[camera] is not None:
+                delay_us = self.wait_us + READ_OUT_US
+                self._ack_ns[half] = self.now_ns + 1000 * delay_us
+
+    def _clock(self, level: int) -> None:
+        if level:
+            assert Action.TAKE_ADDRESS in self._doing
+            self._position = (self._position << 8 | self.pins["DATA_I"]) & 0xFFFFFF
+
+    def _await(self, request: AwaitPin) -> bool:
+        half = ACK[request.pin]
+        deadline_ns = self.now_ns + 1000 * request.timeout_us
+        ack_ns = self._ack_ns.get(half)
+        if ack_ns is None or ack_ns > deadline_ns:
+            self.now_ns = deadline_ns
+            return False
+        poll_ns = request.poll_cycles * CYCLE_NS
+        polls = max(1, -(-(ack_ns - self.now_ns) // poll_ns))
+        self.now_ns += polls * poll_ns
+        action = self._doing[half]
+        picture = self.scenes[Camera(1 - half if action is Action.STORE_OTHER else half)]
+        assert picture is not None
+        if self.pins[SRAM_POWER[half]]:
+            self.memories[half] = picture.copy()
+        return True
+
+    def _strobe(self, request: StrobeRead) -> None:
+        (half,) = [h for h in Sram if self._doing[h] in (Action.READ, *EDGE_ACTIONS, *ADDRESSING)]
+        action, count = self._doing[half], len(request.target)
+        owner = Sram(1 - half) if action is Action.PASS_EDGE else half
+        assert action is not Action.TAKE_ADDRESS
+        picture = self.memories[owner]
+        if action in EDGE_ACTIONS:
+            data = window(picture) if half == Camera.SUN else scan(picture)
+        else:
+            data = picture.reshape(-1)
+        start = self._position
+        if action is Action.READ_FROM:
+            row, column = divmod(start, 1024)
+            start = row * COLUMNS + column
+        request.target[:] = np.take(data, range(start, start + count), mode="wrap")
+        start += count
+        if action is Action.READ_FROM:
+            row, column = divmod(start % (ROWS * COLUMNS), COLUMNS)
+            start = row << 10 | column
+        self._position = start
+        self.now_ns += count * request.cycles * CYCLE_NS
+
+    def _slept(self, request: Sleep, until_us: int | None) -> bool:
+        """Sleep as far as it goes; False when something else has to happen first."""
+        woken = request.wakeable and self._woken
+        deadline_us = self.now_us if woken else request.deadline_us
+        assert deadline_us is not None
+        if until_us is None and not woken and self.program.idle:
+            return False
+        if until_us is not None and deadline_us > until_us:
+            self.now_ns = 1000 * until_us
+            return False
+        self.now_ns = max(self.now_ns, 1000 * deadline_us)
+        self._woken = self._woken and not woken
+        self._answer = woken
+        return True
