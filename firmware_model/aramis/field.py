@@ -13,7 +13,6 @@ from math import atan, cos, hypot, pi, radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.geometry import CameraParameters
 from cubestack.firmware_model.costs import Meter
 
 __all__ = ["COLUMNS", "FOV_DEG", "PIXEL_PITCH_MM", "ROWS", "Field"]
@@ -21,6 +20,8 @@ __all__ = ["COLUMNS", "FOV_DEG", "PIXEL_PITCH_MM", "ROWS", "Field"]
 COLUMNS, ROWS = 1280, 1024
 PIXEL_PITCH_MM = 0.0052
 FOV_DEG = 21.5346
+
+_ONE = np.float32(1)
 
 
 @dataclass(frozen=True)
@@ -30,14 +31,15 @@ class Field:
     Attributes:
         fov_deg: field across the shorter side of the picture, 1 to 90 degrees.
         columns, rows: of the picture, 16 to 4096.
-        pitch_mm: distance of pixel centres.
+        pitch_x_mm, pitch_y_mm: distance of pixel centres.
         round: whether only the circle across the shorter side is used.
     """
 
     fov_deg: float = FOV_DEG
     columns: int = COLUMNS
     rows: int = ROWS
-    pitch_mm: float = PIXEL_PITCH_MM
+    pitch_x_mm: float = PIXEL_PITCH_MM
+    pitch_y_mm: float = PIXEL_PITCH_MM
     round: bool = True
 
     def __post_init__(self) -> None:
@@ -47,48 +49,44 @@ class Field:
         for name in ("columns", "rows"):
             if not 16 <= getattr(self, name) <= 4096:
                 raise ValueError(f"{name} must be 16 to 4096, not {getattr(self, name)}")
-        if not self.pitch_mm > 0:
-            raise ValueError(f"pitch_mm must be above 0, not {self.pitch_mm}")
+        for name in ("pitch_x_mm", "pitch_y_mm"):
+            if not 1e-4 <= getattr(self, name) <= 1:
+                raise ValueError(f"{name} must be 0.0001 to 1, not {getattr(self, name)}")
 
     @property
-    def radius_px(self) -> float:
-        """Half of the shorter side."""
-        return min(self.columns, self.rows) / 2
+    def radius_mm(self) -> float:
+        """Half of the shorter side of the picture."""
+        return min(self.columns * self.pitch_x_mm, self.rows * self.pitch_y_mm) / 2
 
     @property
-    def focal_length_px(self) -> float:
-        """Focal length in px."""
-        return self.radius_px / tan(radians(self.fov_deg / 2))
+    def focal_length_mm(self) -> float:
+        """Focal length of the lens."""
+        return self.radius_mm / tan(radians(self.fov_deg / 2))
 
-    @cached_property
-    def camera(self) -> CameraParameters:
-        """The same as `geometry.unit_vectors` wants it: equation 4.1 is that of CubeStar."""
-        focal = self.focal_length_px
-        return CameraParameters(
-            focal_length_mm=focal * self.pitch_mm,
-            fx=focal,
-            fy=focal,
-            cx=(self.columns - 1) / 2,
-            cy=(self.rows - 1) / 2,
-            k1=0,
-            k2=0,
-            p1=0,
-            p2=0,
-            pitch_mm=self.pitch_mm,
-        )
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Column and row of the boresight, px."""
+        return (self.columns - 1) / 2, (self.rows - 1) / 2
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Tangent of the angle that a pixel next to the boresight takes, in x and y."""
+        return self.pitch_x_mm / self.focal_length_mm, self.pitch_y_mm / self.focal_length_mm
 
     @cached_property
     def smallest_cosine(self) -> float:
         """Cosine of the angle between the boresight and the farthest direction in the field."""
-        farthest = self.radius_px if self.round else hypot(self.columns, self.rows) / 2
-        return cos(atan(farthest / self.focal_length_px))
+        width, height = self.columns * self.pitch_x_mm, self.rows * self.pitch_y_mm
+        farthest = self.radius_mm if self.round else hypot(width, height) / 2
+        return cos(atan(farthest / self.focal_length_mm))
 
     @cached_property
     def solid_angle_sr(self) -> float:
         """Solid angle of the field, of a rectangle as if it were flat."""
         if self.round:
             return 2 * pi * (1 - self.smallest_cosine)
-        return self.columns * self.rows / self.focal_length_px**2
+        across, down = self.scale
+        return self.columns * across * self.rows * down
 
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
@@ -96,7 +94,9 @@ class Field:
         mask = np.ones((self.rows, self.columns), dtype=bool)
         if self.round:
             y, x = np.ogrid[: self.rows, : self.columns]
-            mask = np.hypot(x - self.camera.cx, y - self.camera.cy) <= self.radius_px
+            middle_x, middle_y = self.centre
+            across, down = (x - middle_x) * self.pitch_x_mm, (y - middle_y) * self.pitch_y_mm
+            mask = np.hypot(across, down) <= self.radius_mm
         mask.flags.writeable = False
         return mask
 
@@ -105,24 +105,48 @@ class Field:
         """Number of pixels in the field."""
         return int(np.count_nonzero(self.mask))
 
+    def directions(self, points: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
+        """Unit vectors (n, 3) in camera axes of points (n, 2) of the picture in px: eq. 4.1."""
+        x, y = self._tangents(points, meter)
+        z = _ONE / np.sqrt(_ONE + x * x + y * y)
+        count = len(points)
+        meter.charge(
+            f32_add=2 * count, f32_mul=4 * count, f32_div=count, f32_sqrt=count, loop=count
+        )
+        return np.stack([x * z, y * z, z], axis=1).astype(np.float32)
+
     def inside(self, points: NDArray[np.float32], meter: Meter) -> NDArray[np.bool_]:
         """Which points (n, 2) of the picture in px are in the field."""
-        x = points[:, 0] - np.float32(self.camera.cx)
-        y = points[:, 1] - np.float32(self.camera.cy)
-        count = len(points)
-        meter.charge(f32_add=3 * count, f32_mul=2 * count, f32_compare=2 * count, loop=count)
-        if self.round:
-            within: NDArray[np.bool_] = x * x + y * y <= np.float32(self.radius_px**2)
-            return within
-        return (abs(x) <= np.float32(self.columns / 2)) & (abs(y) <= np.float32(self.rows / 2))
+        x, y = self._tangents(points, meter)
+        return self._inside(x, y, meter)
 
     def contains(self, directions: NDArray[np.float32], meter: Meter) -> NDArray[np.bool_]:
         """Which unit vectors (n, 3) in camera axes are in the field."""
-        count = len(directions)
-        depth = np.maximum(directions[:, 2:], np.float32(1e-6))
-        focal = np.float32(self.focal_length_px)
-        centre = np.array([self.camera.cx, self.camera.cy], dtype=np.float32)
-        points = directions[:, :2] / depth * focal + centre
-        meter.charge(f32_div=count, f32_mul=3 * count, f32_add=2 * count, f32_compare=count)
-        in_front: NDArray[np.bool_] = directions[:, 2] > 0
-        return in_front & self.inside(points.astype(np.float32), meter)
+        x, y, z = directions.T
+        depth = np.maximum(z, np.float32(1e-6))
+        meter.charge(f32_div=2 * len(directions), f32_compare=len(directions))
+        return (z > 0) & self._inside(x / depth, y / depth, meter)
+
+    def _tangents(
+        self, points: NDArray[np.float32], meter: Meter
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        middle = np.array(self.centre, dtype=np.float32)
+        tangents = (points.astype(np.float32) - middle) * np.array(self.scale, dtype=np.float32)
+        meter.charge(f32_add=2 * len(points), f32_mul=2 * len(points), ram_read=2 * len(points))
+        return tangents[:, 0], tangents[:, 1]
+
+    def _inside(
+        self, x: NDArray[np.float32], y: NDArray[np.float32], meter: Meter
+    ) -> NDArray[np.bool_]:
+        """Which tangents of angles to the boresight are in the field."""
+        count = len(x)
+        meter.charge(f32_add=count, f32_mul=2 * count, f32_compare=2 * count, loop=count)
+        if self.round:
+            within: NDArray[np.bool_] = x * x + y * y <= np.float32(
+                (self.radius_mm / self.focal_length_mm) ** 2
+            )
+            return within
+        across, down = self.scale
+        half_x, half_y = np.float32(self.columns / 2 * across), np.float32(self.rows / 2 * down)
+        flat: NDArray[np.bool_] = (np.abs(x) <= half_x) & (np.abs(y) <= half_y)
+        return flat

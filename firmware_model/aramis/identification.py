@@ -14,7 +14,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.geometry import unit_vectors
 from cubestack.firmware_model.algorithms.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.aramis.assignment import assign
 from cubestack.firmware_model.aramis.database import Database
@@ -57,7 +56,7 @@ def identify(
     """
     if len(measured) < 3:
         return unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, measured)
-    vectors = unit_vectors(measured.centroids, field.camera, meter)
+    vectors = field.directions(measured.centroids, meter)
     faces = None
     if hint is not None:
         with meter.phase("faces"):
