@@ -114,8 +114,10 @@ class Mt9m001:
 
     @scene.setter
     def scene(self, scene: Scene) -> None:
-        lens = scene.optics if isinstance(scene, SkyScene) else None
-        size = scene.size if lens is None else (lens.columns, lens.rows)
+        if isinstance(scene, SkyScene):
+            size = scene.optics.columns, scene.optics.rows
+        else:
+            size = scene.size
         if size != (COLUMNS, ROWS):
             raise ValueError(
                 f"the MT9M001 has {COLUMNS} x {ROWS} pixels, the scene's sensor {size}"

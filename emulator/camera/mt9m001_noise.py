@@ -142,7 +142,7 @@ def counts(
     signal *= gain * np.float32((FULL_SCALE + 1) / FULL_WELL_ELECTRONS)
     signal += np.float32(BLACK_LEVEL)
     if not terms.quantisation:
-        signal = signal / np.float32(4) + np.float32(0.5)
-        return np.clip(signal, 0, FULL_SCALE // 4).astype(np.uint8)
-    whole = np.clip(signal + np.float32(0.5), 0, FULL_SCALE).astype(np.uint16)
-    return (whole >> 2).astype(np.uint8)
+        nearest: Image = np.clip(signal / np.float32(4) + np.float32(0.5), 0, FULL_SCALE // 4)
+        return nearest.astype(np.uint8)
+    whole: Image = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
+    return (whole.astype(np.uint16) >> 2).astype(np.uint8)
