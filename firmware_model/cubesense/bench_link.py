@@ -1,0 +1,112 @@
+"""The one-letter bench protocol's side of the bench computer; the port's interrupts and answers.
+
+CubeSense thesis, appendix E. Letters are answered one after the other, a picture in pieces, between
+which the program does other jobs. Ours: four letters wait at most, and one that meets more is lost;
+other bytes are ignored; a capture that fails, and a picture that can not be read, are not answered.
+The I2C register's stream waits for the end of a picture here: taking turns, each would begin its
+own anew for every piece.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.download import PictureReader
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
+from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
+from cubestack.firmware_model.cubesense.measurement import Measurement
+from cubestack.firmware_model.cubesense.state import State
+from cubestack.firmware_model.hardware import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.interface.bench_letters import Letter
+from cubestack.firmware_model.interface.cubesense_bench import BENCH, CAPTURES, DOWNLOADS
+from cubestack.firmware_model.interface.cubesense_codes import IMAGE_BYTES, Camera, Sram
+
+__all__ = ["CHUNK_BYTES", "LETTERS", "PAUSE_US", "BenchLink"]
+
+LETTERS = 4
+"""Letters that wait."""
+
+CHUNK_BYTES = 64
+"""Bytes of a picture that are read and handed to the UART at once."""
+
+PAUSE_US = 2_000
+"""Between two looks at the UART, which needs 5.5 ms for that many at 115200 baud."""
+
+_CAMERAS: dict[Letter, Camera] = {
+    letter: camera for table in (CAPTURES, DOWNLOADS) for camera, letter in table.items()
+}
+
+
+class BenchLink:
+    """Answers letters."""
+
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        state: State,
+        queue: JobQueue,
+        reader: PictureReader,
+        measurement: Measurement,
+    ) -> None:
+        """No letter waits."""
+        self._hardware = hardware
+        self._meter = meter
+        self._state = state
+        self._queue = queue
+        self._reader = reader
+        self._measurement = measurement
+        self._letters: deque[Letter] = deque()
+        self._work = Background(self._serve)
+        self._sent = 0
+
+    def uart_byte(self, byte: int) -> None:
+        """Interrupt: a byte came."""
+        self._meter.charge(uart_interrupt=1)
+        letter = BENCH.find(byte)
+        if letter is None or len(self._letters) >= LETTERS:
+            return
+        self._letters.append(letter)
+        self._queue.request(self._work)
+        self._hardware.wake()
+
+    def uart_silence(self) -> None:
+        """Interrupt: nothing came for a while, which means nothing here."""
+
+    def _serve(self) -> Routine[None]:
+        """Main loop: answer the oldest letter, a picture piece by piece."""
+        letter = self._letters[0]
+        camera = _CAMERAS[letter]
+        if letter == CAPTURES[camera]:
+            done = yield from self._capture(letter, camera)
+        else:
+            done = yield from self._send(Sram(camera))
+        if done:
+            self._letters.popleft()
+            self._sent = 0
+        if self._letters:
+            self._queue.request(self._work, next_turn=True)
+
+    def _capture(self, letter: Letter, camera: Camera) -> Routine[bool]:
+        sram = Sram(camera)
+        self._state.schedule(camera, sram, detect=False)
+        yield from self._measurement.measure(camera, sram, detect=False)
+        if self._state.results[camera].capture.stored:
+            self._hardware.uart_send(Port.BENCH, letter.answer or b"")
+        return True
+
+    def _send(self, sram: Sram) -> Routine[bool]:
+        """Send what there is room for; True at the picture's end."""
+        if self._hardware.uart_backlog(Port.BENCH) > CHUNK_BYTES:
+            now_us: int = yield ReadTimer()
+            yield Sleep(now_us + PAUSE_US)
+            return False
+        end = min(self._sent + CHUNK_BYTES, IMAGE_BYTES)
+        pixels = np.arange(self._sent, end, dtype=np.int32)
+        data = np.zeros(len(pixels), np.uint8)
+        if not (yield from self._reader.read(sram, pixels, data)):
+            return True
+        self._hardware.uart_send(Port.BENCH, data.tobytes())
+        self._sent = end
+        return end == IMAGE_BYTES

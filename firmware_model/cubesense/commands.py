@@ -1,0 +1,173 @@
+"""What each job does, executed by the main loop one after the other.
+
+A setting counts from the next measurement on. Telecommand Reset restarts the communication (its
+counters, its flags and the selected picture), the cameras, or the whole program; telecommands that
+still wait are lost with the latter.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.acquisition import Acquisition
+from cubestack.firmware_model.cubesense.camera_control import CameraControl
+from cubestack.firmware_model.cubesense.download import Download, PictureReader
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, Telecommand
+from cubestack.firmware_model.cubesense.masks import Mask
+from cubestack.firmware_model.cubesense.measurement import Measurement
+from cubestack.firmware_model.cubesense.state import CameraSettings, State, distortion_of
+from cubestack.firmware_model.cubesense.supply import Supply
+from cubestack.firmware_model.hardware import Pay, Routine
+from cubestack.firmware_model.interface.cubesense_codes import (
+    Camera,
+    NadirSearch,
+    ResetTarget,
+    Sram,
+    SramSelection,
+)
+
+__all__ = ["SOFTWARE_RESET", "Commands"]
+
+SOFTWARE_RESET = 1
+"""Cause of the program's own reset."""
+
+Values = Any
+
+
+class Commands:
+    """Executes jobs.
+
+    Attributes:
+        reader: reads pictures, for every stream.
+        download: the frame that telemetry hands out.
+        handled: names of the telecommands that have an effect.
+    """
+
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        state: State,
+        supply: Supply,
+        cameras: CameraControl,
+        acquisition: Acquisition,
+        measurement: Measurement,
+    ) -> None:
+        """Act on the given parts of the program."""
+        self._meter = meter
+        self._state = state
+        self._supply = supply
+        self._cameras = cameras
+        self._measurement = measurement
+        self.reader = PictureReader(acquisition)
+        self.download = Download(meter, self.reader)
+        self._settings: dict[str, Callable[[CameraSettings, Values], None]] = {
+            "DetectionThreshold": self._set_threshold,
+            "AutoAdjust": self._set_auto_adjust,
+            "CameraSettings": self._set_camera,
+            "Boresight": self._set_boresight,
+            "Mask": self._set_mask,
+            "Distortion": self._set_distortion,
+        }
+        self._routines: dict[str, Callable[[Telecommand], Routine[int | None]]] = {
+            "Reset": self._reset,
+            "ClearOverCurrent": self._clear_over_current,
+            "CaptureAndDetect": self._capture,
+            "CaptureOnly": self._capture,
+            "StartImageDownload": self._prepare_frame,
+            "NextImageFrame": self._prepare_frame,
+            "SetNadirSearch": self._set_search,
+        }
+        self._cameras_by_setting = {
+            f"{name}{camera + 1}": (name, camera) for name in self._settings for camera in Camera
+        }
+        self.handled = frozenset({*self._routines, *self._cameras_by_setting})
+
+    def execute(self, job: Job) -> Routine[int | None]:
+        """Do ``job``; returns a cause when the program has to end in a reset."""
+        cause = None
+        match job:
+            case Telecommand():
+                cause = yield from self._telecommand(job)
+            case Measure():
+                yield from self._measurement.measure(job.camera, job.sram, detect=job.detect)
+            case Background():
+                yield from job.work()
+        yield Pay()
+        return cause
+
+    def _telecommand(self, job: Telecommand) -> Routine[int | None]:
+        name = job.message.name
+        cause = None
+        if name in self._cameras_by_setting:
+            setting, camera = self._cameras_by_setting[name]
+            self._meter.charge(i8=job.message.length)
+            self._settings[setting](self._state.cameras[camera], job.values)
+        else:
+            cause = yield from self._routines[name](job)
+        yield Pay()
+        if job.latest and cause is None:
+            self._state.last_processed = 1
+        return cause
+
+    # --- node ---------------------------------------------------------------------------------
+
+    def _reset(self, job: Telecommand) -> Routine[int | None]:
+        match ResetTarget(job.values["Target"]):
+            case ResetTarget.COMMUNICATION:
+                self._state.reset_communication()
+                self.download.forget()
+            case ResetTarget.CAMERAS:
+                yield from self._cameras.restart()
+            case ResetTarget.MCU:
+                return SOFTWARE_RESET
+        return None
+
+    def _clear_over_current(self, job: Telecommand) -> Routine[None]:
+        selection = SramSelection(job.values["Selection"])
+        both = selection is SramSelection.BOTH
+        yield from self._supply.clear_over_current(*(Sram if both else [Sram(selection)]))
+
+    # --- pictures -----------------------------------------------------------------------------
+
+    def _capture(self, job: Telecommand) -> Routine[None]:
+        camera, sram = Camera(job.values["Camera"]), Sram(job.values["Sram"])
+        detect = job.message.name == "CaptureAndDetect"
+        yield from self._measurement.measure(camera, sram, detect=detect)
+
+    def _prepare_frame(self, job: Telecommand) -> Routine[None]:
+        if job.frame is not None:
+            yield from self.download.prepare(job.frame)
+
+    # --- settings -----------------------------------------------------------------------------
+
+    def _set_search(self, job: Telecommand) -> Routine[None]:
+        self._state.nadir_search = NadirSearch(job.values["Search"])
+        yield Pay()
+
+    @staticmethod
+    def _set_threshold(settings: CameraSettings, values: Values) -> None:
+        settings.threshold = values["Threshold"]
+
+    @staticmethod
+    def _set_auto_adjust(settings: CameraSettings, values: Values) -> None:
+        settings.auto_adjust = values["Enabled"]
+
+    @staticmethod
+    def _set_camera(settings: CameraSettings, values: Values) -> None:
+        settings.exposure, settings.gain = values["Exposure"], values["Gain"]
+        settings.blue_gain, settings.red_gain = values["BlueGain"], values["RedGain"]
+
+    @staticmethod
+    def _set_boresight(settings: CameraSettings, values: Values) -> None:
+        settings.boresight = (values["X"], values["Y"])
+
+    @staticmethod
+    def _set_mask(settings: CameraSettings, values: Values) -> None:
+        limits = (values[name] for name in ("XMin", "XMax", "YMin", "YMax"))
+        settings.masks[values["Area"] - 1] = Mask(*limits)
+
+    @staticmethod
+    def _set_distortion(settings: CameraSettings, values: Values) -> None:
+        settings.distortion = distortion_of(values)

@@ -1,0 +1,101 @@
+"""What waits for the main loop: telecommands, measurements, and streams that want to be fed.
+
+Links put jobs in interrupt context, the main loop takes them one after the other. Four wait at
+most, as the node protocol's hosts expect. Streams do not count among them: each has one place
+of its own, and gets its turn when nothing else waits.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from cubestack.firmware_model.cubesense.memory import COMMAND_QUEUE
+from cubestack.firmware_model.hardware import Routine
+from cubestack.firmware_model.interface.cubesense_codes import Camera, ImageSize, Sram
+from cubestack.firmware_model.interface.message import Message
+
+__all__ = ["Background", "FrameRequest", "Job", "JobQueue", "Measure", "Telecommand"]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameRequest:
+    """A frame that a host wants prepared, of the picture in ``sram`` as a square of ``size``."""
+
+    sram: Sram
+    size: ImageSize
+    frame: int
+
+
+@dataclass(eq=False)
+class Telecommand:
+    """An accepted telecommand.
+
+    Attributes:
+        message: its declaration.
+        values: decoded parameters.
+        frame: the frame that it asks for, if any.
+        latest: no telecommand came after it, so telemetry TcmdProcessed speaks of this one.
+    """
+
+    message: Message
+    values: Mapping[str, Any]
+    frame: FrameRequest | None = None
+    latest: bool = False
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measurement that a telemetry request or a register asked for."""
+
+    camera: Camera
+    sram: Sram
+    detect: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Background:
+    """A piece of a stream: ``work`` does as much as there is room for, and returns."""
+
+    work: Callable[[], Routine[None]]
+
+
+Job = Telecommand | Measure | Background
+
+
+class JobQueue:
+    """Jobs in their order, then streams in turn."""
+
+    def __init__(self) -> None:
+        """Make an empty queue."""
+        self._jobs: deque[Telecommand | Measure] = deque()
+        self._streams: deque[Background] = deque()
+
+    def __len__(self) -> int:
+        """How many wait."""
+        return len(self._jobs) + len(self._streams)
+
+    @property
+    def full(self) -> bool:
+        """Whether no further job is accepted."""
+        return len(self._jobs) >= COMMAND_QUEUE
+
+    def put(self, job: Telecommand | Measure) -> bool:
+        """Append ``job``; False when the queue is full."""
+        if self.full:
+            return False
+        self._jobs.append(job)
+        return True
+
+    def request(self, stream: Background, *, next_turn: bool = False) -> None:
+        """Let ``stream`` have a turn, once however often it asks; ``next_turn``: the next one."""
+        if stream in self._streams:
+            return
+        if next_turn:
+            self._streams.appendleft(stream)
+        else:
+            self._streams.append(stream)
+
+    def pop(self) -> Job:
+        """Take the next; IndexError when none waits."""
+        return self._jobs.popleft() if self._jobs else self._streams.popleft()

@@ -1,0 +1,232 @@
+"""The register-pointer protocol's side of the satellite, on I2C; interrupts.
+
+CubeSense thesis, section 6.4.3. Settings and results are the node protocol's own: a setting is
+stored at once, before telecommands that wait, and an action waits with them. A slave can not
+refuse, so an action that meets a full queue is lost and raises TcmdBufferOverrun. Each transfer
+carries one data byte; a further one is not acknowledged.
+
+The picture is read ahead of the host into a small buffer, and while that is empty the clock is
+stretched. A picture that can not be read, because its memory is off, is all ``FILL``.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.download import PictureReader
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, Telecommand
+from cubestack.firmware_model.cubesense.state import State
+from cubestack.firmware_model.hardware import Routine
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import (
+    IMAGE_BYTES,
+    Camera,
+    Measurement,
+    NadirSearch,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
+from cubestack.firmware_model.interface.register_pointer import FILL, PointerRegister
+
+__all__ = ["READ_AHEAD_BYTES", "ImageStream", "RegisterLink"]
+
+READ_AHEAD_BYTES = 64
+"""Bytes of the picture that wait for the host; new ones are fetched when half of them are left."""
+
+_SETTINGS = {
+    f"{camera.name}_{name}": (camera, attribute)
+    for camera in Camera
+    for name, attribute in (
+        ("THRESHOLD", "threshold"),
+        ("EXPOSURE", "exposure"),
+        ("GAIN", "gain"),
+        ("BLUE_GAIN", "blue_gain"),
+        ("RED_GAIN", "red_gain"),
+        ("AUTO", "auto_adjust"),
+    )
+}
+"""Camera, and attribute of its settings, by register."""
+
+_RESULTS: dict[str, tuple[Camera, str, int]] = {
+    f"{camera.name}_{name}": (camera, name.lower(), scale)
+    for camera in Camera
+    for name, scale in (("CAPTURE", 1), ("DETECT", 1), ("POINTS", 1), ("X", 100), ("Y", 100))
+}
+"""Camera, attribute of its result, and counts for a unit, by register."""
+
+
+class ImageStream:
+    """A picture that the host reads byte by byte."""
+
+    def __init__(self, hardware: CubeSenseHardware, queue: JobQueue, reader: PictureReader) -> None:
+        """Nothing is streamed."""
+        self._hardware = hardware
+        self._queue = queue
+        self._reader = reader
+        self._work = Background(self._fill)
+        self._ahead = bytearray()
+        self._sram: Sram | None = None
+        self._fetched = 0
+        self._turn = 0
+
+    @property
+    def active(self) -> bool:
+        """Whether the pointer is at the picture."""
+        return self._sram is not None
+
+    def begin(self, sram: Sram | None) -> None:
+        """Stream the picture in ``sram`` from its first pixel, or None: end the stream."""
+        self._sram = sram
+        self._ahead.clear()
+        self._fetched = 0
+        self._turn += 1
+
+    def next(self) -> int | None:
+        """The next byte; None while it has to be waited for."""
+        if self._fetched < IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2:
+            self._queue.request(self._work)
+            self._hardware.wake()
+        if self._ahead:
+            return self._ahead.pop(0)
+        return None if self._fetched < IMAGE_BYTES else FILL
+
+    def _fill(self) -> Routine[None]:
+        """Main loop: read ahead."""
+        turn, sram, start = self._turn, self._sram, self._fetched
+        count = min(READ_AHEAD_BYTES - len(self._ahead), IMAGE_BYTES - start)
+        if sram is None or count <= 0:
+            return
+        data = np.zeros(count, np.uint8)
+        pixels = np.arange(start, start + count, dtype=np.int32)
+        done = yield from self._reader.read(sram, pixels, data)
+        if turn != self._turn:  # the pointer moved meanwhile
+            return
+        self._ahead += data.tobytes() if done else b""
+        self._fetched = start + count if done else IMAGE_BYTES
+
+
+class RegisterLink:
+    """Registers behind the pointer."""
+
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        state: State,
+        queue: JobQueue,
+        reader: PictureReader,
+    ) -> None:
+        """The pointer is at no register until a host sets it."""
+        self._hardware = hardware
+        self._meter = meter
+        self._state = state
+        self._queue = queue
+        self._image = ImageStream(hardware, queue, reader)
+        self._register: PointerRegister | None = None
+        self._latched = b""
+        self._position = 0
+        self._written = 0
+        self._actions: dict[str, Callable[[Any], None]] = {
+            "MEASURE": lambda value: self._measure(Measurement(value), detect=True),
+            "CAPTURE": lambda value: self._measure(Measurement(value), detect=False),
+            "IMAGE_SRAM": lambda value: setattr(state, "image_sram", Sram(value)),
+            "CLEAR_OVER_CURRENT": self._clear_over_current,
+            "NADIR_SEARCH": self._search,
+        }
+
+    def i2c_start(self, read: bool) -> None:
+        """Interrupt: our address came, to write or to ``read``."""
+        self._written = 0
+
+    def i2c_write(self, byte: int) -> bool:
+        """Interrupt: the pointer, or a data byte; one beyond that is not acknowledged."""
+        self._meter.charge(i2c_interrupt=1)
+        self._written += 1
+        if self._written == 1:
+            self._register = REGISTERS.at(byte)
+        elif self._written == 2:
+            self._write(byte)
+        else:
+            return False
+        self._latch()
+        return True
+
+    def i2c_read(self) -> int | None:
+        """Interrupt: the next byte is wanted; None: not there yet, the clock is stretched."""
+        if self._image.active:
+            byte = self._image.next()
+        elif self._position < len(self._latched):
+            byte = self._latched[self._position]
+            self._position += 1
+        else:
+            byte = FILL
+        if byte is not None:
+            self._meter.charge(i2c_interrupt=1)
+        return byte
+
+    def i2c_stop(self) -> None:
+        """Interrupt: the transfer ended."""
+        self._written = 0
+
+    def _latch(self) -> None:
+        """Take the register's value, all bytes of it at one time."""
+        register = self._register
+        self._position = 0
+        streams = register is not None and register.streams
+        self._image.begin(self._state.image_sram if streams else None)
+        if register is None or not register.readable or streams:
+            self._latched = b""
+            return
+        self._meter.charge(host_message=1)
+        self._latched = register.encode(self._value(register.name))
+
+    def _value(self, name: str) -> float:
+        if name in _SETTINGS:
+            camera, attribute = _SETTINGS[name]
+            return float(getattr(self._state.cameras[camera], attribute))
+        if name in _RESULTS:
+            camera, attribute, scale = _RESULTS[name]
+            return float(getattr(self._state.results[camera], attribute)) / scale
+        others = {
+            "IMAGE_SRAM": self._state.image_sram,
+            "NADIR_SEARCH": self._state.nadir_search,
+            "OVER_CURRENT": sum(over << sram for sram, over in self._state.over_current.items()),
+        }
+        return others[name]
+
+    def _write(self, byte: int) -> None:
+        register = self._register
+        if register is None or register.streams:
+            return
+        value = register.field.decode(byte)
+        if not register.allows(value):
+            return
+        self._meter.charge(host_message=1)
+        if register.name in _SETTINGS:
+            camera, attribute = _SETTINGS[register.name]
+            setattr(self._state.cameras[camera], attribute, byte)
+        else:
+            self._actions[register.name](byte)
+
+    def _measure(self, target: Measurement, *, detect: bool) -> None:
+        if self._put(Measure(target.camera, target.sram, detect)):
+            self._state.schedule(target.camera, target.sram, detect=detect)
+
+    def _clear_over_current(self, selection: int) -> None:
+        message = INTERFACE.telecommand("ClearOverCurrent")
+        self._put(Telecommand(message, {"Selection": selection}))
+
+    def _search(self, value: int) -> None:
+        if value == NadirSearch.LINES or self._hardware.mcu_addressing:
+            self._state.nadir_search = NadirSearch(value)
+
+    def _put(self, job: Measure | Telecommand) -> bool:
+        accepted = self._queue.put(job)
+        if accepted:
+            self._hardware.wake()
+        else:
+            self._state.flags.add("TcmdBufferOverrun")
+        return accepted

@@ -1,0 +1,204 @@
+"""Where the values of each telemetry frame come from; interrupt context, so nothing here waits."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubesense.download import Download
+from cubestack.firmware_model.cubesense.edges import MAX_EDGES
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.state import State
+from cubestack.firmware_model.cubesense.supply import Supply
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import (
+    EDGE_UNIT,
+    EDGES_PER_FRAME,
+    Camera,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense_pins import Monitor
+from cubestack.firmware_model.interface.cubesense_telemetry import RESULTS, SCHEDULES
+from cubestack.firmware_model.interface.message import Message
+
+__all__ = ["FIRMWARE_VERSION", "NODE_TYPE", "SERIAL_BYTES", "Telemetry"]
+
+NODE_TYPE = 4
+"""Ours; the public material names no number."""
+
+FIRMWARE_VERSION = (0, 1)
+
+SERIAL_BYTES = INTERFACE.telemetry("SerialNumber").length
+
+EDGE_FRAMES = -(-MAX_EDGES // EDGES_PER_FRAME)
+
+_COUNTER = 1 << 16
+_HUNDREDTHS = 100
+
+Values = dict[str, Any]
+
+
+class Telemetry:
+    """Answers telemetry requests."""
+
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        state: State,
+        supply: Supply,
+        download: Download,
+    ) -> None:
+        """Report on the given parts of the program."""
+        self._hardware = hardware
+        self._meter = meter
+        self._state = state
+        self._supply = supply
+        self._download = download
+        self._sources: dict[str, Callable[[], Values]] = {
+            "Identification": self._identification,
+            "SerialNumber": self._serial_number,
+            "CommunicationStatus": self._communication,
+            "TcmdProcessed": self._processed,
+            "Power": self._power,
+            "Configuration": self._configuration,
+            "ImageFrame": self._frame,
+            "ImageFrameInfo": self._frame_info,
+            **{f"NadirEdges{part + 1}": partial(self._edges, part) for part in range(EDGE_FRAMES)},
+            "NadirSearchMode": lambda: {"Search": state.nadir_search},
+        }
+        for camera in Camera:
+            number = camera + 1
+            self._sources[f"Masks{number}"] = partial(self._masks, camera)
+            self._sources[f"Details{number}"] = partial(self._details, camera)
+            self._sources[f"PhaseTimes{number}"] = partial(self._times, camera)
+        shown = {identifier: camera for camera, identifier in RESULTS.items()}
+        shown |= {identifier: camera for identifier, (camera, _) in SCHEDULES.items()}
+        for identifier, camera in shown.items():
+            self._sources[INTERFACE.telemetry(identifier).name] = partial(self._result, camera)
+
+    def values(self, message: Message) -> Values:
+        """Values of every field of ``message``, one of the interface's frames."""
+        return self._sources[message.name]()
+
+    def _identification(self) -> Values:
+        seconds, milliseconds = divmod(self._hardware.uptime_ms(), 1000)
+        return {
+            "NodeType": NODE_TYPE,
+            "InterfaceVersion": INTERFACE.version,
+            "FirmwareVersionMajor": FIRMWARE_VERSION[0],
+            "FirmwareVersionMinor": FIRMWARE_VERSION[1],
+            "RuntimeSeconds": seconds % _COUNTER,
+            "RuntimeMilliseconds": milliseconds,
+        }
+
+    def _serial_number(self) -> Values:
+        text = self._hardware.serial_number.encode("ascii", "replace")
+        return {"SerialNumber": text[:SERIAL_BYTES].ljust(SERIAL_BYTES, b"\0")}
+
+    def _communication(self) -> Values:
+        state = self._state
+        flags = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
+        return {
+            "TcmdCount": state.telecommands % _COUNTER,
+            "TlmCount": state.telemetries % _COUNTER,
+            **{name: name in state.flags for name in flags},
+        }
+
+    def _processed(self) -> Values:
+        state = self._state
+        return {
+            "LastTcmd": state.last_command,
+            "Processed": state.last_processed,
+            "Error": state.last_error,
+        }
+
+    def _result(self, camera: Camera) -> Values:
+        result = self._state.results[camera]
+        return {
+            "Alpha": result.alpha / _HUNDREDTHS,
+            "Beta": result.beta / _HUNDREDTHS,
+            "Capture": result.capture,
+            "Detect": result.detect,
+        }
+
+    def _power(self) -> Values:
+        currents = self._supply.currents()
+        over = self._state.over_current
+        return {
+            "Current3V3": currents[Monitor.SUPPLY_3V3],
+            "CurrentSram1": currents[Monitor.SRAM1],
+            "CurrentSram2": currents[Monitor.SRAM2],
+            "Current5V": currents[Monitor.SUPPLY_5V],
+            "OverCurrent1": over[Sram.SRAM1],
+            "OverCurrent2": over[Sram.SRAM2],
+        }
+
+    def _configuration(self) -> Values:
+        values: Values = {}
+        for camera, settings in self._state.cameras.items():
+            number = camera + 1
+            values |= {
+                f"Threshold{number}": settings.threshold,
+                f"AutoAdjust{number}": settings.auto_adjust,
+                f"Exposure{number}": settings.exposure,
+                f"Gain{number}": settings.gain,
+                f"BlueGain{number}": settings.blue_gain,
+                f"RedGain{number}": settings.red_gain,
+            }
+        return values
+
+    def _frame(self) -> Values:
+        self._meter.charge(i8=len(self._download.data))
+        return {"Frame": self._download.data.tobytes()}
+
+    def _frame_info(self) -> Values:
+        return {"FrameNumber": self._download.number, "Checksum": self._download.checksum}
+
+    def _masks(self, camera: Camera) -> Values:
+        values: Values = {}
+        for index, mask in enumerate(self._state.cameras[camera].masks):
+            area = index + 1
+            values |= {
+                f"XMin{area}": mask.x_min,
+                f"XMax{area}": mask.x_max,
+                f"YMin{area}": mask.y_min,
+                f"YMax{area}": mask.y_max,
+            }
+        return values
+
+    def _details(self, camera: Camera) -> Values:
+        result = self._state.results[camera]
+        return {
+            "X": result.x / _HUNDREDTHS,
+            "Y": result.y / _HUNDREDTHS,
+            "Radius": result.radius / _HUNDREDTHS,
+            "Points": result.points,
+            "Sram": result.sram,
+            "FirstX": result.first[0],
+            "FirstY": result.first[1],
+            "PixelsRead": result.pixels_read,
+        }
+
+    def _times(self, camera: Camera) -> Values:
+        result = self._state.results[camera]
+        return {
+            "Wait": result.wait_us,
+            "Store": result.store_us,
+            "Search": result.search_us,
+            "Centroid": result.centroid_us,
+            "Total": result.total_us,
+        }
+
+    def _edges(self, part: int) -> Values:
+        edges = self._state.results[Camera.NADIR].edges
+        shown = np.zeros((EDGES_PER_FRAME, 2))
+        there = edges[part * EDGES_PER_FRAME :][:EDGES_PER_FRAME]
+        shown[: len(there)] = there / EDGE_UNIT
+        first = part * EDGES_PER_FRAME + 1
+        values: Values = {"Count": len(edges)}
+        for number, (x, y) in enumerate(shown, start=first):
+            values |= {f"X{number}": x, f"Y{number}": y}
+        return values
