@@ -257,7 +257,7 @@ private:
     bool settle(int64_t time) {
         bool changed = false;
         eval();
-        while (top.Top::commit()) {
+        while (commit()) {
             changed = true;
             eval();
         }
@@ -270,10 +270,15 @@ private:
     }
 
     void eval() {
-        top.Top::eval(nullptr);
+        eval_once();
         if (DERIVED_EDGE)
-            top.Top::eval(nullptr);
+            eval_once();
     }
+
+    // Once in the library: a large design would not stay in the processor's instruction cache, and
+    // take half a minute to compile.
+    __attribute__((noinline, flatten)) void eval_once() { top.Top::eval(nullptr); }
+    __attribute__((noinline, flatten)) bool commit() { return top.Top::commit(); }
 
     // Only registers listen to the memories, so nothing else has to follow them.
     template <int... N> void drive_memories(int64_t time, std::integer_sequence<int, N...>) {
