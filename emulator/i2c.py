@@ -193,7 +193,8 @@ class _GeneralCall:
             target.i2c_start(read)
 
     def i2c_write(self, byte: int) -> bool:
-        return any([target.i2c_write(byte) for target in self.listeners])
+        acknowledges = [target.i2c_write(byte) for target in self.listeners]
+        return any(acknowledges)
 
     def i2c_read(self) -> int:
         raise AssertionError("nobody answers a read from the general call address")
