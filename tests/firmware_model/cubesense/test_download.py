@@ -1,0 +1,133 @@
+"""Frames of a download, and how often the picture is read for them."""
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.cubesense.thumbnail import thumbnail
+from cubestack.firmware_model.hardware import Request
+from cubestack.firmware_model.interface.cubesense_codes import (
+    EMPTY_FRAME,
+    IMAGE_BYTES,
+    ImageSize,
+    Sram,
+)
+
+from .node import Node
+
+
+@pytest.fixture
+def node() -> Node:
+    node = Node()
+    node.pictures[:] = np.random.default_rng(5).integers(0, 256, node.pictures.shape)
+    return node
+
+
+def ready(node: Node) -> int:
+    return int(node.telemetry("ImageFrameInfo")["FrameNumber"])
+
+
+def shown(node: Node, number: int) -> bytes:
+    """The frame, which must be ready."""
+    assert ready(node) == number
+    return bytes(node.telemetry("ImageFrame")["Frame"])
+
+
+def expected(node: Node, sram: Sram, size: ImageSize) -> list[bytes]:
+    square = thumbnail(node.pictures[sram].reshape(480, 640), size)
+    return [frame.tobytes() for frame in square.reshape(-1, 128)]
+
+
+@pytest.mark.parametrize("size", ImageSize)
+def test_a_download_reads_the_picture_once(node: Node, size: ImageSize) -> None:
+    sram = Sram(size % 2)
+    node.command("StartImageDownload", Sram=sram, Size=size)
+    frames = [shown(node, 0)]
+    for number in range(1, size.frames):
+        node.command("NextImageFrame", Frame=number)
+        frames.append(shown(node, number))
+    assert frames == expected(node, sram, size)
+    assert node.opened == [sram]
+    assert node.read == (640 // size.step) * (480 // size.step)
+    assert node.read + node.skipped <= IMAGE_BYTES
+
+
+def test_frames_in_any_order(node: Node) -> None:
+    size = ImageSize.SIDE_128
+    frames = expected(node, Sram.SRAM2, size)
+    node.command("StartImageDownload", Sram=Sram.SRAM2, Size=size)
+    for number in np.random.default_rng(6).permutation(size.frames):
+        node.command("NextImageFrame", Frame=int(number))
+        assert shown(node, int(number)) == frames[number]
+
+
+def test_going_back_begins_anew_and_going_on_does_not(node: Node) -> None:
+    node.command("StartImageDownload", Size=ImageSize.SIDE_256)
+    for number, begun in ((200, 1), (300, 1), (299, 2), (299, 3), (301, 3)):
+        node.command("NextImageFrame", Frame=number)
+        assert len(node.opened) == begun
+
+
+def test_a_measurement_in_between_costs_a_new_beginning_only(node: Node) -> None:
+    size = ImageSize.SIDE_64
+    frames = expected(node, Sram.SRAM1, size)
+    node.command("StartImageDownload", Size=size)
+    for number in range(10, 20):
+        node.command("NextImageFrame", Frame=number)
+        assert shown(node, number) == frames[number]
+        node.command("CaptureOnly", Sram=Sram.SRAM2)
+    assert len(node.opened) == 10
+
+
+def test_no_frame_is_ready_from_the_request_on(node: Node) -> None:
+    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    seen: list[int] = []
+    node.send("NextImageFrame", Frame=0)  # the one that is ready already
+    node.on_request = lambda _request: seen.append(ready(node))
+    assert ready(node) == EMPTY_FRAME
+    node.run()
+    assert EMPTY_FRAME in seen
+    assert ready(node) == 0
+
+
+def test_a_request_that_was_overtaken_is_never_ready(node: Node) -> None:
+    """Neither while it waits, nor while it is being prepared."""
+    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.send("NextImageFrame", Frame=7)
+    node.send("NextImageFrame", Frame=9)
+    seen = set()
+    late = iter([8])
+
+    def look(_request: Request) -> None:
+        seen.add(ready(node))
+        for number in late:
+            node.send("NextImageFrame", Frame=number)
+
+    node.on_request = look
+    node.run()
+    assert seen <= {EMPTY_FRAME, 8}
+    assert shown(node, 8) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[8]
+
+
+@pytest.mark.parametrize("when", ["before", "meanwhile"])
+def test_a_memory_without_supply_has_no_frame(node: Node, when: str) -> None:
+    size = ImageSize.SIDE_64
+    node.command("StartImageDownload", Size=size)
+    node.send("NextImageFrame", Frame=15)
+    if when == "before":
+        node.off = {Sram.SRAM1}
+    else:
+        node.on_request = lambda _: node.off.update({Sram.SRAM1} if node.read > 40 else ())
+    node.run()
+    assert ready(node) == EMPTY_FRAME
+    assert node.telemetry("TcmdProcessed")["Processed"] == 1
+    node.off = set()
+    node.on_request = lambda _request: None
+    node.command("NextImageFrame", Frame=15)
+    assert shown(node, 15) == expected(node, Sram.SRAM1, size)[15]
+
+
+def test_frames_beyond_the_picture_need_no_memory(node: Node) -> None:
+    node.off = {Sram.SRAM1}
+    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    assert shown(node, 0) == bytes(128)
+    assert node.opened == []

@@ -1,0 +1,250 @@
+"""Where every field of every telemetry frame comes from."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.cubesense.masks import Mask
+from cubestack.firmware_model.cubesense.state import Result
+from cubestack.firmware_model.cubesense.telemetry import FIRMWARE_VERSION, NODE_TYPE
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import (
+    EMPTY_FRAME,
+    Camera,
+    CaptureResult,
+    DetectResult,
+    ImageSize,
+    NadirSearch,
+    Sram,
+    checksum,
+)
+from cubestack.firmware_model.interface.cubesense_telemetry import RESULTS, SCHEDULES
+from cubestack.firmware_model.interface.node_codes import AckError
+
+from .node import Node
+
+Values = dict[str, Any]
+
+UPTIME_US = 70_123_456
+OVER = 0x10000
+
+
+def no_two_alike(node: Node) -> None:
+    """Give everything that telemetry shows a value of its own."""
+    node.now_us = UPTIME_US
+    state = node.state
+    for camera, settings in state.cameras.items():
+        base = 100 * (camera + 1)
+        settings.threshold = base + 1
+        settings.auto_adjust = 1 - camera
+        settings.exposure = 1000 + base
+        settings.gain, settings.blue_gain, settings.red_gain = 2 * base // 5, base + 2, base + 3
+        settings.masks = [
+            Mask(base + area, base + area + 10, base + area + 20, base + area + 30)
+            for area in range(5)
+        ]
+        state.results[camera] = Result(
+            capture=CaptureResult.STORED_OTHER_SRAM,
+            detect=DetectResult(DetectResult.BAD_FIT + camera),
+            alpha=1000 + base,
+            beta=-2000 - base,
+            x=3000 + base,
+            y=-4000 - base,
+            radius=40000 + base,
+            points=base % 250,
+            edges=np.arange(2 * 25, dtype=np.int16).reshape(25, 2) * 32 + base,
+            sram=Sram(1 - camera),
+            first=(base + 4, base + 5),
+            pixels_read=OVER + base,
+            wait_us=OVER + base + 1,
+            store_us=OVER + base + 2,
+            search_us=OVER + base + 3,
+            centroid_us=OVER + base + 4,
+            total_us=OVER + base + 5,
+        )
+    state.over_current = {Sram.SRAM1: False, Sram.SRAM2: True}
+    state.nadir_search = NadirSearch.AROUND_SAMPLES
+    state.telecommands, state.telemetries = 258, 514
+    state.last_command, state.last_processed, state.last_error = 65, 0, AckError.BAD_PARAMETER
+    download = node.commands.download
+    download.data[:] = np.arange(128) * 3
+    download.number, download.checksum = 4097, 171
+
+
+def result(camera: Camera) -> Values:
+    base = (camera + 1) * 100
+    return {
+        "Alpha": (1000 + base) / 100,
+        "Beta": (-2000 - base) / 100,
+        "Capture": 3,
+        "Detect": 5 + camera,
+    }
+
+
+def masks(camera: Camera) -> Values:
+    base = (camera + 1) * 100
+    names = ("XMin", "XMax", "YMin", "YMax")
+    return {
+        f"{name}{area + 1}": base + area + 10 * index
+        for area in range(5)
+        for index, name in enumerate(names)
+    }
+
+
+def details(camera: Camera) -> Values:
+    base = (camera + 1) * 100
+    return {
+        "X": (3000 + base) / 100,
+        "Y": (-4000 - base) / 100,
+        "Radius": (40000 + base) / 100,
+        "Points": base % 250,
+        "Sram": 1 - camera,
+        "FirstX": base + 4,
+        "FirstY": base + 5,
+        "PixelsRead": OVER + base,
+    }
+
+
+def times(camera: Camera) -> Values:
+    start = OVER + (camera + 1) * 100
+    phases = ("Wait", "Store", "Search", "Centroid", "Total")
+    return {name: start + 1 + index for index, name in enumerate(phases)}
+
+
+def edges(part: int) -> Values:
+    """25 edges: 20 in one frame, 5 in the next."""
+    values: Values = {"Count": 25}
+    for index in range(20 * part, 20 * part + 20):
+        there = index < 25
+        values[f"X{index + 1}"] = 2 * index + 200 / 32 if there else 0
+        values[f"Y{index + 1}"] = 2 * index + 1 + 200 / 32 if there else 0
+    return values
+
+
+def configuration() -> Values:
+    values: Values = {}
+    for number in (1, 2):
+        base = 100 * number
+        values |= {
+            f"Threshold{number}": base + 1,
+            f"AutoAdjust{number}": 2 - number,
+            f"Exposure{number}": 1000 + base,
+            f"Gain{number}": 40 * number,
+            f"BlueGain{number}": base + 2,
+            f"RedGain{number}": base + 3,
+        }
+    return values
+
+
+EXPECTED: dict[str, Callable[[], Values]] = {
+    "Identification": lambda: {
+        "NodeType": NODE_TYPE,
+        "InterfaceVersion": 2,
+        "FirmwareVersionMajor": FIRMWARE_VERSION[0],
+        "FirmwareVersionMinor": FIRMWARE_VERSION[1],
+        "RuntimeSeconds": 70,
+        "RuntimeMilliseconds": 123,
+    },
+    "SerialNumber": lambda: {"SerialNumber": b"CS0042"},
+    "CommunicationStatus": lambda: {
+        "TcmdCount": 258,
+        "TlmCount": 515,  # this request too
+        "TcmdBufferOverrun": 0,
+        "I2cTlmReadError": 0,
+        "UartProtocolError": 0,
+        "UartMsgIncomplete": 0,
+    },
+    "TcmdProcessed": lambda: {"LastTcmd": 65, "Processed": 0, "Error": 3},
+    "Power": lambda: {
+        "Current3V3": 1.5,
+        "CurrentSram1": 2.5,
+        "CurrentSram2": 3.5,
+        "Current5V": 4.5,
+        "OverCurrent1": 0,
+        "OverCurrent2": 1,
+    },
+    "Configuration": configuration,
+    "ImageFrame": lambda: {"Frame": (np.arange(128) * 3).astype(np.uint8).tobytes()},
+    "ImageFrameInfo": lambda: {"FrameNumber": 4097, "Checksum": 171},
+    "NadirSearchMode": lambda: {"Search": NadirSearch.AROUND_SAMPLES},
+    "NadirEdges1": lambda: edges(0),
+    "NadirEdges2": lambda: edges(1),
+    **{f"Masks{camera + 1}": lambda c=camera: masks(c) for camera in Camera},
+    **{f"Details{camera + 1}": lambda c=camera: details(c) for camera in Camera},
+    **{f"PhaseTimes{camera + 1}": lambda c=camera: times(c) for camera in Camera},
+    **{
+        INTERFACE.telemetry(identifier).name: lambda c=camera: result(c)
+        for camera, identifier in (
+            *RESULTS.items(),
+            *((target[0], key) for key, target in SCHEDULES.items()),
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("name", [message.name for message in INTERFACE.telemetries])
+def test_every_field_shows_its_source(name: str) -> None:
+    node = Node()
+    no_two_alike(node)
+    expected = EXPECTED[name]()
+    assert node.telemetry(name) == pytest.approx(expected)
+    assert expected.keys() == {field.name for field in INTERFACE.telemetry(name).fields}
+
+
+def test_every_frame_is_expected() -> None:
+    assert EXPECTED.keys() == {message.name for message in INTERFACE.telemetries}
+
+
+@pytest.mark.parametrize(
+    "flag", ["TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete"]
+)
+def test_each_flag_is_shown_alone(flag: str) -> None:
+    node = Node()
+    node.state.flags.add(flag)
+    values = node.telemetry("CommunicationStatus")
+    assert {name for name, value in values.items() if value and "Count" not in name} == {flag}
+
+
+def test_after_start_up() -> None:
+    node = Node()
+    for number in (1, 2):
+        values = node.telemetry(f"Result{number}")
+        assert values == {"Alpha": 0, "Beta": 0, "Capture": 0, "Detect": 0}
+        assert set(node.telemetry(f"Masks{number}").values()) == {0}
+    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": EMPTY_FRAME, "Checksum": 0}
+    assert node.telemetry("TcmdProcessed") == {"LastTcmd": 0, "Processed": 1, "Error": 0}
+    shown = node.telemetry("Configuration")
+    for telecommand in ("DetectionThreshold", "AutoAdjust", "CameraSettings"):
+        for number in (1, 2):
+            resets = INTERFACE.telecommand(f"{telecommand}{number}").reset_values()
+            names = {"Enabled": "AutoAdjust"}
+            for name, value in resets.items():
+                assert shown[f"{names.get(name, name)}{number}"] == value
+
+
+def test_uptime_wraps_at_16_bits_of_seconds() -> None:
+    node = Node()
+    node.now_us = (0x10000 + 5) * 1_000_000 + 999_999
+    values = node.telemetry("Identification")
+    assert (values["RuntimeSeconds"], values["RuntimeMilliseconds"]) == (5, 999)
+
+
+@pytest.mark.parametrize(
+    ("text", "sent"), [("", bytes(6)), ("A1", b"A1\0\0\0\0"), ("12345678", b"123456"), ("é", b"?")]
+)
+def test_serial_numbers_are_six_bytes_of_ascii(text: str, sent: bytes) -> None:
+    node = Node()
+    node.serial_number = text
+    assert node.telemetry("SerialNumber")["SerialNumber"] == sent.ljust(6, b"\0")
+
+
+def test_a_frame_and_its_checksum_belong_together() -> None:
+    node = Node()
+    node.pictures[:] = np.random.default_rng(3).integers(0, 256, node.pictures.shape)
+    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.command("NextImageFrame", Frame=12)
+    data = node.telemetry("ImageFrame")["Frame"]
+    assert any(data)
+    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": 12, "Checksum": checksum(data)}
