@@ -38,7 +38,8 @@ def pixel(camera: Camera, vectors: Pixels) -> Pixels:
     undistorted = PIXELS_PER_DEGREE * np.degrees(np.arctan2(across, vectors[:, 2]))
     radius = np.polynomial.polynomial.polyval(undistorted, DISTORTION)
     unit = vectors[:, :2] / np.where(across > 0, across, 1)[:, None]
-    return boresight + radius[:, None] * unit
+    found: Pixels = boresight + radius[:, None] * unit
+    return found
 
 
 def limb(alpha_deg: float, beta_deg: float, radius_deg: float) -> Pixels:

@@ -1,4 +1,4 @@
-"""An emulated CubeStar with a client on its serial line, in this process."""
+"""An emulated device with a client on its serial line, in this process."""
 
 from __future__ import annotations
 
@@ -6,32 +6,46 @@ import argparse
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal, get_args
 
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.cubesense import CubeSense
+from cubestack.host.cubesense_bench import BenchClient
 from cubestack.host.cubestar import CubeStar
 from cubestack.host.node_client import NodeClient
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from cubestack.emulator.cubesense import CubeSenseBoard
     from cubestack.emulator.cubestar import CubeStarBoard
+    from cubestack.emulator.sky.earth_sun import EarthSunScene
     from cubestack.emulator.sky.scene import Scene
 
-__all__ = ["DEVICES", "Engine", "Session", "add_engine_arguments", "open_session"]
-
-#: Devices that can be emulated now.
-DEVICES = ("cubestar",)
+__all__ = [
+    "CubeSenseSession",
+    "Engine",
+    "Session",
+    "add_engine_arguments",
+    "add_layout_argument",
+    "open_cubesense",
+    "open_session",
+]
 
 Engine = Literal["auto", "compiled", "python"]
 
 
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options that say how the FPGA is run, and which one."""
+    """Declare the option that says how the FPGA is run."""
     parser.add_argument(
         "--engine",
         choices=get_args(Engine),
         default="auto",
         help="how the FPGA is run (default: compiled where there is a compiler)",
     )
+
+
+def add_layout_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare the option that says which of CubeStar's FPGA boards is there."""
     parser.add_argument(
         "--layout",
         type=int,
@@ -42,7 +56,7 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 class Session:
-    """What a command needs to run a device and to talk to it.
+    """What a command needs to run a CubeStar and to talk to it.
 
     Attributes:
         board: the emulated device.
@@ -64,5 +78,35 @@ def open_session(scene: Scene, *, seed: int = 0, engine: Engine = "auto") -> Ite
     board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine)
     try:
         yield Session(board)
+    finally:
+        board.close()
+
+
+class CubeSenseSession:
+    """What a command needs to run a CubeSense and to talk to it.
+
+    Attributes:
+        board: the emulated device.
+        cubesense: host's view through the node protocol.
+        bench: host's view through the bench protocol.
+    """
+
+    def __init__(self, board: CubeSenseBoard) -> None:
+        """Plug clients into ``board``."""
+        self.board = board
+        self.cubesense = CubeSense(NodeClient(board.serial(), CUBESENSE))
+        self.bench = BenchClient(board.bench_serial())
+
+
+@contextmanager
+def open_cubesense(
+    scene: EarthSunScene, *, seed: int = 0, engine: Engine = "auto", mcu_addressing: bool = False
+) -> Iterator[CubeSenseSession]:
+    """Power up a CubeSense that looks at ``scene``."""
+    from cubestack.emulator.cubesense import CubeSenseBoard
+
+    board = CubeSenseBoard(scene, seed=seed, engine=engine, mcu_addressing=mcu_addressing)
+    try:
+        yield CubeSenseSession(board)
     finally:
         board.close()

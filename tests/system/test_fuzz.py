@@ -11,7 +11,7 @@ from smbus2 import i2c_msg
 from cubestack.emulator.sky.scene import SkyScene
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.host.cli.frames import compare
+from cubestack.host.cli.cubestar_frames import compare
 from cubestack.host.cubestar import CubeStar
 from cubestack.host.i2c_client import I2cClient
 from cubestack.host.node_client import NodeClient

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.host.cli.demo import RENDERED
+from cubestack.host.cli.demo_cubestar import RENDERED
 from cubestack.host.cli.main import COMMANDS, main
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2

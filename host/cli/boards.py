@@ -1,0 +1,115 @@
+"""Emulated devices as the commands that serve them see them: any device, its serial lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubesense_bench import BENCH
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+
+if TYPE_CHECKING:
+    from cubestack.emulator.i2c import I2cBus
+    from cubestack.emulator.uart import Uart
+    from cubestack.emulator.virtual_time import Kernel
+    from cubestack.host.cli.session import Engine
+
+__all__ = ["DEVICES", "Board", "Opened", "SerialLine", "open_board"]
+
+DEFAULT_POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+DEFAULT_MAG_LIMIT = 3.8
+"""Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
+
+DEFAULT_ANGLES_DEG = {"sun": (20.0, 10.0), "nadir": (-8.0, 12.0)}
+
+
+class Board(Protocol):
+    """What every emulated device has."""
+
+    kernel: Kernel
+    i2c_bus: I2cBus
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+
+    def close(self) -> None:
+        """Release what the device holds."""
+
+
+@dataclass(frozen=True)
+class SerialLine:
+    """A serial port of a device.
+
+    Attributes:
+        name: what it speaks.
+        suffix: behind the name of the first line's link.
+        uart: the device's end.
+        baud: of the line.
+    """
+
+    name: str
+    suffix: str
+    uart: Uart
+    baud: int
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A device that has been powered up."""
+
+    title: str
+    board: Board
+    lines: tuple[SerialLine, ...]
+
+
+def open_board(
+    device: str, scene: Path | None, *, seed: int, engine: Engine, baud: int | None
+) -> Opened:
+    """Power up ``device`` (a name of ``DEVICES``); ``scene`` None is its default scene.
+
+    ``baud`` is of the node protocol's line, None for the published one.
+    """
+    return DEVICES[device](scene, seed, engine, baud)
+
+
+def _cubestar(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+    from cubestack.emulator.cubestar import CubeStarBoard
+    from cubestack.emulator.onboard_catalogue import onboard_catalogue
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.scene import Scene, SkyScene, load_scene
+
+    scene: Scene
+    if path is None:
+        scene = SkyScene(
+            quaternion_from_pointing(*DEFAULT_POINTING_DEG), mag_limit=DEFAULT_MAG_LIMIT
+        )
+    else:
+        scene = load_scene(path)
+    baud = baud or CUBESTAR.baud
+    board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine, baud=baud)
+    return Opened("CubeStar", board, (SerialLine("node protocol", "", board.uart, baud),))
+
+
+def _cubesense(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+    from cubestack.emulator.cubesense import CubeSenseBoard
+    from cubestack.emulator.sky.earth_sun import EarthSunScene
+    from cubestack.emulator.sky.earth_sun_file import load_earth_sun_scene
+
+    if path is None:
+        angles = DEFAULT_ANGLES_DEG
+        scene = EarthSunScene.facing(sun_deg=angles["sun"], nadir_deg=angles["nadir"])
+    else:
+        scene = load_earth_sun_scene(path)
+    baud = baud or CUBESENSE.baud
+    board = CubeSenseBoard(scene, seed=seed, engine=engine, baud=baud)
+    lines = (
+        SerialLine("node protocol", "", board.uart, baud),
+        SerialLine("bench protocol", ".bench", board.bench_uart, BENCH.baud),
+    )
+    return Opened("CubeSense", board, lines)
+
+
+#: Devices that can be emulated, by the names of the command line.
+DEVICES = {"cubestar": _cubestar, "cubesense": _cubesense}

@@ -1,0 +1,170 @@
+"""CubeStar: a rendered sky and a photograph captured, solved and downloaded."""
+
+import argparse
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.calibration import calibrate, load_camera
+from cubestack.host.cli.cubestar_frames import compare
+from cubestack.host.cli.serving import served
+from cubestack.host.cli.terminal import console, progress_bar
+from cubestack.host.cubestar import CubeStar
+from cubestack.host.node_client import NodeClient
+from cubestack.host.operator import find_threshold
+from cubestack.host.pictures import annotate, save_picture
+from cubestack.host.transport import open_transport
+
+__all__ = ["RENDERED", "show"]
+
+POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius
+RENDERED = Path(__file__).parent / "rendered-sky.png"
+PUBLISHED_TIMES = (
+    "discard 68 ms, capture 388 ms, transfer 404 ms; "
+    "detect and match 320 ms together for 20 stars; attitude below 10 ms"
+)
+"""CubeStar thesis, table 6.2, figure 5.7 and section 5.3.5."""
+
+CROP = (0, 256)  # middle rows of a 1024 x 1024 photograph
+
+
+@dataclass(frozen=True)
+class _Subject:
+    """What the camera is pointed at.
+
+    Attributes:
+        name: stem of the PNG files.
+        title: for the reader.
+        scene: text of the TOML scene.
+        truth: quaternion (4,), known to this command only.
+        camera: camera file whose parameters are loaded by telecommand, or None.
+    """
+
+    name: str
+    title: str
+    scene: str
+    truth: NDArray[np.float64]
+    camera: Path | None = None
+
+
+def show(args: argparse.Namespace) -> bool:
+    """Show both subjects; returns whether both were solved."""
+    solved = [_show(subject, args.out) for subject in (_sky(args.seed), _photograph(args))]
+    return all(solved)
+
+
+def _sky(seed: int) -> _Subject:
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+
+    ra, dec, roll = POINTING_DEG
+    return _Subject(
+        "sky",
+        "rendered sky: Orion, 2026",
+        f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\nseed = {seed}\n',
+        quaternion_from_pointing(ra, dec, roll),
+    )
+
+
+def _photograph(args: argparse.Namespace) -> _Subject:
+    """The first photograph of the folder, else the picture that this project ships."""
+    folder = args.photographs
+    camera = None if folder is None else folder / "truth.json"
+    if camera is None or not camera.is_file():
+        return _shipped()
+    images = json.loads(camera.read_text(encoding="utf-8"))["images"]
+    name = next(name for name in sorted(images) if (folder / name).is_file())
+    picture = (folder / name).resolve()
+    return _Subject(
+        "photograph",
+        f"photograph {name}: another camera, its parameters loaded by telecommand",
+        f'kind = "picture"\nfile = "{picture}"\ncrop = [{CROP[0]}, {CROP[1]}]\n',
+        np.array(images[name]["quaternion_xyzw_inertial_to_camera"]),
+        camera,
+    )
+
+
+def _shipped() -> _Subject:
+    truth = json.loads(RENDERED.with_suffix(".json").read_text(encoding="utf-8"))
+    return _Subject(
+        "photograph",
+        "no photographs here: a picture file that this project rendered itself",
+        f'kind = "picture"\nfile = "{RENDERED.resolve()}"\n',
+        np.array(truth["quaternion_xyzw_inertial_to_camera"]),
+    )
+
+
+def _show(subject: _Subject, out: Path) -> bool:
+    """Capture, solve and download one subject; returns whether it was solved."""
+    started = time.monotonic()
+    console.rule(subject.title)
+    scene = out / f"{subject.name}.toml"
+    scene.write_text(subject.scene, encoding="utf-8")
+    with served("cubestar", scene, out / "ttyCUBESTAR") as port:
+        cubestar = CubeStar(
+            NodeClient(open_transport(str(port), INTERFACE.baud), INTERFACE, timeout_s=5.0)
+        )
+        if subject.camera is not None:
+            fit = calibrate(load_camera(subject.camera).cropped(*CROP))
+            cubestar.configure(fit.settings)
+            console.print(f"camera parameters loaded; the fit is good to {fit.rms_px:.2f} px rms")
+        threshold = find_threshold(cubestar)
+        console.print(f"detection threshold found by trying: {threshold} DN")
+        cubestar.capture_and_process()
+        attitude = cubestar.attitude()
+        _report_attitude(attitude.valid, attitude.quaternion, attitude.matched, subject.truth)
+        _report_phases(cubestar.phase_times())
+        stars = cubestar.stars()
+        with progress_bar() as bar:
+            task = bar.add_task("downloading the picture over the serial line", total=None)
+            picture = cubestar.stream_image(
+                lambda done, total: bar.update(task, completed=done, total=total)
+            )
+        uptime = cubestar.client.telemetry("Identification")
+        cubestar.client.close()
+    save_picture(picture, out / f"{subject.name}-raw.png")
+    annotate(picture, stars, out / f"{subject.name}-stars.png")
+    virtual_s = int(uptime["RuntimeSeconds"]) + int(uptime["RuntimeMilliseconds"]) / 1000
+    console.print(
+        f"{virtual_s:.1f} s of virtual time in {time.monotonic() - started:.1f} s of wall time; "
+        f"pictures: {out / subject.name}-raw.png, {out / subject.name}-stars.png",
+        soft_wrap=True,
+    )
+    return attitude.valid
+
+
+def _report_attitude(
+    valid: bool, quaternion: NDArray[np.float64], matched: int, truth: NDArray[np.float64]
+) -> None:
+    from cubestack.emulator.sky.attitude import matrix_from_quaternion, pointing_from_matrix
+
+    if not valid:
+        console.print("no attitude found in this picture")
+        return
+    if quaternion @ truth < 0:
+        truth = -truth  # the same attitude
+    console.print(f"attitude from {matched} stars, measured beside the truth:")
+    for name, q in (("measured", quaternion), ("truth", truth)):
+        ra, dec, roll = pointing_from_matrix(matrix_from_quaternion(q))
+        parts = " ".join(f"{part:+.5f}" for part in q)
+        console.print(
+            f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]",
+            soft_wrap=True,
+        )
+    across, about = compare(quaternion, truth)
+    assert across is not None
+    assert about is not None
+    console.print(
+        f"error: {3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight"
+    )
+
+
+def _report_phases(phases: dict[str, float]) -> None:
+    shown = ("discard", "capture", "transfer", "detect", "match", "attitude")
+    times = ", ".join(f"{name} {phases[name]:.1f} ms" for name in shown)
+    console.print(f"virtual time: {times}", soft_wrap=True)
+    console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)
