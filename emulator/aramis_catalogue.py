@@ -11,9 +11,8 @@ package has the cross-identification with the Harvard Revised numbers that the t
 """
 
 import hashlib
-import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,9 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.build import cache_folder
 from cubestack.emulator.sky.hipparcos import CATALOGUE_SHA256, DEFAULT_EPOCH, Sky, load_sky
-from cubestack.firmware_model.aramis.database import VERSION, Database, DatabaseError
+from cubestack.firmware_model.aramis import database, geodesic, kvector
+from cubestack.firmware_model.aramis.database import Database, DatabaseError
+from cubestack.firmware_model.aramis.field import FOV_DEG
 from cubestack.firmware_model.aramis.geodesic import geodesic_sphere
 from cubestack.firmware_model.aramis.kvector import KVector
 
@@ -35,8 +36,12 @@ Progress = Callable[[Iterable[int], int, str], Iterable[int]]
 PUBLISHED = {"stars": 1312, "triangles": 265_292}
 """Sections 4.5.2 and 5.5."""
 
-MOST_TRIANGLES = 2_000_000
-"""A database of more would not fit the 32 MB of RAM of the thesis' appendix A."""
+MOST_TRIANGLES = 1_400_000
+"""More, at 22 bytes each, would not fit the 32 MB of RAM of the thesis' appendix A."""
+
+MOST_STARS = 6000
+
+ADVICE = "change fov_deg, stars_per_field, longest_side_deg or mag_limit"
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,7 @@ class CatalogueParameters:
         longest_side_deg: no side of a triangle is longer; None: the field.
     """
 
-    fov_deg: float = 21.5346
+    fov_deg: float = FOV_DEG
     stars_per_field: int = 6
     mag_limit: float = 6.0
     step_deg: float = 1.0
@@ -64,7 +69,7 @@ class CatalogueParameters:
         bounds = {
             "fov_deg": (1, 60),
             "stars_per_field": (3, 50),
-            "mag_limit": (0, 9),
+            "mag_limit": (0, 7.5),
             "step_deg": (0.25, 10),
             "epoch": (1800, 2200),
             "longest_side_deg": (1, 60),
@@ -113,17 +118,16 @@ def build_database(
     parameters = parameters or CatalogueParameters()
     sky = load_sky(parameters.epoch)
     chosen = np.sort(select_stars(sky, parameters, progress))
+    if len(chosen) > MOST_STARS:
+        raise ValueError(f"{len(chosen)} stars are more than {MOST_STARS}; {ADVICE}")
     vectors = sky.vectors[chosen]
     triples = _triples(vectors, np.radians(parameters.side_deg), progress)
     corners = vectors[triples]
     areas, moments = _properties(corners)
     used = areas > 0
     triples, corners, areas, moments = triples[used], corners[used], areas[used], moments[used]
-    if not 1 <= len(triples) <= MOST_TRIANGLES:
-        raise ValueError(
-            f"{len(chosen)} stars give {len(triples)} triangles, not 1 to {MOST_TRIANGLES}; change "
-            f"fov_deg, stars_per_field or mag_limit"
-        )
+    if len(triples) == 0:
+        raise ValueError(f"{len(chosen)} stars give no triangle; {ADVICE}")
     order = np.argsort(areas, kind="stable")
     triples, corners, areas, moments = triples[order], corners[order], areas[order], moments[order]
     by_moment = np.argsort(moments, kind="stable")
@@ -162,31 +166,25 @@ def cached_database(
         return Database.unpack(path.read_bytes())
     except (OSError, DatabaseError):
         pass
-    database = build_database(parameters, progress)
+    built = build_database(parameters, progress)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder, delete=False) as scratch:
-            scratch.write(database.pack())
-        os.replace(scratch.name, path)
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            image = Path(scratch) / path.name
+            image.write_bytes(built.pack())
+            image.replace(path)
     except OSError:
         pass
-    return database
+    return built
 
 
 def _key(parameters: CatalogueParameters) -> str:
-    """Hash of everything that the database depends on."""
+    """Hash of everything that the database depends on, this code included."""
     digest = hashlib.sha256(repr(sorted(asdict(parameters).items())).encode())
-    digest.update(f"{VERSION} {CATALOGUE_SHA256}".encode())
-    for source in (__file__, KVector.__module__, Database.__module__):
-        digest.update(_source(source))
+    digest.update(CATALOGUE_SHA256.encode())
+    for source in (__file__, database.__file__, geodesic.__file__, kvector.__file__):
+        digest.update(Path(source).read_bytes())
     return digest.hexdigest()[:24]
-
-
-def _source(name: str) -> bytes:
-    import sys
-
-    path = name if name.endswith(".py") else sys.modules[name].__file__
-    return Path(path or __file__).read_bytes()
 
 
 def _declinations(step_deg: float) -> NDArray[np.float64]:
@@ -214,16 +212,16 @@ def _triples(
     """Index triples (m, 3), rising, of stars that are pairwise closer than the limit."""
     near = vectors @ vectors.T > np.cos(limit_rad)
     np.fill_diagonal(near, False)
-
-    def of_first() -> Iterator[NDArray[np.intp]]:
-        for first in progress(range(len(vectors)), len(vectors), "listing triangles"):
-            others = first + 1 + np.flatnonzero(near[first, first + 1 :])
-            second, third = np.nonzero(np.triu(near[np.ix_(others, others)]))
-            yield np.stack(
-                [np.full(len(second), first), others[second], others[third]], axis=1
-            ).astype(np.intp)
-
-    return np.concatenate(list(of_first()))
+    parts, count = [np.zeros((0, 3), dtype=np.intp)], 0
+    for first in progress(range(len(vectors)), len(vectors), "listing triangles"):
+        others = first + 1 + np.flatnonzero(near[first, first + 1 :])
+        second, third = np.nonzero(np.triu(near[np.ix_(others, others)]))
+        triples = np.stack([np.full(len(second), first), others[second], others[third]], axis=1)
+        parts.append(triples.astype(np.intp))
+        count += len(triples)
+        if count > MOST_TRIANGLES:
+            raise ValueError(f"more than {MOST_TRIANGLES} triangles; {ADVICE}")
+    return np.concatenate(parts)
 
 
 def _properties(

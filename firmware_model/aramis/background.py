@@ -37,7 +37,7 @@ class Background:
         values = np.arange(256)
         pixels = field.pixels
         self.sums.append((pixels, int(levels @ values), int(levels @ values**2)))
-        meter.charge(table_byte=pixels, i32_add=2 * pixels, i32_mul=pixels, loop=pixels)
+        meter.charge(pixel_read=pixels, i32_add=2 * pixels, i32_mul=pixels, loop=pixels)
 
     def mean(self, meter: Meter) -> int:
         """Mean level, rounded; 0 without a picture."""

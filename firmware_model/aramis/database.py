@@ -178,14 +178,13 @@ class Database:
         )
 
     def _array(self, name: str) -> NDArray[Any]:
-        parts = {
+        parts: dict[str, NDArray[Any]] = {
             "area_starts": self.area_index.starts,
             "moment_starts": self.moment_index.starts,
             "centres": self.sphere.centres,
             "neighbours": self.sphere.neighbours,
         }
-        array: NDArray[Any] = parts[name] if name in parts else getattr(self, name)
-        return array
+        return parts[name] if name in parts else np.asarray(getattr(self, name))
 
 
 def _check(arrays: dict[str, NDArray[Any]], stars: int, triangles: int, faces: int) -> None:

@@ -1,9 +1,9 @@
 """The camera's geometry: what it sees, and where a pixel looks.
 
-AraMiS thesis, sections 2.5.2 (MT9M001: 1280 x 1024) and 4.5.2 (equation 4.1), chapter 8 and
-appendix E (only the round field across the shorter side is used; the baffle covers the rest).
-The pixel pitch of 5.2 um is the sensor's. Camera axes are x right, y down, z out of the lens; an
-integer pixel coordinate is a pixel's centre.
+AraMiS thesis, sections 2.5.2 (MT9M001) and 4.5.2 (equation 4.1, whose pixels need not be square),
+section 8.2 and appendix E (only the round field across the shorter side is used; a baffle covers
+the rest). Camera axes are x right, y down, z out of the lens; an integer pixel coordinate is a
+pixel's centre.
 """
 
 from dataclasses import dataclass
@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.interface.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
-__all__ = ["COLUMNS", "FOV_DEG", "PIXEL_PITCH_MM", "ROWS", "Field"]
+__all__ = ["FOV_DEG", "Field"]
 
-COLUMNS, ROWS = 1280, 1024
-PIXEL_PITCH_MM = 0.0052
-FOV_DEG = 21.5346
+FOV_DEG = 21 + 32 / 60 + 4.7 / 3600
 
 _ONE = np.float32(1)
 
@@ -125,7 +124,8 @@ class Field:
         x, y, z = directions.T
         depth = np.maximum(z, np.float32(1e-6))
         meter.charge(f32_div=2 * len(directions), f32_compare=len(directions))
-        return (z > 0) & self._inside(x / depth, y / depth, meter)
+        in_front: NDArray[np.bool_] = np.greater(z, 0)
+        return in_front & self._inside(x / depth, y / depth, meter)
 
     def _tangents(
         self, points: NDArray[np.float32], meter: Meter

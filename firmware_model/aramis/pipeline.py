@@ -110,7 +110,7 @@ def detect(
         level = background.threshold(settings.sigmas, meter)
         mask = (picture > level) & field.mask
         pixels = field.pixels
-        meter.charge(table_byte=pixels, i32_add=pixels, ram_write=picture.size // 4, loop=pixels)
+        meter.charge(pixel_read=pixels, i32_add=pixels, ram_write=picture.size // 4, loop=pixels)
     mask = remove_spikes(mask, settings.spikes, settings.needed, meter)
     with meter.phase("centroids"):
         regions = find_regions(mask, meter)

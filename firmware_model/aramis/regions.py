@@ -85,7 +85,7 @@ def locate_stars(
     sizes = np.bincount(labels, minlength=count)
     pixels = len(labels)
     meter.charge(
-        table_byte=pixels,
+        pixel_read=pixels,
         ram_read=2 * pixels,
         i32_add=6 * pixels,
         i32_mul=2 * pixels,
