@@ -73,7 +73,7 @@ class DataflowControl(Component):
             Action.SEND_EDGE: self.send_edge,
             Action.PASS_EDGE: self.pass_edge,
         }
-        commands = COMMANDS
+        commands: tuple[Command, ...] = COMMANDS
         if self._mcu_addressing:
             commands += ADDRESSING_COMMANDS
             outputs[Action.TAKE_ADDRESS] = self.take_address

@@ -22,6 +22,7 @@ COMMANDS = {
     "measure": "scene in, attitude out: each frame's result beside the truth",
     "registers": "list a device's telecommands and telemetry",
     "catalogue": "compile the onboard star catalogue and say what is in it",
+    "hdl": "look at the FPGA designs: area, Verilog files, proofs",
     "bench": "measure the cost of the hot paths on this machine",
 }
 

@@ -3,6 +3,7 @@
 import re
 import shutil
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
@@ -40,16 +41,19 @@ class Icarus:
         seed: int,
         harness: str | None = None,
         initialised: bool = True,
+        text: Callable[[Component, str], str] = verilog_text,
     ) -> None:
         """Run the cocotb ``modules`` on ``design``, or on the Verilog file ``harness`` around it.
 
+        ``text`` makes Verilog of the design, as module of the name that it is given.
         Fails with the names of the cocotb tests that failed and the end of their log.
         """
         print(f"{design.__name__} {columns}x{rows} COCOTB_RANDOM_SEED={seed}")
         top = harness or "dut"
-        name = f"{design.__name__}-{columns}x{rows}-{top}{'' if initialised else '-uninitialised'}"
+        name = f"{design.__name__}-{columns}x{rows}-{top}-{initialised}-{text.__name__}"
         if name not in self._built:
-            self._built[name] = self._build(name, design, columns, rows, top, initialised)
+            verilog = text(design(columns, rows), "dut")
+            self._built[name] = self._build(name, verilog, columns, rows, top, initialised)
         self._runs += 1
         results = self._folder / f"{self._runs}.xml"
         log = self._folder / f"{self._runs}.log"
@@ -82,7 +86,7 @@ class Icarus:
     def _build(
         self,
         name: str,
-        design: type[Component],
+        text: str,
         columns: int,
         rows: int,
         top: str,
@@ -90,7 +94,6 @@ class Icarus:
     ) -> Runner:
         folder = self._folder / name
         folder.mkdir()
-        text = verilog_text(design(columns, rows), "dut")
         if not initialised:
             text, changed = INITIALISER.subn(r"\1;", text)
             assert changed

@@ -1,6 +1,8 @@
 """Tile counts: known small designs by hand, and that every top fits its part."""
 
+import json
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -8,10 +10,21 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.hdl.area import AGLN030_TILES, TileCount, UnknownCellError, count_tiles
-from cubestack.hdl.cubesense_top import CubeSenseFpga
-from cubestack.hdl.cubestar_top import CubeStarTop
-from cubestack.hdl.gray_counter import GrayCounter
-from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.area_report import (
+    AREA_FILE,
+    Area,
+    Ice40Count,
+    area_json,
+    area_table,
+    count_ice40,
+    designs,
+    grown,
+)
+from cubestack.hdl.designs import TOPS
+from cubestack.hdl.tools import have_yosys
+
+#: What to do about growth that is meant.
+WANTED = "if it is worth it: cubestack hdl area --ice40 --json > hdl/area.json"
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -83,38 +96,82 @@ def test_unknown_cell_is_refused():
         count_tiles(Function(4, lambda a, b: a * b, 8))
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        CubeStarTop,
-        lambda: CubeSenseFpga("sun"),
-        lambda: CubeSenseFpga("nadir"),
-        lambda: CubeSenseFpga("sun", mcu_addressing=True),
-        lambda: CubeSenseFpga("nadir", mcu_addressing=True),
-    ],
-    ids=["cubestar", "sun", "nadir", "sun-addressing", "nadir-addressing"],
-)
-def test_top_fits_its_part(make):
-    tiles = count_tiles(make())
-    assert tiles.flip_flops > 50
-    assert tiles.total <= AGLN030_TILES
+@cache
+def tiles(name):
+    return count_tiles(designs()[name]())
+
+
+@pytest.mark.parametrize("name", [name for name in TOPS if name in designs()])
+def test_top_fits_its_part(name):
+    assert tiles(name).flip_flops > 50
+    assert tiles(name).total <= AGLN030_TILES
+
+
+@pytest.mark.parametrize("name", designs())
+def test_no_design_grows_unnoticed(name):
+    area = Area(name, name in TOPS, tiles(name), None)
+    assert not grown(area), f"{grown(area)[0]}; {WANTED}"
+
+
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@pytest.mark.parametrize("name", [name for name in TOPS if name in designs()])
+def test_no_top_grows_unnoticed_on_ice40(name):
+    make = designs()[name]
+    area = Area(name, True, TileCount(0, 0), count_ice40(make()))
+    assert not grown(area), f"{grown(area)[0]}; {WANTED}"
+
+
+def test_growth_is_told_in_words():
+    before = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]["cubestar"]
+    for tiles, message in (
+        (before["tiles"], []),
+        (int(before["tiles"] * 1.05), []),
+        (int(before["tiles"] * 1.05) + 1, ["cubestar grew from 197 to 207 tiles, by more than 5%"]),
+    ):
+        assert grown(Area("cubestar", True, TileCount(tiles, 0), None)) == message
+    lut4 = before["ice40"]["lut4"]
+    big = Ice40Count(lut4 * 2, 0, 0)
+    (message,) = grown(Area("cubestar", True, TileCount(0, 0), big))
+    assert message == f"cubestar grew from {lut4} to {2 * lut4} iCE40 LUT4s, by more than 5%"
+    assert grown(Area("moon", True, TileCount(0, 0), None)) == ["moon is not in area.json"]
+
+
+def test_area_file_lists_all_designs_and_no_other():
+    content = json.loads(AREA_FILE.read_text(encoding="utf-8"))
+    assert list(content["designs"]) == list(designs())
+    assert content["part_tiles"] == AGLN030_TILES
+
+
+def test_table_and_json_say_the_same():
+    area = Area("cubestar", True, TileCount(134, 63), Ice40Count(95, 63, 30))
+    lines = list(area_table([area]))
+    assert lines[1].split() == ["cubestar", "134", "63", "197", "25.7%", "95", "63", "30"]
+    (entry,) = json.loads(area_json([area]))["designs"].values()
+    assert (entry["tables"], entry["flip_flops"], entry["tiles"]) == (134, 63, 197)
+    assert entry["ice40"] == {"lut4": 95, "flip_flops": 63, "carries": 30}
 
 
 def test_gray_counter_takes_more_tiles_than_the_matrix_one():
-    gray, matrix = count_tiles(GrayCounter(640 * 480)), count_tiles(MatrixCounter(640, 480))
+    gray, matrix = tiles("Gray counter of 307200"), tiles("matrix counter 640 x 480")
     assert gray.flip_flops == matrix.flip_flops + 1
     assert gray.total > matrix.total
 
 
+#: Designs of the documents' tables, by the words that stand there.
+DOCUMENTED = {
+    'CubeSenseFpga("sun")': "cubesense-sun",
+    'CubeSenseFpga("nadir")': "cubesense-nadir",
+    'CubeSenseFpga("sun", mcu_addressing=True)': "cubesense-sun-addressing",
+    'CubeSenseFpga("nadir", mcu_addressing=True)': "cubesense-nadir-addressing",
+    "MatrixCounter(640, 480)": "matrix counter 640 x 480",
+    "GrayCounter(307200)": "Gray counter of 307200",
+}
+
+
 def test_documented_counts():
-    rows = re.findall(
-        r"^\| `(.+)` \| (\d+) \| (\d+) \| (\d+) \|$",
-        (DOCS / "gateware-cubesense.md").read_text(encoding="utf-8"),
-        re.MULTILINE,
-    )
-    assert len(rows) == 6
-    designs = (CubeSenseFpga, GrayCounter, MatrixCounter)
-    names = {design.__name__: design for design in designs}
+    text = (DOCS / "gateware-cubesense.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(.+)` \| (\d+) \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
+    assert {name for name, *_ in rows} == set(DOCUMENTED)
     for name, *numbers in rows:
-        tiles = count_tiles(eval(name, names))
-        assert [*tiles, tiles.total] == [int(number) for number in numbers], name
+        count = tiles(DOCUMENTED[name])
+        assert [*count, count.total] == [int(number) for number in numbers], name

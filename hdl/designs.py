@@ -1,0 +1,187 @@
+"""All designs by name: the tops with their pins and clocks, and the blocks worth a comparison."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+from amaranth.hdl import Shape
+from amaranth.lib.wiring import Component, Out
+
+from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
+from cubestack.hdl import cubesense_top, cubestar_top
+from cubestack.hdl.cubesense_dataflow import Side
+from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.cubesense_reader import CubeSenseReader
+from cubestack.hdl.cubesense_top import CubeSenseFpga
+from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.frame_gap import FrameGap
+from cubestack.hdl.frame_reader import FrameReader
+from cubestack.hdl.frame_writer import FrameWriter
+from cubestack.hdl.gray_counter import GrayCounter
+from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.nadir_scan import NadirScan
+from cubestack.hdl.sun_search import SunSearch
+from cubestack.hdl.sun_window import SunWindow
+
+__all__ = ["BLOCKS", "TOPS", "Clock", "Pin", "Top", "pins_of"]
+
+
+class Clock(NamedTuple):
+    """An input that clocks flip-flops; shortest period in ns."""
+
+    port: str
+    period_ns: float
+    source: str
+
+
+class Pin(NamedTuple):
+    """A pin, or a bus of them, as the package has it: at most three ports are one pin.
+
+    ``direction`` is "input", "output", "tristate" (an output that can be off) or "inout".
+    """
+
+    name: str
+    width: int
+    direction: str
+    level_in: str | None
+    level_out: str | None
+    enable: str | None
+    enable_width: int
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Top:
+    """A design of whole FPGAs.
+
+    Attributes:
+        make: its component, at full size.
+        summary: what it is, in one line.
+        clocks: inputs that clock flip-flops, unrelated to each other.
+        meanings: of its ports.
+        parts: AGLN030s that it fills; more than one for a model of several chips.
+        pulled_up: pins that need a pull-up.
+    """
+
+    make: Callable[[], Component]
+    summary: str
+    clocks: tuple[Clock, ...]
+    meanings: dict[str, str]
+    parts: int = 1
+    pulled_up: tuple[str, ...] = ()
+
+
+_SRAM = {
+    "SRAM_A": "SRAM address",
+    **dict.fromkeys(("SRAM_D_I", "SRAM_D_O", "SRAM_D_OE"), "SRAM data"),
+    "SRAM_CE_N": "SRAM chip enable, low active",
+    "SRAM_OE_N": "SRAM output enable, low active",
+    "SRAM_WE_N": "SRAM write enable, low active",
+}
+_CUBESTAR = _SRAM | {pin.port: f"{pin.meaning} (header {pin.pins})" for pin in cubestar_top.PINS}
+_CUBESENSE = {
+    port: pins.meaning
+    for pins in (*cubesense_top.PINS, cubesense_top.ADDRESSING_PINS)
+    for port in pins.ports
+} | {"LINK_C_OE": cubesense_top.PINS[-1].meaning}
+_PAIR = {
+    **{
+        f"{prefix}_{port}": f"{side}: {meaning}"
+        for prefix, side in (("SUN", "sun"), ("NAD", "nadir"))
+        for port, meaning in _CUBESENSE.items()
+    },
+    **_CUBESENSE,
+    **dict.fromkeys(("DATA", "DATA_OE"), "bytes to the microcontroller"),
+    "SUNEN": "sun's enable, low active",
+    "NADEN": "nadir's enable, low active",
+    "SUNACK": "a whole picture is in the sun's memory",
+    "NADACK": "a whole picture is in the nadir's memory",
+    "CONTENTION": "model only: DATA, link data, link control lines 0 and 1 have two drivers",
+}
+
+_PIXCLK = Clock("PIXCLK", 100, "image sensor at 10 MHz")
+_DCLK = Clock("DCLK", 770.8, "37 cycles of the microcontroller's 48 MHz")
+_PCLK = Clock("PCLK", 74, "OV7620 at 13.5 MHz")
+_CLK = Clock("CLK", 400, "two instructions of the microcontroller at 5 MHz")
+_LINK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
+
+
+def _cubesense(side: Side, mcu_addressing: bool) -> Top:
+    option = ", the microcontroller sets the address" if mcu_addressing else ""
+    return Top(
+        partial(CubeSenseFpga, side, FULL_SIZE, mcu_addressing),
+        f"CubeSense, {side} sensor's FPGA{option}",
+        (_PCLK, _LINK, _CLK),
+        _CUBESENSE,
+        pulled_up=("LINK_C",),
+    )
+
+
+def _pair(mcu_addressing: bool) -> Top:
+    option = ", the microcontroller sets the address" if mcu_addressing else ""
+    return Top(
+        partial(CubeSensePair, FULL_SIZE, mcu_addressing),
+        f"CubeSense, model of both FPGAs and their link{option}",
+        (_PCLK._replace(port="SUN_PCLK"), _PCLK._replace(port="NAD_PCLK"), _CLK),
+        _PAIR,
+        parts=2,
+    )
+
+
+#: Tops by the name that the command line uses.
+TOPS = {
+    "cubestar": Top(CubeStarTop, "CubeStar frame buffer", (_PIXCLK, _DCLK), _CUBESTAR),
+    "cubesense-sun": _cubesense("sun", mcu_addressing=False),
+    "cubesense-nadir": _cubesense("nadir", mcu_addressing=False),
+    "cubesense-sun-addressing": _cubesense("sun", mcu_addressing=True),
+    "cubesense-nadir-addressing": _cubesense("nadir", mcu_addressing=True),
+    "cubesense-pair": _pair(mcu_addressing=False),
+    "cubesense-pair-addressing": _pair(mcu_addressing=True),
+}
+
+#: Blocks by name, at full size.
+BLOCKS: dict[str, Callable[[], Component]] = {
+    "matrix counter 640 x 480": partial(MatrixCounter, 640, 480),
+    "Gray counter of 307200": partial(GrayCounter, 640 * 480),
+    "matrix counter 1024 x 512": partial(MatrixCounter, 1024, 512),
+    "frame writer 1024 x 512": partial(FrameWriter, 1024, 512),
+    "frame reader 1024 x 512": partial(FrameReader, 1024, 512),
+    "frame writer 640 x 480": partial(FrameWriter, 640, 480),
+    "frame gap of 858 clocks": partial(FrameGap, 858),
+    "nadir scan": partial(NadirScan, FULL_SIZE),
+    "Sun search": partial(SunSearch, FULL_SIZE),
+    "Sun window": partial(SunWindow, FULL_SIZE),
+    "CubeSense reader": partial(CubeSenseReader, FULL_SIZE),
+    "the same, addressing": partial(CubeSenseReader, FULL_SIZE, mcu_addressing=True),
+}
+
+
+def pins_of(component: Component, meanings: dict[str, str]) -> list[Pin]:
+    """Pins of a top: ports NAME_I, NAME_O (or NAME) and NAME_OE are one."""
+    members = component.signature.members
+    pins = []
+    for port, member in members.items():
+        name = port.removesuffix("_OE").removesuffix("_I")
+        if name != port and f"{name}_OE" in members:
+            continue  # a side of another port's pin
+        name = port.removesuffix("_O")
+        enable = f"{name}_OE" if f"{name}_OE" in members else None
+        level_in = f"{name}_I" if enable and f"{name}_I" in members else None
+        if enable:
+            direction = "inout" if level_in else "tristate"
+        else:
+            direction = "output" if member.flow is Out else "input"
+        pins.append(
+            Pin(
+                name if enable else port,
+                Shape.cast(member.shape).width,
+                direction,
+                port if direction == "input" else level_in,
+                None if direction == "input" else port,
+                enable,
+                Shape.cast(members[enable].shape).width if enable else 0,
+                meanings[port],
+            )
+        )
+    return pins

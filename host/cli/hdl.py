@@ -1,0 +1,96 @@
+"""Look at the FPGA designs: how much of the part they take, and Verilog of them
+for other tools.
+
+examples:
+  cubestack hdl area
+  cubestack hdl area --ice40 --json
+  cubestack hdl verilog cubestar --out cubestar.v
+  cubestack hdl verilog cubesense-sun | yosys -f verilog -p 'synth_ice40' -
+"""
+
+import argparse
+from pathlib import Path
+
+__all__ = ["add_arguments", "run"]
+
+AREA = """How many of the AGLN030's 768 tiles each design takes: a tile is one
+3-input table or one flip-flop. An estimate: Yosys simplifies, a search covers
+the result with tables, and nothing is placed. Blocks are counted alone; inside
+of a top they share logic.
+
+examples:
+  cubestack hdl area
+  cubestack hdl area cubestar "Sun search"
+  cubestack hdl area --ice40         a public yardstick beside it: iCE40 cells
+  cubestack hdl area --ice40 --json  what hdl/area.json tracks"""
+
+VERILOG = """One Verilog file that needs no other: a wrapper with the real pins,
+bidirectional ones too, around the design itself, with a list of the pins and a
+stub of constraints as comments. Icarus Verilog, Yosys and Verilator take it
+without a warning.
+
+examples:
+  cubestack hdl verilog cubestar --out cubestar.v
+  cubestack hdl verilog cubesense-pair > pair.v  both FPGAs, to simulate"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the subcommands and their options."""
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    area = _subcommand(actions, "area", "tiles of every design", AREA)
+    area.add_argument("names", metavar="NAME", nargs="*", help="designs; default: all")
+    area.add_argument("--json", action="store_true", help="as JSON")
+    area.add_argument(
+        "--ice40", action="store_true", help="count iCE40 cells too; needs the extra hdl"
+    )
+    area.set_defaults(act=_area)
+    verilog = _subcommand(actions, "verilog", "a top as one Verilog file", VERILOG)
+    verilog.add_argument("top", metavar="TOP", help="a top; a wrong name lists them")
+    verilog.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
+    verilog.set_defaults(act=_verilog)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what the subcommand says."""
+    return int(args.act(args))
+
+
+def _subcommand(
+    actions: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    name: str,
+    summary: str,
+    description: str,
+) -> argparse.ArgumentParser:
+    return actions.add_parser(
+        name,
+        help=summary,
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _area(args: argparse.Namespace) -> int:
+    from cubestack.hdl.area_report import area_json, area_table, areas, designs
+    from cubestack.host.cli.terminal import progress
+
+    names = args.names or list(designs())
+    for name in names:
+        if name not in designs():
+            raise ValueError(f"{name!r} is no design of one FPGA; there are {', '.join(designs())}")
+    rows = list(progress(areas(names, args.ice40), len(names), "designs", quiet=args.json))
+    print(area_json(rows) if args.json else "\n".join(area_table(rows)))
+    return 0
+
+
+def _verilog(args: argparse.Namespace) -> int:
+    from cubestack.hdl.designs import TOPS
+    from cubestack.hdl.verilog_file import verilog_file
+
+    if args.top not in TOPS:
+        raise ValueError(f"{args.top!r} is no top; there are {', '.join(TOPS)}")
+    text = verilog_file(args.top, TOPS[args.top])
+    if args.out is None:
+        print(text, end="")
+    else:
+        args.out.write_text(text, encoding="utf-8")
+    return 0

@@ -1,0 +1,85 @@
+"""``cubestack hdl``: area tables and Verilog files, for readers and for scripts."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cubestack.hdl.area_report import AREA_FILE
+from cubestack.hdl.tools import have_yosys
+from cubestack.host.cli.main import main
+
+
+def test_area_as_text(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["hdl", "area", "cubestar", "Sun search"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "of 768" in lines[0]
+    assert [line[:10] for line in lines[1:]] == ["cubestar  ", "Sun search"]
+
+
+def test_area_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["hdl", "area", "--json", "frame gap of 858 clocks", "cubestar"]) == 0
+    counted = json.loads(capsys.readouterr().out)["designs"]
+    recorded = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]
+    assert list(counted) == ["frame gap of 858 clocks", "cubestar"]
+    for name, entry in counted.items():
+        assert entry == {key: recorded[name][key] for key in entry}
+        assert "ice40" not in entry
+
+
+@pytest.mark.skipif(have_yosys(), reason="Yosys is there")
+def test_a_missing_yosys_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["hdl", "area", "cubestar", "--ice40"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "cubestack[hdl]" in line
+
+
+def test_verilog_to_a_file_and_to_standard_output(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["hdl", "verilog", "cubestar"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("// CubeStar frame buffer")
+    assert main(["hdl", "verilog", "cubestar", "--out", str(tmp_path / "cubestar.v")]) == 0
+    assert capsys.readouterr().out == ""
+    assert (tmp_path / "cubestar.v").read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["verilog", "cubestarr"], 2, ("cubestarr", "cubesense-sun")),
+        (["area", "cubesense-pair"], 2, ("cubesense-pair", "cubesense-sun")),
+        (["verilog", "cubestar", "--out", "missing/cubestar.v"], 1, ("missing", "No such file")),
+        (["paint"], 2, ("paint", "area", "verilog")),
+        ([], 2, ("ACTION",)),
+    ],
+)
+def test_wrong_calls_are_one_line(
+    arguments: list[str],
+    code: int,
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    try:
+        result = main(["hdl", *arguments])
+    except SystemExit as end:
+        result = int(end.code or 0)
+    assert result == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    assert all(word in line for word in words)
+
+
+@pytest.mark.parametrize("action", ["area", "verilog"])
+def test_help_teaches(action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["hdl", action, "--help"])
+    text = capsys.readouterr().out
+    assert f"cubestack hdl {action}" in text
+    assert "examples:" in text
+    assert max(map(len, text.splitlines())) <= 80
