@@ -96,14 +96,15 @@ def select_stars(
     bright = np.flatnonzero(sky.v_mag <= parameters.mag_limit)
     bright = bright[np.argsort(sky.v_mag[bright], kind="stable")]
     vectors = sky.vectors[bright]
-    radius = np.cos(np.radians(parameters.fov_deg / 2))
+    declination = np.arcsin(np.clip(vectors[:, 2], -1, 1))
+    radius = np.radians(parameters.fov_deg / 2)
     kept = np.zeros(len(bright), dtype=bool)
     rows = _declinations(parameters.step_deg)
     for row in progress(range(len(rows)), len(rows), "scanning the sky"):
-        fields = _fields(rows[row], parameters.step_deg)
-        inside = fields @ vectors.T >= radius
+        band = np.flatnonzero(np.abs(declination - rows[row]) <= radius + 1e-9)
+        inside = _fields(rows[row], parameters.step_deg) @ vectors[band].T >= np.cos(radius)
         rank = np.cumsum(inside, axis=1, dtype=np.int32)
-        kept |= (inside & (rank <= parameters.stars_per_field)).any(axis=0)
+        kept[band] |= (inside & (rank <= parameters.stars_per_field)).any(axis=0)
     return bright[kept]
 
 

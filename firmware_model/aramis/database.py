@@ -125,8 +125,8 @@ class Database:
         return body + struct.pack("<I", crc32(body))
 
     @classmethod
-    def unpack(cls, image: bytes) -> Self:
-        """Database of an image.
+    def unpack(cls, image: bytes | bytearray | memoryview) -> Self:
+        """Database of an image, whose bytes its arrays then share.
 
         Raises:
             DatabaseError: for a wrong magic, version, length or checksum, and for indices that
