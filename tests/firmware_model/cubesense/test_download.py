@@ -41,10 +41,12 @@ def expected(node: Node, sram: Sram, size: ImageSize) -> list[bytes]:
 def test_a_download_reads_the_picture_once(node: Node, size: ImageSize) -> None:
     sram = Sram(size % 2)
     node.command("StartImageDownload", Sram=sram, Size=size)
+    download = node.commands.download
     frames = [shown(node, 0)]
     for number in range(1, size.frames):
         node.command("NextImageFrame", Frame=number)
-        frames.append(shown(node, number))
+        assert download.number == number
+        frames.append(download.data.tobytes())
     assert frames == expected(node, sram, size)
     assert node.opened == [sram]
     assert node.read == (640 // size.step) * (480 // size.step)
