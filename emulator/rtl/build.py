@@ -16,8 +16,11 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
+
+from amaranth.lib.wiring import Component
 
 from cubestack.emulator.rtl.pins_header import pins_header
 from cubestack.emulator.rtl.wiring import Wiring
@@ -83,7 +86,7 @@ def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
-    design = design_hash(wiring.component) + pins_header(wiring, "")
+    design = _design_hash(wiring.component) + pins_header(wiring, "")
     compiler = find_compiler()
     if compiler is None:
         raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
@@ -106,6 +109,12 @@ def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
             "XDG_CACHE_HOME names another one"
         ) from error
     return library
+
+
+@lru_cache(maxsize=8)
+def _design_hash(component: Component) -> str:
+    """Kept, because a large design takes a good part of a second."""
+    return design_hash(component)
 
 
 def _key(design: str, compiler: Compiler) -> str:

@@ -1,64 +1,26 @@
 """Compiled engine against Amaranth's simulator, skipping against not skipping: all the same."""
 
-from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import PinEvent, RtlEngine, make_engine
-from cubestack.emulator.rtl.wiring import cubestar_wiring
+from cubestack.emulator.rtl.engine import PinEvent, make_engine
+from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
 from cubestack.emulator.sram import SramTiming
 from cubestack.hdl.cubestar_top import CubeStarTop
 
-WIRING = cubestar_wiring()
-CAMERA_PINS, MCU_PINS, OUTPUT_PINS = WIRING.camera_pins, WIRING.mcu_pins, WIRING.output_pins
+from .comparison import Step, assert_same, engines, read, state
+
 SIZES = [(8, 4), (5, 3)]
-Step = Callable[[RtlEngine], object]
 
 
-def engines(size: tuple[int, int]) -> list[RtlEngine]:
-    """One of each sort; the last is the reference."""
-    return [
-        make_engine(CubeStarTop(*size), kind, skipping=skipping)
-        for kind, skipping in (
-            ("compiled", True),
-            ("compiled", False),
-            ("python", True),
-            ("python", False),
-        )
-    ]
+def wiring(size: tuple[int, int]) -> Wiring:
+    return cubestar_wiring(CubeStarTop(*size))
 
 
-def state(engine: RtlEngine) -> dict[str, object]:
-    """All that can be seen of an engine. Data that is not driven onto the bus is no data."""
-    levels = {name: engine.get_pin(name) for name in (*OUTPUT_PINS, *CAMERA_PINS, *MCU_PINS)}
-    if not levels["SRAM_D_OE"]:
-        del levels["SRAM_D_O"]
-    # Rendered only for those who store.
-    del levels["PIXDATA"]
-    return {
-        **levels,
-        "now": engine.now_ps,
-        "sram": engine.sram.tobytes(),
-        "violations": engine.violations,
-        "counts": engine.violation_counts,
-    }
-
-
-def assert_same(all_engines: Sequence[RtlEngine], step: Step, what: object) -> None:
-    *others, reference = all_engines
-    expected = {"answer": step(reference), **state(reference)}
-    for number, engine in enumerate(others):
-        found = {"answer": step(engine), **state(engine)}
-        differences = {k: (found[k], expected[k]) for k in expected if found.get(k) != expected[k]}
-        assert not differences, (number, what)
-
-
-def read(engine: RtlEngine, count: int, period: Fraction, reach: int) -> bytes:
-    out = np.zeros(count, np.uint8)
-    made = engine.strobe_read(out, period, engine.now_ps + reach)
-    return out[:made].tobytes()
+CAMERA_PINS, MCU_PINS = wiring(SIZES[0]).camera_pins, wiring(SIZES[0]).mcu_pins
+OUTPUT_PINS = wiring(SIZES[0]).output_pins
 
 
 def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
@@ -95,7 +57,7 @@ def test_random_life_of_a_board(size, seed, make_random_camera):
     rng = np.random.default_rng([seed, *size])
     camera = make_random_camera(rng, *size)
     line_ps = int(camera.line_clocks * camera.period)
-    all_engines = engines(size)
+    all_engines = engines(wiring(size))
     assert_same(all_engines, lambda engine: engine.attach(camera), "attach")
     for _ in range(60):
         step = random_step(rng, camera, 2 * line_ps)
@@ -108,7 +70,7 @@ def test_captures_and_reads_back(seed, make_random_camera):
     size = SIZES[seed % len(SIZES)]
     rng = np.random.default_rng(seed)
     camera = make_random_camera(rng, *size)
-    all_engines = engines(size)
+    all_engines = engines(wiring(size))
     wait, bank, late = int(rng.integers(0, 40 * camera.period)), seed & 1, 3_000_000
     steps: list[Step] = [
         lambda engine: engine.attach(camera),
@@ -151,7 +113,7 @@ def test_pin_by_pin(seed):
     """Every output after every event, and the memory and all violations in the end."""
     size = SIZES[seed % len(SIZES)]
     events = random_events(np.random.default_rng(seed), 3000)
-    *others, reference = engines(size)
+    *others, reference = engines(wiring(size))
     expected = reference.apply(events)
     assert len(np.unique(expected[:, OUTPUT_PINS.index("SRAM_A")])) > 10
     for engine in others:

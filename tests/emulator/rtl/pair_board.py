@@ -1,0 +1,208 @@
+"""CubeSense's cameras and microcontroller, for tests of its pair of FPGAs."""
+
+import subprocess
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cubestack.emulator.rtl.engine import RtlEngine
+from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.generate import verilog_text
+
+from .conftest import ListCamera
+
+SIDES = ("sun", "nadir")
+ENABLES = ("SUNEN", "NADEN")
+CONTROLS = ("SHIFT", "EDGE", "RNW", *ENABLES)
+COMMANDS = (*CONTROLS, "power sun", "power nadir", "strobe")
+
+#: A small picture, and one whose sides are powers of two.
+SIZES = (
+    ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1),
+    ReadOut(16, 8, 7, scan_step=4, first_row=0, first_column=2, window=5, window_above=1),
+)
+
+STROBE_PERIOD = 100_000
+SETTLED = 50_000
+"""From an enable to the first data clock: the SRAM's access time, and more."""
+
+Command = tuple[int, str, int]
+
+
+def pair_camera(rng: np.random.Generator, size: ReadOut, frames: int = 3) -> ListCamera:
+    """Whole frames with long gaps, on a clock of its own; most pixels are dark, some runs bright.
+
+    Joined anywhere, because the first gap may be too short. One line in some ten frames is cut.
+    """
+    period = Fraction(10**12, int(rng.integers(9_000_000, 24_000_000)))
+    line_clocks = size.columns + int(rng.integers(1, size.frame_gap))
+    camera = ListCamera(period, line_clocks, size.columns)
+    for number in range(frames):
+        short = not number or rng.random() < 0.1
+        camera.add_blank(int(rng.integers(1, size.frame_gap) if short else size.frame_gap + 3))
+        image = rng.integers(0, 200, (size.rows, size.columns), dtype=np.uint8)
+        x, y = int(rng.integers(0, size.columns - 1)), int(rng.integers(0, size.rows))
+        image[y, x : x + int(rng.integers(1, 5))] |= 0xC8
+        rows = size.rows if rng.random() < 0.9 else size.rows - 1
+        camera.add_image(image[:rows])
+    camera.add_blank(size.frame_gap + 3)
+    return camera
+
+
+class Script:
+    """What the microcontroller does, at which times."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.commands: list[Command] = []
+        self.time_ps = 2_000
+        self._rng = rng
+        self._levels = dict.fromkeys(CONTROLS, 0) | dict.fromkeys(ENABLES, 1)
+
+    def wait(self, ps: float) -> None:
+        self.time_ps += int(ps)
+
+    def do(self, name: str, value: int) -> None:
+        self.wait(self._rng.integers(1, 30_000))
+        self.commands.append((self.time_ps, name, value))
+
+    def standby(self) -> None:
+        """A linked store's receiver first: the sender's line makes an edge of its own when it goes,
+        and the lines beside it change with it."""
+        order = ENABLES
+        if self._levels["SHIFT"]:
+            order = ENABLES if self._levels["RNW"] else ENABLES[::-1]
+        for name in order:
+            self.do(name, 1)
+
+    def command(self, *levels: int) -> None:
+        """From anywhere, through standby, to these levels of SHIFT, EDGE, RNW, SUNEN, NADEN."""
+        self.standby()
+        self._levels = dict(zip(CONTROLS, levels, strict=True))
+        lines = [*self._rng.permutation(CONTROLS[:3]), *self._rng.permutation(ENABLES)]
+        for name in lines:
+            self.do(str(name), self._levels[str(name)])
+
+    def read(self, count: int) -> None:
+        self.wait(SETTLED)
+        self.commands.append((self.time_ps, "strobe", count))
+        self.wait(count * STROBE_PERIOD)
+
+
+def enables(side: str) -> tuple[int, int]:
+    """SUNEN and NADEN for one FPGA alone."""
+    return (0, 1) if side == "sun" else (1, 0)
+
+
+def stores() -> list[tuple[tuple[int, ...], tuple[str, ...]]]:
+    """Each way to store: the levels, and the memories that then hold a picture."""
+    return [
+        ((0, 0, 0, 0, 1), ("sun",)),
+        ((0, 0, 0, 1, 0), ("nadir",)),
+        ((0, 0, 0, 0, 0), SIDES),
+        ((1, 0, 0, 0, 0), ("nadir",)),
+        ((1, 0, 1, 0, 0), ("sun",)),
+    ]
+
+
+def readings(memory: str, size: ReadOut) -> list[tuple[tuple[int, ...], int]]:
+    """Each way to read that memory: the levels, and the number of clocks."""
+    window = 4 + size.window**2
+    own, other = (window, size.scan_clocks) if memory == "sun" else (size.scan_clocks, window)
+    return [
+        ((0, 0, 1, *enables(memory)), size.pixels),
+        ((0, 1, 1, *enables(memory)), own),
+        ((1, 1, int(memory == "sun"), 0, 0), other),
+    ]
+
+
+class Outcome(NamedTuple):
+    sun: bytes
+    nadir: bytes
+    data: bytes
+    acks: list[int]
+    """Times at which the acknowledge that was watched rose."""
+
+
+def run_engine(
+    engine: RtlEngine, cameras: dict[str, ListCamera], commands: Sequence[Command], watched: str
+) -> Outcome:
+    """Play ``commands``; the engine stops whenever ``watched`` rises."""
+    for name, camera in cameras.items():
+        engine.attach(camera, name)
+    data, acks = b"", []
+
+    def advance(until_ps: int) -> None:
+        if not engine.get_pin(watched):
+            engine.run(until_ps, (watched, 1))
+            if engine.get_pin(watched):
+                acks.append(engine.now_ps)
+        engine.run(until_ps)
+
+    for time_ps, name, value in commands:
+        advance(time_ps)
+        if name == "strobe":
+            out = np.zeros(value, np.uint8)
+            made = engine.strobe_read(out, Fraction(STROBE_PERIOD), time_ps + value * STROBE_PERIOD)
+            assert made == value
+            data += out.tobytes()
+        elif name.startswith("power"):
+            engine.power_memory(name.split()[1], bool(value))
+        else:
+            engine.set_pin(name, value)
+    memories = [engine.memories[side].tobytes() for side in SIDES]
+    return Outcome(memories[0], memories[1], data, acks)
+
+
+class IcarusPair:
+    """pair_bench.v around a pair, compiled once."""
+
+    def __init__(self, folder: Path, pair: CubeSensePair, pixels: int) -> None:
+        self._folder = folder
+        self._pixels = pixels
+        (folder / "top.v").write_text(verilog_text(pair))
+        parameters = {
+            "ADDRESS_WIDTH": len(pair.SUN_SRAM_A),
+            "PIXELS": pixels,
+            "STROBE_HALF": STROBE_PERIOD // 2,
+        }
+        command = ["iverilog", "-g2005", "-s", "pair_bench", "-o", "bench.vvp"]
+        command += [f"-Ppair_bench.{name}={value}" for name, value in parameters.items()]
+        command += [str(Path(__file__).with_name("pair_bench.v")), "top.v"]
+        subprocess.run(command, cwd=folder, check=True)
+
+    def run(
+        self, cameras: dict[str, ListCamera], commands: Sequence[Command]
+    ) -> dict[str, Outcome]:
+        """The outcome for each acknowledge; a camera that is not there has no clock."""
+        folder = self._folder
+        for side in SIDES:
+            camera = cameras.get(side) or ListCamera(Fraction(2), 1, 1)
+            period = camera.period
+            head = (period.numerator, period.denominator, camera.line_clocks, camera.active_columns)
+            segments = [(s.start_ps, s.clocks, s.rows) for s in camera.segments]
+            lines = [" ".join(map(str, line)) for line in (head, *segments)]
+            (folder / f"{side}.txt").write_text("\n".join(lines))
+            pixels = b"".join(image.tobytes() for image in camera.images)
+            assert len(pixels) <= self._pixels
+            (folder / f"{side}.hex").write_text(pixels.ljust(self._pixels, b"\0").hex("\n"))
+        (folder / "commands.txt").write_text(
+            "".join(f"{time} {COMMANDS.index(name)} {value}\n" for time, name, value in commands)
+        )
+        subprocess.run(["vvp", "-n", "bench.vvp"], cwd=folder, check=True, capture_output=True)
+        sun, nadir, data = (
+            read_hex(folder / name) for name in ("sun_memory.hex", "nadir_memory.hex", "data.hex")
+        )
+        acks = [line.split() for line in (folder / "ack.txt").read_text().splitlines()]
+        return {
+            pin: Outcome(sun, nadir, data, [int(time) for time, number in acks if number == str(n)])
+            for n, pin in enumerate(("SUNACK", "NADACK"))
+        }
+
+
+def read_hex(path: Path) -> bytes:
+    lines = (line.partition("//")[0] for line in path.read_text().splitlines())
+    return bytes.fromhex("".join(lines))
