@@ -178,10 +178,14 @@ class CubeSenseBoard:
         At the mid-exposure of its middle row. For whoever compares results; None when nothing was
         stored.
         """
-        shutter = self._stored.get(camera)
+        shutter = self.stored_frame(camera)
         if shutter is None:
             return None
         return self.scene.truth(camera, shutter.mid_exposure_ps((ROWS - 1) / 2))
+
+    def stored_frame(self, camera: Camera) -> RollingShutter | None:
+        """Exposure of the frame of ``camera`` that was stored last; None before."""
+        return self._stored.get(camera)
 
     def fail_camera(self, camera: Camera) -> None:
         """Let a camera die: no clock, no answer on its control lines, whatever is switched."""

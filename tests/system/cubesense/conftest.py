@@ -61,6 +61,21 @@ def module_measure() -> Callable[..., Frames]:
 
 
 @pytest.fixture
+def sent() -> Callable[[CubeSenseSession, Camera], np.ndarray]:
+    """The picture (480, 640) that a camera sent while one was stored last, rendered anew."""
+
+    def look(session: CubeSenseSession, camera: Camera) -> np.ndarray:
+        shutter = session.board.stored_frame(camera)
+        assert shutter is not None
+        segment = session.board.cameras[camera].segment_at(shutter.readout_ps + 1)
+        assert segment is not None
+        assert segment.pixels is not None
+        return segment.pixels()
+
+    return look
+
+
+@pytest.fixture
 def memory() -> Callable[[CubeSenseSession, Camera], np.ndarray]:
     """The picture (480, 640) in the memory of a camera's half, looked at from outside."""
 

@@ -1,0 +1,137 @@
+"""CubeSense's ports as unmodified programs use them: pseudo-terminals, and the I2C bus."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import serial
+from smbus2 import i2c_msg
+
+from cubestack.emulator.sky.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import Camera
+from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
+from cubestack.host.cubesense import CubeSense
+from cubestack.host.i2c_client import I2cClient
+from cubestack.host.register_client import RegisterClient
+from tests.system.conftest import COMMAND, Served
+
+from .conftest import NADIR_DEG, SUN_DEG
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Path]:
+    """An emulator process of its own; the path of its node port."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
+    )
+    port = tmp_path / "ttyCUBESENSE"
+    command = [*COMMAND, "emulate", "cubesense", "--scene", "scene.toml", "--pty", "ttyCUBESENSE"]
+    emulator = Served([*command, "--pace", "fast"], tmp_path)
+    yield port
+    assert emulator.end() == 0
+
+
+def test_the_bench_client_of_twelve_lines_gets_the_nadir_picture(served: Path) -> None:
+    with serial.Serial(f"{served}.bench", 115_200, timeout=10) as port:
+        port.write(b"a")
+        assert port.read(1) == b"Y"
+        port.write(b"s")
+        picture = np.frombuffer(port.read(307_200), np.uint8).reshape(480, 640)
+    assert 34 <= np.median(picture) <= 160
+    assert picture[236 + 36, 371 - 24] > 100  # the Earth
+    assert picture[5, 5] < 50
+
+
+def test_node_protocol_on_the_same_device(served: Path) -> None:
+    with serial.Serial(str(served), 57_600, timeout=10) as port:
+        port.write(bytes.fromhex("1F7F 80 1FFF"))
+        answer = port.read_until(b"\x1f\xff")
+        assert answer.startswith(b"\x1f\x7f")
+        assert answer[3] == 2  # interface version
+        port.write(bytes.fromhex("1F7F 14 00 00 1FFF"))
+        assert port.read(5) == bytes.fromhex("1F7F 00 1FFF")
+        deadline = time.monotonic() + 20
+        detect = 2
+        while detect == 2 and time.monotonic() < deadline:
+            port.write(bytes.fromhex("1F7F 94 1FFF"))
+            result = port.read_until(b"\x1f\xff")
+            detect = result[-3]
+        assert detect == 7
+        alpha, beta = np.frombuffer(result[2:-4], "<i2") / 100
+        np.testing.assert_allclose((alpha, beta), SUN_DEG, atol=0.1)
+
+
+def test_examples_of_escapes_are_answered(served: Path) -> None:
+    """An exposure of 0x1F1F, and a frame number that the selected size lacks."""
+    with serial.Serial(str(served), 57_600, timeout=10) as port:
+        port.write(bytes.fromhex("1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF"))
+        assert port.read(5) == bytes.fromhex("1F7F 00 1FFF")
+        port.write(bytes.fromhex("1F7F A8 1FFF"))
+        answer = port.read_until(b"\x1f\xff")
+        # Threshold 225 and 70, sun: auto 0, exposure 1, gain 0, blue, red; nadir as it was sent.
+        assert answer.hex() == "1f7fe146000100008080001f1f1f1f1f1f80801fff"
+
+
+def test_pictures_over_the_bench_are_what_the_camera_sent(
+    opened: Callable[..., Any], scene: EarthSunScene, sent: Callable[..., Any]
+) -> None:
+    with opened(scene) as session:
+        session.cubesense.client.pause(0.3)
+        for camera in Camera:
+            session.bench.take(camera)
+            np.testing.assert_array_equal(session.bench.download(camera), sent(session, camera))
+
+
+def test_both_i2c_protocols_measure(opened: Callable[..., Any], scene: EarthSunScene) -> None:
+    with opened(scene) as session:
+        bus = session.board.i2c()
+        bus.wait(0.3)
+        node = CubeSense(I2cClient(bus, INTERFACE, wait=bus.wait))
+        assert node.capture_and_detect(Camera.SUN).detected
+        registers = RegisterClient(bus, REGISTERS, wait=bus.wait)
+        registers.write("MEASURE", "NADIR_SRAM2")
+        bus.wait(0.5)
+        angles = [float(registers.read(f"NADIR_{axis}")) / 2.9 for axis in "XY"]
+        np.testing.assert_allclose(angles, NADIR_DEG, atol=0.1)
+        np.testing.assert_allclose(
+            [node.result(Camera.NADIR).alpha_deg, node.result(Camera.NADIR).beta_deg],
+            NADIR_DEG,
+            atol=0.1,
+        )
+
+
+def test_image_register_streams_the_picture(
+    opened: Callable[..., Any], scene: EarthSunScene, sent: Callable[..., Any]
+) -> None:
+    with opened(scene) as session:
+        bus = session.board.i2c()
+        bus.wait(0.3)
+        registers = RegisterClient(bus, REGISTERS, wait=bus.wait)
+        registers.write("CAPTURE", "NADIR_SRAM2")
+        bus.wait(0.2)
+        registers.write("IMAGE_SRAM", "SRAM2")
+        head = i2c_msg.read(0x1C, 4 * 640)
+        bus.i2c_rdwr(i2c_msg.write(0x1C, [REGISTERS["IMAGE"].address]), head)
+        expected = sent(session, Camera.NADIR)[:4].reshape(-1)
+        np.testing.assert_array_equal(np.frombuffer(bytes(head), np.uint8), expected)
+
+
+def test_reading_a_result_schedules_the_next_one(
+    opened: Callable[..., Any], scene: EarthSunScene
+) -> None:
+    with opened(scene) as session:
+        cubesense = session.cubesense
+        cubesense.client.pause(0.3)
+        cubesense.result_then_schedule(Camera.NADIR)
+        for turned in (0.0, 5.0, 10.0):
+            session.board.scene = EarthSunScene.facing(nadir_deg=(turned, 0.0))
+            cubesense.result_then_schedule(Camera.NADIR)
+            cubesense.client.pause(1.0)
+            found = cubesense.result(Camera.NADIR)
+            assert found.detected
+            assert found.alpha_deg == pytest.approx(turned, abs=0.1)

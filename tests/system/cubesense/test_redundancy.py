@@ -1,0 +1,115 @@
+"""What still measures when parts fail.
+
+CubeSense thesis, section 3.3 and figures 3.10 and 3.11: one memory failed; one camera and the
+opposite memory failed.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.sky.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense_codes import (
+    Camera,
+    CaptureResult,
+    DetectResult,
+    ImageSize,
+    Sram,
+    SramSelection,
+)
+from cubestack.host.cli.session import CubeSenseSession
+from cubestack.host.cubesense import Measurement
+from cubestack.host.cubesense_download import download_image, picture_of
+
+from .conftest import NADIR_DEG, SUN_DEG
+
+TRUTH = {Camera.SUN: SUN_DEG, Camera.NADIR: NADIR_DEG}
+
+
+def check(measured: Measurement, capture: CaptureResult) -> None:
+    assert measured.capture is capture
+    assert measured.detect is DetectResult.SUCCESS
+    found = (measured.alpha_deg, measured.beta_deg)
+    np.testing.assert_allclose(found, TRUTH[measured.camera], atol=0.1)
+
+
+@pytest.fixture
+def session(opened: Callable[..., Any], scene: EarthSunScene) -> Any:
+    with opened(scene, seed=2) as made:
+        made.cubesense.client.pause(0.3)
+        yield made
+
+
+@pytest.mark.parametrize("failed", Sram)
+def test_with_one_memory_failed_both_cameras_measure_in_the_other(
+    session: CubeSenseSession, failed: Sram
+) -> None:
+    session.board.fail_memory(failed)
+    session.cubesense.client.pause(0.1)
+    assert session.cubesense.power().over_current[failed]
+    good = Sram(1 - failed)
+    for camera in Camera:
+        own = Sram(camera) is good
+        check(
+            session.cubesense.capture_and_detect(camera, good),
+            CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM,
+        )
+        lost = session.cubesense.capture_and_detect(camera, failed)
+        assert lost.capture is CaptureResult.SRAM_OVER_CURRENT
+        assert lost.detect is DetectResult.NONE_SCHEDULED
+
+
+@pytest.mark.parametrize("dead", Camera)
+def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
+    session: CubeSenseSession, dead: Camera
+) -> None:
+    """The dead camera gives no clock, yet its half's memory is written and read."""
+    alive = Camera(1 - dead)
+    session.board.fail_camera(dead)
+    session.board.fail_memory(Sram(alive))
+    session.cubesense.client.pause(0.1)
+    check(session.cubesense.capture_and_detect(alive, Sram(dead)), CaptureResult.STORED_OTHER_SRAM)
+    gone = session.cubesense.capture_and_detect(dead, Sram(dead))
+    assert gone.capture is CaptureResult.CAMERA_TIMEOUT
+    assert gone.detect is DetectResult.NONE_SCHEDULED
+
+
+@pytest.mark.parametrize("camera", Camera)
+def test_picture_in_the_other_memory_is_what_the_camera_sent(
+    session: CubeSenseSession,
+    memory: Callable[..., Any],
+    sent: Callable[..., Any],
+    camera: Camera,
+) -> None:
+    other = Sram(1 - camera)
+    session.cubesense.capture(camera, other)
+    stored = memory(session, Camera(other))
+    np.testing.assert_array_equal(stored, sent(session, camera))
+    seen = picture_of(download_image(session.cubesense.client, other, ImageSize.SIDE_128))
+    np.testing.assert_array_equal(seen, stored[::8, ::8])
+
+
+def test_latch_up_is_cut_off_and_cleared_by_command(session: CubeSenseSession) -> None:
+    cubesense = session.cubesense
+    session.board.power.latch_up("SRAM1")
+    cubesense.client.pause(0.05)
+    power = cubesense.power()
+    assert power.over_current == (True, False)
+    assert power.current_sram_ma[0] < 1
+    cubesense.clear_over_current(SramSelection.SRAM1)
+    cubesense.client.pause(0.1)
+    power = cubesense.power()
+    assert power.over_current == (False, False)
+    assert power.current_sram_ma[0] == pytest.approx(4.6, abs=0.3)
+    check(cubesense.capture_and_detect(Camera.SUN), CaptureResult.STORED_OWN_SRAM)
+
+
+def test_memory_that_stays_latched_is_cut_off_again(session: CubeSenseSession) -> None:
+    session.board.fail_memory(Sram.SRAM2)
+    for _ in range(3):
+        session.cubesense.client.pause(0.1)
+        assert session.cubesense.power().over_current == (False, True)
+        assert session.board.power.current_ma("SRAM2") == 0
+        session.cubesense.clear_over_current(SramSelection.BOTH)

@@ -1,0 +1,116 @@
+"""Every result code, each from a scene or a fault that causes it, read over the serial line."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.camera.fisheye import LENSES, angles_from_vector
+from cubestack.emulator.sky.earth_sun import EarthSunScene, Reflection
+from cubestack.firmware_model.interface.cubesense_codes import (
+    Camera,
+    CaptureResult,
+    DetectResult,
+    Sram,
+)
+
+NOON = EarthSunScene()
+START_UP = (CaptureResult.START_UP, DetectResult.START_UP)
+
+
+def detect(opened: Callable[..., Any], scene: EarthSunScene, camera: Camera) -> DetectResult:
+    with opened(scene) as session:
+        session.cubesense.client.pause(0.3)
+        return session.cubesense.capture_and_detect(camera).detect
+
+
+def test_before_the_first_measurement(opened: Callable[..., Any]) -> None:
+    with opened(NOON) as session:
+        session.cubesense.client.pause(0.3)
+        for camera in Camera:
+            found = session.cubesense.result(camera)
+            assert (found.capture, found.detect) == START_UP
+
+
+def test_pending_from_the_acknowledge_on(opened: Callable[..., Any]) -> None:
+    with opened(NOON) as session:
+        cubesense = session.cubesense
+        cubesense.client.pause(0.3)
+        cubesense.client.command("CaptureAndDetect", Camera=Camera.SUN, Sram=Sram.SRAM1)
+        found = cubesense.result(Camera.SUN)
+        assert (found.capture, found.detect) == (CaptureResult.PENDING, DetectResult.PENDING)
+        assert cubesense.wait_measured(Camera.SUN).detected
+
+
+def test_captured_only(opened: Callable[..., Any]) -> None:
+    with opened(NOON) as session:
+        session.cubesense.client.pause(0.3)
+        assert session.cubesense.capture(Camera.NADIR) is CaptureResult.STORED_OWN_SRAM
+        assert session.cubesense.result(Camera.NADIR).detect is DetectResult.NONE_SCHEDULED
+
+
+def test_no_earth_in_view_is_too_few_edges(opened: Callable[..., Any]) -> None:
+    scene = EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0))
+    assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_FEW_EDGES
+
+
+def test_night_side_is_too_few_edges(opened: Callable[..., Any]) -> None:
+    scene = EarthSunScene(sun=(0, 0, 1), glow_km=0)
+    assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_FEW_EDGES
+
+
+def test_many_lights_are_too_many_edges(opened: Callable[..., Any]) -> None:
+    """Discs around samples of the scanned rows, two edges each."""
+    lens = LENSES[Camera.NADIR]
+    samples = [(x, y) for x in range(191, 512, 64) for y in range(143, 336, 64)]
+    lights = []
+    for vector in lens.unproject(samples):
+        alpha, beta = angles_from_vector(vector)
+        lights.append(Reflection(Camera.NADIR, alpha, beta, radius_px=15.0, level=200.0))
+    scene = EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(lights))
+    assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_MANY_EDGES
+
+
+def test_terminator_is_a_bad_fit(opened: Callable[..., Any]) -> None:
+    scene = EarthSunScene(sun=(1, 0, -0.3))
+    assert detect(opened, scene, Camera.NADIR) is DetectResult.BAD_FIT
+
+
+@pytest.mark.parametrize("sun", [(0, 0, 1), (0.3, 0, 1)])
+def test_sun_behind_the_camera_is_not_found(
+    opened: Callable[..., Any], sun: tuple[float, float, float]
+) -> None:
+    scene = EarthSunScene(nadir=(1, 0, 0), sun=sun)
+    assert detect(opened, scene, Camera.SUN) is DetectResult.SUN_NOT_FOUND
+
+
+def test_hot_pixels_are_no_sun(opened: Callable[..., Any]) -> None:
+    scene = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1), hot_pixels=50, hot_pairs=20)
+    assert detect(opened, scene, Camera.SUN) is DetectResult.SUN_NOT_FOUND
+    assert detect(opened, replace(NOON, hot_pixels=20, hot_pairs=5), Camera.SUN).name == "SUCCESS"
+
+
+def test_dead_camera_times_out_and_the_node_goes_on(opened: Callable[..., Any]) -> None:
+    with opened(NOON) as session:
+        session.cubesense.client.pause(0.3)
+        session.board.fail_camera(Camera.SUN)
+        found = session.cubesense.capture_and_detect(Camera.SUN)
+        assert found.capture is CaptureResult.CAMERA_TIMEOUT
+        assert found.detect is DetectResult.NONE_SCHEDULED
+        assert session.cubesense.capture_and_detect(Camera.NADIR).detected
+
+
+@pytest.mark.parametrize("after_ms", [5, 45, 100])
+def test_latch_up_during_a_measurement(opened: Callable[..., Any], after_ms: float) -> None:
+    """While the picture is awaited or stored, and while lines are searched."""
+    with opened(NOON) as session:
+        cubesense = session.cubesense
+        cubesense.client.pause(0.3)
+        cubesense.client.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)
+        cubesense.client.pause(after_ms / 1000)
+        session.board.power.latch_up("SRAM2")
+        found = cubesense.wait_measured(Camera.NADIR)
+        assert found.capture is CaptureResult.SRAM_OVER_CURRENT
+        assert not found.detected
+        assert cubesense.power().over_current == (False, True)
