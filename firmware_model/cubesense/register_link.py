@@ -33,7 +33,7 @@ from cubestack.firmware_model.interface.register_pointer import FILL, PointerReg
 
 __all__ = ["READ_AHEAD_BYTES", "ImageStream", "RegisterLink"]
 
-READ_AHEAD_BYTES = 64
+READ_AHEAD_BYTES = 32
 """Bytes of the picture that wait for the host; new ones are fetched when half of them are left."""
 
 _SETTINGS = {

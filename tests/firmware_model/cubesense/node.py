@@ -36,7 +36,7 @@ from cubestack.firmware_model.interface.cubesense_pins import Monitor
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.pic18_costs import PIC18F45K20
 
-BENCH_BYTE_US = 80  # a little quicker than 115200 baud, and a part of every pause
+BENCH_BYTE_US = 100  # a little slower than 115200 baud, and a part of every pause
 
 
 class Node:
