@@ -61,13 +61,14 @@ def test_night_side_is_too_few_edges(opened: Callable[..., Any]) -> None:
 
 
 def test_many_lights_are_too_many_edges(opened: Callable[..., Any]) -> None:
-    """Discs around samples of the scanned rows, two edges each."""
+    """Discs around every other sample of rows and columns, four edges each."""
     lens = LENSES[Camera.NADIR]
-    samples = [(x, y) for x in range(191, 512, 64) for y in range(143, 336, 64)]
+    samples = [(x, y) for x in (191, 319, 447) for y in (79, 207, 335)]
+    samples += [(x, y) for x in (255, 383, 511) for y in (143, 271, 399)]
     lights = []
     for vector in lens.unproject(samples):
         alpha, beta = angles_from_vector(vector)
-        lights.append(Reflection(Camera.NADIR, alpha, beta, radius_px=15.0, level=200.0))
+        lights.append(Reflection(Camera.NADIR, alpha, beta, radius_px=18.0, level=200.0))
     scene = EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(lights))
     assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_MANY_EDGES
 
