@@ -88,9 +88,10 @@ def pic18f45k20(library_factor: float = LIBRARY_FACTOR) -> CostTable:
                 strobe + loop16 + array, "assumed", "as strobe_byte, and stored in an array"
             ),
             "address_byte": Cost(
-                3 * 3 * port.cycles + strobe + 2 * 12,
+                (3 * 3 + 4) * port.cycles + strobe + loop16 + 2 * 12,
                 "assumed",
-                "row and column put together, sent as three bytes with a clock each, then a read",
+                "row and column put together, sent as three bytes with a clock each; the mode and "
+                "the data lines' direction changed, and back; then a read",
             ),
             "adc_conversion": Cost(
                 120, "assumed", "acquisition of 5 us and 12 periods of 1.6 us, waited for"

@@ -198,11 +198,11 @@ class Acquisition:
         FPGAs that ``can_address``.
         """
         yield from self._enter(_actions(sram, Action.TAKE_ADDRESS))
-        found: EdgeList | None = None
         pixels = 0
         pixel = self._buffer[:1]
-        asked = next(search)
-        while found is None and self._supply.available(sram):
+        found: EdgeList | None = None
+        asked: tuple[int, int] | None = next(search)
+        while asked is not None and self._supply.available(sram):
             x, y = asked
             yield from self._send_address(y * FULL_SIZE.columns + x)
             yield StrobeRead(pixel, self._strobe_cycles)
@@ -213,7 +213,7 @@ class Acquisition:
             try:
                 asked = search.send(int(pixel[0]))
             except StopIteration as end:
-                found = end.value
+                asked, found = None, end.value
         yield from self._standby()
         if found is None or not self._supply.available(sram):
             return None

@@ -74,11 +74,7 @@ def _bits(register: str, **fields: int) -> int:
 
 
 class CameraControl:
-    """Both cameras' supplies and registers.
-
-    Attributes:
-        acknowledged: by camera, whether it answered every byte of its latest set-up.
-    """
+    """Both cameras' supplies and registers."""
 
     def __init__(self, meter: Meter, state: State, supply: Supply) -> None:
         """Both cameras are off, as at reset."""
@@ -87,7 +83,10 @@ class CameraControl:
         self._supply = supply
         self._written: dict[Camera, dict[str, int] | None] = dict.fromkeys(Camera)
         self._settled_us = dict.fromkeys(Camera, 0)
-        self.acknowledged = dict.fromkeys(Camera, False)
+
+    def acknowledged(self, camera: Camera) -> bool:
+        """Whether ``camera`` answered every byte of its latest set-up."""
+        return self._written[camera] is not None
 
     def start(self) -> Routine[None]:
         """Switch both cameras on and set them up."""
@@ -122,14 +121,12 @@ class CameraControl:
         if self._written[camera] == values:
             return
         self._written[camera] = None
-        self.acknowledged[camera] = False
         for name, value in values.items():
             if not (yield from self._write(camera, REGISTERS[name].address, value)):
                 return
         now_us: int = yield ReadTimer()
         self._settled_us[camera] = now_us + EXPOSURE_SETTLE_US
         self._written[camera] = values
-        self.acknowledged[camera] = True
 
     def _write(self, camera: Camera, address: int, value: int) -> Routine[bool]:
         """One register; False when the camera left a byte unanswered."""

@@ -29,6 +29,7 @@ class CubeSenseProgram:
         node: the node protocol; its methods are the interrupts of its UART and I2C address.
         registers: the register protocol; the same of its I2C address.
         bench: the bench protocol; the same of its UART.
+        cameras: the cameras' supplies and registers.
         commands: what jobs do.
         idle: nothing waits to be done.
     """
@@ -38,12 +39,12 @@ class CubeSenseProgram:
         self.idle = False
         state = State()
         self._supply = Supply(hardware, meter, state)
-        self._cameras = CameraControl(meter, state, self._supply)
+        self.cameras = CameraControl(meter, state, self._supply)
         acquisition = Acquisition(hardware, meter, self._supply)
-        measurement = Measurement(meter, state, self._cameras, acquisition)
+        measurement = Measurement(meter, state, self.cameras, acquisition)
         self._jobs = jobs = JobQueue()
         self.commands = Commands(
-            hardware, meter, state, self._supply, self._cameras, acquisition, measurement
+            hardware, meter, state, self._supply, self.cameras, acquisition, measurement
         )
         reader, download = self.commands.reader, self.commands.download
         telemetry = Telemetry(hardware, meter, state, self._supply, download)
@@ -54,7 +55,7 @@ class CubeSenseProgram:
     def main(self) -> Routine[None]:
         """Run until a reset."""
         yield from self._supply.start()
-        yield from self._cameras.start()
+        yield from self.cameras.start()
         while True:
             self.idle = not self._jobs
             if self.idle:

@@ -4,6 +4,8 @@ from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, fine_table
 from cubestack.firmware_model.pic18_costs import PIC18F45K20
 
+from .bench import Bench
+
 
 @pytest.fixture
 def meter() -> Meter:
@@ -18,3 +20,8 @@ def equidistant() -> RadiusTable:
 @pytest.fixture(scope="session")
 def stereographic() -> RadiusTable:
     return fine_table(Meter(PIC18F45K20), Projection.STEREOGRAPHIC)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()

@@ -1,0 +1,296 @@
+"""Commands to the FPGAs, the wait for ACK, and bytes in sequence or by address."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubesense.acquisition import (
+    ACK_TIMEOUT_US,
+    CHUNK,
+    SAMPLE_BYTES,
+    Acquisition,
+)
+from cubestack.firmware_model.cubesense.edges import EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.sample_search import around_samples
+from cubestack.firmware_model.cubesense.state import State
+from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
+from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
+from cubestack.firmware_model.hardware import Request, SetPin, StrobeRead
+from cubestack.firmware_model.interface.cubesense_codes import (
+    COLUMNS,
+    IMAGE_BYTES,
+    ROWS,
+    Camera,
+    CaptureResult,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense_fpga import Action, Actions, actions
+
+from .bench import FRAME_US, READ_OUT_US, Bench
+from .scenery import earth, scan, sun, window
+
+
+class Rig:
+    """Acquisition alone, on a bench.
+
+    Attributes:
+        doing: what the FPGAs did, one entry each time that an enable had just gone low.
+    """
+
+    def __init__(self, *, mcu_addressing: bool = False) -> None:
+        self.bench = Bench(mcu_addressing=mcu_addressing)
+        self.supply = Supply(self.bench, self.bench.meter, State())
+        self.acquisition = Acquisition(self.bench, self.bench.meter, self.supply)
+        self.run(self.supply.start())
+        rng = np.random.default_rng(3)
+        for sram in Sram:
+            self.bench.memories[sram] = rng.integers(0, 256, (ROWS, COLUMNS), np.uint8)
+        self.doing: list[Actions] = []
+        self.bench.log.clear()
+
+    def run(self, routine: object) -> object:
+        return self.bench.perform(routine)
+
+    def entered(self) -> list[Actions]:
+        """Rows of the command table that the log went through, standby left out."""
+        levels = {"SHIFT": 0, "EDGE": 0, "RNW": 0, "SUNEN": 1, "NADEN": 1}
+        rows = []
+        for _, request in self.bench.log:
+            if isinstance(request, SetPin) and request.pin in levels:
+                levels[request.pin] = request.level
+                row = actions(*levels.values())
+                if row != Actions(Action.STANDBY, Action.STANDBY) and row not in rows[-1:]:
+                    rows.append(row)
+        return rows
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()
+
+
+S = Action.STANDBY
+
+
+@pytest.mark.parametrize(
+    ("camera", "sram", "row"),
+    [
+        (Camera.SUN, Sram.SRAM1, Actions(Action.STORE, S)),
+        (Camera.NADIR, Sram.SRAM2, Actions(S, Action.STORE)),
+        (Camera.SUN, Sram.SRAM2, Actions(Action.SEND_PICTURE, Action.STORE_OTHER)),
+        (Camera.NADIR, Sram.SRAM1, Actions(Action.STORE_OTHER, Action.SEND_PICTURE)),
+    ],
+)
+def test_a_picture_goes_to_the_memory_that_was_asked_for(
+    rig: Rig, camera: Camera, sram: Sram, row: Actions
+) -> None:
+    rig.bench.scenes[camera] = picture = earth(0, 0)
+    other = Sram(1 - sram)
+    kept = rig.bench.memories[other].copy()
+    result = rig.run(rig.acquisition.store(camera, sram))
+    own = sram.value == camera.value
+    expected = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
+    assert result is expected
+    assert np.array_equal(rig.bench.memories[sram], picture)
+    assert np.array_equal(rig.bench.memories[other], kept)
+    assert rig.entered()[-1] == row
+    assert rig.bench.pins["SUNEN"] == rig.bench.pins["NADEN"] == 1
+
+
+@pytest.mark.parametrize("sram", Sram)
+def test_a_dead_camera_costs_two_frames_and_no_picture(rig: Rig, sram: Sram) -> None:
+    rig.bench.scenes[Camera.SUN] = None
+    kept = rig.bench.memories[sram].copy()
+    start_us = rig.bench.now_us
+    assert rig.run(rig.acquisition.store(Camera.SUN, sram)) is CaptureResult.CAMERA_TIMEOUT
+    assert 2 * FRAME_US < rig.bench.now_us - start_us < ACK_TIMEOUT_US + 300
+    assert np.array_equal(rig.bench.memories[sram], kept)
+    assert rig.bench.pins["SUNEN"] == rig.bench.pins["NADEN"] == 1
+
+
+def test_the_longest_wait_for_a_live_camera_is_no_timeout(rig: Rig) -> None:
+    rig.bench.wait_us = 2 * FRAME_US - READ_OUT_US
+    assert rig.run(rig.acquisition.store(Camera.SUN, Sram.SRAM1)) is CaptureResult.STORED_OWN_SRAM
+
+
+@pytest.mark.parametrize("camera", Camera)
+def test_a_latch_up_ends_the_wait_at_once(rig: Rig, camera: Camera) -> None:
+    rig.bench.latched.add(Sram.SRAM2)
+    start_us = rig.bench.now_us
+    result = rig.run(rig.acquisition.store(camera, Sram.SRAM2))
+    assert result is CaptureResult.SRAM_OVER_CURRENT
+    assert rig.bench.now_us - start_us < SAMPLE_US + 200
+    assert rig.bench.cut() == {Sram.SRAM2}
+    rig.bench.log.clear()
+    again = rig.run(rig.acquisition.store(camera, Sram.SRAM2))
+    assert again is CaptureResult.SRAM_OVER_CURRENT
+    assert rig.bench.log == []  # nothing is tried with a memory that is off
+
+
+def test_a_latch_up_of_the_other_memory_does_not_disturb(rig: Rig) -> None:
+    rig.bench.latched.add(Sram.SRAM2)
+    assert rig.run(rig.acquisition.store(Camera.SUN, Sram.SRAM1)) is CaptureResult.STORED_OWN_SRAM
+    assert rig.bench.cut() == {Sram.SRAM2}
+
+
+@pytest.mark.parametrize("sram", Sram)
+def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
+    rig.bench.memories[sram] = picture = earth(5, 5)
+    lines = NadirLines(EdgeConfig(), rig.bench.meter, buffer=rig.acquisition.buffers[0])
+    assert rig.run(rig.acquisition.scan(sram, lines)) is True
+    expected = NadirLines(EdgeConfig(), rig.bench.meter)
+    expected.feed(scan(picture))
+    assert len(lines.edges) > 10
+    assert np.array_equal(lines.edges.points, expected.edges.points)
+    assert lines.wanted == 0
+    linked = Actions(Action.SEND_EDGE, Action.PASS_EDGE)
+    assert rig.entered() == [linked if sram is Sram.SRAM1 else Actions(S, Action.EDGE)]
+
+
+@pytest.mark.parametrize("sram", Sram)
+def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
+    rig.bench.memories[sram] = picture = sun(np.array([300.0, 200.0]), 6)
+    data = rig.run(rig.acquisition.window(sram))
+    assert isinstance(data, np.ndarray)
+    assert np.array_equal(data, window(picture))
+    linked = Actions(Action.PASS_EDGE, Action.SEND_EDGE)
+    assert rig.entered() == [linked if sram is Sram.SRAM2 else Actions(Action.EDGE, S)]
+
+
+def latch_after(bench: Bench, sram: Sram, strobed: int) -> None:
+    """Let ``sram`` latch up once so many bytes were read."""
+    seen = 0
+
+    def count(request: Request) -> None:
+        nonlocal seen
+        if isinstance(request, StrobeRead):
+            seen += len(request.target)
+            if seen >= strobed:
+                bench.latched.add(sram)
+
+    bench.on_request = count
+
+
+def test_a_latch_up_is_noticed_before_the_next_line_is_read(rig: Rig) -> None:
+    latch_after(rig.bench, Sram.SRAM2, 3000)
+    lines = NadirLines(EdgeConfig(), rig.bench.meter)
+    assert rig.run(rig.acquisition.scan(Sram.SRAM2, lines)) is False
+    read = [len(r.target) for _, r in rig.bench.log if isinstance(r, StrobeRead)]
+    assert 3000 <= sum(read) <= 3000 + SAMPLE_BYTES + CHUNK
+    assert rig.bench.cut() == {Sram.SRAM2}
+    assert rig.bench.pins["SUNEN"] == rig.bench.pins["NADEN"] == 1
+
+
+def test_a_latch_up_spoils_the_suns_window(rig: Rig) -> None:
+    latch_after(rig.bench, Sram.SRAM1, 1)
+    assert rig.run(rig.acquisition.window(Sram.SRAM1)) is None
+
+
+def parts(rng: np.random.Generator) -> Iterator[tuple[int, int]]:
+    """How much to skip and to read, up to the picture's end."""
+    at = 0
+    while at < IMAGE_BYTES:
+        skip = int(min(rng.choice([0, 1, 3, 700, 20_000]), IMAGE_BYTES - at))
+        read = int(min(rng.choice([0, 1, 63, 64, 65, 1500]), IMAGE_BYTES - at - skip))
+        at += skip + read
+        yield skip, read
+
+
+@pytest.mark.parametrize("mcu_addressing", [False, True])
+@pytest.mark.parametrize("sram", Sram)
+def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
+    rig = Rig(mcu_addressing=mcu_addressing)
+    acquisition, picture = rig.acquisition, rig.bench.memories[sram].reshape(-1)
+    assert rig.run(acquisition.open_picture(sram)) is True
+    at = 0
+    for skip, read in parts(np.random.default_rng(sram)):
+        rig.run(acquisition.skip_bytes(skip))
+        target = np.zeros(read, np.uint8)
+        rig.run(acquisition.read_bytes(target))
+        at += skip + read
+        assert np.array_equal(target, picture[at - read : at])
+    assert acquisition.picture_open
+    assert np.array_equal(rig.bench.memories[sram].reshape(-1), picture)
+
+
+def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
+    times = []
+    for mcu_addressing in (False, True):
+        rig = Rig(mcu_addressing=mcu_addressing)
+        rig.run(rig.acquisition.open_picture(Sram.SRAM1))
+        start_us = rig.bench.now_us
+        rig.run(rig.acquisition.skip_bytes(IMAGE_BYTES - 64))
+        times.append(rig.bench.now_us - start_us)
+    clocked_us, addressed_us = times
+    assert clocked_us == pytest.approx(IMAGE_BYTES * 4, rel=0.03)
+    assert addressed_us < 30
+
+
+def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
+    target = np.zeros(10, np.uint8)
+    for other in (
+        rig.acquisition.store(Camera.NADIR, Sram.SRAM2),
+        rig.acquisition.window(Sram.SRAM1),
+        rig.acquisition.scan(Sram.SRAM2, NadirLines(EdgeConfig(), rig.bench.meter)),
+    ):
+        rig.run(rig.acquisition.open_picture(Sram.SRAM1))
+        rig.run(rig.acquisition.read_bytes(target))
+        assert rig.acquisition.picture_open
+        rig.run(other)
+        assert not rig.acquisition.picture_open
+
+
+def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
+    target = np.zeros(5000, np.uint8)
+    rig.run(rig.acquisition.open_picture(Sram.SRAM1))
+    latch_after(rig.bench, Sram.SRAM1, 1000)
+    rig.run(rig.acquisition.read_bytes(target))
+    assert not rig.acquisition.picture_open
+    assert not target[1000 + SAMPLE_BYTES + CHUNK :].any()
+    assert rig.run(rig.acquisition.open_picture(Sram.SRAM1)) is False
+
+
+def test_single_pixels_by_address() -> None:
+    rig = Rig(mcu_addressing=True)
+    rig.bench.memories[Sram.SRAM2] = picture = earth(-12, 4)
+    meter = rig.bench.meter
+    answer = rig.run(rig.acquisition.answer(Sram.SRAM2, around_samples(EdgeConfig(), meter)))
+    assert isinstance(answer, tuple)
+    edges, pixels = answer
+    lines = NadirLines(EdgeConfig(), meter)
+    lines.feed(scan(picture))
+    assert {*map(tuple, edges.points)} == {*map(tuple, lines.edges.points)}
+    assert pixels < 250
+    latch_after(rig.bench, Sram.SRAM2, 10)
+    search = around_samples(EdgeConfig(), meter)
+    assert rig.run(rig.acquisition.answer(Sram.SRAM2, search)) is None
+
+
+def test_which_pictures_can_be_addressed() -> None:
+    for mcu_addressing in (False, True):
+        acquisition = Rig(mcu_addressing=mcu_addressing).acquisition
+        for camera in Camera:
+            for sram in Sram:
+                own = camera.value == sram.value
+                assert acquisition.can_address(camera, sram) == (own and mcu_addressing)
+
+
+def test_an_addressed_pixel_costs_what_the_table_says() -> None:
+    rig = Rig(mcu_addressing=True)
+    asked: NDArray[np.int64] = np.array([[0, 0], [639, 479], [63, 15]])
+
+    def search() -> Iterator[tuple[int, int]]:
+        for x, y in asked:
+            value = yield int(x), int(y)
+            assert value == rig.bench.memories[Sram.SRAM1][y, x]
+
+    rig.run(rig.acquisition.answer(Sram.SRAM1, search()))
+    strobed = [us for us, r in rig.bench.log if isinstance(r, StrobeRead)]
+    cost = rig.bench.meter.table.operations["address_byte"].cycles
+    assert np.diff(strobed) == pytest.approx(cost / 5, abs=1)
+
+
+def test_the_buffers_are_those_of_the_budget(rig: Rig) -> None:
+    assert [buffer.nbytes for buffer in rig.acquisition.buffers] == [CHUNK, window_bytes()]

@@ -1,0 +1,93 @@
+"""Latch-up of the memories: found by looking, cut at once, kept off until the host clears it."""
+
+import pytest
+
+from cubestack.firmware_model.cubesense.supply import (
+    OFF_TIME_US,
+    OVER_CURRENT_MA,
+    SAMPLE_US,
+)
+from cubestack.firmware_model.hardware import Request, SetPin
+from cubestack.firmware_model.interface.cubesense_codes import Camera, Sram, SramSelection
+from cubestack.firmware_model.interface.cubesense_pins import SRAM_POWER, Monitor
+
+from .bench import Bench
+
+
+def over_current(bench: Bench) -> set[Sram]:
+    power = bench.telemetry("Power")
+    return {sram for sram in Sram if power[f"OverCurrent{sram + 1}"]}
+
+
+def test_both_memories_and_cameras_are_on_after_start_up(bench: Bench) -> None:
+    assert bench.cut() == set()
+    assert all(bench.pins[pin] for pin in ("SUN_POWER", "NAD_POWER"))
+    assert over_current(bench) == set()
+
+
+@pytest.mark.parametrize("sram", Sram)
+def test_a_latch_up_while_idle_is_cut_within_one_sample_time(bench: Bench, sram: Sram) -> None:
+    bench.log.clear()
+    bench.latched.add(sram)
+    start_us = bench.now_us
+    bench.run(until_us=start_us + 2 * SAMPLE_US)
+    (cut_us,) = (us for us, request in bench.log if request == SetPin(SRAM_POWER[sram], 0))
+    assert cut_us - start_us <= SAMPLE_US + 200
+    assert bench.cut() == over_current(bench) == {sram}
+
+
+def test_it_stays_off_until_the_host_clears_it(bench: Bench) -> None:
+    bench.latched.add(Sram.SRAM2)
+    bench.run(until_us=bench.now_us + 1_000_000)
+    assert bench.cut() == {Sram.SRAM2}
+    bench.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
+    assert bench.cut() == over_current(bench) == {Sram.SRAM2}
+    cleared_us = bench.now_us
+    bench.command("ClearOverCurrent", Selection=SramSelection.BOTH)
+    assert bench.cut() == over_current(bench) == set()
+    assert bench.now_us - cleared_us > OFF_TIME_US
+
+
+def test_a_lasting_latch_up_is_cut_again(bench: Bench) -> None:
+    def latch_again(request: Request) -> None:
+        if request == SetPin(SRAM_POWER[Sram.SRAM1], 1):
+            bench.latched.add(Sram.SRAM1)
+
+    bench.latched.add(Sram.SRAM1)
+    bench.on_request = latch_again
+    bench.run(until_us=bench.now_us + 10_000)
+    bench.log.clear()
+    bench.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
+    bench.run(until_us=bench.now_us + 10_000)
+    switched = [request for _, request in bench.log if isinstance(request, SetPin)]
+    assert switched == [SetPin("SRAM1_POWER", 1), SetPin("SRAM1_POWER", 0)]
+    assert over_current(bench) == {Sram.SRAM1}
+
+
+def test_clearing_does_not_touch_a_memory_that_works(bench: Bench) -> None:
+    bench.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM1)
+    kept = bench.memories[Sram.SRAM1].copy()
+    bench.command("ClearOverCurrent", Selection=SramSelection.BOTH)
+    assert (bench.memories[Sram.SRAM1] == kept).all()
+
+
+@pytest.mark.parametrize(("ma", "cut"), [(OVER_CURRENT_MA - 1, False), (OVER_CURRENT_MA + 1, True)])
+def test_the_limit(bench: Bench, ma: float, cut: bool) -> None:
+    bench.memory_ma = ma
+    bench.run(until_us=bench.now_us + 10_000)
+    assert bench.cut() == (set(Sram) if cut else set())
+
+
+def test_currents_are_shown_to_a_tenth_within_the_converters_step(bench: Bench) -> None:
+    power = bench.telemetry("Power")
+    shown = {
+        Monitor.SUPPLY_3V3: power["Current3V3"],
+        Monitor.SRAM1: power["CurrentSram1"],
+        Monitor.SRAM2: power["CurrentSram2"],
+        Monitor.SUPPLY_5V: power["Current5V"],
+    }
+    for monitor, ma in shown.items():
+        assert ma == pytest.approx(bench.supply_ma.get(monitor, bench.memory_ma), abs=0.16)
+    bench.latched.add(Sram.SRAM1)
+    bench.run(until_us=bench.now_us + 10_000)
+    assert bench.telemetry("Power")["CurrentSram1"] == 0
