@@ -61,5 +61,5 @@ class AramisHardware(Protocol):
     def wake(self) -> None:
         """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
 
-    def uptime_ms(self) -> int:
-        """Time since power-up in ms, read in an interrupt."""
+    def uptime_us(self) -> int:
+        """Time since power-up in us, read in an interrupt."""

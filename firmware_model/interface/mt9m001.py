@@ -81,7 +81,8 @@ def gain_register(amplification: float) -> int:
     if not 1 <= amplification <= HIGHEST_GAIN:
         raise ValueError(f"the gain must be in 1..{HIGHEST_GAIN:g}, not {amplification:g}")
     recommended = (*range(0x08, 0x21), *range(0x51, 0x61), *range(0x61, 0x68))
-    return min(recommended, key=lambda value: abs(gain(value) - amplification))
+    nearest: int = min(recommended, key=lambda value: abs(gain(value) - amplification))
+    return nearest
 
 
 def _register(

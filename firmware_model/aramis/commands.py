@@ -1,0 +1,253 @@
+"""What each telecommand does, executed by the main loop one after the other.
+
+AraMiS thesis, section 2.2. A setting telecommand stores its parameters; the others act at once or
+take time. Only the supply is cut off in the interrupt itself: a latch-up does not wait.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from cubestack.firmware_model.aramis.commands_catalogue import CatalogueUpload
+from cubestack.firmware_model.aramis.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.hardware import AramisHardware
+from cubestack.firmware_model.aramis.host_link import Command
+from cubestack.firmware_model.aramis.program_camera import Camera
+from cubestack.firmware_model.aramis.program_measurement import Measuring
+from cubestack.firmware_model.aramis.program_settings import SETTING_COMMANDS
+from cubestack.firmware_model.aramis.program_state import State
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.hardware import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.interface.aramis import (
+    BLOCK_BYTES,
+    IMAGE_BYTES,
+    CatalogueState,
+    LatchUpStep,
+    ResetCause,
+    SensorState,
+)
+from cubestack.firmware_model.interface.frames import encode_frame
+
+__all__ = ["Commands"]
+
+STREAM_BACKLOG_BYTES = 4 * BLOCK_BYTES
+STREAM_PAUSE_US = 20_000
+
+
+class Commands:
+    """Executes telecommands.
+
+    Attributes:
+        handled: names of the telecommands that have an effect.
+        running: whether one is being executed, the reset that it asked for included.
+        upload: the catalogue that is being loaded.
+    """
+
+    def __init__(
+        self,
+        hardware: AramisHardware,
+        meter: Meter,
+        state: State,
+        camera: Camera,
+        catalogue: CatalogueStore,
+        measuring: Measuring,
+    ) -> None:
+        """Act on the given parts of the program."""
+        self._hardware = hardware
+        self._meter = meter
+        self._state = state
+        self._camera = camera
+        self._catalogue = catalogue
+        self._measuring = measuring
+        self.running = False
+        self.upload = CatalogueUpload(hardware, meter, catalogue)
+        self._reset_cause: ResetCause | None = None
+        self._actions: dict[str, Callable[[Command], None]] = {
+            "SetSystemTime": self._set_time,
+            "SetExposure": lambda _: measuring.restart(),
+            "SetGain": lambda _: measuring.restart(),
+            "SetField": lambda _: measuring.restart(),
+            "BeginCatalogue": self._begin_upload,
+            "CatalogueBlock": self._upload_block,
+            "StopLoop": self._stop_loop,
+            "SaveConfig": lambda _: state.settings.save(),
+            "ClearConfig": self._clear_config,
+            "ClearErrorFlags": lambda _: state.flags.clear(),
+            "Reset": self._reset,
+        }
+        self._routines: dict[str, Callable[[Command], Routine[object]]] = {
+            "Activate": self._activate,
+            "Deactivate": self._deactivate,
+            "GetAttitude": lambda _: measuring.measure(None),
+            "GetAttitudeNearVector": self._measure_near_vector,
+            "GetAttitudeNearPoint": self._measure_near_point,
+            "LatchUpAction": self._latch_up_action,
+            "CommitCatalogue": self._commit_upload,
+            "StartLoop": self._start_loop,
+            "ReloadCatalogue": self._reload,
+            "RefreshCatalogue": self._refresh,
+            "StreamDownImage": self._stream_image,
+            "WriteCameraRegister": self._write_register,
+            "SelectCameraRegister": self._select_register,
+        }
+        self.handled = frozenset({*SETTING_COMMANDS, *self._actions, *self._routines})
+
+    def urgent(self, command: Command) -> None:
+        """Interrupt: what of an accepted telecommand can not wait for the main loop."""
+        if command.message.name == "LatchUpAction" and command.values["Step"] == LatchUpStep.OFF:
+            self._camera.cut()
+
+    def execute(self, command: Command) -> Routine[ResetCause | None]:
+        """Execute ``command``; returns a cause when the program has to end in a reset."""
+        self.running = True
+        name = command.message.name
+        if name in SETTING_COMMANDS:
+            self._state.settings.put(name, command.values)
+        if name in self._actions:
+            self._actions[name](command)
+        if name in self._routines:
+            yield from self._routines[name](command)
+        yield Pay()
+        self.running = self._reset_cause is not None
+        return self._reset_cause
+
+    # --- node -------------------------------------------------------------------------------------
+
+    def _activate(self, _command: Command) -> Routine[None]:
+        if self._state.active:
+            return
+        self._state.sensor = SensorState.ACTIVATING
+        self._measuring.restart()
+        yield from self._camera.start()  # a failure raises its flag; each measurement tries again
+        yield from self._catalogue.load()
+        self._report_load()
+        self._state.sensor = SensorState.READY
+
+    def _deactivate(self, _command: Command) -> Routine[None]:
+        self._state.looping = False
+        yield from self._camera.stop()
+        self._catalogue.forget()
+        self._state.sensor = SensorState.INACTIVE
+
+    def _set_time(self, command: Command) -> None:
+        values = command.values
+        self._state.clock.set(values["JulianDay"], values["Millisecond"], command.came_us)
+
+    def _latch_up_action(self, command: Command) -> Routine[None]:
+        if command.values["Step"] == LatchUpStep.OFF or not self._camera.off:
+            return
+        yield from self._camera.restore()
+        if self._state.active:
+            yield from self._camera.start()
+
+    def _reset(self, _command: Command) -> None:
+        self._reset_cause = ResetCause.TELECOMMAND
+
+    def _clear_config(self, _command: Command) -> None:
+        self._state.settings.erase()
+        self._measuring.restart()
+
+    # --- measurements -----------------------------------------------------------------------------
+
+    def _measure_near_vector(self, command: Command) -> Routine[None]:
+        vector = np.array([command.values[axis] for axis in "XYZ"], np.float32)
+        length = np.sqrt(np.float32((vector * vector).sum()))
+        self._meter.charge(f32_mul=3, f32_add=2, f32_sqrt=1, f32_div=3)
+        yield from self._measuring.measure((vector / length).astype(np.float32))
+
+    def _measure_near_point(self, command: Command) -> Routine[None]:
+        values = command.values
+        hint = self._measuring.direction(values["RightAscension"], values["Declination"])
+        yield from self._measuring.measure(hint)
+
+    def _start_loop(self, _command: Command) -> Routine[None]:
+        if not self._state.active:
+            self._state.raise_flag("NotActive")
+            return
+        now_us: int = yield ReadTimer()
+        self._state.looping = True
+        self._state.loop_due_us = now_us
+
+    def _stop_loop(self, _command: Command) -> None:
+        self._state.looping = False
+
+    # --- catalogue --------------------------------------------------------------------------------
+
+    def _report_load(self) -> None:
+        """Raise the flags of the latest pass over the flash."""
+        store = self._catalogue
+        if store.corrected:
+            self._state.raise_flag("CatalogueCorrected")
+        if store.lost or store.state is CatalogueState.DAMAGED:
+            self._state.raise_flag("CatalogueDamaged")
+        if store.state is CatalogueState.MISSING:
+            self._state.raise_flag("CatalogueMissing")
+
+    def reload_step(self) -> Routine[None]:
+        """A slice of a periodic reload, for the main loop's idle time."""
+        if (yield from self._catalogue.load_step()):
+            self._report_load()
+
+    def _reload(self, _command: Command) -> Routine[None]:
+        if not self._state.active:
+            self._state.raise_flag("NotActive")
+            return
+        yield from self._catalogue.load()
+        self._report_load()
+
+    def _refresh(self, _command: Command) -> Routine[None]:
+        if not self._state.active:
+            self._state.raise_flag("NotActive")
+            return
+        self._state.sensor = SensorState.PROGRAMMING
+        yield from self._catalogue.load()
+        self._report_load()
+        yield from self._catalogue.refresh()
+        self._state.sensor = SensorState.READY
+
+    def _begin_upload(self, command: Command) -> None:
+        self.upload.begin(command.values["Length"], command.values["Checksum"])
+
+    def _upload_block(self, command: Command) -> None:
+        if not self.upload.put(command.values["BlockNumber"], command.values["Data"]):
+            self._state.raise_flag("UploadError")
+
+    def _commit_upload(self, _command: Command) -> Routine[None]:
+        before = self._state.sensor
+        self._state.sensor = SensorState.PROGRAMMING
+        written = yield from self.upload.commit()
+        if not written:
+            self._state.raise_flag("UploadError")
+        elif before is not SensorState.INACTIVE:
+            yield from self._catalogue.load()
+            self._report_load()
+        self._state.sensor = before
+
+    # --- pictures and registers -------------------------------------------------------------------
+
+    def image_block(self) -> bytes:
+        """The selected block of the latest picture; zeros before the first."""
+        number = int(self._state.settings.get("ImageBlockSet", "BlockNumber"))
+        return self._block(number * BLOCK_BYTES)
+
+    def _block(self, start: int) -> bytes:
+        if self._camera.latest is None:
+            return bytes(BLOCK_BYTES)
+        self._meter.charge(ram_read=BLOCK_BYTES // 4)
+        picture = self._camera.picture(self._camera.latest).reshape(-1)
+        return picture[start : start + BLOCK_BYTES].tobytes()
+
+    def _stream_image(self, _command: Command) -> Routine[None]:
+        for start in range(0, IMAGE_BYTES, BLOCK_BYTES):
+            while self._hardware.uart_backlog() > STREAM_BACKLOG_BYTES:
+                now_us: int = yield ReadTimer()
+                yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
+            self._hardware.uart_send(encode_frame(self._block(start)))
+
+    def _write_register(self, command: Command) -> Routine[None]:
+        self._camera.forget_set_up()
+        if not (yield from self._camera.write(command.values["Address"], command.values["Value"])):
+            self._state.raise_flag("CameraSilent")
+
+    def _select_register(self, command: Command) -> Routine[None]:
+        yield from self._camera.select(command.values["Address"])

@@ -1,0 +1,123 @@
+"""AraMiS' main program: telecommands, the loop, and the catalogue's periodic reload.
+
+AraMiS thesis, sections 2.1 (periodic reloading), 2.2 (use cases) and 7.3. The loop is ours, 1 Hz
+unless told otherwise; below a second the next frame comes while the last one is worked on. The
+catalogue is reloaded in slices while there is nothing else to do.
+"""
+
+from cubestack.firmware_model.aramis.commands import Commands
+from cubestack.firmware_model.aramis.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.hardware import AramisHardware, FrameEnd
+from cubestack.firmware_model.aramis.host_link import HostLink
+from cubestack.firmware_model.aramis.program_camera import Camera
+from cubestack.firmware_model.aramis.program_measurement import Measuring
+from cubestack.firmware_model.aramis.program_state import State
+from cubestack.firmware_model.aramis.telemetry import Telemetry
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.hardware import Pay, ReadTimer, Reset, Routine, Sleep
+from cubestack.firmware_model.interface.aramis import MeasurementMode
+
+__all__ = ["LATE_US", "AramisProgram"]
+
+LATE_US = 10_000
+"""An iteration that starts later than this after its time is a timing error; ours."""
+
+OVERLAP_BELOW_MS = 1000
+SLICE_US = 5_000
+"""More than a slice of a reload takes."""
+
+
+class AramisProgram:
+    """One life of the program, from reset to reset.
+
+    Attributes:
+        link: the satellite's interface; its methods are the UART and I2C interrupts.
+        commands: the telecommands.
+    """
+
+    def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
+        """Reset: settings from flash, everything else anew."""
+        self._state = state = State(hardware.flash)
+        self._camera = Camera(hardware, state, meter)
+        self._catalogue = CatalogueStore(hardware, meter)
+        self._measuring = Measuring(meter, state, self._camera, self._catalogue)
+        self.commands = Commands(
+            hardware, meter, state, self._camera, self._catalogue, self._measuring
+        )
+        telemetry = Telemetry(
+            hardware,
+            meter,
+            state,
+            self._camera,
+            self._catalogue,
+            self.commands,
+            lambda: len(self.link.queue),
+        )
+        self.link = HostLink(hardware, meter, state, telemetry.values, self.commands.urgent)
+
+    def frame_ended(self, end: FrameEnd) -> None:
+        """Interrupt: the transfer of a frame ended."""
+        self._camera.frame_ended(end)
+
+    def main(self) -> Routine[None]:
+        """Run until a reset."""
+        yield from self._camera.restore()
+        yield from self._camera.stop()
+        while True:
+            if (yield from self._serve()):
+                continue
+            if self._state.looping:
+                yield from self._iteration()
+            else:
+                yield from self._idle(None)
+
+    def _serve(self) -> Routine[bool]:
+        """Execute a telecommand, if any waits; False when none does."""
+        if not self.link.queue:
+            return False
+        self.commands.running = True
+        cause = yield from self.commands.execute(self.link.queue.popleft())
+        if cause is not None:
+            yield Pay()
+            yield Reset(cause)
+        return True
+
+    def _iteration(self) -> Routine[None]:
+        """One turn of the loop, at its time."""
+        state = self._state
+        now_us: int = yield ReadTimer()
+        if now_us < state.loop_due_us:
+            yield from self._idle(state.loop_due_us)
+            return
+        period_ms = int(state.settings.get("StartLoop", "Period"))
+        if now_us > state.loop_due_us + LATE_US:
+            state.raise_flag("TimingError")
+            state.late += 1
+            state.loop_due_us = now_us
+        state.loop_due_us += 1000 * period_ms
+        aided = state.settings.get("StartLoop", "Mode") == MeasurementMode.AIDED
+        hint = self._measuring.latest_boresight() if aided else None
+        yield from self._measuring.measure(hint, overlap=period_ms < OVERLAP_BELOW_MS)
+        state.iterations += 1
+
+    def _idle(self, deadline_us: int | None) -> Routine[None]:
+        """Reload a slice of the catalogue when that is due and fits, else sleep."""
+        now_us: int = yield ReadTimer()
+        reload_us = self._reload_due_us()
+        fits = deadline_us is None or now_us + SLICE_US <= deadline_us
+        if reload_us is not None and now_us >= reload_us and fits:
+            yield from self.commands.reload_step()
+            return
+        times = [time for time in (deadline_us, reload_us) if time is not None and time > now_us]
+        yield Sleep(min(times) if times else deadline_us)
+
+    def _reload_due_us(self) -> int | None:
+        """When the next reload is to begin, or when one that has begun is to go on; None: never."""
+        if not self._state.active:
+            return None
+        if self._catalogue.loading:
+            return 0
+        period_s = int(self._state.settings.get("SetReloadPeriod", "Period"))
+        if not period_s or self._catalogue.loaded_us is None:
+            return None
+        return self._catalogue.loaded_us + 1_000_000 * period_s

@@ -1,0 +1,276 @@
+"""Values of every telemetry frame, taken when it is asked for."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.algorithms.geometry import angles_of
+from cubestack.firmware_model.algorithms.quest import dcm
+from cubestack.firmware_model.aramis.commands import Commands
+from cubestack.firmware_model.aramis.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.hardware import AramisHardware
+from cubestack.firmware_model.aramis.program_camera import Camera
+from cubestack.firmware_model.aramis.program_state import State
+from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
+from cubestack.firmware_model.interface.aramis_flags import FLAG_NAMES
+from cubestack.firmware_model.interface.aramis_telemetry import SETTINGS_SHOWN
+from cubestack.firmware_model.interface.message import Message
+
+__all__ = ["Telemetry", "body_quaternion"]
+
+NODE_TYPE = 6
+FIRMWARE_VERSION = (0, 1)
+SERIAL_NUMBER = 1
+
+_U16, _U32 = 0xFFFF, 0xFFFF_FFFF
+
+Values = dict[str, Any]
+
+
+def body_quaternion(
+    rotation: NDArray[np.float32], attitude: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Inertial to body (4,): camera to body, after inertial to camera; all scalar last."""
+    (x1, y1, z1, w1), (x2, y2, z2, w2) = rotation.astype(np.float32), attitude.astype(np.float32)
+    product = np.array(
+        [
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+        ],
+        np.float32,
+    )
+    unit: NDArray[np.float32] = product / np.sqrt((product * product).sum())
+    return unit
+
+
+class Telemetry:
+    """Answers telemetry requests; interrupt context, so nothing here waits."""
+
+    def __init__(
+        self,
+        hardware: AramisHardware,
+        meter: Meter,
+        state: State,
+        camera: Camera,
+        catalogue: CatalogueStore,
+        commands: Commands,
+        waiting: Callable[[], int],
+    ) -> None:
+        """Report on the given parts; ``waiting``: telecommands in the queue."""
+        self._hardware = hardware
+        self._meter = meter
+        self._state = state
+        self._camera = camera
+        self._catalogue = catalogue
+        self._commands = commands
+        self._waiting = waiting
+        self._sources: dict[str, Callable[[], Values]] = {
+            "Identification": self._identification,
+            "ExtendedIdentification": self._extended_identification,
+            "ErrorFlags": lambda: {name: name in state.flags for name in FLAG_NAMES},
+            "TcmdProcessed": self._processed,
+            "SensorStatus": self._sensor_status,
+            "SystemTime": self._system_time,
+            "Attitude": self._attitude,
+            "BodyAttitude": self._body_attitude,
+            "Boresight": self._boresight,
+            "PhaseTimes": lambda: dict(state.measurement.times_us),
+            "CatalogueStatus": self._catalogue_status,
+            "UploadStatus": self._upload_status,
+            "ImageBlock": lambda: {"Block": commands.image_block()},
+            "CameraRegister": self._camera_register,
+            "LoopStatus": self._loop_status,
+            "DetectionSummary": self._detection_summary,
+            "IdentificationSummary": self._identification_summary,
+            "StarDetails": self._star_details,
+            "SupplyStatus": self._supply_status,
+        }
+
+    def values(self, message: Message) -> Values:
+        """Values of every field of ``message``."""
+        if message.name in SETTINGS_SHOWN:
+            return self._state.settings.all(SETTINGS_SHOWN[message.name])
+        return self._sources[message.name]()
+
+    # --- node -------------------------------------------------------------------------------------
+
+    def _identification(self) -> Values:
+        seconds, milliseconds = divmod(self._hardware.uptime_us() // 1000, 1000)
+        return {
+            "NodeType": NODE_TYPE,
+            "InterfaceVersion": INTERFACE.version,
+            "FirmwareVersionMajor": FIRMWARE_VERSION[0],
+            "FirmwareVersionMinor": FIRMWARE_VERSION[1],
+            "RuntimeMilliseconds": milliseconds,
+            "RuntimeSeconds": seconds & _U16,
+        }
+
+    def _extended_identification(self) -> Values:
+        return {
+            "SerialNumber": SERIAL_NUMBER,
+            "ResetCause": self._hardware.reset_cause,
+            "TcmdCount": self._state.telecommands & _U16,
+            "TlmCount": self._state.telemetry & _U16,
+        }
+
+    def _processed(self) -> Values:
+        waiting = self._waiting()
+        return {
+            "Processed": int(not waiting and not self._commands.running),
+            "Waiting": waiting,
+        }
+
+    def _sensor_status(self) -> Values:
+        return {
+            "State": self._state.sensor,
+            "Catalogue": self._catalogue.state,
+            "CameraSupply": OnOff.OFF if self._camera.off else OnOff.ON,
+            "Loop": OnOff(self._state.looping),
+            "TimeSet": int(self._state.clock.is_set),
+        }
+
+    def _time(self, uptime_us: int) -> Values:
+        day, millisecond = self._state.clock.at(uptime_us)
+        return {"JulianDay": day & _U32, "Millisecond": millisecond}
+
+    def _system_time(self) -> Values:
+        now_us = self._hardware.uptime_us()
+        return self._time(now_us) | {"Uptime": now_us // 1000 & _U32}
+
+    def _supply_status(self) -> Values:
+        return {
+            "Switch": OnOff.OFF if self._camera.off else OnOff.ON,
+            "Current": self._hardware.camera_current_ma(),
+        }
+
+    def _loop_status(self) -> Values:
+        return {
+            "Running": OnOff(self._state.looping),
+            "Period": self._state.settings.get("StartLoop", "Period"),
+            "Iterations": self._state.iterations & _U32,
+            "LateIterations": self._state.late & _U16,
+        }
+
+    # --- results ----------------------------------------------------------------------------------
+
+    def _quaternion(self) -> NDArray[np.float32]:
+        none = np.zeros(4, np.float32)
+        return none if self._state.quaternion is None else self._state.quaternion
+
+    def _attitude(self) -> Values:
+        latest = self._state.measurement
+        detected = 0 if latest.solution is None else len(latest.solution.measured)
+        return {
+            **{f"Q{index}": part for index, part in enumerate(self._quaternion())},
+            **self._time(latest.image_us),
+            "ImageUptime": latest.image_us // 1000 & _U32,
+            "FrameCounter": latest.frame & _U32,
+            "Outcome": latest.outcome,
+            "Reason": latest.reason,
+            "Mode": latest.mode,
+            "Valid": int(latest.valid),
+            "Matched": self._state.matched,
+            "Detected": detected,
+        }
+
+    def _body_attitude(self) -> Values:
+        latest, attitude = self._state.measurement, self._quaternion()
+        if self._state.quaternion is not None:
+            rotation = self._state.settings.all("SetBodyRotation")
+            parts = np.array([rotation[f"Q{index}"] for index in range(4)], np.float32)
+            attitude = body_quaternion(parts, attitude)
+            self._meter.charge(f32_mul=20, f32_add=15, f32_sqrt=1, f32_div=4)
+        return {
+            **{f"Q{index}": part for index, part in enumerate(attitude)},
+            **self._time(latest.image_us),
+            "Reason": latest.reason,
+            "Valid": int(latest.valid),
+        }
+
+    def _boresight(self) -> Values:
+        ascension = declination = 0.0
+        if self._state.quaternion is not None:
+            direction = dcm(self._state.quaternion, self._meter)[2]
+            ascension, declination = angles_of(direction, self._meter)
+        return {
+            "RightAscension": ascension,
+            "Declination": declination,
+            "Valid": int(self._state.measurement.valid),
+        }
+
+    def _detection_summary(self) -> Values:
+        latest = self._state.measurement
+        return {
+            "Detected": 0 if latest.solution is None else len(latest.solution.measured),
+            "Mean": latest.mean,
+            "Threshold": latest.threshold,
+            "Pictures": latest.pictures,
+        }
+
+    def _identification_summary(self) -> Values:
+        found = self._state.measurement.solution
+        if found is None:
+            return INTERFACE.telemetry("IdentificationSummary").reset_values()
+        return {
+            "Candidates": found.candidates,
+            "Pivots": found.pivots,
+            "Triples": found.triples,
+            "Expected": found.expected,
+            "Matched": int((found.stars >= 0).sum()),
+        }
+
+    def _star_details(self) -> Values:
+        found, database = self._state.measurement.solution, self._catalogue.database
+        if found is None or not len(found.measured):
+            return INTERFACE.telemetry("StarDetails").reset_values()
+        number = self._state.star % len(found.measured)
+        self._state.star = number + 1
+        star = int(found.stars[number])
+        known = database is not None and 0 <= star < len(database.numbers)
+        x, y = found.measured.centroids[number]
+        return {
+            "StarNumber": number,
+            "X": x,
+            "Y": y,
+            "Brightness": found.measured.brightness[number],
+            "Identified": int(known),
+            "Hipparcos": int(database.numbers[star]) if known and database is not None else 0,
+        }
+
+    # --- catalogue and camera ---------------------------------------------------------------------
+
+    def _catalogue_status(self) -> Values:
+        store = self._catalogue
+        database = store.database
+        return {
+            "State": store.state,
+            "Stars": 0 if database is None else len(database.numbers),
+            "Triangles": 0 if database is None else len(database),
+            "Bytes": store.length,
+            "FieldOfView": 0.0 if database is None else database.fov_deg,
+            "Epoch": 0.0 if database is None else database.epoch,
+            "Loads": store.loads & _U16,
+            "Failures": store.failures & _U16,
+            "Corrected": store.corrected,
+            "Lost": store.lost,
+            "CorrectedTotal": store.corrected_total & _U32,
+            "RamErrors": store.ram_errors & _U16,
+            "LoadTime": store.load_us / 1000,
+        }
+
+    def _upload_status(self) -> Values:
+        upload = self._commands.upload
+        return {
+            "Blocks": upload.blocks,
+            "BlocksReceived": upload.received,
+            "NextBlock": upload.missing,
+        }
+
+    def _camera_register(self) -> Values:
+        address, value = self._camera.selected_register
+        return {"Address": address, "Value": value or 0, "Valid": int(value is not None)}
