@@ -2,9 +2,10 @@
 
 AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
 the main triangle, the next three the pivots, and a unique triangle is believed. With verification
-(ours), an attitude must be confirmed by further stars; then any triangle that is left after the
-pivots is tried with both ways of telling its stars apart, and further triples of stars follow when
-none is confirmed. The confirmed attitude is solved again with all stars that confirm it.
+(ours), an attitude must be confirmed by further stars. Then every candidate is tried, with both
+ways of telling its stars apart; pivots, which a false star would spoil, only serve to leave few
+enough; and further triples of stars follow when none is confirmed. The confirmed attitude is solved
+again with all stars that confirm it.
 """
 
 from collections.abc import Iterator
@@ -147,6 +148,7 @@ class _Search:
             self.database,
             self.faces,
             self.meter,
+            self.profile.candidates if self.profile.verify else 1,
         )
 
     def _identities(

@@ -101,8 +101,9 @@ def match_triple(
     database: Database,
     faces: NDArray[np.bool_] | None,
     meter: Meter,
+    enough: int = 1,
 ) -> Match:
-    """Match the triangle of three stars, with pivots as long as several candidates are left.
+    """Match the triangle of three stars, with pivots as long as too many candidates are left.
 
     Args:
         vectors: (n, 3) unit vectors of the stars in camera axes.
@@ -112,6 +113,7 @@ def match_triple(
         database: where to look.
         faces: (f,) which faces count; None: all.
         meter: charged; phases `triangles`, `search` and `pivoting`.
+        enough: no pivot is needed when so few candidates are left; 1 as published.
     """
     with meter.phase("triangles"):
         triangle = measure_triangle(vectors[list(main)], sigma_rad, meter)
@@ -123,7 +125,7 @@ def match_triple(
         return Match(MatchEnd.NO_TRIANGLE, triangle, left, 0)
     used = 0
     for (first, second), star in zip(PIVOT_PAIRS, pivots, strict=False):
-        if len(left) == 1:
+        if len(left) <= enough:
             break
         used += 1
         with meter.phase("triangles"):

@@ -59,7 +59,8 @@ class Profile:
         largest_chance: an attitude is confirmed when chance would do it less often.
         triples: triples tried at most, with verification.
         triple_stars: triples are made of so many of the brightest stars, with verification.
-        candidates: with verification, so many candidates of a triple are tried at most.
+        candidates: with verification, so many candidates of a triple are tried at most, and pivots
+            only serve to leave no more.
         hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (ours).
     """
 
@@ -69,9 +70,9 @@ class Profile:
     tolerance_rad: float = 1.2e-3
     side_tolerance_rad: float = 5e-4
     largest_chance: float = 1e-4
-    triples: int = 60
+    triples: int = 120
     triple_stars: int = 10
-    candidates: int = 8
+    candidates: int = 40
     hint_tolerance_deg: float = 6.0
 
     def __post_init__(self) -> None:

@@ -1,0 +1,113 @@
+"""Identification rates over many random attitudes.
+
+Run from the checkout's top folder: ``python -m tests.firmware_model.aramis.campaign [POSES]``.
+"""
+
+import sys
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from cubestack.emulator.aramis_catalogue import CatalogueParameters
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.identification import identify
+from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
+from cubestack.firmware_model.aramis.solution import Outcome, Profile
+from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
+from cubestack.firmware_model.costs import Meter
+
+from .sky import Light, database, in_published_sense, is_right, misnamed, picture
+
+
+def rates(
+    poses: int,
+    profile: Profile,
+    field: Field | None = None,
+    light: Light | None = None,
+    hint_error_deg: float | None = None,
+    seed: int = 0,
+) -> dict[str, float]:
+    """Parts of so many poses: right, wrong, ambiguous, none; `far` are wrong in the thesis' sense.
+
+    `misnamed` counts stars a pose, `ms` is the mean time on the processor.
+    """
+    field, light, rng = field or Field(), light or Light(), np.random.default_rng(seed)
+    onboard = database(CatalogueParameters(fov_deg=field.fov_deg))
+    counts: Counter[str] = Counter()
+    cycles = 0
+    for _ in range(poses):
+        made = picture(rng, field, light)
+        hint = None if hint_error_deg is None else made.hint(hint_error_deg, rng)
+        meter = Meter(BLACKFIN_BF533)
+        solution = identify(made.stars, field, profile, onboard, meter, hint)
+        cycles += meter.total
+        if solution.outcome is not Outcome.CONCLUSIVE:
+            counts[solution.outcome.value] += 1
+            continue
+        counts["right" if is_right(solution, made.attitude) else "wrong"] += 1
+        counts["far"] += not in_published_sense(solution, made, onboard)
+        counts["misnamed"] += misnamed(solution, made, onboard)
+    names = ("right", "wrong", "ambiguous", "none", "far", "misnamed")
+    result = {name: counts[name] / poses for name in names}
+    return {**result, "ms": BLACKFIN_BF533.seconds(cycles) / poses * 1000}
+
+
+#: What the thesis' simulator may have been like: its window has 582 px where ours has 1024.
+COARSE = Light(noise_px=0.26 * 1024 / 582, mag_noise=0.3)
+
+CASES = {
+    "published": (PUBLISHED.profile, Field(), Light(), None),
+    "published, 2 deg hint": (PUBLISHED.profile, Field(), Light(), 2.0),
+    "published, noise as assumed": (PUBLISHED.profile, Field(), COARSE, None),
+    "published, noise as assumed, 2 deg hint": (PUBLISHED.profile, Field(), COARSE, 2.0),
+    "published, 1 px": (PUBLISHED.profile, Field(), replace(COARSE, noise_px=1.0), None),
+    "published, 1 px, 2 deg hint": (PUBLISHED.profile, Field(), replace(COARSE, noise_px=1.0), 2.0),
+    "published, 5 false stars": (PUBLISHED.profile, Field(), Light(false_stars=5), None),
+    "published, 18 deg": (PUBLISHED.profile, Field(fov_deg=18), Light(), None),
+    "verified": (VERIFIED.profile, Field(), Light(), None),
+    "verified, 5 false": (VERIFIED.profile, Field(), Light(false_stars=5), None),
+    "verified, 5 false, 2 deg hint": (VERIFIED.profile, Field(), Light(false_stars=5), 2.0),
+    "verified, 5 false to mag 3": (
+        VERIFIED.profile,
+        Field(),
+        Light(false_stars=5, false_mags=(3.0, 4.5)),
+        None,
+    ),
+    "verified, 5 false to mag 0": (
+        VERIFIED.profile,
+        Field(),
+        Light(false_stars=5, false_mags=(0.0, 3.0)),
+        None,
+    ),
+    "verified, 10 false": (VERIFIED.profile, Field(), Light(false_stars=10), None),
+    "verified, 18 deg, 5 false": (VERIFIED.profile, Field(fov_deg=18), Light(false_stars=5), None),
+    "verified, only to mag 5, 5 false": (
+        VERIFIED.profile,
+        Field(),
+        Light(mag_limit=5.0, false_stars=5),
+        None,
+    ),
+    "verified, 0.3 px, 5 false": (
+        VERIFIED.profile,
+        Field(),
+        Light(noise_px=0.3, false_stars=5),
+        None,
+    ),
+    "nothing but 20 false stars": (
+        VERIFIED.profile,
+        Field(),
+        Light(mag_limit=-2.0, false_stars=20, false_mags=(2.0, 6.0)),
+        None,
+    ),
+}
+
+
+def main(poses: int) -> None:
+    for name, (profile, field, light, hint) in CASES.items():
+        found = rates(poses, profile, field, light, hint)
+        print(f"{name:42}", *(f"{key} {value:.3f}" for key, value in found.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)

@@ -1,0 +1,134 @@
+"""Random pictures of the sky as lists of stars, and what an attitude found in them is worth."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.aramis_catalogue import CatalogueParameters, build_database
+from cubestack.emulator.sky.hipparcos import load_sky
+from cubestack.firmware_model.aramis.database import Database
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.solution import NONE, Solution, StarList
+
+Array = NDArray[np.float64]
+
+FALSE_STAR = 0
+"""Stands for the Hipparcos number of a star that does not exist."""
+
+
+@lru_cache(maxsize=4)
+def database(parameters: CatalogueParameters | None = None) -> Database:
+    """Built once in a test run."""
+    return build_database(parameters)
+
+
+@dataclass(frozen=True)
+class Light:
+    """What a picture has beside the field.
+
+    Attributes:
+        noise_px: standard deviation of a centroid in x and in y.
+        mag_noise: standard deviation of a magnitude.
+        mag_limit: fainter stars do not show.
+        false_stars: lights that are no stars, anywhere in the field.
+        false_mags: their magnitudes.
+        most: so many of the brightest are in the list.
+    """
+
+    noise_px: float = 0.1
+    mag_noise: float = 0.1
+    mag_limit: float = 6.0
+    false_stars: int = 0
+    false_mags: tuple[float, float] = (4.5, 6.0)
+    most: int = 30
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A list of stars and the truth about it: attitude, and Hipparcos number of each star."""
+
+    stars: StarList
+    attitude: Rotation
+    hip: NDArray[np.int32]
+
+    @property
+    def boresight(self) -> Array:
+        return np.asarray(self.attitude.inv().apply([0.0, 0.0, 1.0]))
+
+    def hint(self, error_deg: float, rng: np.random.Generator) -> NDArray[np.float32]:
+        """A direction that is so far from the boresight."""
+        boresight = self.boresight
+        aside = np.cross(boresight, rng.normal(size=3))
+        aside /= np.linalg.norm(aside)
+        angle = np.radians(error_deg)
+        return np.asarray(np.cos(angle) * boresight + np.sin(angle) * aside, dtype=np.float32)
+
+
+def project(directions: Array, field: Field) -> Array:
+    """Pixels (n, 2) of camera directions (n, 3) in front of the camera."""
+    tangents = directions[:, :2] / directions[:, 2:]
+    return np.asarray(tangents / field.scale + field.centre)
+
+
+def within(points: Array, field: Field) -> NDArray[np.bool_]:
+    x, y = (points - field.centre).T
+    if field.round:
+        return np.asarray(np.hypot(x * field.pitch_x_mm, y * field.pitch_y_mm) <= field.radius_mm)
+    return np.asarray((abs(x) <= field.columns / 2) & (abs(y) <= field.rows / 2))
+
+
+def picture(rng: np.random.Generator, field: Field, light: Light | None = None) -> Picture:
+    """The sky in a random attitude."""
+    light = light or Light()
+    sky = load_sky(mag_limit=light.mag_limit)
+    attitude = Rotation.random(random_state=rng)
+    camera = sky.vectors @ attitude.as_matrix().T
+    ahead = camera[:, 2] > field.smallest_cosine - 1e-6
+    points = project(camera[ahead], field)
+    seen = within(points, field)
+    points, magnitudes, hip = points[seen], sky.v_mag[ahead][seen], sky.hip[ahead][seen]
+    points = points + rng.normal(0, light.noise_px, points.shape)
+    magnitudes = magnitudes + rng.normal(0, light.mag_noise, len(magnitudes))
+    false = np.zeros((0, 2))
+    while len(false) < light.false_stars:
+        more = rng.uniform(0, 1, (light.false_stars, 2)) * (field.columns, field.rows)
+        false = np.concatenate([false, more[within(more, field)]])[: light.false_stars]
+    points = np.concatenate([points, false])
+    magnitudes = np.concatenate([magnitudes, rng.uniform(*light.false_mags, light.false_stars)])
+    hip = np.concatenate([hip, np.full(light.false_stars, FALSE_STAR)])
+    order = np.argsort(magnitudes)[: light.most]
+    brightness = 500 * 10 ** (-0.4 * (magnitudes[order] - 6))
+    stars = StarList(points[order].astype(np.float32), brightness.astype(np.float32))
+    return Picture(stars, attitude, hip[order].astype(np.int32))
+
+
+def errors_deg(quaternion: NDArray[np.float32], truth: Rotation) -> tuple[float, float]:
+    """Cross and roll error: between the boresights, and about them."""
+    turn = (Rotation.from_quat(quaternion.astype(np.float64)) * truth.inv()).as_matrix()
+    cross = np.degrees(np.arctan2(np.hypot(turn[2, 0], turn[2, 1]), turn[2, 2]))
+    roll = np.degrees(np.arctan2(turn[0, 1] - turn[1, 0], turn[0, 0] + turn[1, 1]))
+    return float(cross), float(abs(roll))
+
+
+def is_right(solution: Solution, truth: Rotation) -> bool:
+    assert solution.quaternion is not None
+    cross, roll = errors_deg(solution.quaternion, truth)
+    return cross < 0.1 and roll < 0.3
+
+
+def misnamed(solution: Solution, made: Picture, database: Database) -> int:
+    """Stars that were given another star's number."""
+    named = solution.stars != NONE
+    return int(np.sum(database.numbers[solution.stars[named]] != made.hip[named]))
+
+
+def in_published_sense(solution: Solution, made: Picture, database: Database) -> bool:
+    """The thesis' own criterion (appendix E): the triangle's middle is less than a field's diameter
+    from the boresight."""
+    stars = solution.stars[solution.stars != NONE][:3]
+    middle = database.vectors[stars].mean(axis=0).astype(np.float64)
+    cosine = middle @ made.boresight / np.linalg.norm(middle)
+    return bool(np.degrees(np.arccos(np.clip(cosine, -1, 1))) <= database.fov_deg)
