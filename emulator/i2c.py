@@ -7,7 +7,7 @@ transfers queue for the wire.
 """
 
 import errno
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -107,6 +107,19 @@ class I2cBus:
         self._targets[address] = target
         if general_call:
             self._general.listeners.append(target)
+
+    @property
+    def targets(self) -> Mapping[int, I2cTarget]:
+        """Who answers at which address."""
+        return self._targets
+
+    def move(self, address: int, new_address: int) -> None:
+        """Let the target at ``address`` answer at another one; both as for ``attach``."""
+        if address not in self._targets:
+            raise ValueError(f"no I2C device is at address {address:#04x}")
+        if address != new_address:
+            self.attach(new_address, self._targets[address])
+            del self._targets[address]
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         """Perform one transfer, behind those already under way.

@@ -19,6 +19,7 @@ DONE, FAILED, WRONG_CALL = 0, 1, 2
 COMMANDS = {
     "demo": "capture and solve a sky end to end, with pictures (what `make run` does)",
     "emulate": "serve an emulated device on serial ports until Ctrl-C",
+    "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude out: each frame's result beside the truth",
     "registers": "list a device's telecommands and telemetry",
     "catalogue": "compile the onboard star catalogue and say what is in it",

@@ -1,0 +1,90 @@
+"""The host's I2C adapter: puts transfers on the emulated bus and reports them as Linux does."""
+
+import errno
+from collections.abc import Callable, Generator
+from typing import Any
+
+import simpy
+
+from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.virtual_time import Kernel
+from cubestack.firmware_model.interface.linux_i2c import Function
+
+__all__ = ["FUNCTIONS", "I2cAdapter"]
+
+FUNCTIONS = (
+    Function.I2C
+    | Function.PEC
+    | Function.QUICK
+    | Function.READ_BYTE
+    | Function.WRITE_BYTE
+    | Function.READ_BYTE_DATA
+    | Function.WRITE_BYTE_DATA
+    | Function.READ_WORD_DATA
+    | Function.WRITE_WORD_DATA
+    | Function.PROCESS_CALL
+    | Function.READ_BLOCK_DATA
+    | Function.WRITE_BLOCK_DATA
+    | Function.BLOCK_PROCESS_CALL
+    | Function.READ_I2C_BLOCK
+    | Function.WRITE_I2C_BLOCK
+)
+"""All of plain I2C and SMBus; no 10-bit addresses, no messages without a start, no mangling."""
+
+
+class I2cAdapter:
+    """One master on a bus.
+
+    Attributes:
+        env: kernel.
+        transfers: transfers done since the start.
+    """
+
+    def __init__(
+        self,
+        env: Kernel,
+        bus: I2cBus,
+        *,
+        address_errno: int = errno.ENXIO,
+        data_errno: int = errno.EIO,
+    ) -> None:
+        """Become a master of ``bus``.
+
+        Args:
+            env: kernel of the bus.
+            bus: the bus.
+            address_errno: error of an address that nobody acknowledges; drivers differ.
+            data_errno: error of a byte that is not acknowledged; drivers differ.
+        """
+        self.env = env
+        self.transfers = 0
+        self._bus = bus
+        self._errors = {errno.ENXIO: address_errno, errno.EIO: data_errno}
+        self._pending = 0
+
+    @property
+    def busy(self) -> bool:
+        """Whether a transfer is under way or waits for the wire."""
+        return self._pending > 0
+
+    def submit(self, messages: list[I2cMessage], done: Callable[[int], None]) -> None:
+        """Start a transfer; ``done`` gets 0 at its end in virtual time, or a negative errno.
+
+        Read data lands in the messages.
+        """
+        self._pending += 1
+        self.env.process(self._perform(messages, done))
+
+    def _perform(
+        self, messages: list[I2cMessage], done: Callable[[int], None]
+    ) -> Generator[simpy.Event, Any, None]:
+        try:
+            yield from self._bus.transfer(messages)
+        except I2cNackError as error:
+            number = error.errno or errno.EIO
+            result = -self._errors.get(number, number)
+        else:
+            result = 0
+        self._pending -= 1
+        self.transfers += 1
+        done(result)

@@ -1,0 +1,181 @@
+"""Seccomp user notification: the calls of a filtered process, and what it gets back.
+
+linux/seccomp.h; needs Linux 5.9 for descriptors that are put into the process.
+"""
+
+import ctypes
+import errno
+import fcntl
+import os
+import struct
+from dataclasses import dataclass
+
+__all__ = ["Listener", "Notification", "read_memory", "read_text", "write_memory"]
+
+_RECEIVE = 0xC050_2100
+_SEND = 0xC018_2101
+_VALID = 0x4008_2102
+_ADD_DESCRIPTOR = 0x4018_2103
+
+_NOTIFICATION = struct.Struct("=QIIiIQ6Q")
+_RESPONSE = struct.Struct("=QqiI")
+_ADDITION = struct.Struct("=QIIII")
+_ID = struct.Struct("=Q")
+
+_CONTINUE = 1
+_AT_NUMBER = 1
+_AND_SEND = 2
+
+PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(frozen=True)
+class Notification:
+    """A call that waits.
+
+    Attributes:
+        id: for the answer.
+        pid: thread that called.
+        number: of the system call.
+        arguments: six of them.
+    """
+
+    id: int
+    pid: int
+    number: int
+    arguments: tuple[int, ...]
+
+
+class Listener:
+    """The supervisor's end of a filter.
+
+    Attributes:
+        fd: descriptor; readable while a call waits, hung up when all processes have ended.
+    """
+
+    def __init__(self, fd: int) -> None:
+        """Take over ``fd``."""
+        self.fd = fd
+        self._one_step = True
+
+    def receive(self) -> Notification | None:
+        """The next call; waits for one. None when its process was killed meanwhile."""
+        buffer = bytearray(_NOTIFICATION.size)
+        try:
+            fcntl.ioctl(self.fd, _RECEIVE, buffer, True)
+        except OSError as error:
+            if error.errno in (errno.ENOENT, errno.EINTR):
+                return None
+            raise
+        identifier, pid, _, number, _, _, *arguments = _NOTIFICATION.unpack(buffer)
+        return Notification(identifier, pid, number, tuple(arguments))
+
+    def waits(self, call: Notification) -> bool:
+        """Whether the caller still waits, so that its number names nobody else."""
+        try:
+            fcntl.ioctl(self.fd, _VALID, _ID.pack(call.id))
+        except OSError:
+            return False
+        return True
+
+    def let_pass(self, call: Notification) -> None:
+        """Let the kernel do the call as if there were no filter."""
+        self._send(_RESPONSE.pack(call.id, 0, 0, _CONTINUE))
+
+    def answer(self, call: Notification, result: int) -> None:
+        """End the call with ``result``: 0 or more, or a negative errno."""
+        self._send(_RESPONSE.pack(call.id, max(0, result), min(0, result), 0))
+
+    def answer_with_descriptor(
+        self, call: Notification, fd: int, number: int, *, close_on_exec: bool
+    ) -> None:
+        """Put a copy of ``fd`` into the process as ``number``, and let the call return that."""
+        flags = os.O_CLOEXEC if close_on_exec else 0
+        if self._one_step:
+            wanted = _ADDITION.pack(call.id, _AT_NUMBER | _AND_SEND, fd, number, flags)
+            try:
+                fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, wanted)
+                return
+            except OSError as error:
+                if error.errno == errno.ENOENT:
+                    return
+                if error.errno != errno.EINVAL:
+                    self.answer(call, -(error.errno or errno.EIO))
+                    return
+                self._one_step = False  # before Linux 5.14
+        wanted = _ADDITION.pack(call.id, _AT_NUMBER, fd, number, flags)
+        try:
+            fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, wanted)
+        except OSError as error:
+            self.answer(call, -(error.errno or errno.EIO))
+            return
+        self.answer(call, number)
+
+    def _send(self, response: bytes) -> None:
+        try:
+            fcntl.ioctl(self.fd, _SEND, response)
+        except OSError as error:
+            if error.errno != errno.ENOENT:  # killed meanwhile
+                raise
+
+
+class _Part(ctypes.Structure):
+    _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
+
+
+_libc = ctypes.CDLL(None, use_errno=True)
+_types = (
+    ctypes.c_int,
+    ctypes.POINTER(_Part),
+    ctypes.c_ulong,
+    ctypes.POINTER(_Part),
+    ctypes.c_ulong,
+    ctypes.c_ulong,
+)
+_readv, _writev = _libc.process_vm_readv, _libc.process_vm_writev
+for _function in (_readv, _writev):
+    _function.argtypes = _types
+    _function.restype = ctypes.c_ssize_t
+
+
+def read_memory(pid: int, address: int, count: int) -> bytes:
+    """``count`` bytes of a process; raises OSError, EFAULT where it has no memory."""
+    buffer = ctypes.create_string_buffer(count)
+    done = _move(_readv, pid, ctypes.addressof(buffer), address, count)
+    if done != count:
+        raise OSError(errno.EFAULT, f"process {pid} has no {count} bytes at {address:#x}")
+    return buffer.raw
+
+
+def write_memory(pid: int, address: int, data: bytes) -> None:
+    """Put ``data`` into a process; raises OSError, EFAULT where it can not be written."""
+    buffer = ctypes.create_string_buffer(data, len(data))
+    done = _move(_writev, pid, ctypes.addressof(buffer), address, len(data))
+    if done != len(data):
+        raise OSError(errno.EFAULT, f"process {pid} has no {len(data)} bytes at {address:#x}")
+
+
+def read_text(pid: int, address: int, limit: int) -> bytes:
+    """The bytes before the next zero byte, at most ``limit``; raises OSError."""
+    text = b""
+    while len(text) < limit:
+        rest_of_page = PAGE_BYTES - address % PAGE_BYTES
+        count = min(rest_of_page, 256, limit - len(text))
+        part = read_memory(pid, address, count)
+        end = part.find(0)
+        if end >= 0:
+            return text + part[:end]
+        text += part
+        address += count
+    return text
+
+
+def _move(function: object, pid: int, local: int, remote: int, count: int) -> int:
+    if not count:
+        return 0
+    here, there = _Part(local, count), _Part(remote, count)
+    done = int(function(pid, here, 1, there, 1, 0))  # type: ignore[operator]
+    if done < 0:
+        number = ctypes.get_errno()
+        raise OSError(number, f"can not reach process {pid}: {os.strerror(number)}")
+    return done

@@ -1,0 +1,125 @@
+"""Starts a program that sees the emulated /dev/i2c-N, by one of two routes.
+
+seccomp  the kernel sends the program's calls to a supervisor in this process: any program, also one
+         that is linked statically, and no compiler. Needs Linux 5.9, and leave to filter.
+preload  a library in the program takes the calls: programs that are linked dynamically with glibc.
+         Needs a C compiler, once; it works where a container refuses the other.
+"""
+
+import os
+import select
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+from cubestack.emulator.i2c_host.device_node import DeviceNode
+from cubestack.emulator.i2c_host.filter import make_filter, native_abi
+from cubestack.emulator.i2c_host.notify import Listener
+from cubestack.emulator.i2c_host.supervisor import Files, Supervisor, descriptor_range
+
+__all__ = ["Program", "Route", "RouteError", "bus_environment", "start_filtered", "start_preloaded"]
+
+Route = Literal["seccomp", "preload"]
+
+LAUNCHER = Path(__file__).with_name("launcher.py")
+MESSAGE_BYTES = 4096
+SIGNALLED = 128
+"""Exit code of a program that a signal ended, less the signal: as shells have it."""
+
+
+class RouteError(RuntimeError):
+    """A route is not there on this machine; the text says why."""
+
+
+def bus_environment(bus: int, path: str) -> dict[str, str]:
+    """What a program finds in its environment: the bus, and the socket that serves it."""
+    return {"CUBESTACK_I2C_BUS": str(bus), "CUBESTACK_I2C_SOCKET": path}
+
+
+class Program:
+    """A running program; as a port of the pump it wakes it when the program ends.
+
+    Attributes:
+        name: what was started.
+    """
+
+    congested = False
+
+    def __init__(self, process: "subprocess.Popen[bytes]", name: str) -> None:
+        """Watch ``process``."""
+        self.name = name
+        self._process = process
+        self._pidfd = os.pidfd_open(process.pid)
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended."""
+        return self._process.poll() is not None
+
+    @property
+    def exit_code(self) -> int:
+        """Its exit code as a shell would give it; waits for the end."""
+        code = self._process.wait()
+        return code if code >= 0 else SIGNALLED - code
+
+    def send(self, number: int) -> None:
+        """Send it a signal, if it still runs."""
+        self._process.send_signal(number)
+
+    def watched(self) -> list[tuple[int, int]]:
+        """See Endpoint."""
+        return [] if self.ended else [(self._pidfd, select.POLLIN)]
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+
+    def release_ps(self, count: int) -> int | None:
+        """See Endpoint."""
+        return None
+
+    def close(self) -> None:
+        """See Endpoint."""
+        os.close(self._pidfd)
+
+
+def start_filtered(
+    command: Sequence[str], environment: dict[str, str], node: DeviceNode, files: Files
+) -> tuple[Program, Supervisor]:
+    """Start ``command`` under a supervisor, which must be served from now on.
+
+    Raises RouteError when the kernel, or whoever runs this container, does not allow it.
+    """
+    abi = native_abi()
+    if abi is None:
+        raise RouteError(f"no table of system calls for {os.uname().machine}")
+    numbers = descriptor_range()
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, theirs:
+        theirs.set_inheritable(True)
+        launch = [sys.executable, "-I", "-S", str(LAUNCHER), str(theirs.fileno())]
+        process = subprocess.Popen(
+            [*launch, str(abi.seccomp), *command],
+            env=os.environ | environment,
+            close_fds=False,  # what was handed to us is for the program
+        )
+        theirs.close()
+        ours.send(make_filter(abi, numbers))
+        answer, descriptors, _, _ = socket.recv_fds(ours, MESSAGE_BYTES, 1)
+    if not descriptors:
+        process.wait()
+        raise RouteError(answer[1:].decode() or "the launcher failed")
+    supervisor = Supervisor(Listener(descriptors[0]), abi, node, numbers, files)
+    return Program(process, command[0]), supervisor
+
+
+def start_preloaded(command: Sequence[str], environment: dict[str, str], library: Path) -> Program:
+    """Start ``command`` with the shim ``library``; the socket that it will use must be served."""
+    others = os.environ.get("LD_PRELOAD")
+    preload = f"{library} {others}" if others else str(library)
+    process = subprocess.Popen(
+        command, env=os.environ | environment | {"LD_PRELOAD": preload}, close_fds=False
+    )
+    return Program(process, command[0])

@@ -1,0 +1,135 @@
+"""The bus of an emulation in another process, through its socket, for a supervisor here."""
+
+import errno
+import select
+import socket
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+from cubestack.emulator.ports.serial_port import PortError
+from cubestack.firmware_model.interface.linux_i2c import LENGTH, Call, reply, request
+
+__all__ = ["RemoteBus"]
+
+CHUNK_BYTES = 1 << 16
+Done = Callable[[bytes], None]
+
+
+class RemoteBus:
+    """A port of the pump, as in ``emulator/ports/endpoint.py``.
+
+    Attributes:
+        name: path of the socket.
+    """
+
+    congested = False
+
+    def __init__(self, path: Path) -> None:
+        """Use the socket at ``path``; raises PortError when nobody serves it."""
+        self.name = str(path)
+        self._files: list[_RemoteFile] = []
+        self._connect().close()
+
+    def open(self) -> "_RemoteFile":
+        """Open a device file; raises PortError."""
+        file = _RemoteFile(self._connect())
+        self._files.append(file)
+        return file
+
+    def _connect(self) -> socket.socket:
+        link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            link.connect(self.name)
+        except OSError as error:
+            link.close()
+            raise PortError(
+                errno.ENODEV, f"no emulation serves {self.name} ({error.strerror})"
+            ) from error
+        link.setblocking(False)
+        return link
+
+    def watched(self) -> list[tuple[int, int]]:
+        """See Endpoint."""
+        return [file.watched() for file in self._files]
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+        self._files = [file for file in self._files if not file.gone]
+        for file in self._files:
+            file.exchange()
+
+    def release_ps(self, count: int) -> int | None:
+        """See Endpoint."""
+        return None
+
+    def close(self) -> None:
+        """See Endpoint."""
+        for file in self._files:
+            file.close()
+
+
+class _RemoteFile:
+    """One connection: the other side keeps the file's state."""
+
+    def __init__(self, link: socket.socket) -> None:
+        self._link = link
+        self._due: deque[Done] = deque()
+        self._received = bytearray()
+        self._unsent = bytearray()
+        self.gone = False
+
+    def perform(self, call: Call, body: bytes, done: Done) -> None:
+        """See OpenFile; EIO when the emulation has gone."""
+        if self.gone:
+            done(reply(-errno.EIO))
+            return
+        data = request(0, call, body)
+        self._due.append(done)
+        self._unsent += LENGTH.pack(len(data)) + data
+        self._send()
+
+    def close(self) -> None:
+        """See OpenFile."""
+        self.gone = True
+        self._link.close()
+        while self._due:
+            self._due.popleft()(reply(-errno.EIO))
+
+    def watched(self) -> tuple[int, int]:
+        return self._link.fileno(), select.POLLIN | (select.POLLOUT if self._unsent else 0)
+
+    def exchange(self) -> None:
+        self._send()
+        while not self.gone:
+            try:
+                data = self._link.recv(CHUNK_BYTES)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            self._received += data
+            while (answer := self._take_answer()) is not None and self._due:
+                self._due.popleft()(answer)
+            if not data:
+                self.close()
+
+    def _take_answer(self) -> bytes | None:
+        if len(self._received) < LENGTH.size:
+            return None
+        (length,) = LENGTH.unpack_from(self._received)
+        end = LENGTH.size + length
+        if len(self._received) < end:
+            return None
+        answer = bytes(self._received[LENGTH.size : end])
+        del self._received[:end]
+        return answer
+
+    def _send(self) -> None:
+        try:
+            while self._unsent and not self.gone:
+                del self._unsent[: self._link.send(self._unsent)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.close()

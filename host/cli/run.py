@@ -1,0 +1,169 @@
+"""Run an unmodified program that sees an emulated I2C bus as /dev/i2c-N.
+
+No privileges and no kernel module: the program's calls on that one file are
+taken by seccomp user notification, or by a library that is loaded into it.
+The program's exit code is passed on.
+
+examples:
+  cubestack run -- i2cdetect -y 7
+  cubestack run -- i2cget -y 7 0x1a 0x83
+  cubestack run --bus 1 --pace fast -- python3 flight_software.py
+  cubestack run --device cubestar --device cubesense --hz 400000 -- ./program
+  cubestack run --attach -- i2cdump -y 7 0x1a      on the bus of `emulate --i2c 7`
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import shutil
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cubestack.firmware_model.interface.linux_i2c import socket_path
+from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.boards import DEVICES, open_board
+from cubestack.host.cli.session import add_engine_arguments
+from cubestack.host.cli.terminal import say
+
+if TYPE_CHECKING:
+    from cubestack.emulator.i2c_host.running import HostBus
+
+__all__ = ["add_arguments", "run"]
+
+DEFAULT_BUS = 7
+STANDARD_HZ = 100_000
+BOOT_LIMIT_PS = 10**12
+"""Virtual time within which the devices have started; the program starts after them."""
+
+NACK_ERRORS = ("ENXIO", "EREMOTEIO", "EIO", "ETIMEDOUT")
+"""What Linux's drivers report, each its own, when nobody acknowledges an address."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--bus", type=whole(0, 255), default=DEFAULT_BUS, metavar="N", help="/dev/i2c-N (default 7)"
+    )
+    parser.add_argument(
+        "--attach",
+        nargs="?",
+        const="",
+        metavar="SOCKET",
+        help="the bus of a running emulation (default: the one that serves bus N)",
+    )
+    parser.add_argument(
+        "--device",
+        action="append",
+        choices=DEVICES,
+        help="a device on the bus; may be given again (default cubestar)",
+    )
+    parser.add_argument(
+        "--i2c-addr",
+        action="append",
+        type=_move,
+        default=[],
+        metavar="OLD=NEW",
+        help="what answers at OLD answers at NEW, as in 0x1a=0x2a",
+    )
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
+    )
+    parser.add_argument(
+        "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
+    )
+    add_engine_arguments(parser)
+    parser.add_argument(
+        "--hz", type=whole(1), default=STANDARD_HZ, help="bits a second (default 100000)"
+    )
+    parser.add_argument(
+        "--pace",
+        choices=("real", "fast"),
+        default="real",
+        help="real: a transfer takes its time on the wire; fast: as little as it can",
+    )
+    parser.add_argument(
+        "--nack-errno",
+        choices=NACK_ERRORS,
+        default="ENXIO",
+        help="error when nobody acknowledges an address (default ENXIO)",
+    )
+    parser.add_argument(
+        "--route",
+        choices=("seccomp", "preload"),
+        help="how calls are taken (default: seccomp where the kernel allows it)",
+    )
+    parser.add_argument("--quiet", action="store_true", help="say nothing about bus and route")
+    parser.add_argument("program", nargs="+", metavar="PROGRAM", help="after --, with arguments")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the program; returns its exit code."""
+    from cubestack.emulator.i2c_host.program import RouteError
+    from cubestack.emulator.i2c_host.running import attached_bus, run_program
+
+    if shutil.which(args.program[0]) is None:
+        raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")
+    with ExitStack() as stack:
+        if args.attach is None:
+            bus = _emulated(args, stack)
+        else:
+            bus = attached_bus(Path(args.attach) if args.attach else socket_path(args.bus))
+            stack.callback(bus.port.close)
+        try:
+            return run_program(
+                args.program,
+                args.bus,
+                bus,
+                pace=args.pace,
+                route=args.route,
+                say=(lambda _text: None) if args.quiet else say,
+            )
+        except RouteError as error:
+            raise OSError(str(error)) from None
+
+
+def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
+    """Power up the devices on one bus."""
+    from cubestack.emulator.i2c_host.adapter import I2cAdapter
+    from cubestack.emulator.i2c_host.joined import JoinedKernel, join_buses
+    from cubestack.emulator.i2c_host.running import emulated_bus
+    from cubestack.emulator.virtual_time import PS_PER_S
+
+    names = args.device or ["cubestar"]
+    if args.scene is not None and len(names) > 1:
+        raise ValueError("--scene is of one device; several devices have their own scenes")
+    boards = []
+    for name in names:
+        opened = open_board(name, args.scene, seed=args.seed, engine=args.engine, baud=None)
+        stack.callback(opened.board.close)
+        boards.append(opened.board)
+    first = boards[0]
+    bus = first.i2c_bus
+    bus.bit_ps = PS_PER_S // args.hz
+    join_buses(*((board.kernel, board.i2c_bus) for board in boards))
+    for old, new in args.i2c_addr:
+        bus.move(old, new)
+    kernel = JoinedKernel([board.kernel for board in boards]) if boards[1:] else first.kernel
+
+    def busy() -> bool:
+        return any(board.busy() for board in boards)
+
+    while busy() and kernel.now < BOOT_LIMIT_PS:
+        kernel.step()
+    adapter = I2cAdapter(first.kernel, bus, address_errno=int(getattr(errno, args.nack_errno)))
+    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
+    host_bus = emulated_bus(kernel, busy, adapter, Path(folder) / f"i2c-{args.bus}")
+    stack.callback(host_bus.port.close)
+    return host_bus
+
+
+def _move(text: str) -> tuple[int, int]:
+    """Type of a pair of I2C addresses."""
+    try:
+        old, new = (int(part, 0) for part in text.split("="))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not OLD=NEW, as in 0x1a=0x2a") from None
+    return old, new
