@@ -9,6 +9,7 @@ examples:
 
 import argparse
 
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.registers import FORMATS, render
@@ -16,7 +17,7 @@ from cubestack.host.registers import FORMATS, render
 __all__ = ["add_arguments", "run"]
 
 #: Interface of each device, by the name that the command line uses.
-INTERFACES = {interface.name.lower(): interface for interface in (CUBESTAR, CUBESENSE)}
+INTERFACES = {interface.name.lower(): interface for interface in (CUBESTAR, CUBESENSE, ARAMIS)}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

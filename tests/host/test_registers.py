@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.message import Interface
@@ -14,7 +15,7 @@ from cubestack.host.cli.main import main
 from cubestack.host.registers import FORMATS, render
 
 DOCUMENTS = Path(__file__).parents[2] / "docs"
-DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE], ids=lambda i: i.name)
+DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 PROGRAM = """
