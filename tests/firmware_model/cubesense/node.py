@@ -60,7 +60,7 @@ class Node:
         self.opened: list[Sram] = []
         self.read = self.skipped = 0
         self.outcome = CaptureResult.STORED_OWN_SRAM
-        self.on_request: Callable[[Request], None] = lambda _request: None
+        self.on_request: Callable[[Request], object] = lambda _request: None
         self.now_us = 0
         self.sent = {port: bytearray() for port in Port}
         self.backlog = dict.fromkeys(Port, 0)

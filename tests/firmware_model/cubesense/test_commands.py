@@ -289,13 +289,15 @@ def test_telecommands_are_executed_in_order(bench: Bench) -> None:
     assert bench.telemetry("Configuration")["Threshold1"] == 4
 
 
-def test_a_reset_drops_what_waits_and_is_not_processed_before(bench: Bench) -> None:
+@pytest.mark.parametrize("more", [False, True])
+def test_a_reset_drops_what_waits_and_is_not_processed_before(bench: Bench, more: bool) -> None:
     bench.send("Reset", Target=ResetTarget.MCU)
     seen: list[tuple[int, int]] = []
     bench.on_request = lambda _request: seen.append(
         (len(bench.resets), bench.telemetry("TcmdProcessed")["Processed"])
     )
-    bench.send("DetectionThreshold1", Threshold=9)
+    if more:
+        bench.send("DetectionThreshold1", Threshold=9)
     bench.run()
     assert set(seen) == {(0, 0), (1, 1)}
     assert bench.telemetry("Configuration")["Threshold1"] == 225

@@ -91,23 +91,33 @@ def test_no_frame_is_ready_from_the_request_on(node: Node) -> None:
     assert ready(node) == 0
 
 
-def test_a_request_that_was_overtaken_is_never_ready(node: Node) -> None:
-    """Neither while it waits, nor while it is being prepared."""
+def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Node) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
-    node.send("NextImageFrame", Frame=7)
-    node.send("NextImageFrame", Frame=9)
+    node.send("NextImageFrame", Frame=12)
+    node.send("NextImageFrame", Frame=14)
+    node.run()
+    assert shown(node, 14) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[14]
+    assert node.read == 80
+    assert node.telemetry("TcmdProcessed")["Processed"] == 1
+
+
+def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Node) -> None:
+    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.send("NextImageFrame", Frame=14)
     seen = set()
-    late = iter([8])
+    late = iter([12])
 
     def look(_request: Request) -> None:
         seen.add(ready(node))
-        for number in late:
-            node.send("NextImageFrame", Frame=number)
+        if node.read > 40:
+            for number in late:
+                node.send("NextImageFrame", Frame=number)
 
     node.on_request = look
     node.run()
-    assert seen <= {EMPTY_FRAME, 8}
-    assert shown(node, 8) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[8]
+    assert node.read == 160
+    assert seen <= {EMPTY_FRAME, 12}
+    assert shown(node, 12) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[12]
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile"])

@@ -79,10 +79,10 @@ def test_some_lenses(factors: Sequence[float], expected: bool) -> None:
 
 
 def test_a_dip_between_the_tried_radii_is_found() -> None:
-    """The slope is (r / 80 - 1)^2 + s: falling nowhere but around 80 px."""
+    """The slope is 0.002 (r - 20)^2 + least, so it is least at 20 px."""
     for least, expected in ((0.2, True), (-0.05, False)):
-        factors = (0, 1 + least, -1 / 80, 1 / 80**2 / 3, 0)
-        assert invertible(factors, Meter(PIC18F45K20)) is expected
+        factors = (0, 0.8 + least, -0.04, 0.002 / 3, 0)
+        assert invertible(factors, Meter(PIC18F45K20)) is tables_exist(factors) is expected
 
 
 def test_it_is_quick() -> None:

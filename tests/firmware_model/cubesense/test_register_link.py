@@ -240,9 +240,9 @@ def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Nod
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
     assert node.registers.i2c_read() is None
-    node.on_request = lambda _request: node.write_register(0x12, 1) and node.write_register(IMAGE)
+    moves = iter([(0x12, 1), (IMAGE,)])
+    node.on_request = lambda _request: [node.write_register(*data) for data in moves]
     node.run()
-    node.on_request = lambda _request: None
     assert node.read_register(70) == node.pictures[1, :70].tobytes()
 
 
