@@ -7,9 +7,12 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.camera.optics import Optics
+from cubestack.emulator.sky.earth_sun import EarthSunScene
+from cubestack.emulator.sky.earth_sun_file import load_earth_sun_scene
 from cubestack.emulator.sky.scene import SceneError, SkyScene, load_scene
 
 BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
+EARTH = 'kind = "earth-sun"\n'
 LINK = re.compile(r"\]\(([^)#:]+)\)")
 
 
@@ -22,8 +25,9 @@ def allowed_keys(tmp_path: Path, scene: str) -> set[str]:
     """Keys that a reader of scenes names when it meets one that it does not know."""
     path = tmp_path / "scene.toml"
     path.write_text(scene, encoding="utf-8")
+    load = load_earth_sun_scene if "earth-sun" in scene else load_scene
     with pytest.raises(SceneError, match="unknown key 'colour'; allowed are") as raised:
-        load_scene(path)
+        load(path)
     return set(str(raised.value).split("allowed are ")[1].split(", "))
 
 
@@ -34,6 +38,9 @@ def allowed_keys(tmp_path: Path, scene: str) -> set[str]:
         ("Keys of `poses`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[[poses]]\ncolour = 1'),
         ("Keys of `optics`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[optics]\ncolour = 1'),
         ('Keys of `kind = "picture"`', 'kind = "picture"\ncolour = 1'),
+        ('Keys of `kind = "earth-sun"`', 'kind = "earth-sun"\ncolour = 1'),
+        ("Keys of `nadir_camera` and `sun_camera`", f"{EARTH}[nadir_camera]\ncolour = 1"),
+        ("Keys of `reflections`", f"{EARTH}[[reflections]]\ncolour = 1"),
     ],
 )
 def test_every_key_of_a_scene_is_documented(
@@ -50,6 +57,7 @@ def test_every_key_of_a_scene_is_documented(
     [
         ("Keys of `optics`", Optics()),
         ('Keys of `kind = "sky"`', SkyScene.pointing(0, 0)),
+        ('Keys of `kind = "earth-sun"`', EarthSunScene()),
     ],
 )
 def test_defaults_are_those_of_the_code(root: Path, heading: str, defaults: object) -> None:
@@ -68,12 +76,14 @@ def test_defaults_are_those_of_the_code(root: Path, heading: str, defaults: obje
 
 
 def test_examples_of_scenes_load(root: Path, tmp_path: Path) -> None:
-    sky, picture = BLOCK.findall((root / "docs" / "scenes.md").read_text(encoding="utf-8"))
+    sky, picture, earth = BLOCK.findall((root / "docs" / "scenes.md").read_text(encoding="utf-8"))
     path = tmp_path / "scene.toml"
     path.write_text(sky, encoding="utf-8")
     scene = load_scene(path)
     assert isinstance(scene, SkyScene)
     assert len(scene.poses) == 1
+    path.write_text(earth, encoding="utf-8")
+    assert len(load_earth_sun_scene(path).reflections) == 1
     assert tomllib.loads(picture)["kind"] == "picture"
     path.write_text(picture, encoding="utf-8")
     with pytest.raises(SceneError, match=r"night\.jpg"):  # read, but there is no such file here
