@@ -366,15 +366,16 @@ private:
                 continue;
             for (int n = 0; n < CAMERA_COUNT; n++)
                 if (running >> n & 1)
-                    with(n, [&](auto constant) { come_back<constant()>(time); });
+                    with(n, [&](auto constant) { come_back<constant()>(time, n > camera); });
             return outcome;
         }
     }
 
-    // Takes back what was skipped beyond `now`: the pins may change before that.
-    template <int N> void come_back(int64_t now) {
+    // Takes back what was skipped beyond `now`: the pins may change before that. An edge at this
+    // very instant may be `still_to_come`.
+    template <int N> void come_back(int64_t now, bool still_to_come) {
         Stream &stream = streams[N];
-        const int64_t next = stream.edge_after(now);
+        const int64_t next = stream.edge_after(now - still_to_come);
         if (stream.edge <= next)
             return;
         stream.go_to(next);

@@ -155,7 +155,7 @@ class SimulatedEngine(SteppingEngine):
                 outcome = Outcome.SEGMENT_OVER
             if outcome is not Outcome.TIME_REACHED:
                 for number in cameras:
-                    self._come_back(self._streams[number], time_ps)
+                    self._come_back(self._streams[number], time_ps, number > camera)
                 return time_ps, outcome, camera
 
     def _acknowledges(self) -> list[int]:
@@ -179,10 +179,13 @@ class SimulatedEngine(SteppingEngine):
             last = min(loaded.low_until(stream.edge // 2) - 1, in_reach)
             stream.edge = max(stream.edge, 2 * last + 1)
 
-    def _come_back(self, stream: _Stream, now_ps: int) -> None:
-        """Take back what was skipped beyond ``now_ps``: the pins may change before that."""
+    def _come_back(self, stream: _Stream, now_ps: int, still_to_come: bool) -> None:
+        """Take back what was skipped beyond ``now_ps``: the pins may change before that.
+
+        An edge at this very instant may be ``still_to_come``.
+        """
         assert stream.loaded is not None
-        edge = stream.loaded.first_edge(now_ps + 1)
+        edge = stream.loaded.first_edge(now_ps if still_to_come else now_ps + 1)
         if stream.edge > edge:
             stream.edge = edge
             self._drive(now_ps, stream.pins.clock, edge % 2)

@@ -7,14 +7,15 @@ import numpy as np
 
 from cubestack.emulator.rtl.engine import RtlEngine, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.sram import SramTiming
 
 Step = Callable[[RtlEngine], object]
 
 
-def engines(wiring: Wiring) -> list[RtlEngine]:
+def engines(wiring: Wiring, timing: SramTiming | None = None) -> list[RtlEngine]:
     """One of each sort; the last is the reference."""
     return [
-        make_engine(wiring, kind, skipping=skipping)
+        make_engine(wiring, kind, timing, skipping=skipping)
         for kind, skipping in (
             ("compiled", True),
             ("compiled", False),
