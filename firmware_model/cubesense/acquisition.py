@@ -71,8 +71,8 @@ class Acquisition:
         self._mcu_addressing = hardware.mcu_addressing
         self._meter = meter
         self._supply = supply
-        self._buffer = np.zeros(CHUNK, np.uint8)
         self._window = np.zeros(window_bytes(), np.uint8)
+        self._buffer = self._window[:CHUNK]  # one place: never in use at the same time
         self._strobe_cycles = meter.table.operations["strobe_byte"].cycles
         self._scan_cycles = meter.table.operations["scan_byte"].cycles
         self._open: Sram | None = None
@@ -81,7 +81,7 @@ class Acquisition:
 
     @property
     def buffers(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """For scanned pixels, which a search may use meanwhile, and for the Sun window."""
+        """For scanned pixels (64,), and for the Sun window (229,), of which they are a part."""
         return self._buffer, self._window
 
     def can_address(self, camera: Camera, sram: Sram) -> bool:

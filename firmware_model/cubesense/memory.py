@@ -2,7 +2,8 @@
 
 CubeSense thesis, appendix A.7 (1536 bytes of RAM, 32 kB of flash) and section 6.2 (pages of 256
 bytes, constant tables in flash). Sizes are derived from the constants that the program uses.
-Program code is not modelled, so flash must leave room for it.
+Program code is not modelled, so flash must leave room for it. The Earth and the Sun are never
+looked for at the same time, so their buffers share their places.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 from cubestack.firmware_model.cubesense.distortion import TABLE_ENTRIES
 from cubestack.firmware_model.cubesense.edges import MAX_EDGES
 from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
+from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense_codes import FRAME_BYTES, MASK_AREAS, Camera
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense_telecommands import (
@@ -20,7 +22,7 @@ from cubestack.firmware_model.interface.cubesense_telecommands import (
     TELECOMMANDS,
 )
 
-__all__ = ["CAPACITY", "COMMAND_QUEUE", "Buffer", "Memory", "budget", "used"]
+__all__ = ["CAPACITY", "COMMAND_QUEUE", "Buffer", "Memory", "budget", "report", "used"]
 
 COMMAND_QUEUE = 4
 """Telecommands that wait, as the node protocol's hosts expect."""
@@ -30,8 +32,8 @@ INT, FLOAT = 2, 4
 STACK_BYTES = 256
 """Software stack, one page: assumed, as C18 sets it up."""
 
-STATE_BYTES = 96
-"""Results, settings, counters, flags and task state: assumed."""
+TASK_BYTES = 32
+"""What the links and the main loop remember between two bytes or two steps: assumed."""
 
 
 class Memory(Enum):
@@ -47,45 +49,96 @@ CAPACITY = {Memory.RAM: 1536, Memory.FLASH: 32 * 1024}
 
 @dataclass(frozen=True)
 class Buffer:
-    """One buffer: its name, where it lies, its size in bytes."""
+    """One buffer.
+
+    Attributes:
+        name: what it holds.
+        memory: where it lies.
+        size: in bytes.
+        inside: name of the buffer whose place it shares; empty when it has its own.
+    """
 
     name: str
     memory: Memory
     size: int
+    inside: str = ""
+
+
+_WINDOW, _SUMS = "Sun window", "sums of the window's columns and of a row"
 
 
 def budget() -> tuple[Buffer, ...]:
     """Every buffer of the program."""
+    # Here, because both links need COMMAND_QUEUE first.
+    from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
+    from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
+
     longest = 1 + max(message.length for message in TELECOMMANDS)
+    answers = (message.length for message in INTERFACE.telemetries if message.name != "ImageFrame")
     ram = {
-        "scanned pixels": FULL_SIZE.scan_step,
+        _WINDOW: window_bytes(),
+        _SUMS: (FULL_SIZE.window + 1) * (FLOAT + INT),
         "samples of the row above": len(FULL_SIZE.scan_columns),
         "edges": MAX_EDGES * 2 * INT,
-        "edges, undistorted": MAX_EDGES * 2 * INT,
-        "normal equations, their inverse, right side": (9 + 9 + 3) * FLOAT,
-        "Sun window": window_bytes(),
-        "sums of the window's columns and of a row": (FULL_SIZE.window + 1) * (FLOAT + INT),
         "telecommands, waiting and being received": (COMMAND_QUEUE + 1) * longest,
-        "image frame, also the answer being sent": FRAME_BYTES,
+        "image frame": FRAME_BYTES,
+        "answer being sent, except an image frame": max(answers),
+        "picture for the image register, ahead of the host": READ_AHEAD_BYTES,
+        "picture and letters of the bench protocol": CHUNK_BYTES + LETTERS,
         "masks": len(Camera) * MASK_AREAS * 4 * INT,
-        "results, settings, counters, flags": STATE_BYTES,
+        "results, settings, counters, flags": _state_bytes(),
+        "state of links and main loop": TASK_BYTES,
         "software stack": STACK_BYTES,
     }
-    coefficients = len(Camera) * DISTORTION_TERMS * FLOAT
+    shared = {
+        "scanned pixels": (FULL_SIZE.scan_step, _WINDOW),
+        "edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW),
+        "normal equations, their inverse, right side": ((9 + 9 + 3) * FLOAT, _SUMS),
+    }
+    tables = len(Camera) * TABLE_ENTRIES * np.dtype(np.int16).itemsize
     flash = {
-        "distortion tables": len(Camera) * TABLE_ENTRIES * np.dtype(np.int16).itemsize,
-        "published distortion table": TABLE_ENTRIES,
-        "distortion coefficients": coefficients,
+        "distortion tables of the reset values": tables,
+        "distortion tables of other coefficients": tables,
+        "distortion coefficients": len(Camera) * DISTORTION_TERMS * FLOAT,
     }
     return (
         *(Buffer(name, Memory.RAM, size) for name, size in ram.items()),
+        *(Buffer(name, Memory.RAM, size, inside) for name, (size, inside) in shared.items()),
         *(Buffer(name, Memory.FLASH, size) for name, size in flash.items()),
     )
+
+
+def _state_bytes() -> int:
+    """As many as telemetry shows of it, boresights, and what the cameras were told."""
+    shown = ["CommunicationStatus", "TcmdProcessed", "Configuration", "Power"]
+    for number in (camera + 1 for camera in Camera):
+        shown += [f"Result{number}", f"Details{number}", f"PhaseTimes{number}"]
+    settings = INTERFACE.telemetry("Configuration").length
+    boresights = sum(INTERFACE.telecommand(f"Boresight{camera + 1}").length for camera in Camera)
+    return sum(INTERFACE.telemetry(name).length for name in shown) + settings + boresights
 
 
 def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
     """Bytes in use of each memory."""
     return {
-        memory: sum(buffer.size for buffer in buffers if buffer.memory is memory)
+        memory: sum(
+            buffer.size for buffer in buffers if buffer.memory is memory and not buffer.inside
+        )
         for memory in Memory
     }
+
+
+def report() -> str:
+    """The budget as a Markdown table, one row for a buffer, with sums."""
+    buffers = budget()
+    rows = ["| Memory | Buffer | Bytes |", "|---|---|---:|"]
+    for memory, total in used(buffers).items():
+        rows += [
+            f"| {memory.value} | {buffer.name} | "
+            + (f"({buffer.size}, in: {buffer.inside})" if buffer.inside else f"{buffer.size}")
+            + " |"
+            for buffer in buffers
+            if buffer.memory is memory
+        ]
+        rows.append(f"| {memory.value} | **all, of {CAPACITY[memory]}** | **{total}** |")
+    return "\n".join(rows)

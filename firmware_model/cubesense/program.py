@@ -30,6 +30,7 @@ class CubeSenseProgram:
         registers: the register protocol; the same of its I2C address.
         bench: the bench protocol; the same of its UART.
         cameras: the cameras' supplies and registers.
+        acquisition: what comes from the FPGAs.
         commands: what jobs do.
         idle: nothing waits to be done.
     """
@@ -40,7 +41,7 @@ class CubeSenseProgram:
         state = State()
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
-        acquisition = Acquisition(hardware, meter, self._supply)
+        self.acquisition = acquisition = Acquisition(hardware, meter, self._supply)
         measurement = Measurement(meter, state, self.cameras, acquisition)
         self._jobs = jobs = JobQueue()
         self.commands = Commands(

@@ -1,5 +1,15 @@
-from cubestack.firmware_model.cubesense.edges import MAX_EDGES
-from cubestack.firmware_model.cubesense.memory import CAPACITY, Memory, budget, used
+import numpy as np
+
+from cubestack.firmware_model.cubesense.edges import MAX_EDGES, EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.memory import CAPACITY, Memory, budget, report, used
+from cubestack.firmware_model.interface.cubesense_codes import Sram
+
+from .bench import Bench
+from .scenery import chequered
+
+
+def sizes() -> dict[str, int]:
+    return {buffer.name: buffer.size for buffer in budget()}
 
 
 def test_everything_fits_and_flash_has_room_for_a_program() -> None:
@@ -9,9 +19,37 @@ def test_everything_fits_and_flash_has_room_for_a_program() -> None:
 
 
 def test_sizes_follow_from_what_is_kept() -> None:
-    sizes = {buffer.name: buffer.size for buffer in budget()}
-    assert sizes["scanned pixels"] == 64
-    assert sizes["edges"] == 4 * MAX_EDGES
-    assert sizes["Sun window"] == 4 + 15 * 15
-    assert sizes["distortion tables"] == 2 * 2 * 227
-    assert len(sizes) == len(budget())
+    size = sizes()
+    assert size["scanned pixels"] == 64
+    assert size["edges"] == 4 * MAX_EDGES
+    assert size["Sun window"] == 4 + 15 * 15
+    assert size["distortion tables of the reset values"] == 2 * 2 * 227
+    assert len(size) == len(budget())
+
+
+def test_what_shares_a_place_fits_into_it() -> None:
+    size = sizes()
+    for name in {buffer.inside for buffer in budget()} - {""}:
+        assert sum(buffer.size for buffer in budget() if buffer.inside == name) <= size[name]
+
+
+def test_the_programs_buffers_are_as_large_as_the_budget_says(bench: Bench) -> None:
+    size = sizes()
+    acquisition = bench.program.acquisition
+    scanned, window = acquisition.buffers
+    assert scanned.nbytes == size["scanned pixels"]
+    assert window.nbytes == size["Sun window"]
+    assert np.shares_memory(scanned, window)
+    assert bench.program.commands.download.data.nbytes == size["image frame"]
+    lines = NadirLines(EdgeConfig(), bench.meter, buffer=scanned)
+    assert np.shares_memory(lines.space, scanned)
+    bench.memories[Sram.SRAM2] = chequered()
+    bench.perform(acquisition.scan(Sram.SRAM2, lines))
+    assert lines.edges.full
+    assert lines.edges.points.nbytes == size["edges"]
+
+
+def test_the_report_lists_every_buffer_and_the_sums() -> None:
+    text = report()
+    assert all(buffer.name in text for buffer in budget())
+    assert f"**{used(budget())[Memory.RAM]}**" in text
