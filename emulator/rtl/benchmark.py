@@ -1,10 +1,11 @@
-"""How fast the compiled engine is, and how long its first build takes."""
+"""How fast the compiled engine is, and how long its first builds take."""
 
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -12,30 +13,58 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.build import library_for
 from cubestack.emulator.rtl.engine import RtlEngine, make_engine
-from cubestack.emulator.rtl.wiring import cubestar_wiring
+from cubestack.emulator.rtl.wiring import Wiring, cubesense_wiring, cubestar_wiring
 from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
 from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
+from cubestack.firmware_model.interface.ov7620 import (
+    CLOCKS_PER_LINE,
+    LINES_PER_FRAME,
+    PIXEL_CLOCK_HZ,
+)
 from cubestack.hdl.cubestar_top import CubeStarTop
 
-__all__ = ["cold_build_s", "rtl_clocks_per_s", "strobes_per_s"]
+__all__ = [
+    "PAIR_STORES",
+    "cold_build_s",
+    "pair_scan_ms",
+    "pair_store_ms",
+    "rtl_clocks_per_s",
+    "strobes_per_s",
+]
 
 PERIOD = Fraction(PS_PER_S, CRYSTAL_HZ)
 ROUNDS = 5  # the best one counts: the others were disturbed
 
+#: CubeSense's ways to store: levels of SHIFT, EDGE, RNW, SUNEN and NADEN, and the acknowledges.
+PAIR_STORES = {
+    "own": ((0, 0, 0, 0, 1), ("SUNACK",)),
+    "linked": ((1, 0, 0, 0, 0), ("NADACK",)),
+    "both": ((0, 0, 0, 0, 0), ("SUNACK", "NADACK")),
+}
+_CONTROLS = ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN")
+_SCAN_PERIOD = Fraction(PS_PER_S, 1_000_000)
+
 
 @dataclass(frozen=True)
-class _Frame:
-    """The same frame for ever, with no blanking: every clock has work to do."""
+class _Segment:
+    """Blanking, or all lines of a picture."""
 
-    image: NDArray[np.uint8]
-    number: int = 0
-    period: Fraction = PERIOD
-    line_clocks: int = LINE_CLOCKS
+    start_ps: int
+    clocks: int
+    rows: int
+    pixels: Callable[[], NDArray[np.uint8]] | None
     vsync: int = 1
 
-    @property
-    def rows(self) -> int:
-        return len(self.image)
+
+@dataclass(frozen=True)
+class _Camera:
+    """The same frame for ever: blanking, then the picture."""
+
+    image: NDArray[np.uint8]
+    period: Fraction
+    line_clocks: int
+    blank_clocks: int = 0
 
     @property
     def active_columns(self) -> int:
@@ -43,18 +72,16 @@ class _Frame:
 
     @property
     def clocks(self) -> int:
-        return self.rows * self.line_clocks
+        return self.blank_clocks + len(self.image) * self.line_clocks
 
-    @property
-    def start_ps(self) -> int:
-        return int(self.number * self.clocks * self.period)
-
-    @property
-    def pixels(self) -> Callable[[], NDArray[np.uint8]]:
-        return lambda: self.image
-
-    def segment_at(self, time_ps: int) -> "_Frame":
-        return _Frame(self.image, int(time_ps / (self.clocks * self.period)))
+    def segment_at(self, time_ps: int) -> _Segment:
+        # The last frame that begins at this time or before, its start rounded down.
+        first = (ceil((time_ps + 1) / (self.clocks * self.period)) - 1) * self.clocks
+        picture_ps = int((first + self.blank_clocks) * self.period)
+        if time_ps < picture_ps:
+            return _Segment(int(first * self.period), self.blank_clocks, 0, None)
+        lines = len(self.image)
+        return _Segment(picture_ps, lines * self.line_clocks, lines, lambda: self.image)
 
 
 def rtl_clocks_per_s() -> float:
@@ -79,11 +106,48 @@ def strobes_per_s() -> float:
     return best
 
 
-def cold_build_s() -> float:
-    """Wall time from a design to its shared library, with nothing in the cache."""
+def pair_store_ms(way: str) -> float:
+    """Wall time in which CubeSense's FPGAs store a frame in one of ``PAIR_STORES``."""
+    engine = _pair()
+    levels, acknowledges = PAIR_STORES[way]
+    best = float("inf")
+    for _ in range(ROUNDS):
+        # From standby in the middle of the gap between two frames.
+        _command(engine, 0, 0, 0, 1, 1)
+        frame_ps = CLOCKS_PER_LINE * LINES_PER_FRAME * Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+        engine.run(int((engine.now_ps // frame_ps + 1) * frame_ps))
+        _command(engine, *levels)
+        start = time.perf_counter()
+        for pin in acknowledges:
+            engine.run(engine.now_ps + int(frame_ps), (pin, 1))
+        best = min(best, time.perf_counter() - start)
+    return 1000 * best
+
+
+def pair_scan_ms() -> float:
+    """Wall time of a nadir scan from the nadir's memory."""
+    engine = _pair()
+    out = np.empty(FULL_SIZE.scan_clocks, np.uint8)
+    best = float("inf")
+    for _ in range(ROUNDS):
+        _command(engine, 0, 0, 0, 1, 1)
+        _command(engine, 0, 1, 1, 1, 0)
+        engine.run(engine.now_ps + 1_000_000)
+        start = time.perf_counter()
+        reach_ps = len(out) * int(_SCAN_PERIOD)
+        engine.strobe_read(out, _SCAN_PERIOD, engine.now_ps + reach_ps)
+        best = min(best, time.perf_counter() - start)
+    return 1000 * best
+
+
+def cold_build_s(wiring: Wiring | None = None) -> float:
+    """Wall time from a design to its shared library, with nothing in the cache.
+
+    CubeStar's board, unless given.
+    """
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        library_for(cubestar_wiring(), Path(folder))
+        library_for(wiring or cubestar_wiring(), Path(folder))
         return time.perf_counter() - start
 
 
@@ -91,10 +155,27 @@ def _store(*, skipping: bool) -> tuple[float, RtlEngine]:
     top = CubeStarTop()
     engine = make_engine(top, "compiled", skipping=skipping)
     rng = np.random.default_rng(0)
-    engine.attach(_Frame(rng.integers(0, 256, (top.rows, top.columns), dtype=np.uint8)))
+    image = rng.integers(0, 256, (top.rows, top.columns), dtype=np.uint8)
+    engine.attach(_Camera(image, PERIOD, LINE_CLOCKS))
     engine.set_pin("ENABLE", 1)
     frame_ps = int(top.rows * LINE_CLOCKS * PERIOD)
     start = time.perf_counter()
     reached = engine.run(2 * frame_ps, ("ACK", 1))
     wall_s = time.perf_counter() - start
     return float(reached / PERIOD) / wall_s, engine
+
+
+def _pair() -> RtlEngine:
+    engine = make_engine(cubesense_wiring(), "compiled")
+    rng = np.random.default_rng(0)
+    blank = CLOCKS_PER_LINE * (LINES_PER_FRAME - FULL_SIZE.rows)
+    for camera in ("sun", "nadir"):
+        image = rng.integers(0, 256, (FULL_SIZE.rows, FULL_SIZE.columns), dtype=np.uint8)
+        period = Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+        engine.attach(_Camera(image, period, CLOCKS_PER_LINE, blank), camera)
+    return engine
+
+
+def _command(engine: RtlEngine, *levels: int) -> None:
+    for pin, level in zip(_CONTROLS, levels, strict=True):
+        engine.set_pin(pin, level)

@@ -5,6 +5,11 @@ capture_wall_ms   wall time of one capture: exposure, read-out, FPGA store
 readout_wall_ms   wall time of one transfer, FPGA's SRAM to processor
 realtime_ratio    simulated seconds per wall second of the full 1 Hz loop
 cold_build_s      translating and compiling the FPGA with an empty cache
+pair_own_ms       CubeSense: one frame to the own camera's memory
+pair_linked_ms    CubeSense: one frame across the link
+pair_both_ms      CubeSense: both frames at once
+pair_scan_ms      CubeSense: one nadir scan, SRAM to microcontroller
+pair_build_s      as cold_build_s, both of CubeSense's FPGAs
 """
 
 import argparse
@@ -31,7 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and report."""
-    from cubestack.emulator.rtl.benchmark import cold_build_s, rtl_clocks_per_s
+    from cubestack.emulator.rtl.benchmark import (
+        PAIR_STORES,
+        cold_build_s,
+        pair_scan_ms,
+        pair_store_ms,
+        rtl_clocks_per_s,
+    )
+    from cubestack.emulator.rtl.wiring import cubesense_wiring
     from cubestack.emulator.sky.attitude import quaternion_from_pointing
     from cubestack.emulator.sky.scene import SkyScene
 
@@ -41,6 +53,10 @@ def run(args: argparse.Namespace) -> int:
         figures |= _capture(session)
         figures["realtime_ratio"] = round(_realtime_ratio(session), 2)
     figures["cold_build_s"] = round(cold_build_s(), 1)
+    for way in PAIR_STORES:
+        figures[f"pair_{way}_ms"] = round(pair_store_ms(way), 1)
+    figures["pair_scan_ms"] = round(pair_scan_ms(), 1)
+    figures["pair_build_s"] = round(cold_build_s(cubesense_wiring()), 1)
     if args.json:
         print(json.dumps(figures))
         return 0
