@@ -90,7 +90,7 @@ def decode(coded: NDArray[np.uint8], meter: Meter) -> Decoded:
     if len(coded) % CODED_BYTES:
         raise ValueError(f"coded data comes in words of {CODED_BYTES} bytes, not {len(coded)}")
     words = coded.reshape(-1, CODED_BYTES)
-    data = np.ascontiguousarray(words[:, :DATA_BYTES])
+    data = words[:, :DATA_BYTES].copy()
     syndromes = _check(words) ^ words[:, DATA_BYTES]
     wrong = np.flatnonzero(syndromes)
     bits = _LOCATED[syndromes[wrong]]

@@ -81,6 +81,14 @@ def test_the_cost_is_that_of_the_words_read() -> None:
     assert counter.counts["flash_read"] == 100 * CODED_BYTES // 2
 
 
+@pytest.mark.parametrize("size", [8, 16])
+def test_decoding_leaves_the_coded_words_alone(size: int) -> None:
+    damaged = flipped(encode(bytes(size)), 3)
+    before = damaged.copy()
+    assert decode(damaged, meter()).corrected == 1
+    np.testing.assert_array_equal(damaged, before)
+
+
 def test_parts_of_words_are_refused() -> None:
     with pytest.raises(ValueError, match="words of 9 bytes, not 10"):
         decode(np.zeros(10, np.uint8), meter())
