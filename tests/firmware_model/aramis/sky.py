@@ -19,10 +19,12 @@ FALSE_STAR = 0
 """Stands for the Hipparcos number of a star that does not exist."""
 
 
-@lru_cache(maxsize=4)
+_build = lru_cache(maxsize=4)(build_database)
+
+
 def database(parameters: CatalogueParameters | None = None) -> Database:
     """Built once in a test run."""
-    return build_database(parameters)
+    return _build(parameters or CatalogueParameters())
 
 
 @dataclass(frozen=True)
