@@ -93,7 +93,7 @@ class BenchLink:
         self._state.schedule(camera, sram, detect=False)
         yield from self._measurement.measure(camera, sram, detect=False)
         if self._state.results[camera].capture.stored:
-            self._hardware.uart_send(Port.BENCH, letter.answer or b"")
+            self._uart_send(letter.answer or b"")
         return True
 
     def _send(self, sram: Sram) -> Routine[bool]:
@@ -107,6 +107,10 @@ class BenchLink:
         data = np.zeros(len(pixels), np.uint8)
         if not (yield from self._reader.read(sram, pixels, data)):
             return True
-        self._hardware.uart_send(Port.BENCH, data.tobytes())
+        self._uart_send(data.tobytes())
         self._sent = end
         return end == IMAGE_BYTES
+
+    def _uart_send(self, data: bytes) -> None:
+        self._meter.charge(uart_interrupt=len(data))
+        self._hardware.uart_send(Port.BENCH, data)

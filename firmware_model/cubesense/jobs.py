@@ -10,12 +10,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cubestack.firmware_model.cubesense.memory import COMMAND_QUEUE
 from cubestack.firmware_model.hardware import Routine
 from cubestack.firmware_model.interface.cubesense_codes import Camera, ImageSize, Sram
 from cubestack.firmware_model.interface.message import Message
 
-__all__ = ["Background", "FrameRequest", "Job", "JobQueue", "Measure", "Telecommand"]
+__all__ = [
+    "QUEUE_DEPTH",
+    "Background",
+    "FrameRequest",
+    "Job",
+    "JobQueue",
+    "Measure",
+    "Telecommand",
+]
+
+QUEUE_DEPTH = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +87,7 @@ class JobQueue:
     @property
     def full(self) -> bool:
         """Whether no further job is accepted."""
-        return len(self._jobs) >= COMMAND_QUEUE
+        return len(self._jobs) >= QUEUE_DEPTH
 
     def put(self, job: Telecommand | Measure) -> bool:
         """Append ``job``; False when the queue is full."""
@@ -87,14 +96,15 @@ class JobQueue:
         self._jobs.append(job)
         return True
 
-    def request(self, stream: Background, *, next_turn: bool = False) -> None:
-        """Let ``stream`` have a turn, once however often it asks; ``next_turn``: the next one."""
+    def request(self, stream: Background, *, next_turn: bool = False) -> bool:
+        """Let ``stream`` have a turn; ``next_turn``: the next one. False when it waits already."""
         if stream in self._streams:
-            return
+            return False
         if next_turn:
             self._streams.appendleft(stream)
         else:
             self._streams.append(stream)
+        return True
 
     def pop(self) -> Job:
         """Take the next; IndexError when none waits."""

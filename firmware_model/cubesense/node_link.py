@@ -108,6 +108,7 @@ class NodeLink:
         frame = encode_frame(payload)
         room = self._hardware.uart_backlog(Port.NODE) + len(frame) <= SEND_BYTES
         if room:
+            self._meter.charge(uart_interrupt=len(frame))
             self._hardware.uart_send(Port.NODE, frame)
         return room
 

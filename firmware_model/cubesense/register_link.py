@@ -86,8 +86,8 @@ class ImageStream:
 
     def next(self) -> int | None:
         """The next byte; None while it has to be waited for."""
-        if self._fetched < IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2:
-            self._queue.request(self._work)
+        wanted = self._fetched < IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2
+        if wanted and self._queue.request(self._work):
             self._hardware.wake()
         if self._ahead:
             return self._ahead.pop(0)

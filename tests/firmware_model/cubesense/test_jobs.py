@@ -1,6 +1,6 @@
 import pytest
 
-from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure
+from cubestack.firmware_model.cubesense.jobs import QUEUE_DEPTH, Background, JobQueue, Measure
 from cubestack.firmware_model.cubesense.memory import COMMAND_QUEUE
 from cubestack.firmware_model.hardware import Pay, Routine
 from cubestack.firmware_model.interface.cubesense_codes import Camera, Sram
@@ -21,7 +21,7 @@ def test_jobs_come_in_order_and_before_streams() -> None:
     assert queue.put(measure(0))
     queue.request(two)
     assert queue.put(measure(1))
-    queue.request(one)  # waits already
+    assert not queue.request(one)  # waits already
     assert len(queue) == 4
     assert [queue.pop() for _ in range(4)] == [measure(0), measure(1), one, two]
     assert not queue
@@ -40,8 +40,9 @@ def test_a_stream_may_go_on_before_another() -> None:
 def test_four_jobs_wait_and_streams_do_not_count() -> None:
     queue = JobQueue()
     queue.request(Background(nothing))
-    accepted = [queue.put(measure(number)) for number in range(COMMAND_QUEUE + 1)]
-    assert accepted == [True] * COMMAND_QUEUE + [False]
+    accepted = [queue.put(measure(number)) for number in range(QUEUE_DEPTH + 1)]
+    assert accepted == [True] * QUEUE_DEPTH + [False]
+    assert QUEUE_DEPTH == COMMAND_QUEUE
     assert queue.full
     assert queue.pop() == measure(0)
     assert not queue.full
