@@ -1,0 +1,88 @@
+"""An emulated AraMiS star tracker with a client on its serial line, in this process."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.host.aramis import Aramis
+from cubestack.host.node_client import NodeClient
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from cubestack.emulator.aramis import AramisBoard
+    from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
+    from cubestack.emulator.camera.optics import Optics
+    from cubestack.emulator.sky.scene import Scene
+    from cubestack.firmware_model.aramis.database import Database
+
+__all__ = ["DEFAULT_FIELD_DEG", "AramisSession", "aramis_board", "aramis_catalogue", "open_aramis"]
+
+DEFAULT_POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+
+DEFAULT_FIELD_DEG = 21.53463888888889
+"""Of the published simulations; the lens that was expected to be built has 18."""
+
+
+def aramis_catalogue(field_deg: float = DEFAULT_FIELD_DEG) -> Database:
+    """The onboard catalogue for a lens, from the user's cache or made now, which takes seconds."""
+    from cubestack.emulator.aramis_catalogue import CatalogueParameters, cached_database
+
+    usual = CatalogueParameters()
+    if abs(field_deg - usual.fov_deg) < 1e-3:
+        return cached_database(usual)
+    return cached_database(replace(usual, fov_deg=field_deg))
+
+
+def aramis_board(
+    path: Path | None, *, seed: int = 0, baud: int = INTERFACE.baud, lens: Optics | None = None
+) -> AramisBoard:
+    """Power up a star tracker that looks at the scene in ``path``, or at Orion."""
+    from cubestack.emulator.aramis import AramisBoard
+    from cubestack.emulator.camera.mt9m001_lens import aramis_lens
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.scene import SkyScene, load_scene
+
+    lens = lens or aramis_lens()
+    scene: Scene
+    if path is None:
+        scene = SkyScene(quaternion_from_pointing(*DEFAULT_POINTING_DEG), optics=lens)
+    else:
+        scene = load_scene(path, lens)
+    return AramisBoard(scene, aramis_catalogue(), seed=seed, baud=baud)
+
+
+class AramisSession:
+    """What a command needs to run a star tracker and to talk to it.
+
+    Attributes:
+        board: the emulated device.
+        aramis: host's view, which sees only the bytes of the serial line.
+    """
+
+    def __init__(self, board: AramisBoard) -> None:
+        """Plug a client into ``board``."""
+        self.board = board
+        self.aramis = Aramis(NodeClient(board.serial(), INTERFACE))
+
+
+@contextmanager
+def open_aramis(
+    scene: Scene,
+    *,
+    seed: int = 0,
+    field_deg: float = DEFAULT_FIELD_DEG,
+    noise: NoiseTerms | None = None,
+) -> Iterator[AramisSession]:
+    """Power up a star tracker that looks at ``scene`` and has the catalogue of ``field_deg``."""
+    from cubestack.emulator.aramis import AramisBoard
+
+    board = AramisBoard(scene, aramis_catalogue(field_deg), seed=seed, noise=noise)
+    try:
+        yield AramisSession(board)
+    finally:
+        board.close()
