@@ -27,11 +27,11 @@ __all__ = ["CHUNK_BYTES", "LETTERS", "PAUSE_US", "BenchLink"]
 LETTERS = 4
 """Letters that wait."""
 
-CHUNK_BYTES = 16
+CHUNK_BYTES = 32
 """Bytes of a picture that are read and handed to the UART at once, while as many may still wait."""
 
-PAUSE_US = 1_000
-"""Between two looks at the UART, which needs 1.4 ms for that many at 115200 baud."""
+PAUSE_US = 2_000
+"""Between two looks at the UART, which needs 2.8 ms for that many at 115200 baud."""
 
 _CAMERAS: dict[Letter, Camera] = {
     letter: camera for table in (CAPTURES, DOWNLOADS) for camera, letter in table.items()
