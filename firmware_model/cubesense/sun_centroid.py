@@ -9,9 +9,10 @@ mean moves. A row that reaches the window's left or right border is then left ou
 a column that reaches the upper or lower one out of the mean of y. When nothing would remain, all
 count.
 
-The Sun is not found when the FPGA saw no run of bright pixels, or fewer pixels reach the threshold
-than `SunConfig.min_pixels`; the criteria are ours. Four pixels are one more than the FPGA's run, so
-that one row of stuck pixels is no Sun.
+The Sun is not found when the FPGA saw no run of bright pixels, when fewer pixels reach the
+threshold than `SunConfig.min_pixels`, or when their centre lies outside of the field of view, where
+the lens shows nothing and an int of 1/100 px may overflow; the criteria are ours. Four pixels are
+one more than the FPGA's run, so that one row of stuck pixels is no Sun.
 """
 
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.arithmetic import sequential_sum
-from cubestack.firmware_model.cubesense.distortion import RadiusTable
+from cubestack.firmware_model.cubesense.distortion import RIM_PX, RadiusTable
 from cubestack.firmware_model.cubesense.masks import Mask, masked
 from cubestack.firmware_model.cubesense.nadir import angle_of
 from cubestack.firmware_model.interface.cubesense_codes import DetectResult
@@ -123,6 +124,11 @@ def find_sun(
         )
         offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
         meter.charge(f32_add=4, f32_div=2, f32_convert=4)
+        # In whole pixels, because the processor multiplies bytes by itself.
+        meter.charge(f32_convert=2, i16_add=6)
+        across, down = (int(value) for value in offset)
+        if across * across + down * down > RIM_PX * RIM_PX:
+            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
     with meter.phase("undistort"):
         centre = config.table.correct(offset[None], meter)[0]
         angle = angle_of(centre, meter)

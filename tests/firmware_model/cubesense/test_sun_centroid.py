@@ -117,11 +117,29 @@ def test_masked_pixels_do_not_count(ours: SunConfig, meter: Meter) -> None:
     assert find_sun(data, masked, meter).detect is DetectResult.SUN_NOT_FOUND
 
 
-def test_a_wholly_bright_window_measures_its_middle(ours: SunConfig, meter: Meter) -> None:
-    result = find_sun(window(np.full((ROWS, COLUMNS), 255, np.uint8)), ours, meter)
+def test_a_wholly_bright_window_measures_its_middle(equidistant: RadiusTable, meter: Meter) -> None:
+    config = SunConfig(equidistant, boresight=(100.0, 50.0))
+    result = find_sun(window(np.full((ROWS, COLUMNS), 255, np.uint8)), config, meter)
     assert result.pixels == 225
-    offset = np.array([[7 - 369, 7 - 250]], np.float32)
-    assert [result.x, result.y] == ours.table.correct(offset, meter)[0].tolist()
+    offset = np.array([[7 - 100, 7 - 50]], np.float32)
+    assert [result.x, result.y] == equidistant.correct(offset, meter)[0].tolist()
+
+
+@pytest.mark.parametrize(("distance", "found"), [(224.0, True), (229.0, False)])
+@pytest.mark.parametrize("turn", np.arange(0, 2 * np.pi, 0.7))
+def test_light_beyond_the_rim_of_the_field_is_no_sun(
+    ours: SunConfig, meter: Meter, distance: float, found: bool, turn: float
+) -> None:
+    centre = np.array(SUN_BORESIGHT) + distance * np.array([np.cos(turn), np.sin(turn)])
+    detect = find_sun(window(sun(centre, 5)), ours, meter).detect
+    assert detect is (DetectResult.SUCCESS if found else DetectResult.SUN_NOT_FOUND)
+
+
+def test_no_angle_is_beyond_the_field_wherever_the_light_is(ours: SunConfig, meter: Meter) -> None:
+    for x in range(10, COLUMNS, 90):
+        for y in range(10, ROWS, 65):
+            result = find_sun(window(sun(np.array([x, y], float), 5)), ours, meter)
+            assert np.hypot(result.alpha, result.beta) < 9700
 
 
 def test_another_number_of_bytes_is_refused(ours: SunConfig, meter: Meter) -> None:
