@@ -7,7 +7,8 @@ The result codes are public, what leads to them is not; ours:
 
 - too many edges: more than the part keeps.
 - too few edges: fewer than `NadirConfig.min_edges`, here 6, twice the unknowns.
-- bad fit: no circle, an angular radius that no altitude of interest has, or edges off the circle.
+- bad fit: no circle, an angular radius that no altitude of interest has, a centre so far away that
+  an int of 1/100 px can not hold it (113 deg along an axis), or edges off the circle.
   Up to a quarter of the edges may be dropped first, the worst one at a time: hot pixels, the Moon.
 
 Also ours is the fit in the stereographic projection (see `Projection`). A circle there has the
@@ -38,6 +39,8 @@ MAX_RMS_PX = {Projection.EQUIDISTANT: 8.0, Projection.STEREOGRAPHIC: 0.5}
 In the published projection the limb itself leaves the circle by this much towards the rim. In ours,
 edges of a sunlit limb stay below 0.35 px, and a looser limit lets fits to the terminator pass.
 """
+
+LARGEST_PX = np.float32(np.iinfo(np.int16).max) / HUNDREDTHS
 
 Values = NDArray[np.float32]
 
@@ -107,8 +110,9 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
             return NadirResult(DetectResult.BAD_FIT, edges=used, dropped=dropped)
         centre, radius_deg = _on_the_sky(circle, config.projection, meter)
         low, high = config.radius_deg
-        meter.charge(f32_compare=2)
-        if not low <= radius_deg <= high:
+        meter.charge(f32_compare=4)
+        in_range = bool(np.all(np.abs(centre) < LARGEST_PX))
+        if not (in_range and low <= radius_deg <= high):
             detect = DetectResult.BAD_FIT
             return NadirResult(detect, edges=used, dropped=dropped, radius_deg=radius_deg)
         meter.charge(f32_mul=2, f32_convert=2)

@@ -134,3 +134,15 @@ def test_phases_are_charged(ours: NadirConfig, meter: Meter) -> None:
     assert set(meter.phases) == {"undistort", "fit"}
     assert meter.phases["undistort"] > 1000 * len(lines.edges)
     assert meter.phases["fit"] > 1000 * len(lines.edges)
+
+
+@pytest.mark.parametrize("turn", [0, 90, 180, 270])
+def test_a_centre_that_an_int_can_not_hold_is_a_bad_fit(ours: NadirConfig, turn: int) -> None:
+    for tilt in (112.0, 114.0, 115.0):
+        truth = (tilt * np.cos(np.radians(turn)), tilt * np.sin(np.radians(turn)))
+        result = measure(earth(*truth), ours)
+        if result.detect is DetectResult.SUCCESS:
+            assert error_deg((result.alpha / 100, result.beta / 100), truth) < 1
+        else:
+            assert result.detect in (DetectResult.BAD_FIT, DetectResult.TOO_FEW_EDGES)
+            assert (result.x, result.y, result.alpha, result.beta) == (0, 0, 0, 0)
