@@ -1,11 +1,14 @@
 """``cubestack hdl``: area tables and Verilog files, for readers and for scripts."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from cubestack.hdl.area_report import AREA_FILE
+from cubestack.hdl.proofs.catalogue import PROOFS
+from cubestack.hdl.proofs.prover import Fault
 from cubestack.hdl.tools import have_yosys
 from cubestack.host.cli.main import main
 
@@ -51,6 +54,7 @@ def test_verilog_to_a_file_and_to_standard_output(
         (["verilog", "cubestarr"], 2, ("cubestarr", "cubesense-sun")),
         (["area", "cubesense-pair"], 2, ("cubesense-pair", "cubesense-sun")),
         (["verilog", "cubestar", "--out", "missing/cubestar.v"], 1, ("missing", "No such file")),
+        (["prove", "sun-scam"], 2, ("sun-scam", "sun-scan")),
         (["paint"], 2, ("paint", "area", "verilog")),
         ([], 2, ("ACTION",)),
     ],
@@ -75,7 +79,30 @@ def test_wrong_calls_are_one_line(
     assert all(word in line for word in words)
 
 
-@pytest.mark.parametrize("action", ["area", "verilog"])
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+def test_proofs_as_text_and_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    names = ["cubestar-drivers", "cubestar-read"]
+    assert main(["hdl", "prove", *names]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines[::2]] == names
+    assert all("proved" in line and "found" in line for line in lines[1::2])
+    assert main(["hdl", "prove", "--json", names[0]]) == 0
+    (verdict,) = json.loads(capsys.readouterr().out).values()
+    assert verdict["good"]
+    assert verdict["fault"] == {"wire": "writer.store", "level": 1}
+
+
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+def test_what_is_not_proved_is_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proof = PROOFS["cubestar-drivers"]
+    monkeypatch.setitem(PROOFS, "cubestar-drivers", replace(proof, fault=Fault("bank", 1)))
+    assert main(["hdl", "prove", "cubestar-drivers"]) == 1
+    assert "NOT FOUND" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("action", ["area", "verilog", "prove"])
 def test_help_teaches(action: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["hdl", action, "--help"])

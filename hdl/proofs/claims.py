@@ -1,0 +1,115 @@
+"""Claims that both sensors' designs share, as assertions on a harness."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from amaranth.hdl import (
+    Assert,
+    Assume,
+    ClockDomain,
+    ClockSignal,
+    Module,
+    ResetSignal,
+    Signal,
+    Value,
+)
+from amaranth.hdl._ast import Initial  # not among the public names, though documented as one
+
+from cubestack.hdl.proofs.prover import past
+
+__all__ = [
+    "WRITER_WIRES",
+    "acknowledges_all_rows",
+    "domain",
+    "idle_is_reset",
+    "starts_in",
+    "writer_wires",
+]
+
+
+#: Wires of a writer, by where they are below it.
+WRITER_WIRES = {
+    "rst": "{domain}_rst",
+    "vsync": "vsync",
+    "store": "store",
+    "ack": "ack",
+    "column": "counter.column",
+    "row": "counter.row",
+    "line_open": "line_open",
+    "line_full": "line_full",
+    "frame_full": "frame_full",
+}
+
+
+def writer_wires(writer: str, domain: str, below: str | None = None) -> dict[str, str]:
+    """Wires of a writer, with its name before theirs; submodule ``below`` when named otherwise."""
+    return {
+        f"{writer}_{name}": f"{below or writer}.{wire.format(domain=domain)}"
+        for name, wire in WRITER_WIRES.items()
+    }
+
+
+def domain(m: Module, name: str, clock: Value, reset: Value) -> Any:
+    """Statements at the rising edge of ``clock``, with an asynchronous reset."""
+    m.domains += ClockDomain(name, async_reset=True, local=True)
+    m.d.comb += [ClockSignal(name).eq(clock), ResetSignal(name).eq(reset)]
+    return m.d[name]
+
+
+def starts_in(m: Module, standby: Value) -> None:
+    """The first step is in standby, which makes the state; nothing else does."""
+    m.d.comb += Assume(standby | ~Initial())
+
+
+def idle_is_reset(m: Module, d: SimpleNamespace, standby: Value, retained: set[str]) -> None:
+    """In standby each register has its reset value, but the ``retained`` ones, which rest.
+
+    ValueError when another register has no reset, or a retained one has.
+    """
+    without = {register.name for register in d.registers if register.reset is None}
+    if without != retained:
+        raise ValueError(f"registers without reset: {sorted(without)}, not {sorted(retained)}")
+    was_standby = past(m, standby)
+    for register in d.registers:
+        if register.reset is None:
+            rests = register.value == past(m, register.value)
+            m.d.comb += Assert(~standby | ~was_standby | Initial() | rests)
+        else:
+            m.d.comb += Assert(~standby | (register.value == register.reset))
+
+
+def acknowledges_all_rows(
+    m: Module, d: SimpleNamespace, writer: str, clock: Value, columns: int, rows: int
+) -> Signal:
+    """One writer's ACK, from what it writes; returns the ACK that should be.
+
+    ACK is high from the end of the last pixel's write on, and at no other time. Each row begins
+    with its first column, after the row before it in the same frame, so then all of them have.
+    ``d`` has the wires of WRITER_WIRES with ``writer`` before their names.
+    """
+    wires = SimpleNamespace(**{name: getattr(d, f"{writer}_{name}") for name in WRITER_WIRES})
+    column, row, store = wires.column, wires.row, wires.store
+    sync = domain(m, f"{writer}_monitor", clock, wires.rst)
+    begun = Signal(range(rows + 1), name=f"{writer}_begun")  # rows of this frame
+    complete = Signal(name=f"{writer}_complete")
+    last_pixel = store & (column == columns - 1) & (row == rows - 1)
+    with m.If(~wires.vsync):
+        sync += begun.eq(0)
+    with m.Elif(store & (column == 0)):
+        sync += begun.eq(begun + 1)
+    with m.If(last_pixel):
+        sync += complete.eq(1)
+
+    in_order = row == begun - (column != 0)
+    over = wires.frame_full | wires.ack
+    m.d.comb += [
+        Assert(wires.ack == complete),
+        Assert(~store | in_order),
+        Assert(~last_pixel | (begun == rows)),
+        # What makes these inductive.
+        Assert((column < columns) & (row < rows) & (begun <= rows)),
+        Assert(over | in_order),
+        Assert(~over | ~store),
+        Assert(~wires.line_open | store | wires.line_full | (column != 0)),
+    ]
+    return complete

@@ -1,0 +1,230 @@
+"""Runs one proof: the design as shipped, a harness around it, temporal induction.
+
+The design is flattened; its ports, and those of its internal wires that the harness names, become
+the harness's signals. Yosys turns all clocks and asynchronous resets into steps of one time (its
+``clk2fflogic``), so clocks may come in any order, and its SAT solver proves every assertion: true
+in the first steps, and true in the next one whenever it was true in the steps before.
+
+Registers start with any value at all, as the part's do. What is proved of a design with a fault is
+a counterexample from its start, which takes a small picture.
+"""
+
+import re
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from amaranth.hdl import Instance, Module, Signal, Value
+from amaranth.lib.wiring import Component, In
+
+from cubestack.hdl.generate import rtlil_text
+from cubestack.hdl.tools import run_yosys
+
+__all__ = ["Fault", "Outcome", "Proof", "Register", "UnknownWireError", "past", "prove"]
+
+_FLATTEN = """
+read_rtlil design.il
+hierarchy -top design
+proc
+flatten
+attrmap -remove init
+write_rtlil flat.il
+"""
+
+_PROVE = """
+read_rtlil flat.il
+{fault}
+{expose}
+read_rtlil harness.il
+hierarchy -top harness
+proc
+flatten
+chformal -lower
+clk2fflogic
+opt -full
+tee -o sat.txt sat -prove-asserts -set-assumes -tempinduct -maxsteps {steps} -timeout {limit}
+"""
+
+#: Most steps of an induction; what takes more is not proved.
+STEPS = 4
+
+#: Most steps of a counterexample; a clock takes two.
+FAULT_STEPS = 40
+
+#: Seconds after which a proof is given up.
+LIMIT = 120
+
+_CELL = re.compile(r"^  cell (\$\w+) \S+\n(.*?)^  end$", re.MULTILINE | re.DOTALL)
+_WIRE = re.compile(r"^  wire (?:width (\d+) )?(?:[a-z]+(?: \d+)? )*\\(\S+)$", re.MULTILINE)
+
+
+class UnknownWireError(ValueError):
+    """A harness names a wire that the design does not have."""
+
+
+class Fault(NamedTuple):
+    """A planted bug: a wire inside of the design is stuck at a level."""
+
+    wire: str
+    level: int
+
+
+@dataclass(frozen=True)
+class Proof:
+    """One promise.
+
+    Attributes:
+        claim: what is proved, in one sentence.
+        make: the design, and what describes its size; of a small picture when asked for.
+        wires: internal wires of the design that ``harness`` looks at, by the name that it uses.
+            Submodules are named as in the design, without the numbers that make names unique.
+        harness: adds assumptions and assertions to the module; the namespace has a signal for
+            each port and each wire. Input ports are free. ``size`` is what ``make`` said, and
+            ``registers`` are all of the design's.
+        fault: a bug with which the proof must fail.
+    """
+
+    claim: str
+    make: Callable[[bool], tuple[Component, Any]]
+    wires: dict[str, str]
+    harness: Callable[[Module, SimpleNamespace], None]
+    fault: Fault
+
+
+class Register(NamedTuple):
+    """A register of the design; ``reset`` is None when no reset reaches it."""
+
+    name: str
+    value: Signal
+    reset: int | None
+
+
+class Outcome(NamedTuple):
+    """How a proof ended, after how many steps; ``counterexample`` when it is refuted."""
+
+    proved: bool
+    counterexample: bool
+    steps: int
+    seconds: float
+
+
+def prove(proof: Proof, planted: bool = False) -> Outcome:
+    """Try a proof, or refute it with its fault planted.
+
+    ToolMissingError without a Yosys; UnknownWireError when the design has no such wire.
+    """
+    start = time.monotonic()
+    design, size = proof.make(planted)
+    flat = _flattened(rtlil_text(design, "design"))
+    widths = {name: int(width or 1) for width, name in _WIRE.findall(flat)}
+    names = {re.sub(r"\$\d+(?=\.)", "", name): name for name in widths}
+
+    def found(wire: str) -> str:
+        if wire not in names:
+            raise UnknownWireError(f"the design has no wire {wire}")
+        return names[wire]
+
+    wires = {alias: found(wire) for alias, wire in proof.wires.items()}
+    resets = {found(name): value for name, value in _registers(flat).items()}
+    exposed = sorted({*wires.values(), *resets})
+    harness = _Harness(design, size, proof, wires, {name: widths[name] for name in exposed}, resets)
+    text = rtlil_text(harness, "harness").replace("cell \\$ff ", "cell $ff ")
+    fault = ""
+    if planted:
+        name = found(proof.fault.wire)
+        level = f"{widths[name]}'b{proof.fault.level:0{widths[name]}b}"
+        fault = f"cd design\nconnect -set {name} {level}\ncd"
+    script = _PROVE.format(
+        fault=fault,
+        expose="\n".join(f"expose design/w:{name}" for name in exposed),
+        steps=FAULT_STEPS if planted else STEPS,
+        limit=LIMIT,
+    )
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "flat.il").write_text(flat, encoding="utf-8")
+        (folder / "harness.il").write_text(text, encoding="utf-8")
+        run_yosys(script, folder)
+        report = (folder / "sat.txt").read_text(encoding="utf-8")
+    return Outcome(
+        "Induction step proven: SUCCESS!" in report,
+        "model found for base case: FAIL!" in report,
+        len(re.findall(r"^\[base case \d+\]", report, re.MULTILINE)),
+        time.monotonic() - start,
+    )
+
+
+def past(m: Module, value: Value) -> Signal:
+    """``value`` one step ago; anything at the first step."""
+    before = Signal(len(value))
+    m.submodules += Instance("$ff", p_WIDTH=len(value), i_D=value, o_Q=before)
+    return before
+
+
+@cache
+def _flattened(rtlil: str) -> str:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "design.il").write_text(rtlil, encoding="utf-8")
+        run_yosys(_FLATTEN, folder)
+        return (folder / "flat.il").read_text(encoding="utf-8")
+
+
+def _registers(flat: str) -> dict[str, int | None]:
+    """Reset values of a flat design's registers, by plain name."""
+    found: dict[str, int | None] = {}
+    for kind, body in _CELL.findall(flat):
+        if "dff" not in kind:
+            continue
+        (name,) = re.findall(r"connect \\Q \\(\S+)\n", body)
+        reset = re.findall(r"parameter \\ARST_VALUE \d+'([01]+)\n", body)
+        found[re.sub(r"\$\d+(?=\.)", "", name)] = int(reset[0], 2) if reset else None
+    return found
+
+
+class _Harness(Component):
+    """The design's inputs as ports, its outputs and exposed wires as signals."""
+
+    def __init__(
+        self,
+        design: Component,
+        size: object,
+        proof: Proof,
+        wires: dict[str, str],
+        widths: dict[str, int],
+        resets: dict[str, int | None],
+    ) -> None:
+        self._design = design
+        self._size = size
+        self._proof = proof
+        self._wires = wires
+        self._widths = widths
+        self._resets = resets
+        members = design.signature.members
+        super().__init__({name: m for name, m in members.items() if m.flow is In})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        ports: dict[str, Value] = {}
+        signals = {}
+        for name, member in self._design.signature.members.items():
+            if member.flow is In:
+                signals[name] = ports[f"i_{name}"] = getattr(self, name)
+            else:
+                signals[name] = ports[f"o_{name}"] = Signal(member.shape, name=f"design_{name}")
+        inside = {}
+        for number, (wire, width) in enumerate(self._widths.items()):
+            inside[wire] = ports[f"o_{wire}"] = Signal(width, name=f"wire_{number}")
+        signals |= {alias: inside[wire] for alias, wire in self._wires.items()}
+        m.submodules.design = Instance("design", **ports)
+        registers = [
+            Register(re.sub(r"\$\d+(?=\.)", "", wire), inside[wire], reset)
+            for wire, reset in self._resets.items()
+        ]
+        self._proof.harness(m, SimpleNamespace(**signals, size=self._size, registers=registers))
+        return m

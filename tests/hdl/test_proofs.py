@@ -1,0 +1,107 @@
+"""The proofs' fast tier: one of the two equal FPGAs; and what the prover does with wrong claims.
+
+`cubestack hdl prove` runs all of them.
+"""
+
+import gc
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from amaranth.hdl import Assert, Module
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.proofs.catalogue import PROOFS, Verdict, verdict_text
+from cubestack.hdl.proofs.claims import idle_is_reset
+from cubestack.hdl.proofs.prover import Fault, Outcome, Proof, UnknownWireError, prove
+from cubestack.hdl.tools import have_yosys
+
+pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+
+FAST = [name for name in PROOFS if not name.startswith("nadir")]
+
+#: Faults that are found in a step or two.
+SHALLOW = [name for name in FAST if name not in ("sun-ack", "sun-scan", "sun-first-pixel")]
+
+
+@pytest.mark.parametrize("name", FAST)
+def test_claim_is_proved(name: str) -> None:
+    outcome = prove(PROOFS[name])
+    assert outcome.proved
+    assert not outcome.counterexample
+
+
+@pytest.mark.parametrize("name", SHALLOW)
+def test_planted_bug_is_found(name: str) -> None:
+    outcome = prove(PROOFS[name], planted=True)
+    assert outcome.counterexample
+    assert not outcome.proved
+
+
+@pytest.mark.parametrize("name", ["cubestar-ack", "sun-address", "sun-window"])
+def test_it_is_the_bug_that_is_found_and_not_the_small_picture(name: str) -> None:
+    proof = PROOFS[name]
+    assert prove(replace(proof, make=lambda _: proof.make(True))).proved
+
+
+class Counter(Component):
+    """A matrix counter that always steps."""
+
+    address: Out(4)
+    enable: In(1)
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.counter = counter = MatrixCounter(3, 4)
+        m.d.comb += [counter.next_column.eq(self.enable), self.address.eq(counter.address)]
+        return m
+
+
+def claim(limit: int, wires: dict[str, str] | None = None, fault: str = "counter.row") -> Proof:
+    """That the address stays below ``limit``; the counter's clock rests, and its start is open."""
+
+    def harness(m: Module, d: SimpleNamespace) -> None:
+        m.d.comb += Assert(d.address < limit)
+
+    return Proof("", lambda _: (Counter(), None), wires or {}, harness, Fault(fault, 3))
+
+
+def test_what_is_false_at_once_has_a_counterexample() -> None:
+    outcome = prove(claim(3))
+    assert outcome.counterexample
+    assert not outcome.proved
+
+
+def test_what_is_true_of_every_state_is_proved() -> None:
+    assert prove(claim(16)).proved
+
+
+@pytest.mark.parametrize("proof", [claim(16, {"x": "counter.colum"}), claim(16, fault="counter.x")])
+def test_unknown_wire_is_named(proof: Proof) -> None:
+    with pytest.raises(UnknownWireError, match=r"the design has no wire counter\.(colum|x)"):
+        prove(proof, planted=True)
+
+
+@pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
+def test_a_register_without_reset_must_be_declared() -> None:
+    def harness(m: Module, d: SimpleNamespace) -> None:
+        idle_is_reset(m, d, ~d.ENABLE, set())
+
+    with pytest.raises(ValueError, match=r"registers without reset: \['bank'\], not \[\]"):
+        prove(replace(PROOFS["cubestar-idle"], harness=harness))
+    gc.collect()  # what was refused is never elaborated; have Amaranth say so here
+
+
+def test_verdict_says_what_went_wrong() -> None:
+    good, bad = Outcome(True, False, 1, 0.5), Outcome(False, False, 4, 0.5)
+    refuted = Outcome(False, True, 3, 0.5)
+    name = "sun-scan"
+    text = verdict_text(Verdict(name, good, refuted))
+    assert "proved" in text
+    assert "reader.scan.line_ends stuck at 0) found after 3 steps" in text
+    assert "NOT PROVED" in verdict_text(Verdict(name, bad, refuted))
+    assert "REFUTED after 3 steps" in verdict_text(Verdict(name, refuted, refuted))
+    assert "NOT FOUND" in verdict_text(Verdict(name, good, bad))
+    assert Verdict(name, good, refuted).good
+    assert not any(Verdict(name, *pair).good for pair in [(bad, refuted), (good, good)])
