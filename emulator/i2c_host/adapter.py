@@ -1,6 +1,7 @@
 """The host's I2C adapter: puts transfers on the emulated bus and reports them as Linux does."""
 
 import errno
+from collections import deque
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -37,7 +38,9 @@ class I2cAdapter:
 
     Attributes:
         env: kernel.
-        transfers: transfers done since the start.
+        told: transfers whose end was told.
+        holding: whether the end of a transfer is told only when ``release`` is called: for who runs
+            virtual time ahead and knows when wall time gets there.
     """
 
     def __init__(
@@ -57,10 +60,12 @@ class I2cAdapter:
             data_errno: error of a byte that is not acknowledged; drivers differ.
         """
         self.env = env
-        self.transfers = 0
+        self.told = 0
+        self.holding = False
         self._bus = bus
         self._errors = {errno.ENXIO: address_errno, errno.EIO: data_errno}
         self._pending = 0
+        self._held: deque[tuple[int, int, Callable[[int], None]]] = deque()
 
     @property
     def busy(self) -> bool:
@@ -86,5 +91,21 @@ class I2cAdapter:
         else:
             result = 0
         self._pending -= 1
-        self.transfers += 1
+        if self.holding:
+            self._held.append((self.env.now, result, done))
+        else:
+            self._tell(result, done)
+
+    def _tell(self, result: int, done: Callable[[int], None]) -> None:
+        self.told += 1
         done(result)
+
+    def release(self, time_ps: int) -> None:
+        """Tell of the transfers that ended by ``time_ps``."""
+        while self._held and self._held[0][0] <= time_ps:
+            _, result, done = self._held.popleft()
+            self._tell(result, done)
+
+    def release_ps(self) -> int | None:
+        """When the first transfer ended that was not told of; None without any."""
+        return self._held[0][0] if self._held else None

@@ -8,6 +8,7 @@ import errno
 import fcntl
 import os
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 
 __all__ = ["Listener", "Notification", "read_memory", "read_text", "write_memory"]
@@ -27,6 +28,7 @@ _AT_NUMBER = 1
 _AND_SEND = 2
 
 PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+CHUNK_BYTES = 256  # most paths are shorter
 
 
 @dataclass(frozen=True)
@@ -126,9 +128,9 @@ class _Part(ctypes.Structure):
 _libc = ctypes.CDLL(None, use_errno=True)
 _types = (
     ctypes.c_int,
-    ctypes.POINTER(_Part),
+    ctypes.c_void_p,
     ctypes.c_ulong,
-    ctypes.POINTER(_Part),
+    ctypes.c_void_p,
     ctypes.c_ulong,
     ctypes.c_ulong,
 )
@@ -138,21 +140,50 @@ for _function in (_readv, _writev):
     _function.restype = ctypes.c_ssize_t
 
 
+class _Window:
+    """Moves bytes between this process and another one; its buffer is made once."""
+
+    SIZE = 1 << 14
+
+    def __init__(self) -> None:
+        self._buffer = ctypes.create_string_buffer(self.SIZE)
+        self._view = memoryview(self._buffer).cast("B")
+        self._here = _Part(ctypes.addressof(self._buffer), 0)
+        self._there = _Part(0, 0)
+        self._parts = ctypes.byref(self._here), ctypes.byref(self._there)
+
+    def read(self, pid: int, address: int, count: int) -> bytes:
+        self._move(_readv, pid, address, count)
+        return self._view[:count].tobytes()
+
+    def write(self, pid: int, address: int, data: bytes) -> None:
+        self._view[: len(data)] = data
+        self._move(_writev, pid, address, len(data))
+
+    def _move(self, function: Callable[..., int], pid: int, address: int, count: int) -> None:
+        self._here.length = self._there.length = count
+        self._there.base = address
+        here, there = self._parts
+        done = function(pid, here, 1, there, 1, 0)
+        if done < 0:
+            number = ctypes.get_errno()
+            raise OSError(number, f"can not reach process {pid}: {os.strerror(number)}")
+        if done != count:
+            raise OSError(errno.EFAULT, f"process {pid} has no {count} bytes at {address:#x}")
+
+
+_window = _Window()
+
+
 def read_memory(pid: int, address: int, count: int) -> bytes:
-    """``count`` bytes of a process; raises OSError, EFAULT where it has no memory."""
-    buffer = ctypes.create_string_buffer(count)
-    done = _move(_readv, pid, ctypes.addressof(buffer), address, count)
-    if done != count:
-        raise OSError(errno.EFAULT, f"process {pid} has no {count} bytes at {address:#x}")
-    return buffer.raw
+    """``count`` bytes of a process, at most 16384; raises OSError, EFAULT where it has none."""
+    return _window.read(pid, address, count) if count else b""
 
 
 def write_memory(pid: int, address: int, data: bytes) -> None:
-    """Put ``data`` into a process; raises OSError, EFAULT where it can not be written."""
-    buffer = ctypes.create_string_buffer(data, len(data))
-    done = _move(_writev, pid, ctypes.addressof(buffer), address, len(data))
-    if done != len(data):
-        raise OSError(errno.EFAULT, f"process {pid} has no {len(data)} bytes at {address:#x}")
+    """Put ``data``, at most 16384 bytes, into a process; raises OSError, EFAULT if it can not."""
+    if data:
+        _window.write(pid, address, data)
 
 
 def read_text(pid: int, address: int, limit: int) -> bytes:
@@ -160,7 +191,7 @@ def read_text(pid: int, address: int, limit: int) -> bytes:
     text = b""
     while len(text) < limit:
         rest_of_page = PAGE_BYTES - address % PAGE_BYTES
-        count = min(rest_of_page, 256, limit - len(text))
+        count = min(rest_of_page, CHUNK_BYTES, limit - len(text))
         part = read_memory(pid, address, count)
         end = part.find(0)
         if end >= 0:
@@ -168,14 +199,3 @@ def read_text(pid: int, address: int, limit: int) -> bytes:
         text += part
         address += count
     return text
-
-
-def _move(function: object, pid: int, local: int, remote: int, count: int) -> int:
-    if not count:
-        return 0
-    here, there = _Part(local, count), _Part(remote, count)
-    done = int(function(pid, here, 1, there, 1, 0))  # type: ignore[operator]
-    if done < 0:
-        number = ctypes.get_errno()
-        raise OSError(number, f"can not reach process {pid}: {os.strerror(number)}")
-    return done

@@ -19,6 +19,7 @@ from cubestack.emulator.i2c_host.device_node import DeviceNode
 from cubestack.emulator.i2c_host.filter import make_filter, native_abi
 from cubestack.emulator.i2c_host.notify import Listener
 from cubestack.emulator.i2c_host.supervisor import Files, Supervisor, descriptor_range
+from cubestack.emulator.ports.serial_port import poll_now
 
 __all__ = ["Program", "Route", "RouteError", "bus_environment", "start_filtered", "start_preloaded"]
 
@@ -56,8 +57,8 @@ class Program:
 
     @property
     def ended(self) -> bool:
-        """Whether it has ended."""
-        return self._process.poll() is not None
+        """Whether it has ended, as far as ``exchange`` has seen."""
+        return self._process.returncode is not None
 
     @property
     def exit_code(self) -> int:
@@ -75,6 +76,8 @@ class Program:
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint."""
+        if not self.ended and poll_now(self._pidfd, select.POLLIN):
+            self._process.poll()
 
     def release_ps(self, count: int) -> int | None:
         """See Endpoint."""

@@ -1,6 +1,7 @@
 """A program with an emulated bus: where the bus comes from, by which route, until it ends."""
 
 import signal
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,10 +24,20 @@ from cubestack.emulator.i2c_host.server import I2cServer
 from cubestack.emulator.i2c_host.shim import shim_library
 from cubestack.emulator.i2c_host.supervisor import Files, Supervisor
 from cubestack.emulator.ports.endpoint import Endpoint
-from cubestack.emulator.ports.pump import Pump
-from cubestack.emulator.virtual_time import Kernel
+from cubestack.emulator.ports.pump import SLICE_S, Pump
+from cubestack.emulator.virtual_time import PS_PER_MS, Kernel
 
 __all__ = ["HostBus", "attached_bus", "emulated_bus", "run_program"]
+
+AHEAD_PS = 2 * PS_PER_MS
+"""How far virtual time may be ahead of wall time during a transfer, when it is paced."""
+
+TURNAROUND_NS = 200_000
+"""A call that comes so soon after the last answer starts where that transfer ended: what it takes
+to get from one process to the other is not counted."""
+
+PS_PER_NS = 1000
+NS_PER_S = 10**9
 
 FORWARDED = (signal.SIGTERM, signal.SIGHUP)
 
@@ -38,6 +49,7 @@ class HostBus:
     Attributes:
         kernel: what to drive.
         busy: whether it has work.
+        adapter: its master; None when that is in another process.
         port: to serve with the pump.
         files: opens a device file of it.
         path: of the socket that serves it.
@@ -45,6 +57,7 @@ class HostBus:
 
     kernel: Kernel
     busy: Callable[[], bool]
+    adapter: I2cAdapter | None
     port: Endpoint
     files: Files
     path: str
@@ -57,6 +70,7 @@ def emulated_bus(
     return HostBus(
         kernel,
         lambda: adapter.busy or busy(),
+        adapter,
         server := I2cServer(path, adapter),
         lambda: DeviceFile(adapter),
         server.name,
@@ -66,7 +80,7 @@ def emulated_bus(
 def attached_bus(path: Path) -> HostBus:
     """The bus that another process serves at ``path``; raises PortError."""
     remote = RemoteBus(path)
-    return HostBus(Kernel(), lambda: False, remote, remote.open, remote.name)
+    return HostBus(Kernel(), lambda: False, None, remote, remote.open, remote.name)
 
 
 def run_program(
@@ -88,10 +102,17 @@ def run_program(
         CompilerError: the library of the preload route can not be built.
     """
     program, supervisor, reason = _start(command, number, bus, route)
-    ports: list[Endpoint] = [bus.port, program, *([supervisor] if supervisor else [])]
-    pump = Pump(bus.kernel, ports, bus.busy, pace=pace, report=say, wait=wait_precisely)
-    watch = _Watch(pump, program, supervisor)
-    ports.append(watch)
+    ports = _Ports(bus, program, supervisor, fast=pace == "fast")
+    pump = Pump(
+        bus.kernel,
+        [ports],
+        bus.busy,
+        pace=pace,
+        report=say,
+        clock_ns=ports.clock_ns,
+        wait=wait_precisely,
+    )
+    ports.on_end = pump.stop
     say(f"/dev/i2c-{number} by way of {reason}")
     sharpen_timers()
     handlers = {number: signal.getsignal(number) for number in (*FORWARDED, signal.SIGINT)}
@@ -110,26 +131,75 @@ def run_program(
     return program.exit_code
 
 
-class _Watch:
-    """A port that stops the pump when there is nobody left to serve."""
+class _Ports:
+    """All ports as one, which does transfers in one go where the pump would look at each byte.
 
-    name = "end"
+    Paced, virtual time runs ahead of wall time for that, and the program is told when wall time
+    gets there.
+
+    Attributes:
+        on_end: called when there is nobody left to serve.
+    """
+
+    name = "program and bus"
     congested = False
 
-    def __init__(self, pump: Pump, program: Program, supervisor: Supervisor | None) -> None:
-        self._pump = pump
+    def __init__(
+        self, bus: HostBus, program: Program, supervisor: Supervisor | None, *, fast: bool
+    ) -> None:
+        self.on_end: Callable[[], None] = lambda: None
+        self._bus = bus
         self._program = program
         self._supervisor = supervisor
+        self._fast = fast
+        others: list[Endpoint] = [supervisor] if supervisor else []
+        self._ports: list[Endpoint] = [bus.port, program, *others]
+        self._origin_ns = time.monotonic_ns() - bus.kernel.now // PS_PER_NS
+        if bus.adapter is not None:
+            bus.adapter.holding = not fast
+
+    def clock_ns(self) -> int:
+        """Wall time, on the scale of virtual time when that is paced."""
+        return time.monotonic_ns() - self._origin_ns
 
     def exchange(self, now_ps: int) -> None:
+        for port in self._ports:
+            port.exchange(now_ps)
+        adapter = self._bus.adapter
+        if adapter is not None:
+            told = adapter.told
+            self._transfer(adapter)
+            if adapter.told > told:
+                self._await_next(adapter)
         if self._program.ended and (self._supervisor is None or self._supervisor.ended):
-            self._pump.stop()
+            self.on_end()
+
+    def _transfer(self, adapter: I2cAdapter) -> None:
+        kernel = self._bus.kernel
+        end_ns = time.monotonic_ns() + int(SLICE_S * NS_PER_S)
+        limit_ps = None if self._fast else self.clock_ns() * PS_PER_NS + AHEAD_PS
+        while adapter.busy and time.monotonic_ns() < end_ns:
+            if limit_ps is not None and (kernel.horizon() or 0) > limit_ps:
+                break
+            kernel.step()
+        while kernel.horizon() == kernel.now:  # what is left of them
+            kernel.step()
+        if adapter.holding:
+            adapter.release(self.clock_ns() * PS_PER_NS)
+
+    def _await_next(self, adapter: I2cAdapter) -> None:
+        """Virtual time stands still for a moment: most programs call again at once."""
+        end_ns = time.monotonic_ns() + TURNAROUND_NS
+        while not adapter.busy and time.monotonic_ns() < end_ns:
+            for port in self._ports:
+                port.exchange(self._bus.kernel.now)
+        self._transfer(adapter)
 
     def watched(self) -> list[tuple[int, int]]:
-        return []
+        return [item for port in self._ports for item in port.watched()]
 
     def release_ps(self, count: int) -> int | None:
-        return None
+        return None if self._bus.adapter is None else self._bus.adapter.release_ps()
 
     def close(self) -> None:
         pass

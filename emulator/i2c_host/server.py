@@ -16,6 +16,7 @@ from pathlib import Path
 
 from cubestack.emulator.i2c_host.adapter import I2cAdapter
 from cubestack.emulator.i2c_host.device_file import DeviceFile
+from cubestack.emulator.i2c_host.pacing import poll_all
 from cubestack.emulator.ports.serial_port import PortError
 from cubestack.firmware_model.interface.linux_i2c import (
     LENGTH,
@@ -50,7 +51,7 @@ class I2cServer:
         path = path.absolute()
         self.name = str(path)
         self._adapter = adapter
-        self._clients: list[_Client] = []
+        self._clients: dict[int, _Client] = {}
         self._files: dict[int, DeviceFile] = {}
         _make_private(path.parent)
         _remove_dead(path)
@@ -71,23 +72,27 @@ class I2cServer:
     def watched(self) -> list[tuple[int, int]]:
         """See Endpoint."""
         own = [(self._socket.fileno(), select.POLLIN)] if len(self._clients) < MAX_CLIENTS else []
-        return own + [client.watched() for client in self._clients]
+        return own + [(fileno, client.events) for fileno, client in self._clients.items()]
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint; answers go out at the end of their transfer, whenever that is."""
-        while len(self._clients) < MAX_CLIENTS:
-            try:
-                connection, _ = self._socket.accept()
-            except OSError:
-                break
-            self._clients.append(_Client(connection, self._adapter, self._files))
-        for client in self._clients:
-            client.exchange()
-        if any(client.gone for client in self._clients):
-            for client in self._clients:
-                if client.gone:
-                    client.close()
-            self._clients = [client for client in self._clients if not client.gone]
+        for fileno, events in poll_all(self.watched()):
+            client = self._clients.get(fileno)
+            if client is None:
+                self._accept()
+                continue
+            client.exchange(hung_up=bool(events & (select.POLLHUP | select.POLLERR)))
+            if client.gone:
+                client.close()
+                del self._clients[fileno]
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._socket.accept()
+        except OSError:  # gone again
+            return
+        client = _Client(connection, self._adapter, self._files)
+        self._clients[connection.fileno()] = client
 
     def release_ps(self, count: int) -> int | None:
         """See Endpoint; nothing waits here for its time."""
@@ -95,9 +100,9 @@ class I2cServer:
 
     def close(self) -> None:
         """See Endpoint."""
-        for client in self._clients:
+        for client in self._clients.values():
             client.close()
-        self._clients = []
+        self._clients.clear()
         self._socket.close()
         with contextlib.suppress(FileNotFoundError):
             os.unlink(self.name)
@@ -119,20 +124,23 @@ class _Client:
         self._waiting = False
         self.gone = False
 
-    def watched(self) -> tuple[int, int]:
+    @property
+    def events(self) -> int:
         """While an answer is due only its end, a hang-up, is of interest."""
-        events = 0 if self._waiting else select.POLLIN
-        return self._socket.fileno(), select.POLLOUT if self._unsent else events
+        if self._unsent:
+            return select.POLLOUT
+        return 0 if self._waiting else select.POLLIN
 
-    def exchange(self) -> None:
+    def exchange(self, *, hung_up: bool) -> None:
         """Send what was left, then take the next call."""
         if self._unsent:
             self._send(b"")
+        if self._waiting or self._unsent:
+            self.gone = self.gone or hung_up
+            return
         while not (self._waiting or self._unsent or self.gone):
             if not self._take_call() and not self._receive():
                 break
-        if self._waiting:
-            self._notice_hang_up()
 
     def _receive(self) -> bool:
         """Read what is there; returns whether anything came."""
@@ -187,12 +195,6 @@ class _Client:
         except BlockingIOError:
             pass
         except OSError:
-            self.gone = True
-
-    def _notice_hang_up(self) -> None:
-        poller = select.poll()
-        poller.register(self._socket, 0)
-        if poller.poll(0):
             self.gone = True
 
     def close(self) -> None:

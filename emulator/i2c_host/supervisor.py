@@ -27,7 +27,6 @@ from cubestack.emulator.i2c_host.notify import (
     read_text,
     write_memory,
 )
-from cubestack.emulator.ports.serial_port import poll_now
 from cubestack.firmware_model.interface.linux_i2c import Call, split_reply
 
 __all__ = ["Files", "OpenFile", "Supervisor", "descriptor_range"]
@@ -85,6 +84,9 @@ class Supervisor:
         self._descriptors = descriptors
         self._files = files
         self._opened: dict[int, tuple[OpenFile, socket.socket]] = {}
+        self._transfers = 0
+        self._poller = select.poll()
+        self._poller.register(listener.fd, select.POLLIN)
         named = self._by_path() | self._by_descriptor()
         self._handlers = {
             number: named[name] for name, number in abi.calls.items() if name in named
@@ -99,16 +101,16 @@ class Supervisor:
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint; answers go out at the end of their transfer, whenever that is."""
-        if self.ended:
-            return
-        while (events := poll_now(self._listener.fd, select.POLLIN)) & select.POLLIN:
-            call = self._listener.receive()
-            if call is not None:
-                self._handle(call)
-        self.ended = bool(events)
-        for inode, (_, end) in list(self._opened.items()):
-            if poll_now(end.fileno(), 0):
-                self._forget(inode)
+        while not self.ended and (ready := self._poller.poll(0)):
+            for fd, events in ready:
+                if fd != self._listener.fd:
+                    self._forget(fd)
+                elif not events & select.POLLIN:
+                    self.ended = True
+                elif (call := self._listener.receive()) is not None:
+                    self._handle(call)
+            if self._transfers:
+                break  # which is what the caller waits for
 
     def release_ps(self, count: int) -> int | None:
         """See Endpoint; nothing waits here for its time."""
@@ -116,14 +118,19 @@ class Supervisor:
 
     def close(self) -> None:
         """See Endpoint."""
-        for inode in list(self._opened):
-            self._forget(inode)
+        for file, end in self._opened.values():
+            end.close()
+            file.close()
         os.close(self._listener.fd)
 
-    def _forget(self, inode: int) -> None:
-        file, end = self._opened.pop(inode)
-        end.close()
-        file.close()
+    def _forget(self, fd: int) -> None:
+        """Close the file whose last copy has been closed."""
+        self._poller.unregister(fd)
+        for inode, (file, end) in list(self._opened.items()):
+            if end.fileno() == fd:
+                del self._opened[inode]
+                end.close()
+                file.close()
 
     def _handle(self, call: Notification) -> None:
         """Answer ``call``, or let it pass; whatever is wrong with it is its own problem."""
@@ -168,7 +175,7 @@ class Supervisor:
         if self._node.may_be(text):
             start = None if folder is None else _signed(call.arguments[folder])
             found = self._node.find(text, call.pid, start)
-        if found is None or not self._listener.waits(call):
+        if found is None:
             self._listener.let_pass(call)
         else:
             handle(call, found)
@@ -200,6 +207,7 @@ class Supervisor:
             mine.shutdown(socket.SHUT_RD)
             theirs.setblocking(False)
             self._opened[os.fstat(theirs.fileno()).st_ino] = file, mine
+            self._poller.register(mine, 0)
             self._listener.answer_with_descriptor(
                 call, theirs.fileno(), number, close_on_exec=close_on_exec
             )
@@ -269,7 +277,7 @@ class Supervisor:
             inode = os.stat(f"/proc/{call.pid}/fd/{_signed(call.arguments[0])}").st_ino
         except OSError:
             inode = 0
-        if inode not in self._opened or not self._listener.waits(call):
+        if inode not in self._opened:
             self._listener.let_pass(call)
         else:
             handle(call, self._opened[inode][0])
@@ -283,6 +291,7 @@ class Supervisor:
         marshalled = fetch(call)
 
         def done(reply: bytes) -> None:
+            self._transfers -= 1
             result, data = split_reply(reply)
             if not self._listener.waits(call):
                 return
@@ -292,6 +301,7 @@ class Supervisor:
                 result = -(error.errno or errno.EIO)
             self._listener.answer(call, result)
 
+        self._transfers += 1
         file.perform(marshalled.call, marshalled.body, done)
 
     def _duplicate(self, call: Notification, _file: OpenFile) -> None:
