@@ -118,6 +118,8 @@ class TcpEndpoint(SerialPort):
     any, but makes room for the next one, and what it sent last is lost if the wire was too slow.
     """
 
+    scheme = "tcp"
+
     def __init__(self, host: str, port: int, uart: Uart, *, allow_remote: bool = False) -> None:
         """Listen on ``host``:``port`` (port 0: any free one).
 
@@ -135,7 +137,7 @@ class TcpEndpoint(SerialPort):
         self._input_ended = False
         self.address: tuple[str, int] = self._server.getsockname()[:2]
         name = f"[{self.address[0]}]" if ":" in self.address[0] else self.address[0]
-        self.name = f"tcp://{name}:{self.address[1]}"
+        self.name = f"{self.scheme}://{name}:{self.address[1]}"
         super().__init__(uart)
 
     def watched(self) -> list[tuple[int, int]]:
@@ -168,7 +170,11 @@ class TcpEndpoint(SerialPort):
         self._drop()
         newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = newcomer
+        self._welcome()
         return self._client
+
+    def _welcome(self) -> None:
+        """A client has come."""
 
     def _leaving(self, client: socket.socket) -> bool:
         gone = select.POLLRDHUP | select.POLLHUP | select.POLLERR

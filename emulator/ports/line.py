@@ -2,26 +2,50 @@
 
 from collections import deque
 
+from cubestack.emulator.line_format import LineFormat, LineSampler
 from cubestack.emulator.uart import Uart
 
 __all__ = ["HostLine"]
 
 
 class HostLine:
-    """Plugged into a UART; the line that was there before is unplugged by that."""
+    """Plugged into a UART; the line that was there before is unplugged by that.
+
+    The format of this end is the device's unless ``form`` is set; with another one, what arrives is
+    what a receiver makes of the levels, characters with errors included.
+
+    Attributes:
+        framing_errors: characters with a low stop bit.
+        parity_errors: characters with a wrong parity bit.
+    """
 
     def __init__(self, uart: Uart) -> None:
         """Plug into ``uart``; what it sent before is lost, as on a wire."""
         self._uart = uart
         self._blocks: deque[tuple[bytes, int, int]] = deque()
+        self._sampler: LineSampler | None = None
+        self.framing_errors = self.parity_errors = 0
         uart.line = self._deliver
+        uart.host_form = uart.form
+
+    @property
+    def form(self) -> LineFormat:
+        """Format of this end; setting another one loses what is on the wire to it."""
+        return self._uart.host_form
+
+    @form.setter
+    def form(self, form: LineFormat) -> None:
+        if form != self._uart.host_form:
+            self._uart.host_form = form
+            self._sampler = None if form == self._uart.form else LineSampler(form)
+            self._blocks.clear()
 
     def arrival_ps(self, count: int = 1) -> int | None:
         """When ``count`` of the bytes not taken yet have arrived, or all if there are fewer.
 
         None when there are none.
         """
-        arrival = None
+        arrival = None if self._sampler is None else self._sampler.next_ps()
         for data, first_ps, byte_ps in self._blocks:
             arrival = first_ps + (min(count, len(data)) - 1) * byte_ps
             count -= len(data)
@@ -38,8 +62,18 @@ class HostLine:
         """Start sending ``data``, behind what is still being sent."""
         self._uart.host_writes(data)
 
+    def send_break(self) -> None:
+        """Hold the line low for a while."""
+        self._uart.host_breaks()
+
+    def drop_writes(self) -> None:
+        """Take back what is not on the wire yet."""
+        self._uart.host_drops()
+
     def take(self, now_ps: int, max_bytes: int | None = None) -> bytes:
         """Bytes that have arrived by ``now_ps``, at most ``max_bytes`` of them."""
+        if self._sampler is not None:
+            self._settle(self._sampler, now_ps)
         taken = bytearray()
         while self._blocks and (max_bytes is None or len(taken) < max_bytes):
             data, first_ps, byte_ps = self._blocks[0]
@@ -58,6 +92,18 @@ class HostLine:
         self._blocks.clear()
         if self._uart.line == self._deliver:
             self._uart.line = lambda _data, _first_ps, _byte_ps: None
+            self._uart.host_form = self._uart.form
 
     def _deliver(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        self._blocks.append((data, first_ps, byte_ps))
+        if self._sampler is None:
+            self._blocks.append((data, first_ps, byte_ps))
+            return
+        for index, byte in enumerate(data):
+            self._sampler.put(byte, first_ps + (index - 1) * byte_ps, self._uart.form)
+
+    def _settle(self, sampler: LineSampler, now_ps: int) -> None:
+        """Turn what has been found on the line into bytes."""
+        for character in sampler.take(now_ps):
+            self._blocks.append((bytes([character.value]), character.time_ps, 1))
+            self.framing_errors += character.framing_error
+            self.parity_errors += character.parity_error

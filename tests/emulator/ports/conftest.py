@@ -8,14 +8,16 @@ import os
 import select
 import socket
 import struct
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.pump import wait_ready
+from cubestack.emulator.ports.pump import Pump, wait_ready
 from cubestack.emulator.ports.serial_port import Endpoint
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import Kernel
@@ -84,6 +86,10 @@ class Terminal:
             assert select.select([self.fd], [], [], TIMEOUT_S)[0], f"only {len(data)} bytes came"
             data += os.read(self.fd, count - len(data))
         return data
+
+    def read_now(self) -> bytes:
+        """What is there; BlockingIOError when there is nothing."""
+        return os.read(self.fd, 1 << 16)
 
     def write(self, data: bytes) -> int:
         try:
@@ -184,3 +190,22 @@ def terminal_at() -> type[Terminal]:
 def connection_to() -> type[Connection]:
     """Connects; whoever serves the port may notice."""
     return Connection
+
+
+@contextlib.contextmanager
+def _served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
+    pump = Pump(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
+    thread = threading.Thread(target=pump.run)
+    thread.start()
+    try:
+        yield
+    finally:
+        pump.stop()
+        thread.join(TIMEOUT_S)
+        assert not thread.is_alive()
+
+
+@pytest.fixture
+def served() -> Callable[..., contextlib.AbstractContextManager[None]]:
+    """served(device, endpoint, pace): the endpoint is served by a pump in a thread."""
+    return _served

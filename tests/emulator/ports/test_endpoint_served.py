@@ -1,36 +1,17 @@
 """The ports served by the pump in a thread, for pyserial and plain files."""
 
 import contextlib
-import threading
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import serial
-
-from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.pump import Pump
 
 ALL_BYTES = bytes(range(256))
 TIMEOUT_S = 20.0
 
 
-@contextlib.contextmanager
-def served(device: Any, endpoint: PtyEndpoint | TcpEndpoint, pace: Any) -> Iterator[None]:
-    pump = Pump(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
-    thread = threading.Thread(target=pump.run)
-    thread.start()
-    try:
-        yield
-    finally:
-        pump.stop()
-        thread.join(TIMEOUT_S)
-        assert not thread.is_alive()
-
-
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_pyserial_on_a_pty(pty, device, path, pace):
+def test_pyserial_on_a_pty(pty, device, path, pace, served):
     device.echoes = True
     with served(device, pty, pace):
         for round_ in range(3):
@@ -41,7 +22,7 @@ def test_pyserial_on_a_pty(pty, device, path, pace):
 
 
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_pyserial_over_tcp(tcp, device, pace):
+def test_pyserial_over_tcp(tcp, device, pace, served):
     device.echoes = True
     url = f"socket://{tcp.address[0]}:{tcp.address[1]}"
     with served(device, tcp, pace):
@@ -53,7 +34,7 @@ def test_pyserial_over_tcp(tcp, device, pace):
 
 
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_plain_file_on_a_pty(pty, device, path, pace, terminal_at):
+def test_plain_file_on_a_pty(pty, device, path, pace, terminal_at, served):
     device.echoes = True
     with served(device, pty, pace), contextlib.closing(terminal_at(path)) as terminal:
         terminal.write(ALL_BYTES)
@@ -62,7 +43,7 @@ def test_plain_file_on_a_pty(pty, device, path, pace, terminal_at):
 
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
 def test_fast_pace_loses_nothing_to_a_client_slower_than_the_emulator(
-    kind, request, device, terminal_at, connection_to
+    kind, request, device, terminal_at, connection_to, served
 ):
     """Virtual time waits for it: 400 kB come while it reads a few bytes at a time."""
     port = request.getfixturevalue(kind)
