@@ -9,7 +9,7 @@ from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.bench_link import BenchLink
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.commands import Commands
-from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import JobQueue
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.node_link import NodeLink
@@ -17,9 +17,14 @@ from cubestack.firmware_model.cubesense.register_link import RegisterLink
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
-from cubestack.firmware_model.hardware import Pay, Reset, Routine
+from cubestack.firmware_model.hardware import ReadTimer, Reset, Routine
 
-__all__ = ["CubeSenseProgram"]
+__all__ = ["DRAIN_US", "CubeSenseProgram"]
+
+DRAIN_US = 100_000
+"""A reset waits so long at most for the UART; its longest answer takes half of it. Ours."""
+
+DRAIN_STEP_US = 1_000
 
 
 class CubeSenseProgram:
@@ -38,6 +43,7 @@ class CubeSenseProgram:
     def __init__(self, hardware: CubeSenseHardware, meter: Meter) -> None:
         """Reset: RAM starts with the declared reset values."""
         self.idle = False
+        self._hardware = hardware
         state = State()
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
@@ -65,5 +71,13 @@ class CubeSenseProgram:
             yield from self._supply.sample()
             cause = yield from self.commands.execute(self._jobs.pop())
             if cause is not None:
-                yield Pay()
+                yield from self._drain()
                 yield Reset(cause)
+
+    def _drain(self) -> Routine[None]:
+        """Let the host have what was answered before, the acknowledge of its reset above all."""
+        now_us: int = yield ReadTimer()
+        deadline_us = now_us + DRAIN_US
+        while self._hardware.uart_backlog(Port.NODE) and now_us < deadline_us:
+            yield from self._supply.watch_until(now_us + DRAIN_STEP_US)
+            now_us = yield ReadTimer()

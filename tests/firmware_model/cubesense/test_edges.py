@@ -184,3 +184,19 @@ def test_small_frames(meter: Meter, seed: int) -> None:
         assert picture[y // 32, x // 32] >= 128
         inside = [(a, b) for a, b in neighbours if 0 <= a < 24 and 0 <= b < 20]
         assert len(inside) < len(neighbours) or any(picture[b, a] < 128 for a, b in inside)
+
+
+def test_bytes_can_be_put_straight_into_the_buffer(meter: Meter) -> None:
+    picture = earth(12, -7)
+    buffer = np.zeros(FULL_SIZE.scan_step, np.uint8)
+    lines = NadirLines(EdgeConfig(), meter, buffer=buffer)
+    data, at = scan(picture), 0
+    while lines.wanted:
+        space = lines.space
+        assert np.shares_memory(space, buffer)
+        space[:] = data[at : at + len(space)]
+        at += len(space)
+        lines.filled()
+    assert at == len(data)
+    fed = search(picture, EdgeConfig(), meter)
+    assert np.array_equal(lines.edges.points, fed.points)
