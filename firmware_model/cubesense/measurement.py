@@ -16,7 +16,7 @@ from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, fine_table
 from cubestack.firmware_model.cubesense.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.nadir import NadirConfig, find_nadir
-from cubestack.firmware_model.cubesense.sample_search import around_samples
+from cubestack.firmware_model.cubesense.sample_search import Between, around_samples
 from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
 from cubestack.firmware_model.cubesense.sun_centroid import (
     COORDINATE_BYTES,
@@ -47,6 +47,11 @@ __all__ = ["READ_OUT_TICKS", "Measurement"]
 
 READ_OUT_TICKS = ticks_of(ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
 """From a picture's first row to its end: 30.5 ms."""
+
+BETWEEN = {
+    NadirSearch.AROUND_SAMPLES: Between.BINARY,
+    NadirSearch.AROUND_SAMPLES_STEPPING: Between.SEQUENTIAL,
+}
 
 PROJECTIONS = {Camera.SUN: Projection.EQUIDISTANT, Camera.NADIR: Projection.STEREOGRAPHIC}
 
@@ -135,9 +140,10 @@ class Measurement:
 
     def _find_edges(self, result: Result, config: EdgeConfig) -> Routine[EdgeList | None]:
         acquisition, sram = self._acquisition, result.sram
-        by_address = self._state.nadir_search is NadirSearch.AROUND_SAMPLES
-        if by_address and acquisition.can_address(Camera.NADIR, sram):
-            answer = yield from acquisition.answer(sram, around_samples(config, self._meter))
+        between = BETWEEN.get(self._state.nadir_search)
+        if between is not None and acquisition.can_address(Camera.NADIR, sram):
+            search = around_samples(config, self._meter, between)
+            answer = yield from acquisition.answer(sram, search)
             if answer is None:
                 return None
             edges, result.pixels_read = answer

@@ -144,10 +144,15 @@ class Measurement(IntEnum):
 
 
 class NadirSearch(IntEnum):
-    """How the nadir camera's edges are looked for (CubeSense thesis, 6.5.1 and 9.2.2); ours."""
+    """How the nadir camera's edges are looked for (CubeSense thesis, 6.5.1 and 9.2.2); ours.
+
+    Along scanned lines, or around samples with addresses that the processor chooses: between two
+    unlike samples by halves, or one pixel after the other.
+    """
 
     LINES = 0
     AROUND_SAMPLES = 1
+    AROUND_SAMPLES_STEPPING = 2
 
 
 class ImageSize(IntEnum):

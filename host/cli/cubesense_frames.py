@@ -19,6 +19,13 @@ if TYPE_CHECKING:
 
 __all__ = ["SensorResult", "measure_sensors"]
 
+#: Names of --search.
+SEARCHES = {
+    "lines": NadirSearch.LINES,
+    "samples": NadirSearch.AROUND_SAMPLES,
+    "stepping": NadirSearch.AROUND_SAMPLES_STEPPING,
+}
+
 FRAME_S = 525 * 858 / 13.5e6
 """A camera's frame time: captures start at a random phase of it."""
 
@@ -68,12 +75,12 @@ def measure_sensors(args: argparse.Namespace) -> Iterator[SensorResult]:
     rng = np.random.default_rng(args.seed)
     given = None if args.scene is None else load_earth_sun_scene(args.scene)
     sensors = list(Camera) if args.sensor == "both" else [Camera[args.sensor.upper()]]
-    search = NadirSearch.AROUND_SAMPLES if args.search == "samples" else NadirSearch.LINES
+    search = SEARCHES[args.search]
     with open_cubesense(
         given or _random_scene(args, sensors[0], rng),
         seed=args.seed,
         engine=args.engine,
-        mcu_addressing=search is NadirSearch.AROUND_SAMPLES,
+        mcu_addressing=search is not NadirSearch.LINES,
     ) as session:
         if search is not NadirSearch.LINES:
             session.cubesense.client.command("SetNadirSearch", Search=search)

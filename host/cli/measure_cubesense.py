@@ -57,10 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--search",
-        choices=("lines", "samples"),
+        choices=("lines", "samples", "stepping"),
         default="lines",
-        help="how edges are looked for: along lines (published), or around samples, with FPGAs "
-        "that let the processor choose addresses",
+        help="how edges are looked for: along lines (published); around samples, by halves or "
+        "stepping from pixel to pixel, with FPGAs that let the processor choose addresses",
     )
     parser.add_argument(
         "--tilt", type=angle, metavar="DEG", help="random pose: largest tilt to nadir (30)"
@@ -86,8 +86,10 @@ def run(args: argparse.Namespace) -> int:
     if args.scene is not None and (given or args.no_noise):
         names = ", ".join(f"--{name.replace('_', '-')}" for name in (*POSE_DEFAULTS, "no_noise"))
         raise ValueError(f"{names} belong to the random poses; a scene file has keys for them")
-    if args.search == "samples" and args.memory == "other":
-        raise ValueError("--search samples reads a camera's own SRAM: leave --memory other out")
+    if args.search != "lines" and args.memory == "other":
+        raise ValueError(
+            f"--search {args.search} reads a camera's own SRAM: leave --memory other out"
+        )
     for name, value in POSE_DEFAULTS.items():
         if getattr(args, name) is None:
             setattr(args, name, value)

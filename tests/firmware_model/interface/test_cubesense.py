@@ -168,7 +168,7 @@ def test_every_message_and_field_is_explained_and_round_trips(message: Message) 
         ("Mask1", {"XMax": 640}, ["XMax"]),
         ("Mask1", {"YMax": 480}, ["YMax"]),
         ("Boresight2", {"X": 640}, ["X"]),
-        ("SetNadirSearch", {"Search": 2}, ["Search"]),
+        ("SetNadirSearch", {"Search": 3}, ["Search"]),
         ("CameraSettings1", {"Exposure": 65535, "Gain": 255}, []),
         ("Mask1", {"XMax": 639, "YMax": 479}, []),
         ("NextImageFrame", {"Frame": 8191}, []),

@@ -99,12 +99,17 @@ def test_memory_of_the_other_half_gives_the_same_directions(measure: Callable[..
 
 
 def test_search_around_samples_looks_at_far_fewer_pixels(measure: Callable[..., Frames]) -> None:
-    lines, samples = (
-        measure("--sensor", "nadir", "--frames", 3, "--search", way) for way in ("lines", "samples")
+    lines, halves, stepping = (
+        measure("--sensor", "nadir", "--frames", 3, "--search", way)
+        for way in ("lines", "samples", "stepping")
     )
-    for one, another in zip(lines, samples, strict=True):
-        assert another["pixels_read"] < one["pixels_read"] / 30
-        assert another["error_deg"] < 0.2
+    for line, half, step in zip(lines, halves, stepping, strict=True):
+        assert half["pixels_read"] < step["pixels_read"] / 2 < line["pixels_read"] / 15
+        assert half["phase_ms"]["search"] < line["phase_ms"]["search"] / 3
+        # The same picture has the same edges, however they are found.
+        for key in ("alpha_deg", "beta_deg"):
+            assert half[key] == step[key]
+        assert half["error_deg"] < 0.2
 
 
 def test_scene_file(measure: Callable[..., Frames], tmp_path: Path) -> None:
