@@ -41,6 +41,7 @@ def test_centres_are_spread_evenly() -> None:
 
 
 def test_sixty_faces_at_the_twelve_corners_have_eleven_neighbours() -> None:
+    assert SPHERE.neighbours.shape == (320, 12)
     counts = (SPHERE.neighbours != NO_FACE).sum(axis=1)
     assert sorted(set(counts.tolist())) == [11, 12]
     assert (counts == 11).sum() == 12 * 5

@@ -1,12 +1,14 @@
 """Candidates against a search of the whole database, and pivoting on real and invented skies."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching import MatchEnd, find_triangles, match_triple
-from cubestack.firmware_model.aramis.triangles import measure_triangle
+from cubestack.firmware_model.aramis.triangles import Triangle, measure_triangle
 from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
 from cubestack.firmware_model.costs import Meter
 
@@ -123,24 +125,53 @@ def test_each_pivot_thins_the_candidates() -> None:
         assert left[3] <= left[2] <= left[1] <= left[0]
 
 
-def test_survivors_of_a_pivot_share_two_stars_with_one_of_its_candidates() -> None:
-    onboard = database()
-    for made in pictures(20, seed=5):
+def test_survivors_of_pivots_share_two_stars_with_a_candidate_of_each() -> None:
+    """The pivots are 1 2 4, 1 3 5 and 1 2 6, counted from 1."""
+    onboard, sigma, thinned = database(), 4e-4, 0
+    for made in pictures(10, seed=5):
         vectors = directions(made)
-        main = match_triple(vectors, (0, 1, 2), (), 2e-4, onboard, None, meter())
-        triangle = measure_triangle(vectors[[0, 1, 3]], 2e-4, meter())
-        if triangle is None or len(main.candidates) < 2:
-            continue
-        others = [
-            set(row) for row in onboard.stars[find_triangles(triangle, onboard, None, meter())]
-        ]
-        expected = [
-            candidate
-            for candidate in main.candidates.tolist()
-            if any(len(other & set(onboard.stars[candidate])) >= 2 for other in others)
-        ]
-        after = match_triple(vectors, (0, 1, 2), (3,), 2e-4, onboard, None, meter())
-        assert after.candidates.tolist() == expected
+        left = match_triple(vectors, (0, 1, 2), (), sigma, onboard, None, meter()).candidates
+        for pivots, corners in ((1, (0, 1, 3)), (2, (0, 2, 4)), (3, (0, 1, 5))):
+            triangle = measure_triangle(vectors[list(corners)], sigma, meter())
+            if triangle is None or len(left) < 2:
+                break
+            others = onboard.stars[find_triangles(triangle, onboard, None, meter())].tolist()
+            pairs = {pair for other in others for pair in combinations(other, 2)}
+            before, left = (
+                len(left),
+                left[
+                    [
+                        bool(pairs & set(combinations(row, 2)))
+                        for row in onboard.stars[left].tolist()
+                    ]
+                ],
+            )
+            thinned += len(left) < before
+            after = match_triple(
+                vectors, (0, 1, 2), (3, 4, 5)[:pivots], sigma, onboard, None, meter()
+            )
+            assert after.candidates.tolist() == left.tolist()
+    assert thinned > 10
+
+
+def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
+    """With a moment that excludes nothing, the candidates are a stretch of the list of areas."""
+    onboard, rng = database(), np.random.default_rng(7)
+    every = float(onboard.moments[-1])
+    for _ in range(20):
+        first, last = np.sort(rng.integers(0, len(onboard), 2))
+        low, high = float(onboard.areas[first]), float(onboard.areas[last])
+        triangle = Triangle(
+            sides=np.ones(3, dtype=np.float32),
+            area=np.float32((low + high) / 2),
+            moment=np.float32(0),
+            area_sigma=np.float32((high - low) / 6),
+            moment_sigma=np.float32(every),
+        )
+        reach = np.float32(3) * triangle.area_sigma
+        inside = (onboard.areas >= triangle.area - reach) & (onboard.areas <= triangle.area + reach)
+        found = find_triangles(triangle, onboard, None, meter())
+        assert np.sort(found).tolist() == np.flatnonzero(inside).tolist()
 
 
 def test_enough_candidates_need_no_pivot() -> None:

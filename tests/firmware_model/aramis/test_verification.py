@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.aramis.field import Field
@@ -90,6 +91,18 @@ def test_hardly_any_star(stars: int) -> None:
     found = confirm(quaternion, vectors, database(), FIELD, TOLERANCE, 1, meter())
     assert len(found.measured) <= stars
     assert found.chance >= 1
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_chance_bounds_the_binomial_tail(seed: int) -> None:
+    """The first term of the tail without its factor below 1: never less, and not much more."""
+    (made,) = pictures(1, seed)
+    found = check(made, made.attitude)
+    share = len(made.stars) * np.pi * TOLERANCE**2 / FIELD.solid_angle_sr
+    further, agreed = found.expected - 3, len(found.measured) - 3
+    tail = stats.binom.sf(agreed - 1, further, share)
+    assert tail <= found.chance * 1.001
+    assert found.chance <= 1.1 * tail
 
 
 def test_hypotheses_raise_the_chance() -> None:

@@ -1,0 +1,170 @@
+"""Pictures of the sky, from grey levels to the attitude."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.background import Background
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.pipeline import (
+    PUBLISHED,
+    VERIFIED,
+    Configuration,
+    Detection,
+    detect,
+    solve,
+)
+from cubestack.firmware_model.aramis.solution import Outcome, Reason
+from cubestack.firmware_model.aramis.spikes import SpikeRemoval
+from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
+from cubestack.firmware_model.costs import Meter
+
+from .sky import Light, Picture, database, errors_deg, picture
+
+FIELD = Field()
+SPOT_PX = 1.5
+
+
+def meter() -> Meter:
+    return Meter(BLACKFIN_BF533)
+
+
+def render(made: Picture, rng: np.random.Generator, noise: float = 1.5) -> NDArray[np.uint8]:
+    """Gaussian spots on a noisy sky of 14 grey levels; magnitude 6 peaks at 20."""
+    image = rng.normal(14, noise, (FIELD.rows, FIELD.columns))
+    half = 8
+    for (x, y), light in zip(made.stars.centroids, made.stars.brightness, strict=True):
+        left, top = max(0, int(x) - half), max(0, int(y) - half)
+        part = image[top : top + 2 * half + 2, left : left + 2 * half + 2]
+        rows, columns = np.mgrid[: part.shape[0], : part.shape[1]]
+        square = (columns + left - x) ** 2 + (rows + top - y) ** 2
+        part += light / 25 * np.exp(-square / (2 * SPOT_PX**2))
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def sky(seed: int) -> tuple[Picture, NDArray[np.uint8]]:
+    rng = np.random.default_rng(seed)
+    made = picture(rng, FIELD, Light(noise_px=0, mag_noise=0, most=60))
+    return made, render(made, rng)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_picture_gives_the_attitude(seed: int) -> None:
+    made, image = sky(seed)
+    solution = solve(image, Background(), VERIFIED, database(), meter())
+    assert solution.outcome is Outcome.CONCLUSIVE
+    assert solution.quaternion is not None
+    cross, roll = errors_deg(solution.quaternion, made.attitude)
+    assert cross < 0.01
+    assert roll < 0.05
+
+
+def test_stars_are_found_where_they_are() -> None:
+    made, image = sky(5)
+    found = detect(image, Background(), FIELD, VERIFIED.detection, meter())
+    assert found is not None
+    assert len(found) > 6
+    apart = np.linalg.norm(found.centroids[:, None] - made.stars.centroids[None], axis=2)
+    assert np.median(apart.min(axis=1)) < 0.15
+    assert (np.diff(found.brightness) <= 0).all()
+
+
+def test_subtracting_the_background_makes_centroids_better() -> None:
+    errors = []
+    for subtract in (False, True):
+        found_errors = []
+        for seed in range(3):
+            made, image = sky(seed)
+            settings = replace(VERIFIED.detection, subtract=subtract)
+            found = detect(image, Background(), FIELD, settings, meter())
+            assert found is not None
+            apart = np.linalg.norm(found.centroids[:, None] - made.stars.centroids[None], axis=2)
+            found_errors += apart.min(axis=1).tolist()
+        errors.append(np.median(found_errors))
+    assert errors[1] < errors[0]
+
+
+def test_the_published_method_finds_fewer_stars() -> None:
+    _, image = sky(6)
+    counts = []
+    for spikes in (SpikeRemoval.CENTRE, SpikeRemoval.WINDOW):
+        settings = replace(VERIFIED.detection, spikes=spikes, max_stars=255)
+        found = detect(image, Background(), FIELD, settings, meter())
+        assert found is not None
+        counts.append(len(found))
+    assert 3 <= counts[1] < counts[0]
+
+
+def test_what_lies_outside_the_field_is_not_seen() -> None:
+    image = np.full((FIELD.rows, FIELD.columns), 10, dtype=np.uint8)
+    image[500:510, 20:30] = image[500:510, 640:650] = 200
+    found = detect(image, Background(), FIELD, PUBLISHED.detection, meter())
+    assert found is not None
+    np.testing.assert_allclose(found.centroids, [[644.5, 504.5]], atol=0.01)
+
+
+def test_only_the_brightest_are_kept() -> None:
+    _, image = sky(7)
+    found = detect(image, Background(), FIELD, replace(VERIFIED.detection, max_stars=5), meter())
+    assert found is not None
+    assert len(found) == 5
+
+
+@pytest.mark.parametrize("configuration", [PUBLISHED, VERIFIED])
+@pytest.mark.parametrize("level", [0, 14, 255])
+def test_an_empty_picture(configuration: Configuration, level: int) -> None:
+    image = np.full((FIELD.rows, FIELD.columns), level, dtype=np.uint8)
+    solution = solve(image, Background(), configuration, database(), meter())
+    assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.TOO_FEW_STARS)
+
+
+def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
+    image = np.zeros((FIELD.rows, FIELD.columns), dtype=np.uint8)
+    image[:, ::8] = 255
+    image[::2] = 0
+    off = replace(VERIFIED, detection=replace(VERIFIED.detection, spikes=SpikeRemoval.OFF))
+    solution = solve(image, Background(), off, database(), meter())
+    assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.TOO_MANY_PIXELS)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_dice_give_no_attitude(seed: int) -> None:
+    image = np.random.default_rng(seed).integers(0, 256, (FIELD.rows, FIELD.columns))
+    solution = solve(image.astype(np.uint8), Background(), VERIFIED, database(), meter())
+    assert solution.outcome is Outcome.NONE
+
+
+def test_a_picture_of_another_size_is_refused() -> None:
+    words = r"a picture must have 1024 rows of 1280 pixels, not \(10, 10\)"
+    with pytest.raises(ValueError, match=words):
+        solve(np.zeros((10, 10), np.uint8), Background(), VERIFIED, database(), meter())
+
+
+def test_the_picture_is_not_changed() -> None:
+    _, image = sky(8)
+    image.flags.writeable = False
+    solve(image, Background(), VERIFIED, database(), meter())
+
+
+def test_phases_and_time() -> None:
+    _, image = sky(9)
+    spent = meter()
+    solve(image, Background(), VERIFIED, database(), spent)
+    assert {"threshold", "spikes", "centroids", "search", "attitude"} <= set(spent.phases)
+    assert 0.02 < spent.table.seconds(spent.total) < 2
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"sigmas": -1.0}, "sigmas must be 0 to 20, not -1.0"),
+        ({"needed": 26}, "needed must be 1 to 25, not 26"),
+        ({"min_pixels": 9, "max_pixels": 8}, "min_pixels must be 1 to 8, not 9"),
+        ({"max_stars": 2}, "max_stars must be 3 to 255, not 2"),
+    ],
+)
+def test_settings_out_of_range_are_refused(setting: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Detection(**setting)  # type: ignore[arg-type]

@@ -1,0 +1,81 @@
+"""Pictures that a star camera took in orbit, solved from their pixels.
+
+752 x 290, rows doubled. The camera is a CCD with pixels of 8.6 by 8.3 um behind 20 mm.
+"""
+
+import json
+from dataclasses import replace
+from math import atan, degrees
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.aramis_catalogue import CatalogueParameters
+from cubestack.firmware_model.aramis.background import Background
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, solve
+from cubestack.firmware_model.aramis.solution import Outcome
+from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
+from cubestack.firmware_model.costs import Meter
+
+from .sky import database, errors_deg
+
+FOLDER = Path(__file__).parents[4] / "shared" / "data" / "sky_narrow"
+PICTURES = sorted(FOLDER.glob("*.png"))
+
+pytestmark = pytest.mark.skipif(not PICTURES, reason="the pictures are not part of the project")
+
+FIELD = Field(
+    fov_deg=2 * degrees(atan(580 * 0.0083 / 2 / 20)),
+    columns=752,
+    rows=580,
+    pitch_x_mm=0.0086,
+    pitch_y_mm=0.0083,
+    round=False,
+)
+ONBOARD = CatalogueParameters(fov_deg=18, epoch=2014.8)
+
+
+def load(path: Path) -> tuple[NDArray[np.uint8], Rotation]:
+    truth = json.loads((FOLDER / "truth.json").read_text())["images"][path.name]
+    with Image.open(path) as opened:
+        picture = np.repeat(np.asarray(opened), 2, axis=0)
+    return picture, Rotation.from_quat(truth["quaternion_xyzw_inertial_to_camera"])
+
+
+@pytest.mark.parametrize("path", PICTURES, ids=lambda path: str(path.stem))
+@pytest.mark.parametrize("aided", [False, True])
+def test_each_is_solved(path: Path, aided: bool) -> None:
+    picture, truth = load(path)
+    hint = truth.inv().apply([0.03, 0.02, 1.0]).astype(np.float32) if aided else None
+    configuration = replace(VERIFIED, field=FIELD)
+    solution = solve(
+        picture, Background(), configuration, database(ONBOARD), Meter(BLACKFIN_BF533), hint
+    )
+    assert solution.outcome is Outcome.CONCLUSIVE
+    assert solution.quaternion is not None
+    cross, roll = errors_deg(solution.quaternion, truth)
+    assert cross < 0.05
+    assert roll < 0.2
+
+
+@pytest.mark.parametrize("aided", [False, True])
+def test_most_are_solved_as_published(aided: bool) -> None:
+    """Lost in space, one unique triangle of six is a wrong one: what verification is for."""
+    configuration, right, wrong = replace(PUBLISHED, field=FIELD), 0, 0
+    for path in PICTURES:
+        picture, truth = load(path)
+        hint = truth.inv().apply([0.03, 0.02, 1.0]).astype(np.float32) if aided else None
+        solution = solve(
+            picture, Background(), configuration, database(ONBOARD), Meter(BLACKFIN_BF533), hint
+        )
+        if solution.quaternion is not None:
+            good = errors_deg(solution.quaternion, truth)[0] < 0.05
+            right += good
+            wrong += not good
+    assert right >= 4
+    assert wrong <= (0 if aided else 1)
