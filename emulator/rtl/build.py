@@ -23,8 +23,9 @@ from pathlib import Path
 from amaranth.lib.wiring import Component
 
 from cubestack.emulator.rtl.pins_header import pins_header
+from cubestack.emulator.rtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.hdl.generate import cxxrtl_headers, cxxrtl_text, design_hash
+from cubestack.hdl.generate import cxxrtl_headers, cxxrtl_text, design_hash, rtlil_text
 
 __all__ = [
     "Compiler",
@@ -35,7 +36,7 @@ __all__ = [
     "library_for",
 ]
 
-SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py")
+SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py", "variants.py")
 FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-fno-semantic-interposition", "-shared")
 
 
@@ -86,7 +87,7 @@ def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
-    design = _design_hash(wiring.component) + pins_header(wiring, "")
+    design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
     compiler = find_compiler()
     if compiler is None:
         raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
@@ -139,7 +140,11 @@ def _source(name: str) -> Path:
 def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Path:
     design = cxxrtl_text(wiring.component)
     (scratch / "design.cpp").write_text(design)
-    (scratch / "pins.h").write_text(pins_header(wiring, design))
+    rtlil = rtlil_text(wiring.component)
+    variants = [variant_text(rtlil, levels) for levels in wiring.burst_levels]
+    for number, variant in enumerate(variants):
+        (scratch / f"variant_{number}.cpp").write_text(variant)
+    (scratch / "pins.h").write_text(pins_header(wiring, design, variants))
     library = scratch / "library.so"
     command = [
         *compiler.command,

@@ -78,11 +78,15 @@ template <int N> struct Camera;
 
 #define CAMERA(number, clock_, data_, line_, frame_) \
     template <> struct Camera<number> { \
-        static void clock(Top &top, bool level) { top.clock_.set<bool>(level); } \
-        static bool clock(const Top &top) { return top.clock_.get<bool>(); } \
-        static void data(Top &top, uint8_t value) { top.data_.set<uint8_t>(value); } \
-        static void line(Top &top, bool level) { top.line_.set<bool>(level); } \
-        static bool line(const Top &top) { return top.line_.get<bool>(); } \
+        template <class Model> static void clock(Model &top, bool level) { \
+            top.clock_.template set<bool>(level); \
+        } \
+        template <class Model> static void data(Model &top, uint8_t value) { \
+            top.data_.template set<uint8_t>(value); \
+        } \
+        template <class Model> static void line(Model &top, bool level) { \
+            top.line_.template set<bool>(level); \
+        } \
         static void frame(Top &top, bool level) { (void)top, frame_; } \
     };
 CAMERAS
@@ -92,11 +96,15 @@ template <int N> struct Memory;
 
 #define MEMORY(number, a, d_i, d_o, d_oe, ce_n, oe_n, we_n) \
     template <> struct Memory<number> { \
-        static SramPins pins(const Top &top) { \
-            return SramPins(top.a.get<uint32_t>(), top.ce_n.get<bool>(), top.oe_n.get<bool>(), \
-                            top.we_n.get<bool>(), top.d_oe.get<bool>(), top.d_o.get<uint8_t>()); \
+        template <class Model> static SramPins pins(const Model &top) { \
+            return SramPins( \
+                top.a.template get<uint32_t>(), top.ce_n.template get<bool>(), \
+                top.oe_n.template get<bool>(), top.we_n.template get<bool>(), \
+                top.d_oe.template get<bool>(), top.d_o.template get<uint8_t>()); \
         } \
-        static void offer(Top &top, uint8_t value) { top.d_i.set<uint8_t>(value); } \
+        template <class Model> static void offer(Model &top, uint8_t value) { \
+            top.d_i.template set<uint8_t>(value); \
+        } \
     };
 MEMORIES
 
@@ -202,25 +210,34 @@ public:
         stream.go_to(edge);
         with(camera, [&](auto n) {
             Camera<n()>::frame(top, next.vsync);
-            put_sample<n()>();
+            put_sample<n()>(top);
         });
     }
 
     void use_pixels(int camera, const uint8_t *rendered) {
         streams[camera].pixels = rendered;
-        with(camera, [&](auto n) { put_sample<n()>(); });
+        with(camera, [&](auto n) { put_sample<n()>(top); });
     }
 
     // Makes the edges of the cameras in the mask `running` up to `until`, or up to the one that
     // changes an acknowledge, or that is the last of a segment. `reached` is the time then,
     // `camera` the one whose segment is over.
     Outcome burst(int64_t until, uint32_t running, int64_t &reached, int32_t &camera) {
-        Outcome outcome = TIME_REACHED;
-        if (running & (running - 1))
-            return burst_of_several(until, running, reached, camera);
-        for (camera = 0; running >> (camera + 1); camera++) {}
-        with(camera, [&](auto n) { outcome = burst_of_one<n()>(until, reached); });
-        return outcome;
+#define VARIANT(number) \
+    if (suits_##number(top)) { \
+        copy_##number(top, variant_##number); \
+        variant_##number.eval(nullptr); \
+        if (same_##number(top, variant_##number)) { \
+            const Outcome outcome = burst_on(variant_##number, until, running, reached, camera); \
+            copy_##number(variant_##number, top); \
+            top.eval(nullptr); \
+            forget_derived_edges(top); \
+            return outcome; \
+        } \
+    }
+        VARIANTS
+#undef VARIANT
+        return burst_on(top, until, running, reached, camera);
     }
 
     // The microcontroller's transfer loop; cycle edges are at start + floor of `halves`.
@@ -245,6 +262,11 @@ private:
     Stream streams[CAMERA_COUNT];
     uint32_t contention = 0;
 
+    // The design at some levels of its pins; variants.py says more.
+#define VARIANT(number) cxxrtl_variant_##number::p_top variant_##number;
+    VARIANTS
+#undef VARIANT
+
     // Calls `act` with the camera's number as a constant.
     template <int N = 0, class Act> void with(int camera, Act act) {
         if (camera == N)
@@ -253,15 +275,17 @@ private:
             with<N + 1>(camera, act);
     }
 
+    bool settle(int64_t time) { return settle(top, time); }
+
     // Lets everything follow the inputs, as of `time`; tells whether any register changed.
-    bool settle(int64_t time) {
+    template <class Model> bool settle(Model &top, int64_t time) {
         bool changed = false;
-        eval();
-        while (commit()) {
+        eval(top);
+        while (commit(top)) {
             changed = true;
-            eval();
+            eval(top);
         }
-        drive_memories(time, std::make_integer_sequence<int, MEMORY_COUNT>());
+        drive_memories(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
         const uint32_t now_contended = CONTENTION;
         if (now_contended & ~contention)
             log.add({WIRE_CONTENTION, time, 0, now_contended, 0, -1});
@@ -269,19 +293,24 @@ private:
         return changed;
     }
 
-    void eval() {
-        eval_once();
-        if (DERIVED_EDGE)
-            eval_once();
+    template <class Model> void eval(Model &top) {
+        eval_once(top);
+        if (derived_edge(top))
+            eval_once(top);
     }
 
     // Once in the library: a large design would not stay in the processor's instruction cache, and
     // take half a minute to compile.
-    __attribute__((noinline, flatten)) void eval_once() { top.Top::eval(nullptr); }
-    __attribute__((noinline, flatten)) bool commit() { return top.Top::commit(); }
+    template <class Model> __attribute__((noinline, flatten)) static void eval_once(Model &top) {
+        top.Model::eval(nullptr);
+    }
+    template <class Model> __attribute__((noinline, flatten)) static bool commit(Model &top) {
+        return top.Model::commit();
+    }
 
     // Only registers listen to the memories, so nothing else has to follow them.
-    template <int... N> void drive_memories(int64_t time, std::integer_sequence<int, N...>) {
+    template <class Model, int... N>
+    void drive_memories(Model &top, int64_t time, std::integer_sequence<int, N...>) {
         (srams[N].drive(time, Memory<N>::pins(top)), ...);
         (Memory<N>::offer(top, srams[N].bus()), ...);
     }
@@ -298,36 +327,47 @@ private:
         return any;
     }
 
-    uint32_t acknowledges() const { return ACKNOWLEDGES; }
+    template <class Model> static uint32_t acknowledges(const Model &top) { return ACKNOWLEDGES; }
 
-    template <int N> void put_sample() {
+    template <int N, class Model> void put_sample(Model &top) {
         Camera<N>::line(top, streams[N].inside());
         Camera<N>::data(top, streams[N].pixel());
     }
 
-    template <int N> void make_edge(int64_t time, int64_t until) {
+    template <class Model>
+    Outcome burst_on(Model &top, int64_t until, uint32_t running, int64_t &reached,
+                     int32_t &camera) {
+        Outcome outcome = TIME_REACHED;
+        if (running & (running - 1))
+            return burst_of_several(top, until, running, reached, camera);
+        for (camera = 0; running >> (camera + 1); camera++) {}
+        with(camera, [&](auto n) { outcome = burst_of_one<n()>(top, until, reached); });
+        return outcome;
+    }
+
+    template <int N, class Model> void make_edge(Model &top, int64_t time, int64_t until) {
         Stream &stream = streams[N];
         if (stream.edge % 2 == 0) {
             const bool wrote = writes();
             Camera<N>::clock(top, true);
-            const bool changed = settle(time);
+            const bool changed = settle(top, time);
             stream.next_edge();
-            if (skipping && !changed && !wrote && !Camera<N>::line(top))
+            if (skipping && !changed && !wrote && !stream.inside())
                 stream.skip_low_samples(until);
         } else {
             Camera<N>::clock(top, false);
             if (stream.edge + 1 < stream.segment.edges) {
                 stream.next_sample();
-                put_sample<N>();
+                put_sample<N>(top);
             }
-            settle(time);
+            settle(top, time);
             stream.next_edge();
         }
     }
 
-    template <int N>
-    __attribute__((flatten)) Outcome burst_of_one(int64_t until, int64_t &reached) {
-        const uint32_t before = acknowledges();
+    template <int N, class Model>
+    __attribute__((flatten)) Outcome burst_of_one(Model &top, int64_t until, int64_t &reached) {
+        const uint32_t before = acknowledges(top);
         while (!streams[N].over()) {
             const int64_t time = streams[N].time();
             if (time > until) {
@@ -335,16 +375,18 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            make_edge<N>(time, until);
-            if (acknowledges() != before)
+            make_edge<N>(top, time, until);
+            if (acknowledges(top) != before)
                 return ACKNOWLEDGE_CHANGED;
         }
         return SEGMENT_OVER;
     }
 
     // At one instant the first camera's edge comes first.
-    Outcome burst_of_several(int64_t until, uint32_t running, int64_t &reached, int32_t &camera) {
-        const uint32_t before = acknowledges();
+    template <class Model>
+    Outcome burst_of_several(Model &top, int64_t until, uint32_t running, int64_t &reached,
+                             int32_t &camera) {
+        const uint32_t before = acknowledges(top);
         Outcome outcome = TIME_REACHED;
         for (;;) {
             camera = -1;
@@ -357,8 +399,8 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            with(camera, [&](auto n) { make_edge<n()>(time, until); });
-            if (acknowledges() != before)
+            with(camera, [&](auto n) { make_edge<n()>(top, time, until); });
+            if (acknowledges(top) != before)
                 outcome = ACKNOWLEDGE_CHANGED;
             else if (streams[camera].over())
                 outcome = SEGMENT_OVER;
@@ -366,21 +408,21 @@ private:
                 continue;
             for (int n = 0; n < CAMERA_COUNT; n++)
                 if (running >> n & 1)
-                    with(n, [&](auto constant) { come_back<constant()>(time, n > camera); });
+                    with(n, [&](auto constant) { come_back<constant()>(top, time, n > camera); });
             return outcome;
         }
     }
 
     // Takes back what was skipped beyond `now`: the pins may change before that. An edge at this
     // very instant may be `still_to_come`.
-    template <int N> void come_back(int64_t now, bool still_to_come) {
+    template <int N, class Model> void come_back(Model &top, int64_t now, bool still_to_come) {
         Stream &stream = streams[N];
         const int64_t next = stream.edge_after(now - still_to_come);
         if (stream.edge <= next)
             return;
         stream.go_to(next);
         Camera<N>::clock(top, next % 2);
-        settle(now);
+        settle(top, now);
     }
 };
 

@@ -1,7 +1,9 @@
 """The wiring as C++, for driver.cpp to include: pins.h."""
 
 import re
+from collections.abc import Sequence
 
+from cubestack.emulator.rtl.variants import members
 from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
 __all__ = ["pins_header"]
@@ -9,15 +11,20 @@ __all__ = ["pins_header"]
 _MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 
-def pins_header(wiring: Wiring, design: str) -> str:
+def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> str:
     """Text of pins.h; ``design`` is CXXRTL's C++ of the wiring's component.
+
+    ``variants`` are those of the design at each of the wiring's burst levels.
 
     - PINS: INPUT(name, port, initial level) and OUTPUT(name, port) of every pin.
     - CAMERAS: CAMERA(number, clock, data, line, how the frame pin follows ``level``).
     - MEMORIES: MEMORY(number, A, D_I, D_O, D_OE, CE_N, OE_N, WE_N).
     - DATA_CLOCK_NAME, DATA_CLOCK, DATA: of the transfer loop.
     - ACKNOWLEDGES, CONTENTION: levels in one word each.
-    - DERIVED_EDGE: whether a clock that is no pin has an edge that takes effect.
+    - derived_edge(top): whether a clock that is no pin has an edge that takes effect;
+      forget_derived_edges(top) has none of them seen.
+    - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
+      its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state.
     """
     acknowledges = " | ".join(
         f"{_level(pin)} << {bit}" for bit, pin in enumerate(wiring.acknowledges)
@@ -33,9 +40,13 @@ def pins_header(wiring: Wiring, design: str) -> str:
         "DATA": _port(wiring.data),
         "ACKNOWLEDGES": f"({acknowledges})",
         "CONTENTION": "0u" if wiring.contention is None else _level(wiring.contention),
-        "DERIVED_EDGE": _derived_edge(wiring, design),
+        "VARIANTS": " ".join(f"VARIANT({n})" for n in range(len(variants))),
     }
-    return "".join(f"#define {name} {text}\n" for name, text in definitions.items())
+    text = "".join(f"#define {name} {text}\n" for name, text in definitions.items())
+    text += _derived_edges(wiring, design, "cxxrtl_design")
+    for number, variant in enumerate(variants):
+        text += _variant(wiring, design, variant, number)
+    return text
 
 
 def _port(name: str) -> str:
@@ -44,7 +55,7 @@ def _port(name: str) -> str:
 
 
 def _level(name: str) -> str:
-    return f"top.{_port(name)}.get<uint32_t>()"
+    return f"top.{_port(name)}.template get<uint32_t>()"
 
 
 def _pin(wiring: Wiring, name: str) -> str:
@@ -63,9 +74,42 @@ def _memory(number: int, memory: MemoryPins) -> str:
     return f"MEMORY({number}, {', '.join(_port(memory[pin]) for pin in _MEMORY_PINS)})"
 
 
-def _derived_edge(wiring: Wiring, design: str) -> str:
-    """Asks CXXRTL's own edge detectors, but for those of the pins."""
+def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
+    """Ask CXXRTL's own edge detectors, but for those of the pins."""
     pins = {_port(name) for name in wiring.initial}
     detectors = re.findall(r"bool ((?:pos|neg)edge_(\w+))\(\) const", design)
-    derived = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
-    return f"({' || '.join(derived)})" if derived else "false"
+    edges = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
+    clocks = [clock for clock in re.findall(r"prev_(p_\w+) = \1;", design) if clock not in pins]
+    forget = " ".join(f"top.prev_{clock} = top.{clock};" for clock in clocks)
+    return (
+        f"inline bool derived_edge(const {namespace}::p_top &top) "
+        f"{{ (void)top; return {' || '.join(edges) or 'false'}; }}\n"
+        f"inline void forget_derived_edges({namespace}::p_top &top) {{ (void)top; {forget} }}\n"
+    )
+
+
+def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
+    namespace = f"cxxrtl_variant_{number}"
+    whole, part = members(design), members(variant)
+    shared = [
+        name + side
+        for name, kind in part.items()
+        if whole.get(name) == kind
+        for side in ((".curr", ".next") if kind.startswith("wire") else ("",))
+    ]
+    suits = " && ".join(f"{_level(pin)} == {level}u" for pin, level in wiring.burst_levels[number])
+    same = " && ".join(f"a.{_port(pin)} == b.{_port(pin)}" for pin in wiring.output_pins)
+    return (
+        f"#define cxxrtl_design {namespace}\n"
+        f"#define cxxrtl_design_create {namespace}_create\n"
+        f'#include "variant_{number}.cpp"\n'
+        "#undef cxxrtl_design\n"
+        "#undef cxxrtl_design_create\n"
+        + _derived_edges(wiring, variant, namespace)
+        + f"inline bool suits_{number}(const cxxrtl_design::p_top &top) {{ return {suits}; }}\n"
+        "template <class A, class B> "
+        f"bool same_{number}(const A &a, const B &b) {{ return {same}; }}\n"
+        "template <class From, class To> "
+        f"void copy_{number}(const From &from, To &to) "
+        f"{{ {' '.join(f'to.{name} = from.{name};' for name in shared)} }}\n"
+    )

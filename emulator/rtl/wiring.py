@@ -9,7 +9,7 @@ from functools import cache, cached_property
 
 from amaranth.lib.wiring import Component, In
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action, actions
+from cubestack.firmware_model.interface.cubesense_fpga import COMMANDS, Action, actions
 from cubestack.hdl.cubesense_pair import CubeSensePair
 from cubestack.hdl.cubestar_top import CubeStarTop
 
@@ -79,6 +79,8 @@ class Wiring:
         settling_clocks: after as many clocks with the line pin low no further one changes a
             register.
         contention: output that is not 0 while two drivers are on one wire; None for no such.
+        burst_levels: levels of inputs at which the compiled engine is to be quickest; each takes
+            longer to build.
     """
 
     component: Component
@@ -90,6 +92,7 @@ class Wiring:
     storing: Callable[[Level], Collection[str]]
     settling_clocks: int
     contention: str | None = None
+    burst_levels: tuple[tuple[tuple[str, int], ...], ...] = ()
 
     @cached_property
     def widths(self) -> dict[str, int]:
@@ -175,6 +178,7 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
         # As CubeStar's; then the pause between two frames is counted.
         settling_clocks=8 + pair.read_out.frame_gap,
         contention="CONTENTION",
+        burst_levels=tuple((("CLK", 0), *levels.items()) for levels in _storing_levels()),
     )
 
 
@@ -192,6 +196,22 @@ def wiring_of(design: Wiring | Component | None) -> Wiring:
         case CubeSensePair():
             return cubesense_wiring(design)
     raise TypeError(f"{type(design).__name__} has no ready wiring: make a Wiring for it")
+
+
+def _storing_levels() -> list[dict[str, int]]:
+    """Levels of the control lines in each command that stores a picture."""
+    storing = {Action.STORE, Action.STORE_OTHER}
+    return [
+        {
+            "SHIFT": command.shift or 0,
+            "EDGE": command.edge or 0,
+            "RNW": command.rnw or 0,
+            "SUNEN": command.sunen,
+            "NADEN": command.naden,
+        }
+        for command in COMMANDS
+        if storing & {*command.actions}
+    ]
 
 
 @cache
