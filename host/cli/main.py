@@ -17,12 +17,13 @@ DONE, FAILED, WRONG_CALL = 0, 1, 2
 
 #: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).
 COMMANDS = {
-    "demo": "capture and solve a sky end to end, with pictures (what `make run` does)",
+    "demo": "show the devices end to end, with pictures (what `make run` does)",
     "emulate": "serve an emulated device on serial ports until Ctrl-C",
     "run": "run an unmodified program that sees an emulated I2C bus",
-    "measure": "scene in, attitude out: each frame's result beside the truth",
+    "measure": "scene in, attitude or directions out: each result beside the truth",
     "registers": "list a device's telecommands and telemetry",
     "catalogue": "compile the onboard star catalogue and say what is in it",
+    "memory": "list the firmware's buffers against the processor's memories",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs",
     "bench": "measure the cost of the hot paths on this machine",
 }

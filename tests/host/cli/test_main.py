@@ -228,3 +228,41 @@ def test_catalogue_for_people(run: Run) -> None:
     outcome = run("catalogue", "--mag-limit", 3)
     assert outcome.code == DONE
     assert "stars" in outcome.out
+
+
+def test_memory_report_names_every_buffer_and_fits(run: Run) -> None:
+    outcome = run("memory", "cubesense", "--json")
+    assert outcome.code == DONE
+    ram = json.loads(outcome.out)["RAM"]
+    assert ram["used"] <= ram["bytes"] == 1536
+    assert {"Sun window", "edges", "software stack"} <= ram["buffers"].keys()
+    table = run("memory", "cubesense")
+    assert all(name in table.out for name in ram["buffers"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--frames", "0"), ("0", "at least 1")),
+        (("--altitude", "-3"), ("altitude", "above 0")),
+        (("--sensor", "star"), ("star", "nadir")),
+        (("--search", "samples", "--memory", "other"), ("--memory other",)),
+        (("--scene", "a.toml", "--tilt", "3"), ("--tilt", "scene")),
+        (("--scene", "a.toml", "--no-noise"), ("--no-noise", "scene")),
+        (("--scene", "missing.toml"), ("missing.toml", "No such file")),
+        (("--mode", "lis"), ("--mode",)),
+    ],
+)
+def test_wrong_calls_of_measure_cubesense(
+    run: Run, arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    check_one_line(run("measure", "cubesense", *arguments), *words)
+
+
+@pytest.mark.parametrize("command", ["measure", "emulate"])
+def test_a_scene_of_the_other_device_is_refused(run: Run, tmp_path: Path, command: str) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text('kind = "sky"\nra_deg = 1\ndec_deg = 1\n', encoding="utf-8")
+    check_one_line(run(command, "cubesense", "--scene", scene), "scene.toml", "earth-sun", "sky")
+    scene.write_text('kind = "earth-sun"\n', encoding="utf-8")
+    check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", "sky", "earth-sun")
