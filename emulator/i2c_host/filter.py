@@ -21,6 +21,7 @@ F_DUPFD_CLOEXEC = 1030
 ON_PATH = (
     *("open", "openat", "openat2", "stat", "lstat", "newfstatat", "statx"),
     *("access", "faccessat", "faccessat2", "readlink", "readlinkat"),
+    *("getxattr", "lgetxattr"),
 )
 ON_DESCRIPTOR = ("read", "write", "readv", "writev", "fstat", "dup")
 
@@ -56,6 +57,8 @@ _X86_64 = {
     "dup": 32,
     "fcntl": 72,
     "readlink": 89,
+    "getxattr": 191,
+    "lgetxattr": 192,
     "openat": 257,
     "newfstatat": 262,
     "readlinkat": 267,
@@ -65,6 +68,8 @@ _X86_64 = {
     "faccessat2": 439,
 }
 _GENERIC = {
+    "getxattr": 8,
+    "lgetxattr": 9,
     "dup": 23,
     "fcntl": 25,
     "ioctl": 29,

@@ -71,6 +71,8 @@ static int (*real_fstatat)(int, const char *, struct stat *, int);
 static int (*real_statx)(int, const char *, int, unsigned, struct statx *);
 static int (*real_access)(const char *, int);
 static int (*real_faccessat)(int, const char *, int, int);
+static ssize_t (*real_getxattr)(const char *, const char *, void *, size_t);
+static ssize_t (*real_lgetxattr)(const char *, const char *, void *, size_t);
 
 static int inode_of(int fd, ino_t *inode, mode_t *mode)
 {
@@ -132,6 +134,8 @@ __attribute__((constructor)) static void prepare(void)
     real_statx = dlsym(RTLD_NEXT, "statx");
     real_access = dlsym(RTLD_NEXT, "access");
     real_faccessat = dlsym(RTLD_NEXT, "faccessat");
+    real_getxattr = dlsym(RTLD_NEXT, "getxattr");
+    real_lgetxattr = dlsym(RTLD_NEXT, "lgetxattr");
     const char *bus = getenv("CUBESTACK_I2C_BUS"), *path = getenv("CUBESTACK_I2C_SOCKET");
     if (!bus || !path || strlen(path) >= sizeof config.socket) return;
     config.bus = atoi(bus);
@@ -524,4 +528,20 @@ int access(const char *path, int how)
 int faccessat(int folder, const char *path, int how, int flags)
 {
     return is_device(folder, path) ? 0 : real_faccessat(folder, path, how, flags);
+}
+
+static ssize_t no_attribute(void)
+{
+    errno = EOPNOTSUPP;
+    return -1;
+}
+
+ssize_t getxattr(const char *path, const char *name, void *value, size_t size)
+{
+    return is_device(AT_FDCWD, path) ? no_attribute() : real_getxattr(path, name, value, size);
+}
+
+ssize_t lgetxattr(const char *path, const char *name, void *value, size_t size)
+{
+    return is_device(AT_FDCWD, path) ? no_attribute() : real_lgetxattr(path, name, value, size);
 }

@@ -157,6 +157,8 @@ class Supervisor:
             "faccessat2": partial(there, handle=self._exists),
             "readlink": partial(here, handle=self._no_link),
             "readlinkat": partial(there, handle=self._no_link),
+            "getxattr": partial(here, handle=self._no_attribute),
+            "lgetxattr": partial(here, handle=self._no_attribute),
         }
 
     def _on_path(
@@ -249,6 +251,9 @@ class Supervisor:
 
     def _no_link(self, call: Notification, _found: Found) -> None:
         self._listener.answer(call, -errno.EINVAL)
+
+    def _no_attribute(self, call: Notification, _found: Found) -> None:
+        self._listener.answer(call, -errno.EOPNOTSUPP)
 
     # --- by descriptor ------------------------------------------------------------------------
 

@@ -1,17 +1,21 @@
 """In-process links: a host in the same Python process drives virtual time by waiting.
 
 The host side has the transport interface of `cubestack.host` (write, read, close) for the serial
-line, and the one method of smbus2 that carries any transfer (i2c_rdwr) for the I2C bus. Waiting
-for an answer runs the simulation; nothing else does, so a run is repeatable to the byte.
+line, and for the I2C bus the one method of smbus2 that carries any transfer (i2c_rdwr); for all
+others give it to ``cubestack.host.smbus.CubeSMBus``. Waiting for an answer runs the simulation;
+nothing else does, so a run is repeatable to the byte.
 """
 
 import errno
 from typing import Any
 
 from cubestack.emulator.i2c import I2cBus, I2cMessage
+from cubestack.emulator.i2c_host.adapter import I2cAdapter
+from cubestack.emulator.i2c_host.device_file import DeviceFile
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.interface.linux_i2c import Call, split_reply
 
 __all__ = ["DirectI2c", "DirectSerial"]
 
@@ -51,12 +55,13 @@ class DirectSerial:
 
 
 class DirectI2c:
-    """The host's end of an I2C bus, with smbus2's ``i2c_rdwr``."""
+    """The host's end of an I2C bus, with smbus2's ``i2c_rdwr``; also one opened device file."""
 
     def __init__(self, env: Kernel, bus: I2cBus) -> None:
         """Become a master of ``bus``."""
         self._env = env
         self._bus = bus
+        self._file = DeviceFile(I2cAdapter(env, bus))
 
     def i2c_rdwr(self, *messages: Any) -> None:
         """Perform one combined transfer of smbus2 ``i2c_msg`` objects.
@@ -70,6 +75,20 @@ class DirectI2c:
             if done.read:
                 for index, byte in enumerate(done.data):
                     message.buf[index] = bytes([byte])
+
+    def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
+        """Do a packed call of the device file (see ``firmware_model/interface/linux_i2c.py``).
+
+        Returns the result, 0 or more or a negative errno, and data.
+        """
+        replies: list[bytes] = []
+        self._file.perform(call, body, replies.append)
+        while not replies:
+            self._env.step()
+        return split_reply(replies[0])
+
+    def close(self) -> None:
+        """Nothing is left behind."""
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of virtual time pass."""
