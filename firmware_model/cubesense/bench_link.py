@@ -22,16 +22,15 @@ from cubestack.firmware_model.interface.bench_letters import Letter
 from cubestack.firmware_model.interface.cubesense_bench import BENCH, CAPTURES, DOWNLOADS
 from cubestack.firmware_model.interface.cubesense_codes import IMAGE_BYTES, Camera, Sram
 
-__all__ = ["CHUNK_BYTES", "LETTERS", "PAUSE_US", "BenchLink"]
+__all__ = ["CHUNK_BYTES", "LETTERS", "BenchLink"]
 
 LETTERS = 4
 """Letters that wait."""
 
-CHUNK_BYTES = 32
+CHUNK_BYTES = 24
 """Bytes of a picture that are read and handed to the UART at once, while as many may still wait."""
 
-PAUSE_US = 2_000
-"""Between two looks at the UART, which needs 2.8 ms for that many at 115200 baud."""
+_BYTE_US = -(-10 * 1_000_000 // BENCH.baud)
 
 _CAMERAS: dict[Letter, Camera] = {
     letter: camera for table in (CAPTURES, DOWNLOADS) for camera, letter in table.items()
@@ -98,9 +97,10 @@ class BenchLink:
 
     def _send(self, sram: Sram) -> Routine[bool]:
         """Send what there is room for; True at the picture's end."""
-        if self._hardware.uart_backlog(Port.BENCH) > CHUNK_BYTES:
+        too_many = self._hardware.uart_backlog(Port.BENCH) - CHUNK_BYTES
+        if too_many > 0:
             now_us: int = yield ReadTimer()
-            yield Sleep(now_us + PAUSE_US)
+            yield Sleep(now_us + too_many * _BYTE_US)
             return False
         end = min(self._sent + CHUNK_BYTES, IMAGE_BYTES)
         pixels = np.arange(self._sent, end, dtype=np.int32)

@@ -33,8 +33,8 @@ from cubestack.firmware_model.interface.register_pointer import FILL, PointerReg
 
 __all__ = ["READ_AHEAD_BYTES", "ImageStream", "RegisterLink"]
 
-READ_AHEAD_BYTES = 24
-"""Bytes of the picture that wait for the host; new ones are fetched when a third is left."""
+READ_AHEAD_BYTES = 32
+"""Bytes of the picture that wait for the host; new ones are fetched when half of them are left."""
 
 _SETTINGS = {
     f"{camera.name}_{name}": (camera, attribute)
@@ -86,7 +86,7 @@ class ImageStream:
 
     def next(self) -> int | None:
         """The next byte; None while it has to be waited for."""
-        wanted = self._fetched < IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 3
+        wanted = self._fetched < IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2
         if wanted and self._queue.request(self._work):
             self._hardware.wake()
         if self._ahead:

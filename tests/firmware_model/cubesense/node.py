@@ -36,7 +36,7 @@ from cubestack.firmware_model.interface.cubesense_pins import Monitor
 from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.pic18_costs import PIC18F45K20
 
-BENCH_BYTE_US = 100  # a little slower than 115200 baud, and a part of every pause
+BENCH_BYTE_US = 87
 
 
 class Node:
@@ -49,6 +49,7 @@ class Node:
         opened: memories whose pictures were begun, in order.
         read, skipped: bytes read and passed over.
         outcome: capture result of the next measurements.
+        backlog: bytes that the node protocol's UART still has to send.
         on_request: called before each request is performed.
         now_us: bench time.
     """
@@ -63,7 +64,8 @@ class Node:
         self.on_request: Callable[[Request], object] = lambda _request: None
         self.now_us = 0
         self.sent = {port: bytearray() for port in Port}
-        self.backlog = dict.fromkeys(Port, 0)
+        self.backlog = 0
+        self._free_us = 0
         self.woken = 0
         self.amps = {monitor: 1.5 + index for index, monitor in enumerate(Monitor)}
         self.mcu_addressing = mcu_addressing
@@ -97,10 +99,12 @@ class Node:
     def uart_send(self, port: Port, data: bytes) -> None:
         self.sent[port] += data
         if port is Port.BENCH:
-            self.backlog[port] += len(data)
+            self._free_us = max(self._free_us, self.now_us) + BENCH_BYTE_US * len(data)
 
     def uart_backlog(self, port: Port) -> int:
-        return self.backlog[port]
+        if port is Port.NODE:
+            return self.backlog
+        return max(0, -(-(self._free_us - self.now_us) // BENCH_BYTE_US))
 
     def wake(self) -> None:
         self.woken += 1
@@ -180,10 +184,7 @@ class Node:
                 return self.now_us
             case Sleep():
                 assert request.deadline_us is not None
-                slept_us = max(request.deadline_us - self.now_us, 0)
-                self.now_us += slept_us
-                left = self.backlog[Port.BENCH] - slept_us // BENCH_BYTE_US
-                self.backlog[Port.BENCH] = max(left, 0)
+                self.now_us = max(self.now_us, request.deadline_us)
         return None
 
     # --- node protocol ----------------------------------------------------------------------------

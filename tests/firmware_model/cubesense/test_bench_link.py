@@ -61,7 +61,7 @@ def test_a_picture_is_sent_at_the_pace_of_the_line(
 
     def look(_request: Request) -> None:
         nonlocal largest
-        largest = max(largest, node.backlog[Port.BENCH])
+        largest = max(largest, node.uart_backlog(Port.BENCH))
 
     node.on_request = look
     assert node.letters(letter) == node.pictures[camera].tobytes()

@@ -257,14 +257,14 @@ def test_counters_wrap(node: Node) -> None:
 
 
 def test_an_answer_without_room_is_dropped(node: Node) -> None:
-    node.backlog[Port.NODE] = SEND_BYTES - 12
+    node.backlog = SEND_BYTES - 12
     assert len(node.uart(bytes.fromhex("1F7F 80 1FFF"))) == 12
-    node.backlog[Port.NODE] += 1
+    node.backlog += 1
     assert node.uart(bytes.fromhex("1F7F 80 1FFF")) == b""
     assert node.uart(bytes.fromhex("1F7F 96 1FFF")) != b""
     node.run()
     node.log.clear()
-    node.backlog[Port.NODE] = SEND_BYTES
+    node.backlog = SEND_BYTES
     assert node.uart(bytes.fromhex("1F7F 96 1FFF")) == b""
     assert not node.queue  # a result that was not sent schedules nothing
 
