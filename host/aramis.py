@@ -102,10 +102,9 @@ class Aramis:
         """
         self._perform("Activate")
         status = self.client.telemetry("SensorStatus")
-        if status["State"] != SensorState.READY:
-            raise StepFailedError(
-                f"not ready after Activate: {SensorState(int(status['State']))!r}"
-            )
+        state = SensorState(int(status["State"]))
+        if state is not SensorState.READY:
+            raise StepFailedError(f"the star tracker is not ready after Activate: {state.name}")
         return CatalogueState(int(status["Catalogue"]))
 
     def deactivate(self) -> None:

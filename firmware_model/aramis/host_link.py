@@ -3,8 +3,8 @@
 Both carry the same telecommands and telemetry. A telecommand is checked here against the table,
 acknowledged and queued for the main loop; telemetry is answered at once. Node dialect of the
 CubeSpace family: a telemetry answer does not repeat the ID; a telecommand is acknowledged on the
-UART with one error byte, on I2C through telemetry TcmdProcessed. An unknown telemetry ID gets no
-answer. Parameters behind the ID of a telemetry request are ignored. An answer that the UART's
+UART with one error byte, and on both through telemetry TcmdProcessed. An unknown telemetry ID gets
+no answer. Parameters behind the ID of a telemetry request are ignored. An answer that the UART's
 buffer has no room for is dropped: a host that waits for each answer never fills it.
 """
 
@@ -57,6 +57,7 @@ class HostLink:
 
     Attributes:
         queue: accepted telecommands for the main loop.
+        latest: ID and error code of the latest telecommand.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class HostLink:
         self._reading = False
         self._answer: bytes | None = None
         self._position = 0
+        self.latest = (0, AckError.OK)
 
     # --- UART -------------------------------------------------------------------------------------
 
@@ -179,6 +181,12 @@ class HostLink:
         return message.pack(**self._telemetry(message))
 
     def _accept(self, identifier: int, parameters: bytes) -> AckError:
+        error = self._judge(identifier, parameters)
+        self.latest = identifier, error
+        return error
+
+    def _judge(self, identifier: int, parameters: bytes) -> AckError:
+        """Queue a telecommand, or say what is wrong with it."""
         message = INTERFACE.find(identifier)
         if message is None or message.kind is not Kind.TELECOMMAND:
             self._state.raise_flag("TcmdIdError")

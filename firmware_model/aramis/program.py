@@ -51,7 +51,7 @@ class AramisProgram:
             self._camera,
             self._catalogue,
             self.commands,
-            lambda: len(self.link.queue),
+            lambda: self.link,
         )
         self.link = HostLink(hardware, meter, state, telemetry.values, self.commands.urgent)
 

@@ -1,7 +1,7 @@
 """Where everything lies: the SDRAM, and the flash chips of the catalogue.
 
 AraMiS thesis, sections 2.3.2 and 2.3.3 and appendix A: 32 MB of SDRAM (MT48LC16M16), flash parts of
-4 MB (M29W320D), of which two hold the coded catalogue (assumed: one would not). RAM holds the
+4 MB (M29W320D), of which three hold the coded catalogue (assumed: its size decides). RAM holds the
 picture, a second one that comes while the first is worked on, and the catalogue.
 """
 
@@ -20,7 +20,7 @@ __all__ = [
 MB = 1 << 20
 
 SDRAM_BYTES = 32 * MB
-FLASH_BYTES = 8 * MB
+FLASH_BYTES = 12 * MB
 
 SECTOR_BYTES = 1 << 16
 """Smallest part of the flash that can be erased."""

@@ -11,6 +11,7 @@ from cubestack.firmware_model.algorithms.quest import dcm
 from cubestack.firmware_model.aramis.commands import Commands
 from cubestack.firmware_model.aramis.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.hardware import AramisHardware
+from cubestack.firmware_model.aramis.host_link import HostLink
 from cubestack.firmware_model.aramis.program_camera import Camera
 from cubestack.firmware_model.aramis.program_state import State
 from cubestack.firmware_model.costs import Meter
@@ -59,16 +60,16 @@ class Telemetry:
         camera: Camera,
         catalogue: CatalogueStore,
         commands: Commands,
-        waiting: Callable[[], int],
+        link: Callable[[], HostLink],
     ) -> None:
-        """Report on the given parts; ``waiting``: telecommands in the queue."""
+        """Report on the given parts; ``link`` gives the host's, which is made after this."""
         self._hardware = hardware
         self._meter = meter
         self._state = state
         self._camera = camera
         self._catalogue = catalogue
         self._commands = commands
-        self._waiting = waiting
+        self._link = link
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": self._identification,
             "ExtendedIdentification": self._extended_identification,
@@ -119,10 +120,13 @@ class Telemetry:
         }
 
     def _processed(self) -> Values:
-        waiting = self._waiting()
+        waiting = len(self._link().queue)
+        latest, error = self._link().latest
         return {
             "Processed": int(not waiting and not self._commands.running),
             "Waiting": waiting,
+            "Latest": latest,
+            "Error": error,
         }
 
     def _sensor_status(self) -> Values:

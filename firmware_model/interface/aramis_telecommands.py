@@ -34,8 +34,8 @@ BLOCK_BYTES = 128
 
 MS_PER_DAY = 86_400_000
 
-MOST_CATALOGUE_BYTES = 65_536 * BLOCK_BYTES - 1024 * 1024
-"""Of a catalogue's image: what 8 MB of flash hold besides the check bits."""
+MOST_CATALOGUE_BYTES = 65_536 * BLOCK_BYTES
+"""Of a catalogue's image: as many blocks as a telecommand can number."""
 
 _DEFAULT_EXPOSURE_ROWS = 6299
 

@@ -7,6 +7,7 @@ there is none. IDs and layouts are ours; those from 200 on have no use case behi
 from dataclasses import replace
 
 from cubestack.firmware_model.interface.aramis_codes import (
+    AckError,
     CatalogueState,
     MeasurementMode,
     MeasurementOutcome,
@@ -89,11 +90,13 @@ _NODE = (
     Message(
         131,
         "TcmdProcessed",
-        2,
-        "whether every accepted telecommand is done",
+        4,
+        "whether every accepted telecommand is done, and the acknowledge of the latest one",
         (
             Field("Processed", "u8", 0, "1: all are done"),
             Field("Waiting", "u8", 8, "telecommands that wait"),
+            Field("Latest", "u8", 16, "ID of the latest telecommand, accepted or not"),
+            Field("Error", "enum8", 24, "its error code", choices=AckError),
         ),
     ),
     Message(
