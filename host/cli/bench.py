@@ -5,6 +5,7 @@ capture_wall_ms   wall time of one capture: exposure, read-out, FPGA store
 readout_wall_ms   wall time of one transfer, FPGA's SRAM to processor
 realtime_ratio    simulated seconds per wall second of the full 1 Hz loop
 cold_build_s      translating and compiling the FPGA with an empty cache
+sensors_ratio     as realtime_ratio, CubeSense with both cameras once a second
 pair_own_ms       CubeSense: one frame to the own camera's memory
 pair_linked_ms    CubeSense: one frame across the link
 pair_both_ms      CubeSense: both frames at once
@@ -17,16 +18,18 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
-from cubestack.host.cli.session import open_session
+from cubestack.firmware_model.interface.cubesense_codes import Camera
+from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.cli.terminal import console
 
 if TYPE_CHECKING:
-    from cubestack.host.cli.session import Session
+    from cubestack.host.cli.session import CubeSenseSession, Session
 
 __all__ = ["add_arguments", "run"]
 
 LOOP_ITERATIONS = 10
 CAPTURES = 5
+PS_PER_S = 10**12
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from cubestack.emulator.rtl.wiring import cubesense_wiring
     from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.earth_sun import EarthSunScene
     from cubestack.emulator.sky.scene import SkyScene
 
     figures: dict[str, float] = {"rtl_clocks_per_s": round(rtl_clocks_per_s())}
@@ -52,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
     with open_session(scene, engine="compiled") as session:
         figures |= _capture(session)
         figures["realtime_ratio"] = round(_realtime_ratio(session), 2)
+    with open_cubesense(EarthSunScene(), engine="compiled") as sensors:
+        figures["sensors_ratio"] = round(_sensors_ratio(sensors), 2)
     figures["cold_build_s"] = round(cold_build_s(), 1)
     for way in PAIR_STORES:
         figures[f"pair_{way}_ms"] = round(pair_store_ms(way), 1)
@@ -98,6 +104,24 @@ def _realtime_ratio(session: "Session") -> float:
     client.pause(1.0)
     virtual, wall = kernel.now, time.perf_counter()
     client.pause(float(LOOP_ITERATIONS))
-    ratio = (kernel.now - virtual) / 1e12 / (time.perf_counter() - wall)
+    ratio = (kernel.now - virtual) / PS_PER_S / (time.perf_counter() - wall)
     client.command("StopLoop")
     return ratio
+
+
+def _sensors_ratio(sensors: "CubeSenseSession") -> float:
+    """Each second a host reads both results, which starts the next measurements."""
+    client, kernel = sensors.cubesense.client, sensors.board.kernel
+
+    def turn() -> None:
+        due = kernel.now + PS_PER_S
+        for camera in Camera:
+            sensors.cubesense.result_then_schedule(camera)
+        client.pause((due - kernel.now) / PS_PER_S)
+
+    client.pause(0.5)
+    turn()
+    virtual, wall = kernel.now, time.perf_counter()
+    for _ in range(LOOP_ITERATIONS):
+        turn()
+    return (kernel.now - virtual) / PS_PER_S / (time.perf_counter() - wall)
