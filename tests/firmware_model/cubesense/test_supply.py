@@ -2,13 +2,20 @@
 
 import pytest
 
+from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.supply import (
     OFF_TIME_US,
     OVER_CURRENT_MA,
     SAMPLE_US,
 )
-from cubestack.firmware_model.hardware import Request, SetPin
-from cubestack.firmware_model.interface.cubesense_codes import Camera, Sram, SramSelection
+from cubestack.firmware_model.hardware import Request, SetPin, Sleep
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import (
+    Camera,
+    ResetTarget,
+    Sram,
+    SramSelection,
+)
 from cubestack.firmware_model.interface.cubesense_pins import SRAM_POWER, Monitor
 
 from .bench import Bench
@@ -34,6 +41,26 @@ def test_a_latch_up_while_idle_is_cut_within_one_sample_time(bench: Bench, sram:
     (cut_us,) = (us for us, request in bench.log if request == SetPin(SRAM_POWER[sram], 0))
     assert cut_us - start_us <= SAMPLE_US + 200
     assert bench.cut() == over_current(bench) == {sram}
+
+
+@pytest.mark.parametrize("target", [ResetTarget.CAMERAS, ResetTarget.MCU])
+def test_the_memories_are_watched_through_every_wait(bench: Bench, target: ResetTarget) -> None:
+    """A reset of the cameras waits for 100 ms; one of the program, for the UART."""
+    bench.backlog[Port.NODE] = 200
+    latched_us: list[int] = []
+
+    def latch(request: Request) -> None:
+        if isinstance(request, Sleep) and not request.wakeable and not latched_us:
+            latched_us.append(bench.now_us)
+            bench.latched.add(Sram.SRAM1)
+
+    bench.log.clear()
+    message = INTERFACE.telecommand("Reset")
+    bench.i2c_write(bytes([message.id]) + message.pack(Target=target))
+    bench.on_request = latch
+    bench.run()
+    cut_us = next(us for us, request in bench.log if request == SetPin("SRAM1_POWER", 0))
+    assert cut_us - latched_us[0] <= SAMPLE_US + 200
 
 
 def test_it_stays_off_until_the_host_clears_it(bench: Bench) -> None:
@@ -67,8 +94,12 @@ def test_a_lasting_latch_up_is_cut_again(bench: Bench) -> None:
 def test_clearing_does_not_touch_a_memory_that_works(bench: Bench) -> None:
     bench.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM1)
     kept = bench.memories[Sram.SRAM1].copy()
+    bench.log.clear()
+    start_us = bench.now_us
     bench.command("ClearOverCurrent", Selection=SramSelection.BOTH)
     assert (bench.memories[Sram.SRAM1] == kept).all()
+    assert not any(isinstance(request, SetPin) for _, request in bench.log)
+    assert bench.now_us - start_us < SAMPLE_US + 1_000
 
 
 @pytest.mark.parametrize(("ma", "cut"), [(OVER_CURRENT_MA - 1, False), (OVER_CURRENT_MA + 1, True)])
