@@ -49,7 +49,7 @@ def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
         port = re.compile(rf"wire width 1 input \d+ +\\{name}\n")
         if not port.search(top):
             raise ValueError(f"the design has no one-bit input {name}")
-        top = port.sub(lambda _, name=name: f"wire width 1 \\{name}\n", top)
+        top = port.sub(rf"wire width 1 \\{name}\n", top)
         top += f"\nconnect \\{name} 1'{level}\n"
     # Only registers have an initial value.
     kept = (top + others).replace(
