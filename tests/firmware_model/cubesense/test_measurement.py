@@ -371,17 +371,23 @@ def test_new_distortion_coefficients_make_a_new_table_once(bench: Bench, camera:
 # --- addresses from the program ---------------------------------------------------------------
 
 
-def test_a_search_around_samples_reads_few_pixels_and_finds_the_same() -> None:
+@pytest.mark.parametrize(
+    ("search", "most"),
+    [(NadirSearch.AROUND_SAMPLES, 250), (NadirSearch.AROUND_SAMPLES_STEPPING, 1200)],
+)
+def test_a_search_around_samples_reads_few_pixels_and_finds_the_same(
+    search: NadirSearch, most: int
+) -> None:
     bench = Bench(mcu_addressing=True)
     bench.scenes[Camera.NADIR] = earth(-15, 20)
     lines = measure(bench, Camera.NADIR)
     all_edges = edges_of(bench)
-    bench.command("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES)
+    bench.command("SetNadirSearch", Search=search)
     samples = measure(bench, Camera.NADIR)
     assert edges_of(bench) == all_edges
     assert (samples["X"], samples["Y"]) == pytest.approx((lines["X"], lines["Y"]), abs=0.02)
-    assert samples["PixelsRead"] < 250 < 9920 == lines["PixelsRead"]
-    assert samples["Search"] < lines["Search"] / 4
+    assert samples["PixelsRead"] < most < 9920 == lines["PixelsRead"]
+    assert samples["Search"] < lines["Search"] * (0.25 if most < 1000 else 0.6)
     linked = measure(bench, Camera.NADIR, Sram.SRAM1)  # no addresses over the link
     assert linked["PixelsRead"] == 9920
     assert (linked["X"], linked["Y"]) == (lines["X"], lines["Y"])
