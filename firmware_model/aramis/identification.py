@@ -1,11 +1,14 @@
 """From measured stars to an attitude: triples, pivots, identities, QUEST and the outcome.
 
 AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
-the main triangle, the next three the pivots, and a unique triangle is believed. With verification
-(ours), an attitude must be confirmed by further stars. Then every candidate is tried, with both
-ways of telling its stars apart; pivots, which a false star would spoil, only serve to leave few
-enough; and further triples of stars follow when none is confirmed. The confirmed attitude is solved
-again with all stars that confirm it.
+the main triangle, the next three the pivots, and a unique triangle is believed. A rough direction
+leaves the triangles around it; ours is that it also must be close to the boresight found, and that
+the sides must agree with the identities, of which the second choice will do.
+
+With verification (ours), an attitude must be confirmed by further stars. Then every candidate is
+tried, with both ways of telling its stars apart; pivots, which a false star would spoil, only serve
+to leave few enough; and further triples of stars follow when none is confirmed. The confirmed
+attitude is solved again with all stars that confirm it.
 """
 
 from collections.abc import Iterator
@@ -89,7 +92,12 @@ class _Search:
             return unsolved(Outcome.AMBIGUOUS, reason, self.measured, **counts)
         if match.end is not MatchEnd.UNIQUE:
             return unsolved(Outcome.NONE, reason, self.measured, **counts)
-        identities = self._identities(main, match, int(match.candidates[0]))[0]
+        choices = self._identities(main, match, int(match.candidates[0]))
+        if self.hint is not None:
+            choices = [choice for choice in choices if self._sides_agree(main, choice)]
+            if not choices:
+                return unsolved(Outcome.NONE, Reason.UNCONFIRMED, self.measured, **counts)
+        identities = choices[0]
         quaternion = self._attitude(np.array(main), identities)
         if quaternion is None:
             return unsolved(Outcome.NONE, Reason.DEGENERATE, self.measured, **counts)
@@ -201,7 +209,7 @@ class _Search:
             boresight = dcm(quaternion, self.meter)[2]
             self.meter.charge(f32_mul=3, f32_add=2, f32_compare=1)
         limit = np.cos(np.radians(self.profile.hint_tolerance_deg))
-        return bool(np.dot(boresight, self.hint.astype(np.float32)) < np.float32(limit))
+        return not np.dot(boresight, self.hint.astype(np.float32)) >= np.float32(limit)
 
     def _confirm(
         self, quaternion: NDArray[np.float32], hypotheses: int

@@ -36,7 +36,7 @@ class Reason(Enum):
     DEGENERATE = "the stars stand on a line"
     NO_TRIANGLE = "no triangle of the database has that area and moment"
     NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
-    UNCONFIRMED = "no attitude was confirmed by further stars"
+    UNCONFIRMED = "no attitude was confirmed"
     FAR_FROM_HINT = "the boresight is far from the rough direction"
 
     @classmethod
@@ -55,7 +55,8 @@ class Profile:
         pivots: pivot triangles at most, 0 to 3.
         verify: whether an attitude must be confirmed by further stars.
         tolerance_rad: distance within which a star confirms.
-        side_tolerance_rad: largest difference of a side, with verification.
+        side_tolerance_rad: largest difference of a side, with verification or a rough direction;
+            three sigma of a difference of two stars' places by default.
         largest_chance: an attitude is confirmed when chance would do it less often.
         triples: triples tried at most, with verification.
         triple_stars: triples are made of so many of the brightest stars, with verification.
@@ -68,7 +69,7 @@ class Profile:
     pivots: int = 3
     verify: bool = False
     tolerance_rad: float = 1.2e-3
-    side_tolerance_rad: float = 5e-4
+    side_tolerance_rad: float = 7e-4
     largest_chance: float = 1e-4
     triples: int = 120
     triple_stars: int = 10

@@ -54,11 +54,18 @@ def test_with_more_noise_than_assumed_the_published_profile_fails_as_published()
     assert found["far"] > 0.03
 
 
+def test_a_rough_direction_leaves_only_right_results() -> None:
+    found = rates(120, PUBLISHED.profile, hint_error_deg=2)
+    assert found["wrong"] == 0
+    assert found["right"] > 0.95
+
+
 def test_a_rough_direction_rules_out_what_is_far_away() -> None:
     """The thesis' own criterion of a true result, in the noise that fails without a direction."""
     found = rates(120, PUBLISHED.profile, light=replace(COARSE, noise_px=1.0), hint_error_deg=2)
     assert found["far"] == 0
-    assert found["right"] > 0.5
+    assert found["wrong"] < 0.05
+    assert found["right"] > 0.35
 
 
 @pytest.mark.parametrize(
@@ -152,6 +159,14 @@ def test_stars_that_all_coincide(profile: Profile) -> None:
     stars = StarList(np.full((6, 2), 500, dtype=np.float32), np.ones(6, dtype=np.float32))
     solution = identify(stars, FIELD, profile, database(), Meter(BLACKFIN_BF533))
     assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.DEGENERATE)
+
+
+@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_a_direction_that_is_none_gives_nothing(profile: Profile, value: float) -> None:
+    for made in pictures(5, 11):
+        solution = run(made, profile, np.full(3, value, dtype=np.float32))
+        assert solution.outcome is not Outcome.CONCLUSIVE
 
 
 @pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
