@@ -96,7 +96,10 @@ class Bench:
                 return self.us
             case Sleep(deadline_us, wakeable):
                 if wakeable:
+                    woken = self.woken
                     self.on_sleep()
+                    if self.woken > woken:
+                        return True
                 assert deadline_us is not None
                 self.us = max(self.us, deadline_us)
                 return False
