@@ -36,7 +36,7 @@ Reply = Callable[[bytes], None]
 _LAST_7_BIT = 0x7F
 _LAST_10_BIT = 0x3FF
 _INT_MAX = 0x7FFF_FFFF
-_KNOWN_FLAGS = MessageFlag.READ | MessageFlag.DMA_SAFE | MessageFlag.RECEIVE_LENGTH
+_KNOWN_FLAGS = int(MessageFlag.READ | MessageFlag.DMA_SAFE | MessageFlag.RECEIVE_LENGTH)
 _U64 = struct.Struct("=Q")
 
 
