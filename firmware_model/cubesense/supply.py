@@ -23,7 +23,7 @@ SAMPLE_US = 5_000
 """Longest time between two looks at the monitors while the program waits."""
 
 OFF_TIME_US = 100_000
-"""How long a supply stays off in a power cycle: ours, the sources give no time."""
+"""How long a supply stays off at least in a power cycle: ours, the sources give no time."""
 
 SETTLE_US = 1_000
 """From a supply's switch to its first use: assumed."""
@@ -42,6 +42,7 @@ class Supply:
         self._meter = meter
         self._state = state
         self._on = dict.fromkeys(Sram, False)
+        self._cut_us = dict.fromkeys(Sram, 0)
 
     def start(self) -> Routine[None]:
         """Switch both memories on."""
@@ -63,6 +64,7 @@ class Supply:
             if self._hardware.adc_counts(_MONITORS[sram]) > _LIMIT_COUNTS:
                 yield from self._switch(sram, False)
                 self._state.over_current[sram] = True
+                self._cut_us[sram] = yield ReadTimer()
 
     def watch_until(self, deadline_us: int) -> Routine[None]:
         """Wait, and keep an eye on the memories."""
@@ -92,7 +94,7 @@ class Supply:
         cut = [sram for sram in memories if self._state.over_current[sram]]
         if not cut:
             return
-        yield from self._pause(OFF_TIME_US)
+        yield from self.watch_until(max(self._cut_us[sram] for sram in cut) + OFF_TIME_US)
         for sram in cut:
             yield from self._switch(sram, True)
             self._state.over_current[sram] = False

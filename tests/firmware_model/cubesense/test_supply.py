@@ -69,10 +69,20 @@ def test_it_stays_off_until_the_host_clears_it(bench: Bench) -> None:
     assert bench.cut() == {Sram.SRAM2}
     bench.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
     assert bench.cut() == over_current(bench) == {Sram.SRAM2}
-    cleared_us = bench.now_us
     bench.command("ClearOverCurrent", Selection=SramSelection.BOTH)
     assert bench.cut() == over_current(bench) == set()
-    assert bench.now_us - cleared_us > OFF_TIME_US
+
+
+@pytest.mark.parametrize("cleared_after_us", [20_000, 500_000])
+def test_it_is_off_for_a_while_at_least(bench: Bench, cleared_after_us: int) -> None:
+    bench.log.clear()
+    bench.latched.add(Sram.SRAM2)
+    bench.run(until_us=bench.now_us + cleared_after_us)
+    bench.command("ClearOverCurrent", Selection=SramSelection.SRAM2)
+    (off_us, _), (on_us, last) = ((us, r) for us, r in bench.log if isinstance(r, SetPin))
+    assert last == SetPin("SRAM2_POWER", 1)
+    assert on_us - off_us == pytest.approx(max(OFF_TIME_US, cleared_after_us), abs=SAMPLE_US + 1000)
+    assert on_us - off_us >= OFF_TIME_US
 
 
 def test_a_lasting_latch_up_is_cut_again(bench: Bench) -> None:
