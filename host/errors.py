@@ -10,6 +10,7 @@
           +-- TransportError
           |    +-- PortOpenError        the port does not open
           |    +-- PortClosedError      the other side has gone
+          |    +-- RecordingMismatchError  a recording has no such request at this place
           +-- NodeError
                +-- NoAnswerError        also a TimeoutError
                +-- BadAnswerError       an answer that the interface does not allow
@@ -31,6 +32,7 @@ __all__ = [
     "NodeError",
     "PortClosedError",
     "PortOpenError",
+    "RecordingMismatchError",
     "StepFailedError",
     "TargetError",
     "TransportError",
@@ -59,6 +61,10 @@ class PortOpenError(TransportError):
 
 class PortClosedError(TransportError):
     """The other side has gone."""
+
+
+class RecordingMismatchError(TransportError):
+    """A recording has no such request at this place."""
 
 
 class NodeError(HostError):

@@ -14,7 +14,7 @@ from smbus2 import i2c_msg
 
 from cubestack.firmware_model.interface.message import Interface, Message, Value
 from cubestack.host.client import Client
-from cubestack.host.errors import CommandRefusedError, NoAnswerError
+from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
 
 __all__ = ["I2cBus", "I2cClient"]
 
@@ -60,6 +60,8 @@ class I2cClient(Client):
         self._check(message, data)
         try:
             self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([message.id]) + data))
+        except TransportError:
+            raise
         except OSError as error:
             raise NoAnswerError(
                 f"telecommand {message.name} not acknowledged at I2C address {self._address:#04x}"
@@ -76,6 +78,8 @@ class I2cClient(Client):
             answer = i2c_msg.read(self._address, message.length)
             try:
                 self._bus.i2c_rdwr(i2c_msg.write(self._address, [message.id]), answer)
+            except TransportError:
+                raise
             except OSError:
                 continue
             return message.unpack(bytes(answer))

@@ -12,7 +12,7 @@ from smbus2 import i2c_msg
 from cubestack.firmware_model.interface.field import InterfaceError, Value
 from cubestack.firmware_model.interface.register_pointer import PointerMap, PointerRegister
 from cubestack.host.client import Progress
-from cubestack.host.errors import NoAnswerError
+from cubestack.host.errors import NoAnswerError, TransportError
 from cubestack.host.i2c_client import RETRY_PERIOD_S, I2cBus
 
 __all__ = ["RegisterClient"]
@@ -72,6 +72,8 @@ class RegisterClient:
             raise InterfaceError(f"register {register.name}: {value!r} is out of range")
         try:
             self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([register.address]) + data))
+        except TransportError:
+            raise
         except OSError as error:
             raise self._silence(register, 1) from error
 
@@ -88,6 +90,8 @@ class RegisterClient:
                 self._wait(RETRY_PERIOD_S)
             try:
                 return self._fetch(register, progress)
+            except TransportError:
+                raise
             except OSError:
                 continue
         raise self._silence(register, 1 + self._retries)

@@ -1,0 +1,106 @@
+"""A CubeSense on record: played back it says the same; with another default, what differs."""
+
+import io
+
+import pytest
+
+from cubestack.emulator.probes import firmware_probes
+from cubestack.emulator.recording import Recorder, Replay
+from cubestack.emulator.trace import VcdTrace
+from cubestack.firmware_model.cubesense.state import CameraSettings
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense_codes import Camera
+from cubestack.firmware_model.interface.recording import Recording, load_recording
+from cubestack.host.cubesense import CubeSense
+from cubestack.host.cubesense_bench import BenchClient
+from cubestack.host.i2c_client import I2cClient
+from cubestack.host.node_client import NodeClient
+from cubestack.host.recording import RecordedI2c, RecordedTransport
+from cubestack.host.register_client import RegisterClient
+
+
+def lines(board):
+    return {"uart": board.uart, "bench_uart": board.bench_uart}
+
+
+@pytest.fixture
+def recorded(opened, scene, tmp_path) -> Recording:
+    """A measurement, a picture over the bench, telemetry and registers over I2C."""
+    path = tmp_path / "a.rec"
+    with (
+        opened(scene, seed=1) as session,
+        path.open("w") as stream,
+        Recorder(stream, "cubesense", lines(session.board)) as recorder,
+    ):
+        board = session.board
+        board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+        session.cubesense.capture_and_detect(Camera.SUN)
+        session.cubesense.client.telemetry("Configuration")
+        session.bench.take(Camera.NADIR)
+        bus = board.i2c()
+        I2cClient(bus, INTERFACE, wait=bus.wait).telemetry("Power")
+        RegisterClient(bus, INTERFACE.registers, wait=bus.wait).read("SUN_THRESHOLD")
+    return load_recording(path)
+
+
+def replay(recording: Recording, opened, scene, seed: int = 1) -> list[str]:
+    with opened(scene, seed=seed) as session:
+        board = session.board
+        return Replay(recording, board.kernel, lines(board), board.i2c_bus).run(INTERFACE)
+
+
+def test_same_version_says_the_same(recorded, opened, scene):
+    assert replay(recorded, opened, scene) == []
+
+
+def test_changed_default_is_named(recorded, opened, scene, monkeypatch):
+    reset = CameraSettings.at_reset
+
+    def changed(camera: Camera) -> CameraSettings:
+        settings = reset(camera)
+        settings.blue_gain += 1
+        return settings
+
+    monkeypatch.setattr(CameraSettings, "at_reset", changed)
+    differences = replay(recorded, opened, scene)
+    assert len(differences) == 1
+    assert "telemetry Configuration, field BlueGain1: 0x81, recorded 0x80" in differences[0]
+
+
+def test_host_programs_run_on_the_recording(recorded):
+    cubesense = CubeSense(NodeClient(RecordedTransport(recorded, INTERFACE), INTERFACE))
+    assert cubesense.capture_and_detect(Camera.SUN).detected
+    BenchClient(RecordedTransport(recorded, INTERFACE, "bench_uart")).take(Camera.NADIR)
+    power = I2cClient(RecordedI2c(recorded, INTERFACE), INTERFACE).telemetry("Power")
+    assert 0 < power["Current5V"] < 200
+
+
+def test_trace_shows_the_measurement(opened, scene):
+    stream = io.StringIO()
+    with opened(scene, seed=1) as session:
+        board = session.board
+        trace = VcdTrace(
+            stream, "cubesense", board.kernel, lines(board), board.engine, firmware_probes(board)
+        )
+        session.cubesense.capture_and_detect(Camera.SUN)
+        trace.close()
+    text = stream.getvalue()
+    assert "sPENDING " in text
+    assert "sSUCCESS " in text
+    for name in ("SUNACK", "SUN_SRAM_A", "rx_byte", "awake", "sun_detect"):
+        assert f" {name} $end" in text
+
+
+def test_recording_does_not_change_the_run(recorded, opened, scene, tmp_path):
+    path = tmp_path / "b.rec"
+    with opened(scene, seed=1) as session:
+        stream = io.StringIO()
+        trace = VcdTrace(stream, "x", session.board.kernel, lines(session.board))
+        with path.open("w") as file, Recorder(file, "cubesense", lines(session.board)):
+            session.cubesense.capture_and_detect(Camera.SUN)
+        trace.close()
+    again = load_recording(path)
+    assert (
+        recorded.sent("uart", "device")[1][: len(again.sent("uart", "device")[1])]
+        == (again.sent("uart", "device")[1])
+    )
