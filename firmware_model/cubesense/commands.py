@@ -11,6 +11,7 @@ from typing import Any
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
+from cubestack.firmware_model.cubesense.distortion import DistortionError, Projection, fine_table
 from cubestack.firmware_model.cubesense.download import Download, PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, Telecommand
@@ -26,6 +27,7 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     Sram,
     SramSelection,
 )
+from cubestack.firmware_model.interface.node_codes import AckError
 
 __all__ = ["SOFTWARE_RESET", "Commands"]
 
@@ -168,6 +170,16 @@ class Commands:
         limits = (values[name] for name in ("XMin", "XMax", "YMin", "YMax"))
         settings.masks[values["Area"] - 1] = Mask(*limits)
 
-    @staticmethod
-    def _set_distortion(settings: CameraSettings, values: Values) -> None:
-        settings.distortion = distortion_of(values)
+    def _set_distortion(self, settings: CameraSettings, values: Values) -> None:
+        """Keep factors of which the tables can be made; the quick check may be wrong about some.
+
+        Making one is charged to the measurement that needs it first.
+        """
+        factors = distortion_of(values)
+        try:
+            for projection in Projection:
+                fine_table(Meter(self._meter.table), projection, factors)
+        except DistortionError:
+            self._state.last_error = AckError.BAD_PARAMETER
+        else:
+            settings.distortion = factors

@@ -27,6 +27,7 @@ CORRECTION_LIMIT_PX = 254
 """Largest correction; the published table's bytes, which are rounded up, hold 255."""
 
 LEAST_SLOPE = np.float32(0.1)
+LARGEST_RATIO = np.float32(3)
 LARGEST_OFFSET_PX = np.float32(16)
 NEWTON_LIMIT = 8
 """Stricter than the tables' makers are, because radii in between are not tried: ours."""
@@ -37,7 +38,8 @@ _TRIED = [np.float32(radius) for radius in (*range(0, RIM_PX, STEP_PX), RIM_PX)]
 def invertible(coefficients: Sequence[float], meter: Meter) -> bool:
     """Whether `byte_table` and `fine_table` can be made of ``coefficients``, at any projection.
 
-    Some for which they could are refused: a slope below 0.1 somewhere, or an offset beyond 16 px.
+    Some for which they could are refused: a slope below 0.1 somewhere, slopes that differ by more
+    than a factor of 3 (ours by 2.2), or an offset beyond 16 px.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         terms = [np.float32(value) for value in coefficients]
@@ -71,7 +73,7 @@ def _undistorted(
 
 
 def _rises(slopes: list[np.float32], low: np.float32, high: np.float32, meter: Meter) -> bool:
-    """Whether the slope is steep enough all over ``low`` to ``high``."""
+    """Whether the slope is steep enough, and even enough, all over ``low`` to ``high``."""
     linear, square, cube = slopes[1], 2 * slopes[2], 3 * slopes[3]  # of the slope's derivative
     least = [low, high]
     # The roots of cube x^2 + square x + linear, in a form that has no difference of like numbers.
@@ -81,7 +83,9 @@ def _rises(slopes: list[np.float32], low: np.float32, high: np.float32, meter: M
         half = np.float32(-0.5) * (square + np.copysign(np.sqrt(root), square))
         least += [half / cube] if cube != 0 else []
         least += [linear / half] if half != 0 else []
-    return all(_polynomial(slopes, at, meter) > LEAST_SLOPE for at in least if low <= at <= high)
+    found = [_polynomial(slopes, at, meter) for at in least if low <= at <= high]
+    meter.charge(f32_compare=2 * len(found), f32_mul=1)
+    return bool(min(found) > LEAST_SLOPE and max(found) <= LARGEST_RATIO * min(found))
 
 
 def _fits(new: list[np.float32], meter: Meter) -> bool:
