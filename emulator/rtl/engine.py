@@ -149,8 +149,8 @@ class RtlEngine(Protocol):
         """Advance to ``until_ps``, pixel clock edges at that very instant included.
 
         ``stop_on`` is one of the wiring's acknowledges and a level: stop right after the edge that
-        brings it to that level, or at once when it is there already. Returns ``now_ps``; ValueError
-        for a time in the past.
+        brings it to that level, or at once when it is there already; later cameras' edges at that
+        instant are then still to come. Returns ``now_ps``; ValueError for a time in the past.
         """
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:

@@ -1,0 +1,71 @@
+"""The two ready wirings, and calls with names that they do not have."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.rtl.engine import make_engine
+from cubestack.emulator.rtl.wiring import cubesense_wiring, cubestar_wiring, wiring_of
+from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.generate import rtlil_text
+
+from .pair_board import CONTROLS, SIZES, stores
+
+PAIR = cubesense_wiring(CubeSensePair(SIZES[0]))
+STAR = cubestar_wiring(CubeStarTop(3, 2))
+ADDRESSING = cubesense_wiring(CubeSensePair(SIZES[0], mcu_addressing=True))
+
+# Amaranth complains of a design that was never made.
+for wiring in (PAIR, STAR, ADDRESSING):
+    rtlil_text(wiring.component)
+
+
+def test_every_input_has_one_driver():
+    for wiring in (PAIR, STAR, ADDRESSING):
+        memory_inputs = [memory["D_I"] for memory in wiring.memories]
+        driven = [*wiring.camera_pins, *wiring.mcu_pins, *memory_inputs]
+        assert sorted(driven) == sorted(wiring.initial)
+        assert {*wiring.initial}.isdisjoint(wiring.output_pins)
+    assert PAIR.initial["SUNEN"] == PAIR.initial["NADEN"] == 1
+
+
+def test_address_pins_of_the_microcontroller_come_with_the_option():
+    assert "DATA_I" not in PAIR.mcu_pins
+    assert "DATA_I" in ADDRESSING.mcu_pins
+    assert ADDRESSING.widths["DATA_I"] == 8
+
+
+def test_a_camera_is_stored_in_the_ways_to_store_until_the_acknowledge():
+    cameras = [("sun",), ("nadir",), ("sun", "nadir"), ("sun",), ("nadir",)]
+    used = {levels: names for (levels, _), names in zip(stores(), cameras, strict=True)}
+    memories = dict(stores())
+    for levels in product((0, 1), repeat=5):
+        pins = dict(zip(CONTROLS, levels, strict=True)) | {"SUNACK": 0, "NADACK": 0}
+        assert tuple(PAIR.storing(pins.__getitem__)) == used.get(levels, ())
+        for memory in memories.get(levels, ()):
+            pins["SUNACK" if memory == "sun" else "NADACK"] = 1
+        assert not PAIR.storing(pins.__getitem__)
+
+
+def test_ready_wirings_are_found():
+    assert wiring_of(PAIR) is PAIR
+    assert wiring_of(PAIR.component).acknowledges == ("SUNACK", "NADACK")
+    assert wiring_of(STAR.component).acknowledges == ("ACK",)
+    with pytest.raises(TypeError, match="int has no ready wiring"):
+        wiring_of(3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", ["compiled", "python"])
+def test_wrong_names_and_levels(kind):
+    engine = make_engine(PAIR, kind)
+    with pytest.raises(ValueError, match="cameras are sun, nadir, not moon"):
+        engine.attach(None, "moon")
+    with pytest.raises(ValueError, match="memories are sun, nadir, not moon"):
+        engine.power_memory("moon", False)
+    with pytest.raises(ValueError, match="SUNEN has 1 bits, too few for 2"):
+        engine.set_pin("SUNEN", 2)
+    with pytest.raises(ValueError, match="SUNACK or NADACK only, not on DATA"):
+        engine.run(1, ("DATA", 1))
+    assert np.shares_memory(engine.sram, engine.memories["sun"])
