@@ -115,6 +115,15 @@ def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure() -> None:
     assert starts[0] / PS_PER_S == pytest.approx(end_of_old + 3001 * ROW_S, abs=1e-7)
 
 
+def test_a_change_between_frames_counts_from_its_own_time() -> None:
+    camera = Mt9m001(scene())
+    change = 662 * PS_PER_MS // 10  # the first frame ended at 65.85 ms, the next is due at 66.68
+    stream(camera, 0, change)
+    put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
+    starts = [s[0] for s in stream(camera, change, PS_PER_S) if s[1] == 242]
+    assert starts[0] / PS_PER_S == pytest.approx(0.0662 + 3001 * ROW_S, abs=1e-7)
+
+
 def test_changes_wait_while_they_are_held() -> None:
     camera = Mt9m001(scene())
     put(camera, "OUTPUT_CONTROL", 0b11)
