@@ -44,7 +44,8 @@ class RemoteBus:
         except OSError as error:
             link.close()
             raise PortError(
-                errno.ENODEV, f"no emulation serves {self.name} ({error.strerror})"
+                f"no emulation serves {self.name} ({error.strerror or error}); "
+                "start one with cubestack emulate, or leave out --attach"
             ) from error
         link.setblocking(False)
         return link

@@ -60,7 +60,7 @@ class I2cServer:
             self._socket.bind(self.name)
         except OSError as error:
             self._socket.close()
-            raise PortError(error.errno, f"can not make {path}: {error.strerror}") from error
+            raise PortError(f"can not make {path}: {_reason(error)}") from error
         self._socket.listen(MAX_CLIENTS)
         self._socket.setblocking(False)
 
@@ -210,7 +210,7 @@ def _make_private(folder: Path) -> None:
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
     except OSError as error:
-        raise PortError(error.errno, f"can not make {folder}: {error.strerror}") from error
+        raise PortError(f"can not make {folder}: {_reason(error)}") from error
     private = stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o077
     if not private or found.st_uid != os.getuid():
         raise PortError(f"{folder} must be a folder of this user alone: chmod 700 {folder}")
@@ -229,6 +229,11 @@ def _remove_dead(path: Path) -> None:
             with contextlib.suppress(FileNotFoundError):
                 path.unlink()
         except OSError as error:
-            raise PortError(error.errno, f"can not look at {path}: {error.strerror}") from error
+            raise PortError(f"can not look at {path}: {_reason(error)}") from error
         else:
             raise PortError(f"{path} is served already; choose another bus number, or end that one")
+
+
+def _reason(error: OSError) -> str:
+    """Its reason; Python itself raises some without an error number."""
+    return error.strerror or str(error)

@@ -202,7 +202,10 @@ class Supervisor:
                     call, text.fileno(), number, close_on_exec=close_on_exec
                 )
             return
-        file = self._files()
+        try:
+            file = self._files()
+        except OSError as error:
+            raise OSError(errno.ENODEV, str(error)) from error
         mine, theirs = socket.socketpair()
         with theirs:
             # Calls that the filter can not tell (on a copy with a low number) fail, not hang.
