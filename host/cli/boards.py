@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubesense_bench import BENCH
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
@@ -111,5 +112,15 @@ def _cubesense(path: Path | None, seed: int, engine: Engine, baud: int | None) -
     return Opened("CubeSense", board, lines)
 
 
+def _aramis(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+    from cubestack.host.cli.aramis_session import aramis_board
+
+    if engine != "auto":
+        raise ValueError(f"aramis has no FPGA: leave --engine {engine} out")
+    baud = baud or ARAMIS.baud
+    board = aramis_board(path, seed=seed, baud=baud)
+    return Opened("AraMiS", board, (SerialLine("node protocol", "", board.uart, baud),))
+
+
 #: Devices that can be emulated, by the names of the command line.
-DEVICES = {"cubestar": _cubestar, "cubesense": _cubesense}
+DEVICES = {"cubestar": _cubestar, "cubesense": _cubesense, "aramis": _aramis}

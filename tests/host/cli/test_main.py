@@ -83,6 +83,7 @@ def test_help(run: Run, command: str | None) -> None:
         (("measure", "cubestar", "--mode", "guessing"), ("guessing", "tracking")),
         (("emulate", "cubestar", "--pty", "a", "--tcp", "4000"), ("--pty", "--tcp")),
         (("emulate", "cubestar", "--tcp", "70000"), ("70000", "65535")),
+        (("emulate", "aramis", "--engine", "compiled"), ("--engine", "FPGA")),
         (("emulate", "cubestar", "--baud", "0"), ("baud", "0")),
         (("emulate", "cubestar", "--pace", "slow"), ("slow", "fast")),
         (("registers", "cubestar", "--format", "pdf"), ("pdf", "markdown")),
