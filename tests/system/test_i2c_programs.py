@@ -294,3 +294,44 @@ def test_a_program_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None
 def test_attached_to_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--attach", str(tmp_path / "bus"), "--", "true"]) == 1
     assert "no emulation serves" in capsys.readouterr().err
+
+
+def test_preload_takes_over_where_seccomp_is_refused(route: str, served: Path) -> None:
+    """A process under a listener gets no second one, as in a container that refuses it."""
+    if route != "seccomp":
+        pytest.skip("needs a filter around it")
+    inner = [*COMMAND, "--bus", "8", "--attach", str(served), "--", "cat", "/proc/bus/i2c"]
+    outcome = start("--quiet", "--route", "seccomp", "--attach", served, "--", *inner)
+    assert outcome.code == 0
+    assert outcome.out.startswith("i2c-7")  # cat does not use fopen, so the outer one answers
+    assert "by way of preload, as seccomp is not there: the kernel refuses" in outcome.err
+
+
+def test_processes_left_behind_are_served(run: Run, route: str, tmp_path: Path) -> None:
+    """Under a filter they would fail without their supervisor."""
+    result = tmp_path / "result"
+    script = (
+        "import os, smbus2\n"
+        "read, write = os.pipe()\n"
+        "if not os.fork():\n"
+        "    os.close(write); os.read(read, 1)\n"  # until the parent has ended
+        f"    open({str(result)!r}, 'w').write(str(smbus2.SMBus(7).read_byte_data(26, 131)))\n"
+        "os._exit(5)\n"
+    )
+    assert run(sys.executable, "-c", script).code == 5
+    if route == "seccomp":
+        assert result.read_text() == "1"
+
+
+def test_a_signal_to_the_command_goes_to_the_program(route: str, served: Path) -> None:
+    script = "trap 'exit 33' TERM; echo ready; read line"
+    options = ("--quiet", "--route", route, "--attach", str(served))
+    with subprocess.Popen(
+        [*COMMAND, *options, "--", "sh", "-c", script],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"ready\n"
+        process.terminate()
+        assert process.wait(TIMEOUT_S) == 33
