@@ -11,8 +11,11 @@ from enum import Enum
 
 import numpy as np
 
+from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
 from cubestack.firmware_model.cubesense.distortion import TABLE_ENTRIES
 from cubestack.firmware_model.cubesense.edges import MAX_EDGES
+from cubestack.firmware_model.cubesense.jobs import QUEUE_DEPTH
+from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
 from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense_codes import FRAME_BYTES, MASK_AREAS, Camera
@@ -22,10 +25,7 @@ from cubestack.firmware_model.interface.cubesense_telecommands import (
     TELECOMMANDS,
 )
 
-__all__ = ["CAPACITY", "COMMAND_QUEUE", "Buffer", "Memory", "budget", "report", "used"]
-
-COMMAND_QUEUE = 4
-"""Telecommands that wait, as the node protocol's hosts expect."""
+__all__ = ["CAPACITY", "Buffer", "Memory", "budget", "report", "used"]
 
 INT, FLOAT = 2, 4
 
@@ -69,10 +69,6 @@ _WINDOW, _SUMS = "Sun window", "sums of the window's columns and of a row"
 
 def budget() -> tuple[Buffer, ...]:
     """Every buffer of the program."""
-    # Here, because both links need COMMAND_QUEUE first.
-    from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
-    from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
-
     longest = 1 + max(message.length for message in TELECOMMANDS)
     answers = (message.length for message in INTERFACE.telemetries if message.name != "ImageFrame")
     ram = {
@@ -80,11 +76,11 @@ def budget() -> tuple[Buffer, ...]:
         _SUMS: (FULL_SIZE.window + 1) * (FLOAT + INT),
         "samples of the row above": len(FULL_SIZE.scan_columns),
         "edges": MAX_EDGES * 2 * INT,
-        "telecommands, waiting and being received": (COMMAND_QUEUE + 1) * longest,
+        "telecommands, waiting and being received": (QUEUE_DEPTH + 1) * longest,
         "image frame": FRAME_BYTES,
         "answer being sent, except an image frame": max(answers),
         "picture for the image register, ahead of the host": READ_AHEAD_BYTES,
-        "picture and letters of the bench protocol": CHUNK_BYTES + LETTERS,
+        "picture and letters of the bench protocol": 2 * CHUNK_BYTES + LETTERS,
         "masks": len(Camera) * MASK_AREAS * 4 * INT,
         "results, settings, counters, flags": _state_bytes(),
         "state of links and main loop": TASK_BYTES,

@@ -1,7 +1,6 @@
 import pytest
 
 from cubestack.firmware_model.cubesense.jobs import QUEUE_DEPTH, Background, JobQueue, Measure
-from cubestack.firmware_model.cubesense.memory import COMMAND_QUEUE
 from cubestack.firmware_model.hardware import Pay, Routine
 from cubestack.firmware_model.interface.cubesense_codes import Camera, Sram
 
@@ -42,7 +41,6 @@ def test_four_jobs_wait_and_streams_do_not_count() -> None:
     queue.request(Background(nothing))
     accepted = [queue.put(measure(number)) for number in range(QUEUE_DEPTH + 1)]
     assert accepted == [True] * QUEUE_DEPTH + [False]
-    assert QUEUE_DEPTH == COMMAND_QUEUE
     assert queue.full
     assert queue.pop() == measure(0)
     assert not queue.full

@@ -37,7 +37,7 @@ def served(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_the_bench_client_of_twelve_lines_gets_the_nadir_picture(served: Path) -> None:
-    with serial.Serial(f"{served}.bench", 115_200, timeout=10) as port:
+    with serial.Serial(f"{served}.bench", 115_200, timeout=60) as port:
         port.write(b"a")
         assert port.read(1) == b"Y"
         port.write(b"s")
@@ -48,7 +48,7 @@ def test_the_bench_client_of_twelve_lines_gets_the_nadir_picture(served: Path) -
 
 
 def test_node_protocol_on_the_same_device(served: Path) -> None:
-    with serial.Serial(str(served), 57_600, timeout=10) as port:
+    with serial.Serial(str(served), 57_600, timeout=60) as port:
         port.write(bytes.fromhex("1F7F 80 1FFF"))
         answer = port.read_until(b"\x1f\xff")
         assert answer.startswith(b"\x1f\x7f")
@@ -68,7 +68,7 @@ def test_node_protocol_on_the_same_device(served: Path) -> None:
 
 def test_examples_of_escapes_are_answered(served: Path) -> None:
     """An exposure of 0x1F1F, and a frame number that the selected size lacks."""
-    with serial.Serial(str(served), 57_600, timeout=10) as port:
+    with serial.Serial(str(served), 57_600, timeout=60) as port:
         port.write(bytes.fromhex("1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF"))
         assert port.read(5) == bytes.fromhex("1F7F 00 1FFF")
         port.write(bytes.fromhex("1F7F A8 1FFF"))
