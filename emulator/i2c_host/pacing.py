@@ -36,7 +36,11 @@ def poll_all(watched: Watched) -> list[tuple[int, int]]:
 
 def wait_precisely(watched: Watched, timeout_s: float) -> None:
     """Like the pump's ``wait_ready``, but never too late: it may end ``EARLY_S`` early."""
-    timeout_s = max(0.0, timeout_s - EARLY_S)
+    wait_until(watched, max(0, int((timeout_s - EARLY_S) * NS_PER_S)))
+
+
+def wait_until(watched: Watched, timeout_ns: int) -> None:
+    """Wait until a descriptor is ready, or a signal comes, at most ``timeout_ns``."""
     entries = b"".join(_ENTRY.pack(fileno, events, 0) for fileno, events in watched)
-    timeout = _TIMEOUT.pack(*divmod(int(timeout_s * NS_PER_S), NS_PER_S))
+    timeout = _TIMEOUT.pack(*divmod(timeout_ns, NS_PER_S))
     _libc.ppoll(entries, len(watched), timeout, None)

@@ -10,7 +10,7 @@ from typing import Literal
 from cubestack.emulator.i2c_host.adapter import I2cAdapter
 from cubestack.emulator.i2c_host.device_file import DeviceFile
 from cubestack.emulator.i2c_host.device_node import DeviceNode
-from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely
+from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely, wait_until
 from cubestack.emulator.i2c_host.program import (
     Program,
     Route,
@@ -190,7 +190,8 @@ class _Ports:
     def _await_next(self, adapter: I2cAdapter) -> None:
         """Virtual time stands still for a moment: most programs call again at once."""
         end_ns = time.monotonic_ns() + TURNAROUND_NS
-        while not adapter.busy and time.monotonic_ns() < end_ns:
+        while not adapter.busy and (left_ns := end_ns - time.monotonic_ns()) > 0:
+            wait_until(self.watched(), left_ns)
             for port in self._ports:
                 port.exchange(self._bus.kernel.now)
         self._transfer(adapter)
