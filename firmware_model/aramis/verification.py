@@ -2,10 +2,10 @@
 
 The thesis believes every unique triangle, and many of its results are wrong (section 8.2). Here the
 three sides must first agree one by one, because area and moment leave one measure of a triangle
-free. Then every catalogue star that the attitude puts into the field is looked for among the
-measured ones. The attitude is believed when chance would place so many so seldom:
-hypotheses * C(n, k) * p^k, for k found of the n expected besides the triangle's, where p is the
-part of the field within reach of a measured star.
+free; so must its sense of rotation. Then every catalogue star that the attitude puts into the field
+is looked for among the measured ones. The attitude is believed when chance would place so many so
+seldom: hypotheses * C(n, k) * p^k, for k found of the n expected besides the triangle's, where p is
+the part of the field within reach of a measured star.
 """
 
 from dataclasses import dataclass
@@ -45,14 +45,25 @@ def sides_agree(
     tolerance: float,
     meter: Meter,
 ) -> bool:
-    """Whether the sides of two triangles of unit vectors (3, 3) differ by at most `tolerance`."""
-    meter.charge(f32_add=33, f32_mul=18, f32_sqrt=6, f32_compare=3, loop=3)
+    """Whether two triangles of unit vectors (3, 3) agree within `tolerance`.
+
+    Compared are the sides, and the volume of the three vectors, whose sign tells a triangle from
+    its mirror image: nothing else does when two sides are equal.
+    """
+    meter.charge(f32_add=33 + 11, f32_mul=18 + 18, f32_sqrt=6, f32_compare=4, loop=3)
     for first, second in ((0, 1), (1, 2), (0, 2)):
         measured = np.sqrt(np.sum((vectors[first] - vectors[second]) ** 2))
         expected = np.sqrt(np.sum((catalogue[first] - catalogue[second]) ** 2))
         if not abs(measured - expected) <= np.float32(tolerance):
             return False
-    return True
+    return bool(abs(_volume(vectors) - _volume(catalogue)) <= np.float32(tolerance))
+
+
+def _volume(vectors: NDArray[np.float32]) -> np.float32:
+    """Triple product of three vectors (3, 3)."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vectors
+    across = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return np.float32(across)
 
 
 def confirm(
