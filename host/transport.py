@@ -1,4 +1,4 @@
-"""Byte transports: a serial port through pyserial, a TCP socket; both look the same.
+"""Byte transports: a serial port through pyserial, a TCP socket, RFC 2217; all look the same.
 
 A transport is what the client needs of a line: anything with these three methods will do, as the
 emulator's in-process link does.
@@ -14,7 +14,7 @@ import serial
 
 from cubestack.host.errors import PortClosedError, PortOpenError, TargetError
 
-__all__ = ["SerialTransport", "TcpTransport", "Transport", "open_transport"]
+__all__ = ["Rfc2217Transport", "SerialTransport", "TcpTransport", "Transport", "open_transport"]
 
 CONNECT_TIMEOUT_S = 5.0
 
@@ -56,8 +56,7 @@ class SerialTransport:
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """See Transport."""
         try:
-            if self._port.timeout != timeout_s:  # setting it touches the port
-                self._port.timeout = timeout_s
+            self._set_timeout(timeout_s)
             first: bytes = self._port.read(1)
             if not first:
                 return b""
@@ -69,6 +68,18 @@ class SerialTransport:
     def close(self) -> None:
         """See Transport."""
         self._port.close()
+
+    def _set_timeout(self, timeout_s: float) -> None:
+        if self._port.timeout != timeout_s:  # setting it touches the port
+            self._port.timeout = timeout_s
+
+
+class Rfc2217Transport(SerialTransport):
+    """A serial port behind an RFC 2217 server."""
+
+    def _set_timeout(self, timeout_s: float) -> None:
+        # Through the property, pyserial would negotiate all settings anew, 50 ms each time.
+        self._port._timeout = timeout_s
 
 
 class TcpTransport:
@@ -122,17 +133,22 @@ def _open_tcp(target: str, _baud: int) -> Transport:
     return TcpTransport(host, port)
 
 
-_OPENERS: dict[str, Callable[[str, int], Transport]] = {"tcp": _open_tcp}
+_OPENERS: dict[str, Callable[[str, int], Transport]] = {
+    "tcp": _open_tcp,
+    "rfc2217": Rfc2217Transport,
+}
 
 
 def open_transport(target: str, baud: int) -> Transport:
-    """Open ``target``: a serial port's path (/dev/ttyUSB0, ./ttyCUBESTAR), or tcp://HOST:PORT.
+    """Open ``target``: a port's path (/dev/ttyUSB0, ./ttyCUBESTAR), tcp:// or rfc2217://HOST:PORT.
 
-    ``baud`` is for serial ports. Raises TargetError (a ValueError) for a text that names nothing,
+    ``baud`` is not for tcp://. Raises TargetError (a ValueError) for a text that names nothing,
     TransportError when it does not open.
     """
     if not target:
-        raise TargetError("no target given: name a serial port, or tcp://HOST:PORT")
+        raise TargetError(
+            "no target given: name a serial port, tcp://HOST:PORT or rfc2217://HOST:PORT"
+        )
     scheme, separator, _ = target.partition("://")
     if not separator:
         return SerialTransport(target, baud)

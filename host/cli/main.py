@@ -22,6 +22,7 @@ COMMANDS = {
     "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude or directions out: each result beside the truth",
     "registers": "list a device's telecommands and telemetry",
+    "shell": "read, write and watch registers by name",
     "catalogue": "compile the onboard star catalogue and say what is in it",
     "memory": "list the firmware's buffers against the processor's memories",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs",

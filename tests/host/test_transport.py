@@ -103,7 +103,7 @@ def test_a_refused_connection_is_told_in_one_line() -> None:
         ("tcp://:4000", "must be tcp://HOST:PORT"),
         ("tcp://host:port", "must be tcp://HOST:PORT"),
         ("tcp://host:99999", "must be tcp://HOST:PORT"),
-        ("usb://1", "usb://1: no transport usb://; known: tcp:// or a port's path"),
+        ("usb://1", "usb://1: no transport usb://; known: tcp://, rfc2217:// or a port's path"),
     ],
 )
 def test_a_target_without_sense_is_a_wrong_call(target: str, message: str) -> None:

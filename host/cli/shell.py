@@ -1,0 +1,165 @@
+"""A shell for a device's registers: read, write and watch by the tables' names.
+
+TARGET is a serial port (/dev/ttyUSB0), tcp://HOST:PORT, rfc2217://HOST:PORT,
+i2c:BUS:ADDR, emulated:DEVICE or recorded:FILE. Words complete with Tab; `help`
+lists the commands. With -c or a script file, the first command that fails ends
+the run: exit code 1 when the device failed, 2 when the command makes no sense.
+
+examples:
+  cubestack shell emulated:cubesense
+  cubestack shell ./ttyCUBESTAR --device cubestar -c 'read Identification'
+  cubestack shell emulated:cubesense --json -c 'write CaptureAndDetect SUN SRAM1;
+      time 0.5; read Result1'
+  cubestack shell i2c:7:0x1b --script commands.txt
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from cubestack.host.cli.targets import TARGETS, add_target_arguments, open_any_target
+from cubestack.host.cli.terminal import say
+from cubestack.host.errors import HostError
+from cubestack.host.shell import Result, Shell
+
+__all__ = ["add_arguments", "run"]
+
+PROMPT = "{}> "
+HISTORY_LINES = 1000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("target", metavar="TARGET", help=TARGETS)
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument("-c", dest="commands", metavar="COMMANDS", help="separated by semicolons")
+    source.add_argument("--script", type=Path, metavar="FILE", help="one command a line")
+    parser.add_argument("--json", action="store_true", help="one object for each command")
+    add_target_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the commands, or ask for them."""
+    lines = _lines(args)
+    target = open_any_target(args.target, args)
+    try:
+        shell = Shell(target)
+        show = _show_json if args.json else _show_text
+        shell.on_row = (lambda _result: None) if args.json else show
+        if lines is None and sys.stdin.isatty():
+            return _interactive(shell, show)
+        for line in lines if lines is not None else sys.stdin:
+            if line.strip() in ("quit", "exit"):
+                break
+            result = shell.execute(line)
+            if result is not None:
+                show(result)
+        return 0
+    finally:
+        target.close()
+
+
+def _lines(args: argparse.Namespace) -> list[str] | None:
+    if args.commands is not None:
+        return list(split_commands(args.commands))
+    if args.script is None:
+        return None
+    try:
+        return list(args.script.read_text(encoding="utf-8").splitlines())
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"can not read script {args.script}: {error}") from None
+
+
+def split_commands(text: str) -> Iterator[str]:
+    """Commands between semicolons and line ends, but for those in quotes."""
+    command, quote = "", ""
+    for character in text:
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "'\"":
+            quote = character
+        elif character in ";\n":
+            yield command
+            command = ""
+            continue
+        command += character
+    yield command
+
+
+def _show_json(result: Result) -> None:
+    print(json.dumps(result.data))
+
+
+def _show_text(result: Result) -> None:
+    width = max((len(name) for name, _ in result.rows), default=0)
+    for name, text in result.rows:
+        print(f"{name:<{width}}  {text}" if name else text)
+
+
+def _interactive(shell: Shell, show: object) -> int:
+    """Ask for commands until the end of the input; errors are told and change nothing else."""
+    assert callable(show)
+    say(f"{shell.target.interface.name} at {shell.target.name}; Tab completes, help lists")
+    with _line_editor(shell):
+        while True:
+            try:
+                line = input(PROMPT.format(shell.target.interface.name.lower()))
+                if line.strip() in ("quit", "exit"):
+                    return 0
+                result = shell.execute(line)
+                if result is not None:
+                    show(result)
+            except EOFError:
+                print()
+                return 0
+            except KeyboardInterrupt:
+                print()
+            except (ValueError, HostError) as error:
+                say(f"error: {error}")
+
+
+@contextmanager
+def _line_editor(shell: Shell) -> Iterator[None]:
+    """Completion and history through the standard library's readline, where there is one.
+
+    It completes words and keeps a history, which is all that is wanted: no further dependency.
+    """
+    try:
+        import readline
+    except ImportError:
+        yield
+        return
+    found: list[str] = []
+
+    def complete(_text: str, state: int) -> str | None:
+        if state == 0:
+            found[:] = shell.complete(readline.get_line_buffer()[: readline.get_endidx()])
+        if state >= len(found):
+            return None
+        return found[state] + ("" if found[state].endswith("=") else " ")
+
+    readline.set_completer(complete)
+    readline.set_completer_delims(" ")
+    libedit = "libedit" in (readline.__doc__ or "")
+    readline.parse_and_bind("bind ^I rl_complete" if libedit else "tab: complete")
+    history = _history_file()
+    with suppress(OSError):
+        readline.read_history_file(history)
+    readline.set_history_length(HISTORY_LINES)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            history.parent.mkdir(parents=True, exist_ok=True)
+            readline.write_history_file(history)
+
+
+def _history_file() -> Path:
+    state = os.environ.get("XDG_STATE_HOME")
+    return (Path(state) if state else Path.home() / ".local/state") / "cubestack" / "history"

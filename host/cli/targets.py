@@ -1,0 +1,138 @@
+"""``emulated:DEVICE`` as a target, beside all that ``host.targets`` opens."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.boards import DEVICES
+from cubestack.host.errors import TargetError
+from cubestack.host.node_client import NodeClient
+from cubestack.host.targets import INTERFACES, Target, interface_of, open_target, with_i2c
+
+__all__ = ["add_target_arguments", "open_any_target"]
+
+EMULATED = "emulated:"
+
+TARGETS = (
+    "a serial port, tcp://HOST:PORT, rfc2217://HOST:PORT, i2c:BUS:ADDR, emulated:DEVICE, "
+    "recorded:FILE"
+)
+
+
+def add_target_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say how a target is opened."""
+    parser.add_argument("--device", choices=INTERFACES, help="where the target does not tell")
+    parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
+    parser.add_argument("--baud", type=whole(1), help="of the node protocol's line")
+    parser.add_argument("--scene", type=Path, metavar="FILE", help="of an emulated device")
+    parser.add_argument("--seed", type=whole(0), default=0, help="of an emulated device")
+
+
+def open_any_target(text: str, args: argparse.Namespace) -> Target:
+    """Open the target ``text`` with the options of ``add_target_arguments``.
+
+    Raises what ``host.targets.open_target`` does, and ValueError for a scene that is none.
+    """
+    if not text.startswith(EMULATED):
+        if args.scene is not None:
+            raise TargetError(f"--scene is for emulated:DEVICE, not for {text}")
+        return open_target(text, args.device, bench=args.bench, baud=args.baud)
+    device = text.removeprefix(EMULATED).lower()
+    if device not in DEVICES:
+        known = ", ".join(EMULATED + name for name in DEVICES)
+        raise TargetError(f"no device {device!r} can be emulated; known: {known}")
+    if args.bench is not None:
+        raise TargetError(f"{text} has its bench protocol already: leave out --bench")
+    return open_emulated(text, device, args.scene, seed=args.seed, baud=args.baud)
+
+
+def open_emulated(
+    text: str, device: str, scene: Path | None, *, seed: int = 0, baud: int | None = None
+) -> Target:
+    """Power up ``device`` in this process; time passes while the host waits."""
+    from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+    from cubestack.host.cli.boards import open_board
+
+    opened = open_board(device, scene, seed=seed, engine="auto", baud=baud)
+    board = opened.board
+    interface = interface_of(device, text)
+    lines = [DirectSerial(board.kernel, line.uart) for line in opened.lines]
+    target = Target(text, interface, NodeClient(lines[0], interface), lines[0])
+    target.on_close.append(board.close)
+    bus = DirectI2c(board.kernel, board.i2c_bus)
+    target.registers = with_i2c(target, bus, bus.wait)
+    if interface.bench is not None and len(lines) > 1:
+        target.bench = lines[1]
+    target.controls = _BoardControls(board, device)
+    return target
+
+
+class _BoardControls:
+    """See ``host.targets.Controls``."""
+
+    def __init__(self, board: Any, device: str) -> None:
+        self._board = board
+        self._device = device
+        self.channels = tuple(board.power.table.channels)
+        self._faults = self._make_faults()
+        self.faults = tuple(self._faults)
+
+    def _make_faults(self) -> dict[str, Callable[[], None]]:
+        board = self._board
+        faults: dict[str, Callable[[], None]] = {
+            f"latch-up {channel}": _call(board.power.latch_up, channel) for channel in self.channels
+        }
+        if hasattr(board, "fail_camera"):
+            from cubestack.firmware_model.interface.cubesense_codes import Camera, Sram
+
+            for camera in Camera:
+                faults[f"camera {camera.name.lower()}"] = _call(board.fail_camera, camera)
+            for sram in Sram:
+                faults[f"memory {sram.name}"] = _call(board.fail_memory, sram)
+        return faults
+
+    def fault(self, words: list[str]) -> None:
+        text = " ".join(words)
+        if text not in self._faults:
+            raise TargetError(f"no fault {text!r}; known: {', '.join(self.faults)}")
+        self._faults[text]()
+
+    def scene(self, path: Path) -> None:
+        try:
+            if self._device == "cubestar":
+                from cubestack.emulator.sky.scene import load_scene
+
+                self._board.camera.scene = load_scene(path)
+            elif self._device == "cubesense":
+                from cubestack.emulator.sky.earth_sun_file import load_earth_sun_scene
+
+                self._board.scene = load_earth_sun_scene(path)
+            else:
+                raise TargetError(f"the scene of {self._device} can not be changed while it runs")
+        except FileNotFoundError:
+            raise TargetError(f"no scene file {path}") from None
+
+    def currents(self) -> dict[str, float]:
+        power = self._board.power
+        return {"total": power.current_ma()} | {
+            channel: power.current_ma(channel) for channel in self.channels
+        }
+
+    def switch(self, channel: str, on: bool) -> None:
+        if channel not in self.channels:
+            raise TargetError(f"no channel {channel!r}; known: {', '.join(self.channels)}")
+        self._board.power.switch(channel, on)
+
+    def time_s(self) -> float:
+        return float(self._board.kernel.now / 1e12)
+
+    def advance(self, seconds: float) -> None:
+        self._board.kernel.advance_to(self._board.kernel.now + round(seconds * 1e12))
+
+
+def _call(function: Callable[[Any], None], argument: Any) -> Callable[[], None]:
+    return lambda: function(argument)

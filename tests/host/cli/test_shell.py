@@ -1,0 +1,115 @@
+"""`cubestack shell` on emulated devices and recordings: outputs and exit codes."""
+
+import json
+import os
+import pty
+import select
+import subprocess
+import sys
+
+import pytest
+
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.host.cli.main import main
+from cubestack.host.cli.shell import split_commands
+
+TIMEOUT_S = 60
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def shell(capsys):
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = main(["shell", *arguments])
+        output = capsys.readouterr()
+        return code, output.out, output.err
+
+    return run
+
+
+def test_emulated_cubesense(shell):
+    commands = (
+        "write CaptureAndDetect SUN SRAM1; time 0.5; read Result1 Detect; bench q;"
+        "write SUN_THRESHOLD 30; read SUN_THRESHOLD; fault latch-up SRAM2; time 0.1;"
+        "read Power OverCurrent2"
+    )
+    code, out, err = shell("emulated:cubesense", "--json", "-c", commands)
+    assert (code, err) == (0, "")
+    results = [json.loads(line) for line in out.splitlines()]
+    assert results[2]["values"] == {"Detect": 7}
+    assert bytes.fromhex(results[3]["answer"]) == b"Y"
+    assert results[5]["values"] == {"SUN_THRESHOLD": 30}
+    assert results[8]["values"] == {"OverCurrent2": 1}
+
+
+def test_emulated_cubestar_with_a_script(shell, tmp_path):
+    script = tmp_path / "commands.txt"
+    script.write_text("# comment\n\nread Identification NodeType\nquit\nread nonsense\n")
+    assert shell("emulated:cubestar", "--script", str(script)) == (0, "NodeType  5\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "error"),
+    [
+        (["emulated:cubesense", "-c", "read nothing"], 2, "nothing is called 'nothing'"),
+        (["emulated:cubesense", "-c", "write Reset 9"], 1, "refused: BAD_PARAMETER (3)"),
+        (["emulated:mars", "-c", ""], 2, "no device 'mars' can be emulated"),
+        (["emulated:cubesense", "--bench", "x", "-c", ""], 2, "leave out --bench"),
+        (["./port", "-c", "", "--scene", "x"], 2, "--scene is for emulated:DEVICE"),
+        (["./port", "--script", "no.txt"], 2, "can not read script no.txt"),
+        (["./port", "--device", "cubestar", "-c", ""], 1, "can not open ./port"),
+        (["emulated:cubesense", "-c", "scene no.toml"], 2, "no.toml"),
+    ],
+)
+def test_failures_are_one_line(shell, arguments, code, error):
+    found, out, err = shell(*arguments)
+    assert found == code
+    assert error in err
+    assert (out, err.count("\n")) == ("", 1)
+
+
+def test_first_failure_ends_the_run(shell):
+    code, out, err = shell("emulated:cubesense", "-c", "read SUN_GAIN; read x; read SUN_GAIN")
+    assert (code, out.count("SUN_GAIN")) == (2, 1)
+    assert "nothing is called 'x'" in err
+
+
+def test_semicolons_in_quotes_are_kept():
+    assert list(split_commands("a; b 'x;y' ;\nc")) == ["a", " b 'x;y' ", "", "c"]
+
+
+def test_interactive(tmp_path):
+    """On a terminal: Tab completes, errors do not end it, the history is kept."""
+    master, slave = pty.openpty()
+    environment = os.environ | {"XDG_STATE_HOME": str(tmp_path), "TERM": "dumb"}
+    command = [sys.executable, "-m", "cubestack.host.cli.main", "shell", "emulated:cubesense"]
+    process = subprocess.Popen(
+        command, stdin=slave, stdout=slave, stderr=slave, env=environment, start_new_session=True
+    )
+    os.close(slave)
+    seen = b""
+
+    def expect(text: bytes) -> None:
+        nonlocal seen
+        while text not in seen:
+            assert select.select([master], [], [], TIMEOUT_S)[0], seen
+            seen += os.read(master, 4096)
+        seen = seen[seen.index(text) + len(text) :]
+
+    try:
+        expect(b"cubesense> ")
+        os.write(master, b"read Ident\t NodeT\t\n")
+        expect(b"NodeType  4")
+        expect(b"cubesense> ")
+        os.write(master, b"raed\n")
+        expect(b"did you mean read?")
+        expect(b"cubesense> ")
+        os.write(master, b"quit\n")
+        assert process.wait(TIMEOUT_S) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(master)
+    history = (tmp_path / "cubestack" / "history").read_text()
+    assert "read Identification" in history
