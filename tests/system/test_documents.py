@@ -128,3 +128,39 @@ def test_commands_of_the_fidelity_page_exist(root: Path) -> None:
         make_parser().parse_args(["measure", "cubestar", "--json", *command.split()])
     for file in re.findall(r"`(\w+/[\w/]+\.py)`", page):
         assert (root / file).is_file(), file
+
+
+def test_commands_and_figures_of_cubesense_s_page(root: Path) -> None:
+    from cubestack.emulator.power import PowerModel
+    from cubestack.emulator.power_tables import CUBESENSE
+    from cubestack.emulator.virtual_time import Kernel
+    from cubestack.firmware_model.cubesense.memory import Memory, budget, used
+    from cubestack.host.cli.main import make_parser
+
+    page = (root / "docs" / "fidelity-cubesense.md").read_text(encoding="utf-8")
+    commands = re.findall(r"`measure (--[^`]+)`", page)
+    assert len(commands) >= 7
+    for command in commands:
+        make_parser().parse_args(["measure", "cubesense", "--json", *command.split()])
+    for file in re.findall(r"`(\w+/[\w/]+\.py)`", page):
+        assert (root / file).is_file(), file
+    assert f"{used(budget())[Memory.RAM]} of 1536 bytes" in page
+    rows = section(page, "Power (table 7.1)").splitlines()
+    states = [[cell.strip() for cell in row.split("|")[1:8]] for row in rows if row.endswith("% |")]
+    counts = {"off": 0, "one": 1, "both": 2, "": 0, "one side": 1, "both sides": 2}
+    compared = 0
+    for processor, *parts, published, ours, _ in states:
+        memories, cameras, sides = (counts[part] for part in parts)
+        power = PowerModel(Kernel(), CUBESENSE)
+        power.set_state("processor", "on" if processor == "on" else "reset")
+        for half, (number, side) in enumerate((("1", "sun"), ("2", "nadir"))):
+            power.switch(f"SRAM{number}", half < memories)
+            power.switch(f"{side}_camera", half < cameras)
+            if half < sides:
+                power.set_state(f"sram{number}", "active")
+                power.set_state(f"{side}_fpga", "imaging")
+        milliwatts = power.current_ma() * CUBESENSE.volts
+        assert milliwatts == pytest.approx(float(ours), abs=0.06)
+        assert milliwatts == pytest.approx(float(published), rel=0.06)
+        compared += 1
+    assert compared == 8
