@@ -15,10 +15,12 @@ from amaranth.lib.wiring import Component
 from cubestack.hdl.generate import rtlil_text
 from cubestack.hdl.lut_cover import FALSE, TRUE, GateNetwork
 
-__all__ = ["AGLN030_TILES", "TileCount", "UnknownCellError", "count_tiles"]
+__all__ = ["AGLN030_PINS", "AGLN030_TILES", "TileCount", "UnknownCellError", "count_tiles"]
 
-#: Tiles of the part that all sensors' FPGA boards carry.
+#: Tiles and user pins of the part that all sensors' FPGA boards carry; the pins by section 3.2.2 of
+#: the CubeSense thesis.
 AGLN030_TILES = 768
+AGLN030_PINS = 77
 
 # Flip-flops whose enable and clear a tile has; Yosys' names of them.
 _FLIP_FLOPS = ("$_DFF_", "$_DFFE_")

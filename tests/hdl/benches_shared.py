@@ -1,0 +1,166 @@
+"""One SRAM for camera and bus: who has it, and that neither disturbs the other."""
+
+import random
+from typing import Any
+
+import cocotb
+from bench import Camera, Mcu, frame, picture, timed_test
+from cocotb.triggers import Timer
+from ebi import Ebi, sram_at, stored
+from geometry import GEOMETRY
+from instants import ODD, wait
+
+SIZE = 2 * GEOMETRY.bank_size
+STANDBY = {
+    **dict.fromkeys(("ACK", "AD_LOW_O", "AD_LOW_OE", "SRAM_D_O", "SRAM_D_OE"), 0),
+    **dict.fromkeys(("SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"), 1),
+}
+
+
+class SharedBench:
+    """Camera, processor and SRAM around the board."""
+
+    def __init__(self, dut: Any) -> None:
+        self.dut = dut
+        for name in ("ENABLE", "RNW", "BANK", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"):
+            getattr(dut, name).value = 0
+        self.camera = Camera(dut)
+        self.mcu = Mcu(dut)
+        self.bus = Ebi(dut)
+        self.sram = sram_at(dut, "SRAM_", lambda: not int(dut.RNW.value))
+
+    @classmethod
+    async def start(cls, dut: Any) -> "SharedBench":
+        bench = cls(dut)
+        await Timer(1, unit="ns")
+        bench.in_standby()
+        bench.sram.start()
+        bench.bus.start()
+        cocotb.start_soon(bench.camera.run())
+        return bench
+
+    def in_standby(self) -> None:
+        assert {name: int(getattr(self.dut, name).value) for name in STANDBY} == STANDBY
+        address = self.dut.SRAM_A.value
+        assert int(address[GEOMETRY.position_bits - 1 : 0]) == 0, "all but the bank"
+
+    async def shoot(self, bank: int) -> bytes:
+        """From standby to standby: a picture is stored."""
+        await self.mcu.store(bank)
+        await self.camera.reach(len(self.camera.clocks) + 3)
+        content = picture()
+        self.camera.send(frame(content))
+        assert await self.mcu.acknowledged()
+        await self.mcu.standby()
+        assert stored(self.sram, bank) == content
+        return content
+
+    async def open(self) -> None:
+        """From standby: the bus has the memory."""
+        await self.mcu.set(RNW=1, BANK=random.getrandbits(1))
+        await self.mcu.set(ENABLE=1)
+
+
+@timed_test
+async def bus_has_the_whole_memory(dut: Any) -> None:
+    """Reads and writes in any order against an array."""
+    bench = await SharedBench.start(dut)
+    await bench.open()
+    expected = bytearray(bench.sram.memory)
+    for _ in range(300):
+        address = random.randrange(SIZE)
+        if random.getrandbits(1):
+            expected[address] = random.getrandbits(8)
+            await bench.bus.write(address, expected[address])
+        else:
+            assert await bench.bus.read(address) == expected[address]
+    await bench.mcu.standby()
+    assert bench.sram.memory == expected
+    assert bench.sram.edges == len(bench.sram.pulses), "a write pulse that was none"
+
+
+@timed_test
+async def picture_is_worked_on_where_it_was_stored(dut: Any) -> None:
+    bench = await SharedBench.start(dut)
+    for bank in (0, 1, 0):
+        content = await bench.shoot(bank)
+        await bench.open()
+        for _ in range(30):
+            x, y = random.randrange(GEOMETRY.columns), random.randrange(GEOMETRY.rows)
+            address = GEOMETRY.address(x, y, bank)
+            assert await bench.bus.read(address) == content[y * GEOMETRY.columns + x]
+        await bench.bus.write(GEOMETRY.address(0, 0, bank), content[0] ^ 0xFF)
+        assert await bench.bus.read(GEOMETRY.address(0, 0, bank)) == content[0] ^ 0xFF
+        await bench.mcu.standby()
+
+
+@timed_test
+async def bus_is_cut_off_while_storing(dut: Any) -> None:
+    """Accesses then have no effect at all, and nothing answers."""
+    bench = await SharedBench.start(dut)
+
+    async def meddle() -> None:
+        while True:
+            address = random.randrange(SIZE)
+            if random.getrandbits(1):
+                await bench.bus.write(address, random.getrandbits(8))
+            else:
+                assert await bench.bus.read(address) is None
+
+    for bank in (1, 0):
+        other = stored(bench.sram, 1 - bank)
+        await bench.mcu.store(bank)
+        meddling = cocotb.start_soon(meddle())
+        await bench.camera.reach(len(bench.camera.clocks) + 3)
+        content = picture()
+        bench.camera.send(frame(content))
+        assert await bench.mcu.acknowledged()
+        meddling.cancel()
+        for name in ("CS_N", "RE_N", "WE_N"):
+            getattr(dut, name).value = 1
+        bench.bus.drives = True
+        await bench.mcu.standby()
+        assert (stored(bench.sram, bank), stored(bench.sram, 1 - bank)) == (content, other)
+
+
+@timed_test
+async def idle_is_reset(dut: Any) -> None:
+    """In standby nothing on any other pin moves any output; the address latch is forgotten too."""
+
+    async def stands_still(name: str) -> None:
+        await getattr(dut, name).value_change
+        raise AssertionError(f"{name} moved in standby")
+
+    bench = await SharedBench.start(dut)
+    await bench.open()
+    await bench.bus.address(SIZE - 1)
+    await bench.mcu.standby()
+    await Timer(1, unit="ns")
+    bench.in_standby()
+    watches = [cocotb.start_soon(stands_still(name)) for name in (*STANDBY, "SRAM_A")]
+    pins = ("RNW", "BANK", "ALE", "CS_N", "RE_N", "WE_N", "AD_HIGH", "AD_LOW_I", "SRAM_D_I")
+    for _ in range(1000):
+        await wait(random.randint(1, 5_000), ODD)
+        pin = getattr(dut, random.choice(pins))
+        pin.value = random.getrandbits(len(pin))
+    for watch in watches:
+        watch.cancel()
+
+
+@timed_test
+async def strobes_together_read(dut: Any) -> None:
+    """A processor never does that; FPGA and SRAM must not fight over it."""
+    bench = await SharedBench.start(dut)
+    await bench.open()
+    before = bytes(bench.sram.memory)
+    await bench.bus.address(1)
+    bench.bus.drives = False
+    for pins in (("CS_N", "RE_N", "WE_N"), ("CS_N", "WE_N", "RE_N")):
+        dut.RE_N.value = dut.WE_N.value = dut.CS_N.value = 0
+        await wait(30_000, ODD)
+        assert int(dut.SRAM_WE_N.value) == 1
+        assert int(dut.AD_LOW_O.value) == before[1]
+        for name in pins[::-1]:
+            getattr(dut, name).value = 1
+        await wait(1_000, ODD)
+    assert bench.sram.memory == before

@@ -1,0 +1,110 @@
+"""The processor's external bus in its mode of 24 address and 8 data bits, and SRAMs behind it."""
+
+import random
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import cocotb
+from cocotb.triggers import ReadOnly
+from geometry import GEOMETRY
+from instants import ODD, wait
+from sram import SLOWEST_ACCESS, UNKNOWN, Sram
+
+#: Address bits that some memory uses: memory or bank, row, column.
+USED_BITS = GEOMETRY.position_bits + 1
+
+
+class Ebi:
+    """Bus master. Lines that it does not drive are unknown; bits of no use are random."""
+
+    def __init__(self, dut: Any, *selects: str) -> None:
+        self._dut = dut
+        self._selects = selects or ("CS_N",)
+        self.drives = True
+        for name in (*self._selects, "RE_N", "WE_N"):
+            getattr(dut, name).value = 1
+        for name in ("AD_HIGH", "AD_LOW_I", "ALE"):
+            getattr(dut, name).value = 0
+
+    def start(self) -> None:
+        cocotb.start_soon(self._watch())
+
+    async def _watch(self) -> None:
+        """One driver at most on the data lines, whenever a point in time has settled."""
+        while True:
+            await self._dut.AD_LOW_OE.value_change
+            await ReadOnly()
+            assert not (self.drives and int(self._dut.AD_LOW_OE.value)), "two drivers on AD_LOW"
+
+    async def address(self, address: int) -> None:
+        """The first half of an access."""
+        address |= random.getrandbits(24 - USED_BITS) << USED_BITS
+        self.drives = True
+        self._dut.AD_HIGH.value = random.getrandbits(8)  # ALE does not wait for the lines
+        self._dut.AD_LOW_I.value = random.getrandbits(8)
+        self._dut.ALE.value = 1
+        await self._pause()
+        self._dut.AD_HIGH.value, self._dut.AD_LOW_I.value = address >> 16, address >> 8 & 0xFF
+        await self._pause()
+        self._dut.ALE.value = 0
+        await self._pause()
+        self._dut.AD_HIGH.value = address & 0xFF
+
+    async def write(self, address: int, value: int, select: str = "") -> None:
+        await self.address(address)
+        self._dut.AD_LOW_I.value = value
+        await self._strobe("WE_N", select)
+
+    async def read(self, address: int, select: str = "") -> int | None:
+        """The byte, or None when nobody drives the bus."""
+        await self.address(address)
+        self._dut.AD_LOW_I.value = UNKNOWN
+        self.drives = False
+        byte = await self._strobe("RE_N", select)
+        self.drives = True
+        self._dut.AD_LOW_I.value = random.getrandbits(8)
+        return byte
+
+    async def _strobe(self, strobe: str, select: str) -> int | None:
+        chip = getattr(self._dut, select or self._selects[0])
+        chip.value = 0
+        await self._pause()
+        getattr(self._dut, strobe).value = 0
+        await wait(SLOWEST_ACCESS + random.randrange(1_000, 20_000), ODD)
+        driven = int(self._dut.AD_LOW_OE.value)
+        byte = int(self._dut.AD_LOW_O.value) if driven else None
+        getattr(self._dut, strobe).value = 1
+        await self._pause()
+        chip.value = 1
+        await self._pause()
+        return byte
+
+    async def _pause(self) -> None:
+        await wait(random.randrange(1_000, 20_000), ODD)
+
+
+class _Clock:
+    """PIXCLK for an SRAM's judgement of write pulses; low while the bus may write."""
+
+    def __init__(self, dut: Any, storing: Callable[[], bool]) -> None:
+        self._dut = dut
+        self._storing = storing
+
+    @property
+    def value(self) -> int:
+        return int(self._dut.PIXCLK.value) if self._storing() else 0
+
+
+def sram_at(dut: Any, prefix: str, storing: Callable[[], bool]) -> Sram:
+    """A model on the pins that begin with ``prefix``; ``storing`` says when the camera writes."""
+    names = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
+    pins = {f"SRAM_{name}": getattr(dut, f"{prefix}{name}") for name in names}
+    pins["SRAM_D_I"].value = 0
+    return Sram(SimpleNamespace(**pins, PIXCLK=_Clock(dut, storing)), GEOMETRY)
+
+
+def stored(sram: Sram, bank: int = 0) -> bytes:
+    """A picture in a memory, row by row."""
+    rows, columns = range(GEOMETRY.rows), range(GEOMETRY.columns)
+    return bytes(sram.memory[GEOMETRY.address(x, y, bank)] for y in rows for x in columns)
