@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from cubestack.host.cubestar import Star
 from cubestack.host.star_names import star_name
 
 __all__ = ["annotate", "save_picture"]
@@ -19,6 +19,22 @@ UNKNOWN = (255, 140, 90)
 
 #: Display gamma: lifts faint stars out of the black without touching the file with the raw values.
 GAMMA = 0.5
+
+
+class Star(Protocol):
+    """What is marked: a centroid, and the star's Hipparcos number when it is identified."""
+
+    @property
+    def x_px(self) -> float:
+        """Column."""
+
+    @property
+    def y_px(self) -> float:
+        """Row."""
+
+    @property
+    def hipparcos(self) -> int | None:
+        """None when it is not identified."""
 
 
 def save_picture(picture: NDArray[np.uint8], path: Path) -> None:

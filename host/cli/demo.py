@@ -5,18 +5,22 @@ An emulator process serves a device on pseudo-terminals; a client in this
 process talks to it through pyserial and nothing else. First the star tracker:
 a rendered sky, then a photograph, one of --photographs if that folder has any,
 else a picture that this project rendered itself. Then the sun and nadir sensor:
-the Sun, and the Earth from 750 km.
+the Sun, and the Earth from 750 km. Last the star tracker without FPGA: a sky.
 """
 
 import argparse
 from pathlib import Path
 
-from cubestack.host.cli import demo_cubesense, demo_cubestar
+from cubestack.host.cli import demo_aramis, demo_cubesense, demo_cubestar
 from cubestack.host.cli.arguments import whole
 
 __all__ = ["add_arguments", "run"]
 
-DEVICES = {"cubestar": demo_cubestar.show, "cubesense": demo_cubesense.show}
+DEVICES = {
+    "cubestar": demo_cubestar.show,
+    "cubesense": demo_cubesense.show,
+    "aramis": demo_aramis.show,
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -19,7 +19,7 @@ def served(device: str, scene: Path, port: Path) -> Iterator[Path]:
     """An emulator process that serves ``device``, which sees ``scene``, on ``port``."""
     command = [sys.executable, "-m", "cubestack.host.cli.main", "emulate", device]
     command += ["--scene", str(scene), "--pty", str(port), "--pace", "fast"]
-    say("starting the emulator; its first start on a machine compiles the FPGA")
+    say("starting the emulator; its first start on a machine compiles what it needs")
     emulator = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         assert emulator.stderr is not None
