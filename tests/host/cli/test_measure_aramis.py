@@ -2,13 +2,26 @@
 
 import argparse
 import json
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from cubestack.emulator.aramis_catalogue import CatalogueParameters, build_database
+from cubestack.emulator.camera.mt9m001_imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001_lens import aramis_lens
+from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
+from cubestack.emulator.camera.mt9m001_registers import read_settings
+from cubestack.emulator.camera.register_file import RegisterFile
+from cubestack.emulator.camera.shutter import RollingShutter
+from cubestack.emulator.sky.attitude import attitude_error_deg, quaternion_from_pointing
+from cubestack.emulator.sky.scene import SkyScene
 from cubestack.firmware_model.aramis.database import Database
+from cubestack.firmware_model.interface.mt9m001 import REGISTERS
 from cubestack.host.cli import aramis_session, measure_aramis
 
 
@@ -89,6 +102,20 @@ def test_a_scene_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     frames = measure(capsys, "--scene", path, "--frames", 2)
     assert frames[0]["truth"] == frames[1]["truth"]
     assert [f["right"] for f in frames] == [True] * 2
+
+
+def test_a_picture_file_as_the_light(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    pointing = quaternion_from_pointing(84.0, -1.0, 20.0)
+    scene = SkyScene(pointing, optics=aramis_lens())
+    settings = read_settings(RegisterFile(REGISTERS))
+    settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
+    shutter = RollingShutter(10**12, Fraction(31_750_000), 6299, 6299)
+    sky = Mt9m001Imager(0, NoiseTerms(), None).picture(scene, shutter, settings)
+    wide = np.pad(sky, ((0, 20), (7, 0)))
+    Image.fromarray(wide).save(tmp_path / "sky.png")
+    frame = measure(capsys, "--image", tmp_path / "sky.png", "--crop", "7,0")[0]
+    assert (frame["solved"], frame["right"], frame["truth"]) == (True, None, None)
+    assert attitude_error_deg(np.array(frame["quaternion"]), pointing)[0] < 0.01
 
 
 def test_a_table_for_readers(capsys: pytest.CaptureFixture[str]) -> None:
