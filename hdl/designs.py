@@ -115,6 +115,7 @@ _PAIR = {
 
 _PIXCLK = Clock("PIXCLK", 100, "image sensor at 10 MHz")
 _DCLK = Clock("DCLK", 770.8, "37 cycles of the microcontroller's 48 MHz")
+_ENABLE = Clock("ENABLE", 1000, "microcontroller, a few times a second; latches BANK")
 _ALE = Clock("ALE", 83, "bus accesses of four cycles at 48 MHz")
 _PCLK = Clock("PCLK", 74, "OV7620 at 13.5 MHz")
 _CLK = Clock("CLK", 400, "two instructions of the microcontroller at 5 MHz")
@@ -145,15 +146,23 @@ def _pair(mcu_addressing: bool) -> Top:
 
 #: Tops by the name that the command line uses.
 TOPS = {
-    "cubestar": Top(CubeStarTop, "CubeStar frame buffer", (_PIXCLK, _DCLK), _CUBESTAR),
+    "cubestar": Top(CubeStarTop, "CubeStar frame buffer", (_PIXCLK, _DCLK, _ENABLE), _CUBESTAR),
     "cubestar-shared": Top(
-        CubeStarShared, "CubeStar, one SRAM for FPGA and processor", (_PIXCLK, _ALE), _SHARED
+        CubeStarShared,
+        "CubeStar, one SRAM for FPGA and processor",
+        (_PIXCLK, _ALE, _ENABLE),
+        _SHARED,
     ),
-    "cubestar-double": Top(CubeStarDouble, "CubeStar, two SRAMs in turn", (_PIXCLK, _ALE), _DOUBLE),
+    "cubestar-double": Top(
+        CubeStarDouble,
+        "CubeStar, two SRAMs in turn",
+        (_PIXCLK, _ALE, _ENABLE._replace(port="RNW", source=_ENABLE.source[:-4] + "INTO")),
+        _DOUBLE,
+    ),
     "cubestar-boards": Top(
         CubeStarTwoBoards,
         "CubeStar, model of two shared-memory boards on one bus",
-        (_PIXCLK, _ALE),
+        (_PIXCLK, _ALE, *(_ENABLE._replace(port=f"BOARD{n}_ENABLE") for n in (1, 2))),
         _BOARDS,
         parts=2,
     ),

@@ -1,5 +1,6 @@
 """Verilog files: three tools take them without a warning, and they do what the designs do."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -77,6 +78,27 @@ def test_every_pin_and_every_bit_is_listed(file: Path) -> None:
     assert sides == set(component.signature.members)
     if file.stem.startswith("cubesense") and top.parts == 1:
         assert number == 64
+
+
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@pytest.mark.parametrize("name", TOPS)
+def test_every_clock_pin_is_constrained(name: str, tmp_path: Path) -> None:
+    (tmp_path / "design.il").write_text(rtlil_text(TOPS[name].make()), encoding="utf-8")
+    run_yosys("read_rtlil design.il\nproc\nflatten\nopt_clean\nwrite_json out.json\n", tmp_path)
+    module = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["modules"]["top"]
+    pins = {
+        bit: f"{port.removesuffix('_I')}[{n}]" if len(entry["bits"]) > 1 else port
+        for port, entry in module["ports"].items()
+        if entry["direction"] == "input"
+        for n, bit in enumerate(entry["bits"])
+    }
+    clocks = {
+        pins[bit]
+        for cell in module["cells"].values()
+        for bit in cell["connections"].get("CLK", [])
+        if bit in pins
+    }
+    assert clocks == {clock.port for clock in TOPS[name].clocks}
 
 
 def core(name: str, component: Component) -> str:
