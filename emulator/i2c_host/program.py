@@ -6,6 +6,8 @@ preload  a library in the program takes the calls: programs that are linked dyna
          Needs a C compiler, once; it works where a container refuses the other.
 """
 
+import contextlib
+import ctypes
 import os
 import select
 import socket
@@ -27,6 +29,7 @@ Route = Literal["seccomp", "preload"]
 
 LAUNCHER = Path(__file__).with_name("launcher.py")
 MESSAGE_BYTES = 4096
+PR_SET_CHILD_SUBREAPER = 36
 SIGNALLED = 128
 """Exit code of a program that a signal ended, less the signal: as shells have it."""
 
@@ -49,9 +52,12 @@ class Program:
 
     congested = False
 
-    def __init__(self, process: "subprocess.Popen[bytes]", name: str) -> None:
-        """Watch ``process``."""
+    def __init__(
+        self, process: "subprocess.Popen[bytes]", name: str, *, adopts: bool = False
+    ) -> None:
+        """Watch ``process``; ``adopts`` says that what it leaves behind becomes ours."""
         self.name = name
+        self._adopts = adopts
         self._process = process
         self._pidfd = os.pidfd_open(process.pid)
 
@@ -76,8 +82,11 @@ class Program:
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint."""
-        if not self.ended and poll_now(self._pidfd, select.POLLIN):
-            self._process.poll()
+        if not self.ended:
+            if poll_now(self._pidfd, select.POLLIN):
+                self._process.poll()
+        elif self._adopts:
+            _bury_children()
 
     def release_ps(self, count: int) -> int | None:
         """See Endpoint."""
@@ -99,6 +108,8 @@ def start_filtered(
     if abi is None:
         raise RouteError(f"no table of system calls for {os.uname().machine}")
     numbers = descriptor_range()
+    # A kernel that lets a process look into its descendants only (yama) shall let us.
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
         theirs.set_inheritable(True)
@@ -115,7 +126,7 @@ def start_filtered(
         process.wait()
         raise RouteError(answer[1:].decode() or "the launcher failed")
     supervisor = Supervisor(Listener(descriptors[0]), abi, node, numbers, files)
-    return Program(process, command[0]), supervisor
+    return Program(process, command[0], adopts=True), supervisor
 
 
 def start_preloaded(command: Sequence[str], environment: dict[str, str], library: Path) -> Program:
@@ -126,3 +137,10 @@ def start_preloaded(command: Sequence[str], environment: dict[str, str], library
         command, env=os.environ | environment | {"LD_PRELOAD": preload}, close_fds=False
     )
     return Program(process, command[0])
+
+
+def _bury_children() -> None:
+    """Let processes that have ended go: only then does the kernel let their filter go."""
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass

@@ -12,6 +12,7 @@ from cubestack.emulator.i2c_host.device_file import DeviceFile
 from cubestack.emulator.i2c_host.device_node import DeviceNode
 from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely, wait_until
 from cubestack.emulator.i2c_host.program import (
+    SIGNALLED,
     Program,
     Route,
     RouteError,
@@ -36,6 +37,7 @@ TURNAROUND_NS = 200_000
 """A call that comes so soon after the last answer starts where that transfer ended: what it takes
 to get from one process to the other is not counted."""
 
+IDLE_NS = 100_000_000
 PS_PER_NS = 1000
 NS_PER_S = 10**9
 
@@ -101,33 +103,39 @@ def run_program(
         RouteError: the kernel refuses the route.
         CompilerError: the library of the preload route can not be built.
     """
-    program, supervisor, reason = _start(command, number, bus, route)
-    ports = _Ports(bus, program, supervisor, fast=pace == "fast")
-    pump = Pump(
-        bus.kernel,
-        [ports],
-        bus.busy,
-        pace=pace,
-        report=say,
-        clock_ns=ports.clock_ns,
-        wait=wait_precisely,
-    )
-    ports.on_end = pump.stop
-    say(f"/dev/i2c-{number} by way of {reason}")
-    sharpen_timers()
-    handlers = {number: signal.getsignal(number) for number in (*FORWARDED, signal.SIGINT)}
+    running: list[_Ports] = []
+
+    def end(number: int, _frame: object) -> None:
+        if not running:
+            raise SystemExit(SIGNALLED + number)
+        running[0].signalled(number)
+
+    handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
     try:
-        for number in FORWARDED:
-            signal.signal(number, lambda number, _frame: program.send(number))
-        # The terminal sends it to the program as well, and that one decides.
-        signal.signal(signal.SIGINT, lambda _number, _frame: pump.stop() if program.ended else None)
-        pump.run()
+        program, supervisor, reason = _start(command, number, bus, route)
+        ports = _Ports(bus, program, supervisor, fast=pace == "fast")
+        running.append(ports)
+        say(f"/dev/i2c-{number} by way of {reason}")
+        sharpen_timers()
+        if bus.adapter is None:
+            ports.serve()
+        else:
+            pump = Pump(
+                bus.kernel,
+                [ports],
+                bus.busy,
+                pace=pace,
+                report=say,
+                clock_ns=ports.clock_ns,
+                wait=wait_precisely,
+            )
+            ports.on_end = pump.stop
+            pump.run()
     finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        program.close()
-        if supervisor:
-            supervisor.close()
+        for signal_number, handler in handlers.items():
+            signal.signal(signal_number, handler)
+        for each in running:
+            each.close()
     return program.exit_code
 
 
@@ -152,6 +160,7 @@ class _Ports:
         self._program = program
         self._supervisor = supervisor
         self._fast = fast
+        self._ended = False
         others: list[Endpoint] = [supervisor] if supervisor else []
         self._ports: list[Endpoint] = [bus.port, program, *others]
         self._origin_ns = time.monotonic_ns() - bus.kernel.now // PS_PER_NS
@@ -172,7 +181,24 @@ class _Ports:
             if adapter.told > told:
                 self._await_next(adapter)
         if self._program.ended and (self._supervisor is None or self._supervisor.ended):
-            self.on_end()
+            self._end()
+
+    def serve(self) -> None:
+        """Serve without a pump: the bus is in another process."""
+        while not self._ended:
+            wait_until(self.watched(), IDLE_NS)
+            self.exchange(0)
+
+    def signalled(self, number: int) -> None:
+        """Pass a signal on, but for Ctrl-C: that comes to the program as well, and it decides."""
+        if self._program.ended:
+            self._end()  # only what the program left behind was still served
+        elif number != signal.SIGINT:
+            self._program.send(number)
+
+    def _end(self) -> None:
+        self._ended = True
+        self.on_end()
 
     def _transfer(self, adapter: I2cAdapter) -> None:
         kernel = self._bus.kernel
@@ -203,7 +229,10 @@ class _Ports:
         return None if self._bus.adapter is None else self._bus.adapter.release_ps()
 
     def close(self) -> None:
-        pass
+        """Release program and supervisor; the bus is the caller's."""
+        self._program.close()
+        if self._supervisor is not None:
+            self._supervisor.close()
 
 
 def _start(
