@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.host.aramis import Aramis
+from cubestack.host.cli.terminal import progress
 from cubestack.host.node_client import NodeClient
 
 if TYPE_CHECKING:
@@ -28,14 +30,18 @@ DEFAULT_FIELD_DEG = 21.53463888888889
 """Of the published simulations; the lens that was expected to be built has 18."""
 
 
+@lru_cache(maxsize=2)
 def aramis_catalogue(field_deg: float = DEFAULT_FIELD_DEG) -> Database:
-    """The onboard catalogue for a lens, from the user's cache or made now, which takes seconds."""
+    """The onboard catalogue for a lens, from the user's cache or made now, which takes seconds.
+
+    Shows its progress, so no other progress may be shown meanwhile.
+    """
     from cubestack.emulator.aramis_catalogue import CatalogueParameters, cached_database
 
     usual = CatalogueParameters()
     if abs(field_deg - usual.fov_deg) < 1e-3:
-        return cached_database(usual)
-    return cached_database(replace(usual, fov_deg=field_deg))
+        return cached_database(usual, progress)
+    return cached_database(replace(usual, fov_deg=field_deg), progress)
 
 
 def aramis_board(

@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cubestack.host.cli.aramis_session import DEFAULT_FIELD_DEG
+from cubestack.host.cli import aramis_session
 from cubestack.host.cli.arguments import angle, corner, number, positive, whole
 from cubestack.host.cli.terminal import console, progress
 
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--field",
         type=_field,
-        default=DEFAULT_FIELD_DEG,
+        default=aramis_session.DEFAULT_FIELD_DEG,
         metavar="DEG",
         help="field of view of lens and catalogue (default 21.5346, the published one)",
     )
@@ -114,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
             "--mag-limit, --false-stars, --no-noise and rates belong to the random sky; a scene "
             "file has keys for them"
         )
+    aramis_session.aramis_catalogue(args.field)  # before anything else shows its progress
     results: list[AramisResult] = []
     started = time.monotonic()
     for result in progress(measure_frames(args), args.frames, "measuring", quiet=args.json):
