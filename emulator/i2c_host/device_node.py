@@ -1,6 +1,5 @@
 """The name /dev/i2c-N: which paths mean it, and what a program sees that looks at it."""
 
-import contextlib
 import os
 import stat
 import struct
@@ -56,8 +55,10 @@ class DeviceNode:
             return Found.LISTING
         if not path.startswith("/"):
             start = "cwd" if folder in (None, AT_FDCWD) else f"fd/{folder}"
-            with contextlib.suppress(OSError):
+            try:
                 path = os.path.join(os.readlink(f"/proc/{pid}/{start}"), path)
+            except OSError:
+                return None
         head, tail = os.path.split(path)
         if tail == self._name and os.path.realpath(head) == "/dev":
             return Found.DEVICE

@@ -8,6 +8,7 @@ from smbus2 import i2c_msg
 from cubestack.emulator.i2c import I2cBus, I2cNackError
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.interface.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
 
 BYTE = 10_000_000
 
@@ -162,3 +163,12 @@ def test_waiting_passes_virtual_time():
     kernel = Kernel()
     DirectI2c(kernel, I2cBus(kernel)).wait(0.25)
     assert kernel.now == PS_PER_S // 4
+
+
+def test_calls_of_a_device_file(i2c, memory):
+    assert i2c.call(Call.IOCTL, pack_ioctl(Ioctl.SLAVE, 0x1A)) == (0, b"")
+    assert i2c.call(Call.WRITE, b"\x02") == (1, b"")
+    assert i2c.call(Call.READ, pack_read(3)) == (3, b"\x42\x43\x44")
+    assert i2c.call(Call.IOCTL, pack_ioctl(Ioctl.SLAVE, 0x30)) == (0, b"")
+    assert i2c.call(Call.READ, pack_read(3)) == (-errno.ENXIO, b"")
+    i2c.close()
