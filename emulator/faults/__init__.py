@@ -1,0 +1,1 @@
+"""Faults on purpose: declared in one table, planned in TOML, injected at virtual times."""

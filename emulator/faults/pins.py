@@ -1,0 +1,162 @@
+"""Faults between processor and FPGA: acknowledges that lie, and glitches on control pins.
+
+Stands where the processor looks for its FPGA and passes on everything else.
+"""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.faults.injection import Injection, Report, active
+from cubestack.emulator.faults.sites import Sites
+from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
+from cubestack.emulator.rtl.engine import RtlEngine
+from cubestack.emulator.virtual_time import PS_PER_US, Kernel
+
+__all__ = ["PinFaults"]
+
+PS_PER_NS = 1000
+
+
+class PinFaults:
+    """An FPGA whose pins are not what they should be.
+
+    Attributes:
+        around_reads: called before and after bytes are taken from the FPGA.
+    """
+
+    def __init__(self, env: Kernel, engine: RtlEngine, report: Report) -> None:
+        """Stand before ``engine``."""
+        self._env = env
+        self._engine = engine
+        self._report = report
+        self._injections: list[Injection] = []
+        self._forced: dict[str, int] = {}
+        self._driven: dict[str, int] = {}
+        self._rose_ps: dict[str, int] = {}
+        self.around_reads: list[Callable[[], None]] = []
+
+    @classmethod
+    def placed(cls, sites: Sites, report: Report) -> "PinFaults":
+        """Stand between the FPGA and the processor of a board."""
+        assert sites.engine is not None
+        pins = cls(sites.kernel, sites.engine, report)
+        sites.processor.engine = cast(RtlEngine, pins)  # it has what a processor calls
+        return pins
+
+    def __getattr__(self, name: str) -> Any:
+        """Whatever is not disturbed."""
+        return getattr(self._engine, name)
+
+    def prepare(self, injection: Injection) -> None:
+        """Nothing yet."""
+
+    def begin(self, injection: Injection) -> None:
+        """Act from now on."""
+        if isinstance(injection.fault, ControlGlitch):
+            self._env.process(self._glitch(injection, injection.fault))
+            return
+        self._injections.append(injection)
+        level = self._engine.get_pin(injection.target)
+        self._report(self._env.now, injection, f"begins with the pin at {level}")
+
+    def end(self, injection: Injection) -> None:
+        """Act no longer."""
+        if injection in self._injections:
+            self._injections.remove(injection)
+
+    # --- what a processor calls -----------------------------------------------------------------
+
+    def set_pin(self, name: str, value: int) -> None:
+        """Drive a pin; one that is in a glitch follows after it."""
+        self._driven[name] = value
+        if name not in self._forced:
+            self._engine.set_pin(name, value)
+
+    def get_pin(self, name: str) -> int:
+        """Level of a pin as the processor sees it."""
+        level = self._engine.get_pin(name)
+        for injection, fault in self._on(name):
+            match fault:
+                case AckStuck():
+                    level = fault.level
+                case AckLost():
+                    if level:
+                        self._once(injection, name, "rise not seen")
+                    level = 0
+                case AckLate() if level:
+                    rose_ps = self._rose_ps.setdefault(name, self._engine.now_ps)
+                    level = int(self._engine.now_ps >= rose_ps + _delay_ps(fault))
+        if not self._engine.get_pin(name):
+            self._rose_ps.pop(name, None)
+        return level
+
+    def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
+        """Advance to ``until_ps``, or to where the processor sees ``stop_on``."""
+        self._note_rises(until_ps)
+        if stop_on is None or not self._on(stop_on[0]):
+            return self._engine.run(until_ps, stop_on)
+        pin, level = stop_on
+        if self.get_pin(pin) == level:
+            return self._engine.now_ps
+        late = [fault for _, fault in self._on(pin) if isinstance(fault, AckLate)]
+        if level and late and pin in self._rose_ps:
+            seen_ps = self._rose_ps[pin] + max(map(_delay_ps, late))
+            until_ps = min(until_ps, max(seen_ps, self._engine.now_ps))
+        return self._engine.run(until_ps)
+
+    def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
+        """Run the transfer loop."""
+        for act in self.around_reads:
+            act()
+        done = self._engine.strobe_read(out, period, until_ps)
+        for act in self.around_reads:
+            act()
+        return done
+
+    # --------------------------------------------------------------------------------------------
+
+    def _on(self, pin: str) -> list[tuple[Injection, AckLate | AckLost | AckStuck]]:
+        now_ps = self._env.now
+        mine = [injection for injection in self._injections if injection.target == pin]
+        return [
+            *active(mine, AckLate, now_ps),
+            *active(mine, AckLost, now_ps),
+            *active(mine, AckStuck, now_ps),
+        ]
+
+    def _note_rises(self, until_ps: int) -> None:
+        """Run up to where an acknowledge rises that is to be seen late, and keep the time."""
+        for injection, _ in active(self._injections, AckLate, self._env.now):
+            pin = injection.target
+            if self._engine.get_pin(pin):
+                continue
+            self._rose_ps.pop(pin, None)
+            if self._engine.run(until_ps, (pin, 1)) and self._engine.get_pin(pin):
+                self._rose_ps[pin] = self._engine.now_ps
+                self._report(self._engine.now_ps, injection, "rises")
+
+    def _once(self, injection: Injection, pin: str, text: str) -> None:
+        """Report a fault's first hit only."""
+        if injection.hits < 2:
+            self._report(self._env.now, injection, f"{pin} {text}")
+
+    def _glitch(self, injection: Injection, fault: ControlGlitch) -> Any:
+        pin = injection.target
+        if pin not in self._forced:
+            self._engine.run(max(self._env.now, self._engine.now_ps))
+            self._driven[pin] = self._engine.get_pin(pin)
+            self._forced[pin] = 1 - self._driven[pin]
+            self._engine.set_pin(pin, self._forced[pin])
+            self._report(self._engine.now_ps, injection, f"goes to {self._forced[pin]}")
+            yield self._env.timeout(round(fault.width_ns * PS_PER_NS))
+            self._engine.run(max(self._env.now, self._engine.now_ps))
+            del self._forced[pin]
+            self._engine.set_pin(pin, self._driven[pin])
+
+
+def _delay_ps(fault: AckLate) -> int:
+    return round(fault.delay_us * PS_PER_US)

@@ -1,0 +1,240 @@
+"""Faults of a camera's output: a source of pixels that stands before the camera.
+
+A line with a clock too few or too many becomes segments of its own, so that the FPGA gets exactly
+the edges that a real one would. At most one of these faults hits a line.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.faults.injection import Injection, Report, active
+from cubestack.emulator.faults.table import (
+    Blooming,
+    CameraDead,
+    ClockExtra,
+    ClockLost,
+    ColumnDefect,
+    LineMissing,
+    PixelDead,
+    PixelHot,
+)
+from cubestack.emulator.rtl.engine import PixelSource, StreamSegment
+
+__all__ = ["FaultySource"]
+
+Picture = NDArray[np.uint8]
+
+_CLOCK_FAULTS = (ClockLost, ClockExtra, LineMissing)
+_PIXEL_FAULTS = (PixelHot, PixelDead, ColumnDefect, Blooming)
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A segment with a grid of its own; see StreamSegment and PixelSource."""
+
+    start_ps: int
+    clocks: int
+    vsync: int
+    rows: int
+    pixels: Callable[[], Picture] | None
+    period: Fraction
+    line_clocks: int
+    active_columns: int
+
+    @property
+    def end_ps(self) -> int:
+        return self.start_ps + int(self.clocks * self.period)
+
+
+@dataclass(frozen=True)
+class _Hit:
+    """A fault of the clocks in one line."""
+
+    injection: Injection
+    row: int
+    column: int
+
+
+class FaultySource:
+    """A camera's output with faults; otherwise what ``source`` says.
+
+    Attributes:
+        period, line_clocks, active_columns: of the segment handed out last.
+        injections: faults that act or will act.
+    """
+
+    def __init__(self, source: PixelSource, report: Report) -> None:
+        """Stand before ``source``."""
+        self._source = source
+        self._report = report
+        self.injections: list[Injection] = []
+        self.period = source.period
+        self.line_clocks = source.line_clocks
+        self.active_columns = source.active_columns
+        self._cut: tuple[tuple[object, ...], list[_Piece]] | None = None
+
+    def segment_at(self, time_ps: int) -> StreamSegment | None:
+        """See PixelSource."""
+        if active(self.injections, CameraDead, time_ps):
+            return None
+        base = self._source.segment_at(time_ps)
+        self.period = self._source.period
+        self.line_clocks = self._source.line_clocks
+        self.active_columns = self._source.active_columns
+        if base is None or not base.rows or not self.injections:
+            return base
+        key = (
+            *(base.start_ps, base.clocks, self.line_clocks, self.active_columns, self.period),
+            *((injection.number, injection.end_ps) for injection in self.injections),
+        )
+        if self._cut is None or self._cut[0] != key:
+            self._cut = key, self._pieces(base)
+        for piece in self._cut[1]:
+            if piece.end_ps > time_ps:
+                self.period = piece.period
+                self.line_clocks = piece.line_clocks
+                self.active_columns = piece.active_columns
+                return piece
+        # Where a piece's start was rounded down, its end may be 1 ps early.
+        return self.segment_at(base.start_ps + int(base.clocks * self._source.period))
+
+    # --- the picture ----------------------------------------------------------------------------
+
+    def _spoiled(self, base: StreamSegment, hits: list[_Hit]) -> Callable[[], Picture]:
+        """Renders the picture with its faults, once; the log then knows that it was needed."""
+        rendered: list[Picture] = []
+        line_ps = self.line_clocks * self.period
+
+        def render() -> Picture:
+            if rendered:
+                return rendered[0]
+            assert base.pixels is not None
+            picture = base.pixels().copy()
+            for injection in self.injections:
+                if isinstance(injection.fault, _PIXEL_FAULTS):
+                    lines = _lines(injection, base.start_ps, line_ps, base.rows)
+                    if lines:
+                        text = _spoil(picture, lines, injection)
+                        self._report(base.start_ps + int(lines.start * line_ps), injection, text)
+            for hit in hits:
+                place = f"line {hit.row}"
+                if not isinstance(hit.injection.fault, LineMissing):
+                    place += f", column {hit.column}"
+                self._report(base.start_ps + int(hit.row * line_ps), hit.injection, place)
+            rendered.append(picture)
+            return picture
+
+        return render
+
+    # --- the clocks -----------------------------------------------------------------------------
+
+    def _hits(self, base: StreamSegment) -> list[_Hit]:
+        """What hits the clocks of this frame, by line."""
+        hits: dict[int, _Hit] = {}
+        for injection in self.injections:
+            fault = injection.fault
+            if not isinstance(fault, _CLOCK_FAULTS) or not injection.active(base.start_ps):
+                continue
+            # By frame time, so that a frame nobody looked at does not change the next one's.
+            key = base.start_ps
+            if float(injection.generator_at(key).random()) >= fault.rate:
+                continue
+            row = injection.drawn(fault.row, base.rows, key, 1)
+            column = 0
+            if not isinstance(fault, LineMissing):
+                column = injection.drawn(fault.column, self.active_columns, key, 2)
+            hits.setdefault(row, _Hit(injection, row, column))
+        return [hits[row] for row in sorted(hits)]
+
+    def _pieces(self, base: StreamSegment) -> list[_Piece]:
+        hits = self._hits(base)
+        full = self._spoiled(base, hits)
+        pieces: list[_Piece] = []
+        clocks, columns, period = self.line_clocks, self.active_columns, self.period
+
+        def put(
+            first: int,
+            count: int,
+            rows: slice | None = None,
+            part: slice = slice(None),
+            step: Fraction = period,
+            repeat: int = 1,
+        ) -> None:
+            """``count`` clocks from clock ``first`` on, with some columns of some rows."""
+            if count <= 0:
+                return
+            start_ps = base.start_ps + int(first * period)
+            if rows is None:
+                piece = _Piece(start_ps, count, base.vsync, 0, None, step, count, 0)
+            else:
+                number = len(range(*rows.indices(base.rows)))
+                width = len(range(*part.indices(columns))) * repeat
+
+                def pixels() -> Picture:
+                    return np.ascontiguousarray(np.repeat(full()[rows, part], repeat, axis=1))
+
+                piece = _Piece(
+                    start_ps, count, base.vsync, number, pixels, step, count // number, width
+                )
+            pieces.append(piece)
+
+        done = 0
+        for hit in hits:
+            row, column = hit.row, hit.column
+            first = row * clocks
+            put(done * clocks, (row - done) * clocks, slice(done, row))
+            one = slice(row, row + 1)
+            if isinstance(hit.injection.fault, LineMissing):
+                put(first, clocks)
+            else:
+                put(first, column, one, slice(0, column))
+                if isinstance(hit.injection.fault, ClockExtra):
+                    twice = slice(column, column + 1)
+                    put(first + column, 2, one, twice, step=period / 2, repeat=2)
+                rest = slice(column + 1, columns)
+                if column + 1 < columns:
+                    put(first + column + 1, clocks - column - 1, one, rest)
+                else:
+                    put(first + column + 1, clocks - column - 1)
+            done = row + 1
+        put(done * clocks, (base.rows - done) * clocks, slice(done, base.rows))
+        return pieces
+
+
+def _lines(injection: Injection, start_ps: int, line_ps: Fraction, rows: int) -> range:
+    """Lines that are read out while a fault acts."""
+
+    def first_from(time_ps: int) -> int:
+        return min(max(-((start_ps - time_ps) // line_ps), 0), rows)
+
+    end = rows if injection.end_ps is None else first_from(injection.end_ps)
+    return range(first_from(injection.start_ps), end)
+
+
+def _spoil(picture: Picture, lines: range, injection: Injection) -> str:
+    """Put a fault into some lines of ``picture``; returns what was done."""
+    height, width = picture.shape
+    fault = injection.fault
+    match fault:
+        case PixelHot() | PixelDead():
+            x, y = injection.drawn(fault.x, width, 1), injection.drawn(fault.y, height, 2)
+            if y in lines:
+                picture[y, x] = fault.level if isinstance(fault, PixelHot) else 0
+            return f"pixel ({x}, {y})"
+        case ColumnDefect():
+            x = injection.drawn(fault.x, width, 1)
+            picture[lines.start : lines.stop, x] = fault.level
+            return f"column {x}"
+        case Blooming():
+            bright = picture[lines.start : lines.stop] >= fault.threshold
+            spilled = bright.copy()
+            for shift in range(1, min(fault.length, len(lines) - 1) + 1):
+                spilled[shift:] |= bright[:-shift]
+                spilled[:-shift] |= bright[shift:]
+            picture[lines.start : lines.stop][spilled] = 255
+            return f"{int(bright.sum())} bright pixels spill"
+    raise AssertionError(fault)

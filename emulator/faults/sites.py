@@ -1,0 +1,83 @@
+"""What a board offers to faults, by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.faults.declaration import Site
+from cubestack.emulator.i2c import I2cBus
+from cubestack.emulator.power import PowerModel
+from cubestack.emulator.processor import Processor
+from cubestack.emulator.rtl.engine import PixelSource, RtlEngine
+from cubestack.emulator.uart import Uart
+from cubestack.emulator.virtual_time import Kernel
+
+__all__ = ["CameraSite", "Sites"]
+
+
+@dataclass(frozen=True)
+class CameraSite:
+    """A camera.
+
+    Attributes:
+        source: its output.
+        power: turns its supply on or off, at a time in ps.
+        channel: load switch that feeds it.
+    """
+
+    source: PixelSource
+    power: Callable[[bool, int], None]
+    channel: str
+
+
+@dataclass(frozen=True)
+class Sites:
+    """Everything of a board that a fault can hit; its keys are the targets.
+
+    Attributes:
+        kernel: virtual time.
+        processor: it looks for its FPGA in ``processor.engine``.
+        uarts: serial lines.
+        buses: I2C buses to the satellite.
+        supplies: all supply channels.
+        engine: the FPGAs; None without one.
+        controls: pins that command the FPGAs.
+        cameras: by their names at the engine.
+        memories: bytes of each memory, beside those at the FPGAs.
+    """
+
+    kernel: Kernel
+    processor: Processor
+    uarts: Mapping[str, Uart]
+    buses: Mapping[str, I2cBus]
+    supplies: PowerModel
+    engine: RtlEngine | None = None
+    controls: tuple[str, ...] = ()
+    cameras: Mapping[str, CameraSite] = field(default_factory=dict)
+    memories: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+
+    def targets(self, site: Site) -> tuple[str, ...]:
+        """Names of everything that faults of a kind can hit, the usual one first."""
+        match site:
+            case Site.UART:
+                return tuple(self.uarts)
+            case Site.I2C:
+                return tuple(self.buses)
+            case Site.SUPPLY:
+                return tuple(self.supplies.table.channels)
+            case Site.CAMERA:
+                return tuple(self.cameras)
+            case Site.CONTROL:
+                return self.controls
+            case Site.MEMORY:
+                return tuple(self.all_memories())
+            case Site.ACKNOWLEDGE:
+                return () if self.engine is None else self.engine.wiring.acknowledges
+            case Site.FPGA:
+                return () if self.engine is None else ("fpga",)
+
+    def all_memories(self) -> dict[str, NDArray[np.uint8]]:
+        """Bytes of every memory."""
+        return {**({} if self.engine is None else self.engine.memories), **self.memories}
