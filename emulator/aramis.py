@@ -7,6 +7,7 @@ flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
 
 from collections import deque
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal, cast
 
 import numpy as np
@@ -17,6 +18,8 @@ from cubestack.emulator.camera.mt9m001 import Mt9m001
 from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
 from cubestack.emulator.camera.ppi import Ppi
 from cubestack.emulator.camera.shutter import RollingShutter
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2c import I2cBus
 from cubestack.emulator.no_fpga import NoFpga
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
@@ -102,6 +105,7 @@ class AramisBoard:
             i2c_address: 7-bit address on the satellite's bus.
         """
         self.kernel = Kernel()
+        self._seed = seed
         self._rng = np.random.default_rng([seed, 0xA7A])
         self.sdram = np.frombuffer(self._rng.bytes(SDRAM_BYTES), np.uint8).copy()
         self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
@@ -144,6 +148,19 @@ class AramisBoard:
         self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, _SatelliteTarget(self))
         self._show_camera()
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Injects faults into this board; its camera and processor have none of their own."""
+        sites = Sites(
+            self.kernel,
+            self.processor,
+            {"uart": self.uart},
+            {"i2c": self.i2c_bus},
+            self.power,
+            memories={"sdram": self.sdram, "flash": self.catalogue_flash},
+        )
+        return Faults(sites, self._seed)
 
     @property
     def program(self) -> AramisProgram:

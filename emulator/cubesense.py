@@ -5,6 +5,7 @@ microcontroller for both, its buses to the satellite, and its switches and curre
 """
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Literal, Protocol
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy as np
 from cubestack.emulator.camera.ov7620 import Ov7620
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.cubesense_lines import Lines
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.i2c import I2cBus, I2cTarget
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
@@ -101,6 +104,7 @@ class CubeSenseBoard:
             mcu_addressing: FPGAs with the option that lets the processor choose addresses.
         """
         self.kernel = Kernel()
+        self._seed = seed
         self._rng = np.random.default_rng(seed)
         self.engine = make_engine(CubeSensePair(mcu_addressing=mcu_addressing), kind=engine)
         self.cameras = {camera: Ov7620(scene, camera) for camera in Camera}
@@ -145,6 +149,24 @@ class CubeSenseBoard:
         program = self.processor.program
         assert isinstance(program, CubeSenseProgram)
         return program
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Injects faults into this board."""
+        sites = Sites(
+            self.kernel,
+            self.processor,
+            {"uart": self.uart, "bench": self.bench_uart},
+            {"i2c": self.i2c_bus},
+            self.power,
+            self.engine,
+            controls=("RNW", "EDGE", "SHIFT", *ENABLE),
+            cameras={
+                half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")
+                for camera, half in HALVES.items()
+            },
+        )
+        return Faults(sites, self._seed)
 
     @property
     def scene(self) -> EarthSunScene:

@@ -4,6 +4,7 @@ CubeStar thesis, section 5.2 and tables C.1 to C.4. Camera to FPGA and SRAM, FPG
 processor to the satellite's UART and I2C, and the supplies of all three boards.
 """
 
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from cubestack.emulator.camera.mlx75412 import Mlx75412
 from cubestack.emulator.camera.optics import ROWS
 from cubestack.emulator.camera.shutter import RollingShutter
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.i2c import I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
@@ -76,6 +79,7 @@ class CubeStarBoard:
             i2c_address: 7-bit address on the satellite's bus.
         """
         self.kernel = Kernel()
+        self._seed = seed
         self._rng = np.random.default_rng(seed)
         self.engine = make_engine(kind=engine)
         self.camera = Mlx75412(scene, seed=seed)
@@ -123,6 +127,22 @@ class CubeStarBoard:
         program = self.processor.program
         assert isinstance(program, CubeStarProgram)
         return program
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Injects faults into this board."""
+        sites = Sites(
+            self.kernel,
+            self.processor,
+            {"uart": self.uart},
+            {"i2c": self.i2c_bus},
+            self.power,
+            self.engine,
+            controls=("ENABLE", "RNW"),
+            cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
+            memories={"external": self._hardware.external_ram},
+        )
+        return Faults(sites, self._seed)
 
     def serial(self) -> DirectSerial:
         """Host's end of the UART, in this process."""

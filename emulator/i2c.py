@@ -15,7 +15,7 @@ import simpy
 
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["I2cBus", "I2cMessage", "I2cNackError", "I2cTarget"]
+__all__ = ["I2cBus", "I2cDisturbance", "I2cMessage", "I2cNackError", "I2cTarget"]
 
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
@@ -78,11 +78,25 @@ class I2cTarget(Protocol):
         """The transfer ended, or went on with another target."""
 
 
+class I2cDisturbance(Protocol):
+    """Stands between a host and the targets; each hook may wait, or raise I2cNackError."""
+
+    def before_start(self) -> Generator[simpy.Event, Any, None]:
+        """A host is about to begin a transfer."""
+
+    def after_address(self, address: int) -> Generator[simpy.Event, Any, None]:
+        """The address of a message was sent."""
+
+    def after_byte(self, address: int, read: bool) -> Generator[simpy.Event, Any, None]:
+        """A byte was sent by the host, or by the target, and is not acknowledged yet."""
+
+
 class I2cBus:
     """One bus with any number of targets.
 
     Attributes:
         bit_ps: time of one bit.
+        disturbance: what is on the wires, if anything.
     """
 
     def __init__(self, env: Kernel, hz: int = 100_000) -> None:
@@ -93,6 +107,7 @@ class I2cBus:
         self._targets: dict[int, I2cTarget] = {}
         self._general = _GeneralCall()
         self._wire = simpy.Resource(env)
+        self.disturbance: I2cDisturbance | None = None
         self.bit_ps = PS_PER_S // hz
 
     def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
@@ -130,9 +145,13 @@ class I2cBus:
             yield granted
             addressed: I2cTarget | None = None
             failure: I2cNackError | None = None
+            if self.disturbance is not None:
+                yield from self.disturbance.before_start()
             try:
                 for message in messages:
                     yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
+                    if self.disturbance is not None:
+                        yield from self.disturbance.after_address(message.address)
                     target = self._find(message)
                     if addressed is not None and addressed is not target:
                         addressed.i2c_stop()
@@ -163,12 +182,16 @@ class I2cBus:
             while len(message.data) < wanted:
                 byte = yield from self._next_byte(target, message.address)
                 yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+                if self.disturbance is not None:
+                    yield from self.disturbance.after_byte(message.address, read=True)
                 if message.block and not message.data:
                     wanted += _block_length(byte, message.address)
                 message.data.append(byte)
             return
         for byte in message.data:
             yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+            if self.disturbance is not None:
+                yield from self.disturbance.after_byte(message.address, read=False)
             if not target.i2c_write(byte):
                 raise I2cNackError(
                     errno.EIO, f"I2C device {message.address:#04x} refused byte {byte:#04x}"

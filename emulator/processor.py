@@ -69,6 +69,7 @@ class Processor:
     """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
 
     Attributes:
+        engine: what the processor has at its pins to the FPGA.
         program: the running program, for the interrupt lines of the peripherals.
         resets: number of resets since power-up.
         waiting: asleep until an interrupt, with no deadline.
@@ -105,7 +106,7 @@ class Processor:
         """
         self._env = env
         self._meter = meter
-        self._engine = engine
+        self.engine = engine
         self._camera_bus = camera_bus
         self._boot = boot
         self._boot_us = boot_us
@@ -161,20 +162,20 @@ class Processor:
             case ReadTimer():
                 return self._env.now // PS_PER_US
             case SetPin(pin, level):
-                self._engine.run(self._env.now)
+                self.engine.run(self._env.now)
                 if self._other_pins is not None and pin in self._other_pins:
                     self._other_pins.set(pin, level)
                 else:
-                    self._engine.set_pin(pin, level)
+                    self.engine.set_pin(pin, level)
                 self._meter.charge(port_write=1)
                 self._on_pin(pin, level)
                 return None
             case ReadPin(pin):
-                self._engine.run(self._env.now)
+                self.engine.run(self._env.now)
                 self._meter.charge(port_read=1)
                 if self._other_pins is not None and pin in self._other_pins:
                     return self._other_pins.get(pin)
-                return self._engine.get_pin(pin)
+                return self.engine.get_pin(pin)
             case AwaitPin():
                 return (yield from self._await_pin(request))
             case Sleep():
@@ -184,7 +185,7 @@ class Processor:
             case CameraTransfer():
                 assert self._camera_bus is not None
                 yield self._env.timeout(self._camera_bus.transfer_ps(request))
-                self._engine.run(self._env.now)
+                self.engine.run(self._env.now)
                 return self._camera_bus.transfer(request, self._env.now)
             case _:
                 raise TypeError(f"a program can not request {request!r}")
@@ -198,12 +199,12 @@ class Processor:
     def _await_pin(self, request: AwaitPin) -> Steps:
         start = self._env.now
         deadline = start + request.timeout_us * PS_PER_US
-        self._engine.run(start)
+        self.engine.run(start)
         reached = start
-        while self._engine.get_pin(request.pin) != request.level:
+        while self.engine.get_pin(request.pin) != request.level:
             if self._env.now >= deadline:
                 return False
-            reached = self._engine.run(min(deadline, self._horizon()), (request.pin, request.level))
+            reached = self.engine.run(min(deadline, self._horizon()), (request.pin, request.level))
             yield self._env.timeout(reached - self._env.now)
         poll = request.poll_cycles * PS_PER_S
         polls = max(1, -(-(reached - start) * self._clock.hz // poll))
@@ -234,9 +235,9 @@ class Processor:
         done = 0
         while done < len(request.target):
             yield from self._pay()
-            self._engine.run(self._env.now)
+            self.engine.run(self._env.now)
             # At least one cycle: an event inside it is an interrupt in the middle of the loop.
             limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
-            done += self._engine.strobe_read(request.target[done:], period, limit)
-            yield self._env.timeout(self._engine.now_ps - self._env.now)
+            done += self.engine.strobe_read(request.target[done:], period, limit)
+            yield self._env.timeout(self.engine.now_ps - self._env.now)
         return None

@@ -13,7 +13,7 @@ import simpy
 from cubestack.emulator.line_format import LineFormat, LineSampler
 from cubestack.emulator.virtual_time import Kernel
 
-__all__ = ["BITS_PER_BYTE", "Uart", "UartTap"]
+__all__ = ["BITS_PER_BYTE", "Disturbance", "Uart", "UartTap"]
 
 BITS_PER_BYTE = 10  # start bit, 8 data bits, stop bit
 
@@ -29,6 +29,18 @@ class UartTap(Protocol):
 
     def framing_error(self, time_ps: int) -> None:
         """The device has dropped a character."""
+
+
+class Disturbance(Protocol):
+    """Stands in a line between its two ends, and hands on what it likes, when it likes."""
+
+    def to_host(
+        self, data: bytes, first_ps: int, byte_ps: int, line: Callable[[bytes, int, int], None]
+    ) -> None:
+        """The device sends ``data``; give ``line`` what shall arrive, in the order of time."""
+
+    def to_device(self, byte: int, start_ps: int, hear: Callable[[int, int], None]) -> None:
+        """A byte that began at ``start_ps`` is over; ``hear`` has the device receive one now."""
 
 
 class Uart:
@@ -47,6 +59,7 @@ class Uart:
         on_silence: interrupt: nothing was received for ``silence_bytes`` byte times. Raised once,
             and again only after a byte came.
         taps: who else listens.
+        disturbance: what is in the line, if anything.
         framing_errors: characters that the device dropped.
     """
 
@@ -67,6 +80,7 @@ class Uart:
         self.on_silence = on_silence
         self.line: Callable[[bytes, int, int], None] = lambda _data, _first_ps, _byte_ps: None
         self.taps: list[UartTap] = []
+        self.disturbance: Disturbance | None = None
         self.framing_errors = 0
         self._silence_ps = silence_bytes * self.byte_ps
         self._incoming: deque[tuple[int, LineFormat]] = deque()
@@ -82,7 +96,10 @@ class Uart:
             return
         start = max(self._env.now, self._sending_until)
         self._sending_until = start + len(data) * self.byte_ps
-        self.line(data, start + self.byte_ps, self.byte_ps)
+        if self.disturbance is None:
+            self.line(data, start + self.byte_ps, self.byte_ps)
+        else:
+            self.disturbance.to_host(data, start + self.byte_ps, self.byte_ps, self.line)
         for tap in self.taps:
             tap.device_sent(data, start + self.byte_ps, self.byte_ps)
 
@@ -165,6 +182,12 @@ class Uart:
             tap.framing_error(self._env.now)
 
     def _hear(self, byte: int, start_ps: int) -> None:
+        if self.disturbance is None:
+            self._receive(byte, start_ps)
+        else:
+            self.disturbance.to_device(byte, start_ps, self._receive)
+
+    def _receive(self, byte: int, start_ps: int) -> None:
         for tap in self.taps:
             tap.device_heard(byte, start_ps)
         self.on_byte(byte)

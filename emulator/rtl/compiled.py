@@ -62,6 +62,8 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "driver_pin": (_INT, (ctypes.c_char_p,)),
     "driver_set": (None, (_POINTER, _INT, ctypes.c_uint32, _LONG)),
     "driver_get": (ctypes.c_uint32, (_POINTER, _INT)),
+    "driver_register": (ctypes.c_char_p, (_INT, ctypes.POINTER(_INT))),
+    "driver_flip": (None, (_POINTER, _INT, _INT, _LONG)),
     "driver_power": (None, (_POINTER, _INT, _INT, _LONG)),
     "driver_load": (None, (_POINTER, _INT, ctypes.POINTER(_Segment), _LONG)),
     "driver_use_pixels": (None, (_POINTER, _INT, _POINTER)),
@@ -83,6 +85,14 @@ def load_library(path: Path) -> ctypes.CDLL:
         function.restype = result
         function.argtypes = arguments
     return library
+
+
+def _registers_of(library: ctypes.CDLL) -> dict[str, int]:
+    registers: dict[str, int] = {}
+    bits = ctypes.c_int32()
+    while (name := library.driver_register(len(registers), bits)) is not None:
+        registers[name.decode()] = bits.value
+    return registers
 
 
 class CompiledEngine(SteppingEngine):
@@ -110,6 +120,7 @@ class CompiledEngine(SteppingEngine):
             skipping,
         )
         self._pins = {name: self._library.driver_pin(name.encode()) for name in wiring.widths}
+        self._registers = _registers_of(self._library)
         self._log = ViolationLog()
         self._where = [*self.memories, BETWEEN_FPGAS]  # the driver's -1 is the last one
         self._reached, self._camera = ctypes.c_int64(), ctypes.c_int32()
@@ -139,6 +150,16 @@ class CompiledEngine(SteppingEngine):
             if count:
                 self._log.counts[kind] = count
         return self._log
+
+    @property
+    def registers(self) -> dict[str, int]:
+        """Bits of every register."""
+        return dict(self._registers)
+
+    def _flip(self, register: str, bit: int) -> None:
+        number = list(self._registers).index(register)
+        self._library.driver_flip(self._handle, number, bit, self.now_ps)
+        self._collect_violations()
 
     def _set(self, name: str, value: int) -> None:
         self._library.driver_set(self._handle, self._pins[name], value, self.now_ps)

@@ -73,6 +73,25 @@ struct Pin {
 
 const Pin PIN_TABLE[] = {PINS};
 
+// A register of the design, for upsets.
+struct Register {
+    const char *name;
+    int32_t bits;
+    void (*flip)(Top &, int32_t);
+};
+
+template <size_t Bits> void flip_bit(cxxrtl::wire<Bits> &wire, int32_t bit) {
+    const uint32_t mask = 1u << bit % 32;
+    wire.curr.data[bit / 32] ^= mask;
+    wire.next.data[bit / 32] ^= mask;
+}
+
+#define REGISTER(name, port, bits) \
+    {name, bits, [](Top &top, int32_t bit) { flip_bit(top.port, bit); }},
+
+const Register REGISTER_TABLE[] = {REGISTERS {nullptr, 0, nullptr}};
+const int32_t REGISTER_COUNT = (int32_t)(sizeof REGISTER_TABLE / sizeof *REGISTER_TABLE) - 1;
+
 // The lines of camera number N.
 template <int N> struct Camera;
 
@@ -194,6 +213,11 @@ public:
         if (strcmp(pin.name, DATA_CLOCK_NAME) == 0 && value && !top.DATA_CLOCK.get<bool>())
             sample(now);
         pin.set(top, value);
+        settle(now);
+    }
+
+    void flip(const Register &target, int32_t bit, int64_t now) {
+        target.flip(top, bit);
         settle(now);
     }
 
@@ -450,6 +474,18 @@ void driver_set(Driver *driver, int32_t pin, uint32_t value, int64_t now) {
 }
 
 uint32_t driver_get(const Driver *driver, int32_t pin) { return PIN_TABLE[pin].get(driver->top); }
+
+// Name and bits of register number `index`; null behind the last one.
+const char *driver_register(int32_t index, int32_t *bits) {
+    if (index < 0 || index >= REGISTER_COUNT)
+        return nullptr;
+    *bits = REGISTER_TABLE[index].bits;
+    return REGISTER_TABLE[index].name;
+}
+
+void driver_flip(Driver *driver, int32_t index, int32_t bit, int64_t now) {
+    driver->flip(REGISTER_TABLE[index], bit, now);
+}
 
 void driver_power(Driver *driver, int32_t memory, int32_t on, int64_t now) {
     driver->power(memory, on != 0, now);

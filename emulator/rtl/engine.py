@@ -135,6 +135,16 @@ class RtlEngine(Protocol):
         in ``memories``: what is left of them is the caller's to say.
         """
 
+    @property
+    def registers(self) -> dict[str, int]:
+        """Bits of every register by its path in the design; empty in the simulated engine."""
+
+    def flip(self, register: str, bit: int) -> None:
+        """Turn over a bit of a register at ``now_ps``, as a particle does; ValueError for none.
+
+        A register that is in reset at once has its reset value again.
+        """
+
     def set_pin(self, name: str, value: int) -> None:
         """Drive one of the wiring's ``mcu_pins`` from ``now_ps`` on; ValueError for any other."""
 

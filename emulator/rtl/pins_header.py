@@ -8,6 +8,8 @@ from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
 __all__ = ["pins_header"]
 
+_ESCAPE = re.compile("__|_([0-9a-f]{2})_")
+
 _MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 
@@ -21,6 +23,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - MEMORIES: MEMORY(number, A, D_I, D_O, D_OE, CE_N, OE_N, WE_N).
     - DATA_CLOCK_NAME, DATA_CLOCK, DATA: of the transfer loop.
     - ACKNOWLEDGES, CONTENTION: levels in one word each.
+    - REGISTERS: REGISTER(name, port, bits) of every register.
     - derived_edge(top): whether a clock that is no pin has an edge that takes effect;
       forget_derived_edges(top) has none of them seen.
     - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
@@ -40,6 +43,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
         "DATA": _port(wiring.data),
         "ACKNOWLEDGES": f"({acknowledges})",
         "CONTENTION": "0u" if wiring.contention is None else _level(wiring.contention),
+        "REGISTERS": " \\\n    ".join(_registers(design)),
         "VARIANTS": " ".join(f"VARIANT({n})" for n in range(len(variants))),
     }
     text = "".join(f"#define {name} {text}\n" for name, text in definitions.items())
@@ -72,6 +76,20 @@ def _camera(number: int, camera: CameraPins) -> str:
 
 def _memory(number: int, memory: MemoryPins) -> str:
     return f"MEMORY({number}, {', '.join(_port(memory[pin]) for pin in _MEMORY_PINS)})"
+
+
+def _registers(design: str) -> list[str]:
+    """What CXXRTL buffers are registers; it escapes what C++ does not take in a name."""
+    registers = []
+    for member, kind in (members(design) if design else {}).items():
+        if kind.startswith("wire"):
+            name = _ESCAPE.sub(_plain, member.removeprefix("p_"))
+            registers.append(f'REGISTER("{name}", {member}, {kind[len("wire<") : -1]})')
+    return registers
+
+
+def _plain(escape: re.Match[str]) -> str:
+    return chr(int(escape[1], 16)) if escape[1] else "_"
 
 
 def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:

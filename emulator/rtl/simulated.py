@@ -78,6 +78,14 @@ class SimulatedEngine(SteppingEngine):
         """What the SRAM model recorded."""
         return self._log
 
+    @property
+    def registers(self) -> dict[str, int]:
+        """None: the simulator has no way to a register inside the design."""
+        return {}
+
+    def _flip(self, register: str, bit: int) -> None:
+        raise AssertionError("there is no register to turn over")
+
     def _get(self, name: str) -> int:
         return int(self._context.get(getattr(self.wiring.component, name)))
 

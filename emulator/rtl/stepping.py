@@ -79,6 +79,15 @@ class SteppingEngine(ABC):
     def _get(self, name: str) -> int:
         """Settled level of any pin."""
 
+    @property
+    @abstractmethod
+    def registers(self) -> dict[str, int]:
+        """Bits of every register that can be turned over."""
+
+    @abstractmethod
+    def _flip(self, register: str, bit: int) -> None:
+        """Turn a bit of a register over at ``now_ps`` and let everything settle."""
+
     @abstractmethod
     def _power(self, memory: int, on: bool) -> None:
         """Switch a memory's supply at ``now_ps``."""
@@ -128,6 +137,18 @@ class SteppingEngine(ABC):
             raise ValueError(f"the memories are {', '.join(self.memories)}, not {name}")
         self.run(self.now_ps)
         self._power(list(self.memories).index(name), on)
+
+    def flip(self, register: str, bit: int) -> None:
+        """Turn over a bit of a register."""
+        if not self.registers:
+            raise ValueError("only the compiled engine can turn over the FPGA's registers")
+        if bit not in range(self.registers.get(register, 0)):
+            known = ", ".join(f"{name} ({bits})" for name, bits in self.registers.items())
+            raise ValueError(f"no register bit {register}[{bit}]; registers (bits): {known}")
+        self.run(self.now_ps)
+        for camera in self._cameras:
+            self._catch_up(camera)
+        self._flip(register, bit)
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive one of the microcontroller's pins."""
