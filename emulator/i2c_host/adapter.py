@@ -8,7 +8,7 @@ from typing import Any
 import simpy
 
 from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError
-from cubestack.emulator.virtual_time import Kernel
+from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.interface.linux_i2c import Function
 
 __all__ = ["FUNCTIONS", "I2cAdapter"]
@@ -38,6 +38,8 @@ class I2cAdapter:
 
     Attributes:
         env: kernel.
+        retries: how often a transfer is tried again that lost the bus to another master.
+        timeout_ps: time after which it is not tried again.
         told: transfers whose end was told.
         holding: whether the end of a transfer is told only when ``release`` is called: for who runs
             virtual time ahead and knows when wall time gets there.
@@ -60,6 +62,8 @@ class I2cAdapter:
             data_errno: error of a byte that is not acknowledged; drivers differ.
         """
         self.env = env
+        self.retries = 0
+        self.timeout_ps = PS_PER_S
         self.told = 0
         self.holding = False
         self._bus = bus
@@ -83,18 +87,25 @@ class I2cAdapter:
     def _perform(
         self, messages: list[I2cMessage], done: Callable[[int], None]
     ) -> Generator[simpy.Event, Any, None]:
-        try:
-            yield from self._bus.transfer(messages)
-        except I2cNackError as error:
-            number = error.errno or errno.EIO
-            result = -self._errors.get(number, number)
-        else:
-            result = 0
+        give_up_ps = self.env.now + self.timeout_ps
+        for _ in range(1 + self.retries):
+            result = yield from self._try(messages)
+            if result != -errno.EAGAIN or self.env.now > give_up_ps:
+                break
+            yield self.env.timeout(self._bus.bit_ps)  # so that it does give up
         self._pending -= 1
         if self.holding:
             self._held.append((self.env.now, result, done))
         else:
             self._tell(result, done)
+
+    def _try(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, int]:
+        try:
+            yield from self._bus.transfer(messages)
+        except I2cNackError as error:
+            number = error.errno or errno.EIO
+            return -self._errors.get(number, number)
+        return 0
 
     def _tell(self, result: int, done: Callable[[int], None]) -> None:
         self.told += 1

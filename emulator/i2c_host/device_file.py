@@ -11,6 +11,7 @@ from collections.abc import Callable
 from cubestack.emulator.i2c import I2cMessage
 from cubestack.emulator.i2c_host.adapter import FUNCTIONS, I2cAdapter
 from cubestack.emulator.i2c_host.smbus import Transaction
+from cubestack.emulator.virtual_time import PS_PER_MS
 from cubestack.firmware_model.interface.linux_i2c import (
     MAX_BLOCK_BYTES,
     MAX_MESSAGE_BYTES,
@@ -32,6 +33,8 @@ from cubestack.firmware_model.interface.linux_i2c import (
 __all__ = ["DeviceFile", "Reply"]
 
 Reply = Callable[[bytes], None]
+
+TIMEOUT_UNIT_PS = 10 * PS_PER_MS
 
 _LAST_7_BIT = 0x7F
 _LAST_10_BIT = 0x3FF
@@ -93,8 +96,12 @@ class DeviceFile:
                 self.checksums = bool(argument)
             case Ioctl.FUNCS:
                 return reply(0, _U64.pack(FUNCTIONS))
-            case Ioctl.RETRIES | Ioctl.TIMEOUT:  # no arbitration is lost here, no driver is late
-                return reply(-errno.EINVAL if argument > _INT_MAX else 0)
+            case Ioctl.RETRIES | Ioctl.TIMEOUT if argument > _INT_MAX:
+                return reply(-errno.EINVAL)
+            case Ioctl.RETRIES:
+                self._adapter.retries = argument
+            case Ioctl.TIMEOUT:
+                self._adapter.timeout_ps = argument * TIMEOUT_UNIT_PS
             case _:
                 return reply(-errno.ENOTTY)
         return reply(0)
