@@ -80,8 +80,14 @@ class NodeClient(Client):
 
         What came before is dropped, so a late answer is not taken for this one's.
         """
+        return self.exchange(encode_frame(payload))
+
+    def exchange(self, wire: bytes, rest: bytes = b"") -> bytes | None:
+        """Send bytes as they are, ``rest`` in a piece of its own; returns as ``request`` does."""
         self._drop_input()
-        self._transport.write(encode_frame(payload))
+        self._transport.write(wire)
+        if rest:
+            self._transport.write(rest)
         return self._next_frame()
 
     def stream(self, name: str, count: int) -> Iterator[bytes]:

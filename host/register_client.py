@@ -77,6 +77,16 @@ class RegisterClient:
         except OSError as error:
             raise self._silence(register, 1) from error
 
+    def read_raw(self, address: int, count: int) -> bytes:
+        """Bytes behind any address, declared or not, in one transfer; raises OSError."""
+        answer = i2c_msg.read(self._address, count)
+        self._bus.i2c_rdwr(i2c_msg.write(self._address, [address]), answer)
+        return bytes(answer)
+
+    def write_raw(self, address: int, data: bytes) -> None:
+        """Write bytes to any address, allowed or not, in one transfer; raises OSError."""
+        self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([address]) + data))
+
     def _readable(self, name: str) -> PointerRegister:
         register = self.registers[name]
         if not register.readable:

@@ -23,7 +23,15 @@ from cubestack.host.shell_picture import download
 from cubestack.host.shell_values import parse_value, parse_values
 from cubestack.host.targets import Controls, Target
 
-__all__ = ["Command", "Result", "Shell", "ShellError", "has_side_effect", "plain"]
+__all__ = [
+    "SCHEDULING",
+    "Command",
+    "Result",
+    "Shell",
+    "ShellError",
+    "has_side_effect",
+    "plain",
+]
 
 RAW_TIMEOUT_S = 0.3
 """Silence after which the answer to raw bytes is over."""

@@ -23,6 +23,7 @@ COMMANDS = {
     "measure": "scene in, attitude or directions out: each result beside the truth",
     "registers": "list a device's telecommands and telemetry",
     "shell": "read, write and watch registers by name",
+    "conformance": "check a device's protocol against the tables",
     "catalogue": "compile the onboard star catalogue and say what is in it",
     "memory": "list the firmware's buffers against the processor's memories",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs",

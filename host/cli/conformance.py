@@ -1,0 +1,86 @@
+"""Check a device's protocol against the interface tables, emulated or real.
+
+Walks every telemetry frame, telecommand, register and bench letter, and every
+error path. Without --allow-write only what changes nothing is done: no
+telecommand is sent at all. Exit code 0 when all passed, 1 when something failed
+or differs.
+
+examples:
+  cubestack conformance emulated:cubestar --allow-write
+  cubestack conformance /dev/ttyUSB0 --device cubesense
+  cubestack conformance /dev/ttyUSB0 --device cubesense --compare emulated:cubesense
+"""
+
+import argparse
+import json
+from collections import Counter
+
+from cubestack.host.cli.targets import TARGETS, add_target_arguments, open_any_target
+from cubestack.host.conformance import Check, Outcome, Suite, compare
+
+__all__ = ["add_arguments", "run"]
+
+MARKS = {Outcome.PASSED: "ok", Outcome.FAILED: "FAILED", Outcome.SKIPPED: "-"}
+NAME_COLUMNS = 52
+DETAIL_COLUMNS = 100
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("target", metavar="TARGET", help=TARGETS)
+    parser.add_argument(
+        "--allow-write", action="store_true", help="send telecommands, write registers"
+    )
+    parser.add_argument("--compare", metavar="TARGET", help="show the first difference to another")
+    parser.add_argument("--json", action="store_true", help="one object for each check")
+    add_target_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the suite on one target, or on two."""
+    show = _show_json if args.json else _show_text
+    suites = []
+    for number, text in enumerate([args.target, args.compare][: 1 + (args.compare is not None)]):
+        if number:  # options are the first target's, but for the device
+            args.bench = args.scene = args.baud = None
+        target = open_any_target(text, args)
+        try:
+            suite = Suite(target, args.allow_write)
+            if not number:
+                suite.on_check = show
+                args.device = args.device or target.interface.name.lower()
+            suite.run()
+            suites.append(suite)
+        finally:
+            target.close()
+    difference = compare(*suites) if len(suites) == 2 else None
+    _summarise(suites, difference, as_json=args.json)
+    return int(any(suite.failed for suite in suites) or difference is not None)
+
+
+def _show_text(check: Check) -> None:
+    detail = check.detail
+    if len(detail) > DETAIL_COLUMNS and check.outcome is Outcome.PASSED:
+        detail = detail[: DETAIL_COLUMNS - 3] + "..."
+    print(f"{MARKS[check.outcome]:<7}{check.name:<{NAME_COLUMNS}} {detail}".rstrip())
+
+
+def _show_json(check: Check) -> None:
+    content = {"check": check.name, "outcome": check.outcome.value, "detail": check.detail}
+    print(json.dumps(content))
+
+
+def _summarise(suites: list[Suite], difference: str | None, *, as_json: bool) -> None:
+    for suite in suites:
+        counts = Counter(check.outcome for check in suite.checks)
+        numbers = {outcome.value: counts[outcome] for outcome in Outcome}
+        if as_json:
+            print(json.dumps({"target": suite.target.name, **numbers}))
+        else:
+            text = ", ".join(f"{number} {name}" for name, number in numbers.items())
+            print(f"{suite.target.name}: {text}")
+    if len(suites) == 2:
+        if as_json:
+            print(json.dumps({"difference": difference}))
+        else:
+            print(f"first difference: {difference or 'none'}")

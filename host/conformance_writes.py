@@ -1,0 +1,364 @@
+"""Checks that change the device: telecommands, their errors and effects, registers, bench letters.
+
+A setting that can be read back is put back to what it was.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+from cubestack.firmware_model.interface.bench_letters import BenchProtocol, Letter
+from cubestack.firmware_model.interface.field import Field, InterfaceError, Value
+from cubestack.firmware_model.interface.message import TELEMETRY_BIT, Message
+from cubestack.firmware_model.interface.register_pointer import PointerRegister
+from cubestack.host.conformance import FailedError, SkippedError, Suite
+from cubestack.host.errors import CommandRefusedError, NoAnswerError, NodeError
+from cubestack.host.transport import Transport
+
+__all__ = ["check_writes", "read_back", "values_to_try"]
+
+PROCESSING_TIMEOUT_S = 15.0
+RESTART_TIMEOUT_S = 10.0
+RESTART_POLL_S = 0.25
+BENCH_TIMEOUT_S = 3.0
+BENCH_READ_BYTES = 4096
+
+#: Telecommands whose success is not this suite's to see, with the reason.
+LEFT_OUT = {
+    "StreamDownImage": "streams a whole picture",
+    "UploadBlock": "needs an upload under way",
+    "TestWDG": "ends in a watchdog reset on purpose",
+    "WriteCameraRegister": "writes any register of the camera",
+}
+
+#: Telecommands with fields of the same names as telemetry that shows something else: what was
+#: measured, a clock, or part of what is set.
+NOT_SHOWN = {
+    "setTrackingMode",
+    "GetAttitudeNearPoint",
+    "SetBodyRotation",
+    "SetSystemTime",
+    "StartLoop",
+    "SetIdentification",
+    "SetField",
+}
+
+#: Settings of which some values need an option of the hardware; without it they are refused.
+OPTIONAL = {"SetNadirSearch", "NADIR_SEARCH"}
+
+#: What ends a mode that a telecommand starts.
+ENDED_BY = {"Trigger": "StopLoop", "StartLoop": "StopLoop"}
+
+
+def check_writes(suite: Suite) -> None:
+    """Run them all; without permission each is reported as left out."""
+    interface = suite.target.interface
+    suite.writing("unknown telecommand IDs", lambda seen: _check_unknown(suite, seen))
+    for message in interface.telecommands:
+        if message.supported:
+            _check_telecommand(suite, message)
+    for register in interface.registers or ():
+        if register.writable and register.readable:
+            suite.writing(
+                f"register {register.name}: written", partial(_check_register, suite, register)
+            )
+    if interface.bench is not None:
+        for letter in interface.bench.letters:
+            suite.writing(f"bench letter {letter.letter!r}", partial(_check_letter, suite, letter))
+        suite.writing(
+            "bench: no letter of the protocol", partial(_check_no_letter, suite, interface.bench)
+        )
+
+
+def _check_telecommand(suite: Suite, message: Message) -> None:
+    name = f"telecommand {message.name}"
+    suite.writing(f"{name}: wrong lengths", partial(_check_lengths, suite, message))
+    for field, data in _violations(message):
+        suite.writing(
+            f"{name}: {field.name} out of range", partial(_check_range, suite, message, field, data)
+        )
+    suite.writing(name, partial(_check_effect, suite, message))
+
+
+def _check_unknown(suite: Suite, seen: list[str]) -> None:
+    declared = {m.id for m in suite.target.interface.telecommands if m.supported}
+    unknown = [identifier for identifier in range(TELEMETRY_BIT) if identifier not in declared]
+    for identifier in unknown:
+        _expect_error(suite, bytes([identifier]), "INVALID_ID", f"ID {identifier}")
+    seen.append(f"{len(unknown)} refused")
+
+
+def _check_lengths(suite: Suite, message: Message, seen: list[str]) -> None:
+    data = message.pack(**message.reset_values())
+    for wrong in [data + b"\0", data[:-1]] if data else [b"\0"]:
+        what = f"{len(wrong)} bytes"
+        _expect_error(suite, bytes([message.id]) + wrong, "WRONG_LENGTH", what)
+        seen.append(f"{what} refused")
+
+
+def _check_range(
+    suite: Suite, message: Message, field: Field, data: bytes, seen: list[str]
+) -> None:
+    """``field`` at a value that its limits forbid, the others at their reset values."""
+    before = _shown(suite, message)
+    what = f"{field.name} = {field.label(message.unpack(data)[field.name])}"
+    _expect_error(suite, bytes([message.id]) + data, "BAD_PARAMETER", what)
+    seen.append("refused")
+    if _shown(suite, message) != before:
+        raise FailedError(f"refused, but {what} changed what is read back")
+    _expect_flag(suite, field.range_flag, seen)
+
+
+def _check_effect(suite: Suite, message: Message, seen: list[str]) -> None:
+    if message.name in LEFT_OUT:
+        raise SkippedError(LEFT_OUT[message.name])
+    before = _shown(suite, message)
+    if before is None:
+        _perform_any(suite, message)
+        seen.append("processed")
+        if message.name in ENDED_BY:
+            _perform(suite, suite.target.interface.telecommand(ENDED_BY[message.name]), {})
+        return
+    refused = 0
+    for values in [*values_to_try(message), before]:
+        try:
+            _perform(suite, message, values)
+        except CommandRefusedError:
+            if message.name not in OPTIONAL or values == before:
+                raise
+            refused += 1
+            continue
+        _expect_shown(suite, message, values)
+    seen.append("read back" + (f", {refused} values not there" if refused else ""))
+
+
+def _perform_any(suite: Suite, message: Message) -> None:
+    """Perform it with the first values that the node takes: not all go together with its state."""
+    refusal: CommandRefusedError | None = None
+    for values in values_to_try(message):
+        try:
+            _perform(suite, message, values)
+            return
+        except CommandRefusedError as error:
+            refusal = refusal or error
+    if refusal is not None:
+        raise refusal
+
+
+def read_back(suite: Suite, message: Message) -> dict[str, tuple[Message, Field]]:
+    """Where each of a telecommand's fields is shown in telemetry; empty unless all are.
+
+    By name: the field's own, with the telecommand's number behind it, or the telecommand's.
+    """
+    if message.name in NOT_SHOWN:
+        return {}
+    number = re.sub(r".*?(\d*)$", r"\1", message.name)
+    found = {}
+    for field in message.fields:
+        names = [field.name + number] if number else [field.name]
+        if len(message.fields) == 1:
+            names.append(message.name)
+        place = _place(suite, field, [name.lower() for name in names])
+        if place is None:
+            return {}
+        found[field.name] = place
+    return found
+
+
+def _place(suite: Suite, field: Field, names: list[str]) -> tuple[Message, Field] | None:
+    for telemetry in suite.target.interface.telemetries:
+        if telemetry.supported and not telemetry.steps:
+            for shown in telemetry.fields:
+                same = (shown.type, shown.scale, shown.unit) == (
+                    field.type,
+                    field.scale,
+                    field.unit,
+                )
+                if same and shown.name.lower() in names:
+                    return telemetry, shown
+    return None
+
+
+def values_to_try(message: Message) -> Iterator[dict[str, Value]]:
+    """Allowed values of all fields: reset, smallest, largest, in between, single ones."""
+    reset = message.reset_values()
+    candidates = [reset]
+    for share in (0.0, 1.0, 0.5):
+        values: dict[str, Value] = {}
+        for field in message.fields:
+            low, high = _limits(field)
+            value = low + share * (high - low)
+            integer = field.type != "f32" and field.scale == 1
+            values[field.name] = int(value) if integer else value
+        candidates.append(values)
+    floats = [field.name for field in message.fields if field.type == "f32"]
+    candidates += [reset | {name: 1.0} for name in floats]  # unit vectors among them
+    seen = []
+    for values in candidates:
+        try:
+            carried = message.unpack(message.pack(**values))
+        except InterfaceError:
+            continue
+        if not message.violations(carried) and carried not in seen:
+            seen.append(carried)
+            yield carried
+
+
+def _limits(field: Field) -> tuple[float, float]:
+    if field.choices is not None:
+        values = [int(choice) for choice in field.choices]
+        return min(values), max(values)
+    if field.type.startswith("bytes"):
+        return 0, 0
+    low, high = (0.0, 1.0) if field.type == "f32" else _raw_limits(field)
+    return (
+        low if field.minimum is None else field.minimum,
+        high if field.maximum is None else field.maximum,
+    )
+
+
+def _raw_limits(field: Field) -> tuple[float, float]:
+    low, high = field.raw_range
+    return low / field.scale, high / field.scale
+
+
+def _violations(message: Message) -> Iterator[tuple[Field, bytes]]:
+    reset = message.reset_values()
+    for field in message.fields:
+        if field.type.startswith("bytes"):
+            continue
+        tries: list[float] = []
+        if field.type == "f32":
+            tries.append(float("nan"))
+        else:
+            tries += _raw_limits(field)
+        low, high = _limits(field)
+        tries += [low - 1 / field.scale, high + 1 / field.scale]
+        for value in reversed(tries):
+            try:
+                data = message.pack(**(reset | {field.name: value}))
+            except (InterfaceError, ValueError, OverflowError):
+                continue
+            if field in [wrong for wrong, _ in message.violations(message.unpack(data))]:
+                yield field, data
+                break
+
+
+def _shown(suite: Suite, message: Message) -> dict[str, Value] | None:
+    """What telemetry shows of a telecommand's fields; None when not all are there."""
+    places = read_back(suite, message)
+    if not places:
+        return None
+    frames = {telemetry.name for telemetry, _ in places.values()}
+    read = {name: suite.target.node.telemetry(name) for name in sorted(frames)}
+    values = {name: read[place.name][field.name] for name, (place, field) in places.items()}
+    data = message.pack(**values)
+    return message.unpack(data)
+
+
+def _expect_shown(suite: Suite, message: Message, wanted: Mapping[str, Value]) -> None:
+    found = _shown(suite, message) or {}
+    for field in message.fields:
+        if found[field.name] != wanted[field.name]:
+            raise FailedError(
+                f"{field.name} was set to {field.label(wanted[field.name])}, "
+                f"{field.label(found[field.name])} is read back"
+            )
+
+
+def _expect_error(suite: Suite, payload: bytes, error: str, what: str) -> None:
+    codes = suite.target.interface.ack_errors
+    answer = suite.request(payload)
+    if answer is None:
+        raise FailedError(f"{what}: no acknowledge, declared {error}")
+    if answer != bytes([codes[error]]):
+        known = {int(code): code.name for code in codes}
+        name = known.get(answer[0], "unknown") if len(answer) == 1 else "no error code"
+        raise FailedError(f"{what}: acknowledged with {answer.hex()} ({name}), declared {error}")
+
+
+def _expect_flag(suite: Suite, flag: str, seen: list[str]) -> None:
+    if not flag:
+        return
+    for telemetry in suite.target.interface.telemetries:
+        for field in telemetry.fields:
+            if telemetry.supported and (field.flag or field.name) == flag:
+                if not suite.target.node.telemetry(telemetry.name)[field.name]:
+                    raise FailedError(f"refused, but flag {flag} is not set in {telemetry.name}")
+                seen.append(f"flag {flag}")
+                return
+
+
+def _perform(suite: Suite, message: Message, values: Mapping[str, Value]) -> None:
+    """Send it, and wait until it is processed; after a restart, until the node answers again."""
+    node = suite.target.node
+    node.command(message.name, **values)
+    try:
+        node.wait_processed(PROCESSING_TIMEOUT_S)
+    except NoAnswerError:
+        _wait_restarted(suite, message)
+
+
+def _wait_restarted(suite: Suite, message: Message) -> None:
+    for _ in range(int(RESTART_TIMEOUT_S / RESTART_POLL_S)):
+        try:
+            suite.target.node.telemetry(suite.target.interface.telemetries[0].name)
+            return
+        except NodeError:
+            suite.target.node.pause(RESTART_POLL_S)
+    raise FailedError(f"no answer for {RESTART_TIMEOUT_S:g} s after {message.name}")
+
+
+def _check_register(suite: Suite, register: PointerRegister, seen: list[str]) -> None:
+    client = suite.target.registers
+    if client is None:
+        raise SkippedError("no I2C bus within reach")
+    before = client.read(register.name)
+    label = register.field.label
+    low, high = _limits(register.field)
+    for value in (int(low), int(high), before):
+        client.write(register.name, value)
+        found = client.read(register.name)
+        if found == before and register.name in OPTIONAL:
+            continue
+        if found != value:
+            raise FailedError(f"{label(value)} was written, {label(found)} is read")
+    seen.append("read back")
+    if high < register.field.raw_range[1]:
+        client.write_raw(register.address, bytes([int(high) + 1]))
+        found = client.read(register.name)
+        if found != before:
+            raise FailedError(
+                f"{int(high) + 1} is not allowed, but {label(found)} is read after it"
+            )
+        seen.append("wrong value ignored")
+
+
+def _check_letter(suite: Suite, letter: Letter, seen: list[str]) -> None:
+    line = _bench_line(suite)
+    line.write(letter.request)
+    answer = bytearray()
+    while len(answer) < letter.length:
+        data = line.read(BENCH_READ_BYTES, BENCH_TIMEOUT_S)
+        if not data:
+            break
+        answer += data
+    if len(answer) != letter.length or letter.answer not in (None, bytes(answer)):
+        raise FailedError(f"{len(answer)} bytes came, declared {letter.length}")
+    seen.append(f"{letter.length} bytes")
+
+
+def _check_no_letter(suite: Suite, protocol: BenchProtocol, seen: list[str]) -> None:
+    unknown = next(byte for byte in range(256) if protocol.find(byte) is None)
+    line = _bench_line(suite)
+    line.write(bytes([unknown]))
+    data = line.read(BENCH_READ_BYTES, BENCH_TIMEOUT_S)
+    if data:
+        raise FailedError(f"{unknown:#04x} was answered with {len(data)} bytes")
+    seen.append("no answer")
+
+
+def _bench_line(suite: Suite) -> Transport:
+    if suite.target.bench is None:
+        raise SkippedError("no line with the bench protocol within reach")
+    return suite.target.bench

@@ -1,0 +1,62 @@
+"""`cubestack conformance` on emulated devices: all pass; reports and exit codes."""
+
+import json
+
+import pytest
+
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.firmware_model.cubesense.state import CameraSettings
+from cubestack.host.cli.main import main
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def conformance(capsys):
+    def run(*arguments: str) -> tuple[int, list[dict]]:
+        code = main(["conformance", "--json", *arguments])
+        return code, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+    return run
+
+
+@pytest.mark.parametrize("device", ["cubestar", "aramis"])
+def test_emulated_device_keeps_to_its_tables(conformance, device):
+    code, lines = conformance(f"emulated:{device}", "--allow-write")
+    assert [line for line in lines if line.get("outcome") == "failed"] == []
+    assert code == 0
+    assert lines[-1]["passed"] > 100
+
+
+def test_cubesense_and_comparison_with_another_default(conformance, monkeypatch):
+    """Registers are within reach, and two equal devices differ in nothing."""
+    code, lines = conformance("emulated:cubesense", "--compare", "emulated:cubesense")
+    assert (code, lines[-1]) == (0, {"difference": None})
+    reset = CameraSettings.at_reset
+    changed = []
+
+    def second_one_differs(camera):
+        settings = reset(camera)
+        changed.append(camera)
+        settings.gain += len(changed) > 2
+        return settings
+
+    monkeypatch.setattr(CameraSettings, "at_reset", second_one_differs)
+    code, lines = conformance("emulated:cubesense", "--compare", "emulated:cubesense")
+    assert code == 1
+    assert lines[-1]["difference"] == (
+        "telemetry Configuration: Gain1=0 on emulated:cubesense, Gain1=1 on emulated:cubesense"
+    )
+
+
+def test_report_for_a_reader(capsys):
+    assert main(["conformance", "emulated:cubestar"]) == 0
+    out = capsys.readouterr().out
+    assert "ok     telemetry Identification" in out
+    assert "-      telecommand Exposure" in out
+    assert "0 failed" in out.splitlines()[-1]
+
+
+def test_target_that_is_none(capsys):
+    assert main(["conformance", "emulated:mars"]) == 2
+    assert "no device 'mars' can be emulated" in capsys.readouterr().err

@@ -1,0 +1,163 @@
+"""The suite on nodes in memory: a good one passes, each fault is found and named."""
+
+import pytest
+
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.host.conformance import Check, Outcome, Suite, compare
+from cubestack.host.conformance_writes import read_back, values_to_try
+from cubestack.host.node_client import NodeClient
+from cubestack.host.targets import Target
+
+
+def suite(node, link, **options) -> Suite:
+    interface = node.interface
+    client = NodeClient(link, interface, retries=0)
+    return Suite(Target("fake", interface, client, link), **options)
+
+
+@pytest.fixture
+def good(node, uart, monkeypatch):
+    """A CubeStar in memory that shows its settings, and the error flags of refusals."""
+    places = {m.name: read_back(suite(node, uart), m) for m in CUBESTAR.telecommands}
+    for message in CUBESTAR.telemetries:  # after power-up, settings show their reset values
+        node.values[message.name] = {}
+    for name, shown in places.items():
+        for field, (telemetry, place) in shown.items():
+            node.values[telemetry.name][place.name] = CUBESTAR.telecommand(name).reset_values()[
+                field
+            ]
+    node.values["Identification"]["InterfaceVersion"] = CUBESTAR.version
+    node.values["ExtendedIdentification"]["ResetCause"] = 1
+    node.values["TaskStatus"]["taskStatus"] = node.values["LogStatus"]["Status"] = 1
+    execute, answer = node.execute, node.answer
+
+    def remember(name, values):
+        execute(name, values)
+        for field, (telemetry, place) in places[name].items():
+            node.values[telemetry.name][place.name] = values[field]
+
+    def flag(payload):
+        reply = answer(payload)
+        if reply == b"\x03" and payload[0] < 128:
+            message = CUBESTAR.find(payload[0])
+            for _, name in message.violations(message.unpack(payload[1:])):
+                if name:
+                    node.values["ErrorFlags"][name] = 1
+        return reply
+
+    monkeypatch.setattr(node, "execute", remember)
+    monkeypatch.setattr(node, "answer", flag)
+    return node
+
+
+def failures(run: Suite) -> dict[str, str]:
+    return {check.name: check.detail for check in run.run() if check.outcome is Outcome.FAILED}
+
+
+def test_good_node_passes(good, uart):
+    run = suite(good, uart, allow_write=True)
+    assert failures(run) == {}
+    names = [check.name for check in run.checks]
+    assert len(set(names)) == len(names)
+    for message in CUBESTAR.messages:
+        if message.supported:
+            assert f"{message.kind.value} {message.name}" in names
+
+
+def test_nothing_is_sent_without_permission(good, uart):
+    run = suite(good, uart)
+    assert failures(run) == {}
+    assert good.log == []
+    skipped = [check for check in run.checks if check.outcome is Outcome.SKIPPED]
+    assert "telecommand Exposure" in {check.name for check in skipped}
+    assert all("--allow-write" in check.detail for check in skipped)
+
+
+def test_settings_are_put_back(good, uart):
+    before = {name: dict(values) for name, values in good.values.items()}
+    suite(good, uart, allow_write=True).run()
+    after = {name: dict(values) for name, values in good.values.items()}
+    for changing in ("ErrorFlags", "UploadStatus"):
+        after[changing] = before[changing]
+    assert {k: v for k, v in after.items() if v} == {k: v for k, v in before.items() if v}
+
+
+@pytest.mark.parametrize(
+    ("payload", "reply", "check", "detail"),
+    [
+        (b"\x80", bytes(7), "telemetry Identification", "has 7 bytes, not 8"),
+        (b"\x80", None, "telemetry Identification", "no answer"),
+        (b"\x80", bytes(8), "telemetry Identification", "InterfaceVersion is 0, declared 3"),
+        (b"\x9b", b"\x09", "telemetry IDMode", "field Mode is 9: not allowed"),
+        (b"\x07\0", b"\0", "telecommand Exposure: wrong lengths", "(OK), declared WRONG_LENGTH"),
+        (b"\x07\0", None, "telecommand Exposure: wrong lengths", "no acknowledge"),
+        (b"\x00", b"\0", "unknown telecommand IDs", "ID 0: acknowledged with 00"),
+        (b"\x10", b"\x03", "telecommand CaptureImage", "refused: BAD_PARAMETER"),
+    ],
+)
+def test_fault_is_found(good, uart, monkeypatch, payload, reply, check, detail):
+    answer = good.answer
+    monkeypatch.setattr(good, "answer", lambda p: reply if p == payload else answer(p))
+    found = failures(suite(good, uart, allow_write=True))
+    assert detail in found[check]
+
+
+def test_setting_that_does_not_stick_is_found(good, uart, monkeypatch):
+    execute = good.execute
+    monkeypatch.setattr(
+        good, "execute", lambda name, values: None if name == "Exposure" else execute(name, values)
+    )
+    found = failures(suite(good, uart, allow_write=True))
+    assert list(found) == ["telecommand Exposure"]
+    assert "is read back" in found["telecommand Exposure"]
+
+
+def test_missing_flag_is_found(good, uart, monkeypatch):
+    telemetry = good.telemetry
+    monkeypatch.setattr(
+        good, "telemetry", lambda name: {} if name == "ErrorFlags" else telemetry(name)
+    )
+    found = failures(suite(good, uart, allow_write=True))
+    assert found
+    assert all("is not set in ErrorFlags" in detail for detail in found.values())
+
+
+def test_answer_to_an_unknown_telemetry_is_found(good, uart, monkeypatch):
+    answer = good.answer
+    unknown = next(i for i in range(128, 256) if CUBESTAR.find(i) is None)
+    monkeypatch.setattr(good, "answer", lambda p: b"\1" if p == bytes([unknown]) else answer(p))
+    assert failures(suite(good, uart)) == {f"unknown telemetry ID {unknown}": "answered with 01"}
+
+
+def test_deaf_decoder_is_found(good, uart, monkeypatch):
+    write = uart.write
+    monkeypatch.setattr(uart, "write", lambda data: write(data) if data[:1] == b"\x1f" else None)
+    found = failures(suite(good, uart))
+    assert set(found) == {"framing: noise before a frame"}
+
+
+@pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
+def test_values_to_try_are_allowed_and_differ(interface):
+    for message in interface.telecommands:
+        tried = list(values_to_try(message))
+        assert tried
+        assert all(not message.violations(values) for values in tried)
+        assert all(tried.count(values) == 1 for values in tried)
+
+
+def runs(*checks: Check) -> Suite:
+    made = Suite(Target("x", CUBESTAR, None))
+    made.checks = list(checks)
+    return made
+
+
+def test_comparison_shows_the_first_difference():
+    one = Check("a", Outcome.PASSED, "", ("Gain=1",))
+    assert compare(runs(one), runs(one)) is None
+    other = Check("a", Outcome.PASSED, "", ("Gain=2",))
+    assert compare(runs(one), runs(other)) == "a: Gain=1 on x, Gain=2 on x"
+    failed = Check("a", Outcome.FAILED, "why", ("Gain=1",))
+    assert compare(runs(one), runs(failed)) == "a: passed on x, failed on x (why)"
+    assert compare(runs(one), runs()) == "a: only on x"
