@@ -21,6 +21,7 @@ from cubestack.firmware_model.interface.mt9m001 import (
 from cubestack.host.aramis import Attitude
 from cubestack.host.cli.aramis_session import AramisSession, open_aramis
 from cubestack.host.cli.cubestar_frames import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG, compare
+from cubestack.host.cli.fault_plan import inject_plan
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
@@ -93,6 +94,7 @@ def measure_frames(args: argparse.Namespace) -> Iterator[AramisResult]:
     with open_aramis(
         scene, seed=args.seed, field_deg=args.field, noise=_noise(args.without)
     ) as session:
+        inject_plan(session.board.faults, args.faults)
         _configure(session, args)
         session.aramis.activate()
         pristine = session.board.catalogue_flash.copy()
@@ -125,6 +127,7 @@ def _scene(args: argparse.Namespace, lens: Optics, rng: np.random.Generator) -> 
         rate_deg_s=rate,
         mag_limit=args.mag_limit,
         false_stars=args.false_stars,
+        false_star_mag=args.false_mags,
         noise=not args.no_noise,
         seed=int(rng.integers(1 << 31)),
         optics=lens,

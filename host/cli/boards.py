@@ -12,6 +12,7 @@ from cubestack.firmware_model.interface.cubesense_bench import BENCH
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
 if TYPE_CHECKING:
+    from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.i2c import I2cBus
     from cubestack.emulator.uart import Uart
     from cubestack.emulator.virtual_time import Kernel
@@ -31,6 +32,10 @@ class Board(Protocol):
 
     kernel: Kernel
     i2c_bus: I2cBus
+
+    @property
+    def faults(self) -> Faults:
+        """Injects faults into it."""
 
     def busy(self) -> bool:
         """Whether anything is under way that does not wait for the host."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cubestack.firmware_model.interface.cubesense_codes import Camera, NadirSearch, Sram
+from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.session import CubeSenseSession, open_cubesense
 from cubestack.host.cubesense import Measurement, direction
 
@@ -82,6 +83,7 @@ def measure_sensors(args: argparse.Namespace) -> Iterator[SensorResult]:
         engine=args.engine,
         mcu_addressing=search is not NadirSearch.LINES,
     ) as session:
+        inject_plan(session.board.faults, args.faults)
         if search is not NadirSearch.LINES:
             session.cubesense.client.command("SetNadirSearch", Search=search)
         for _ in range(args.frames):

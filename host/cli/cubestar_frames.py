@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 from cubestack.host.calibration import calibrate, load_camera
+from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.session import Session, open_session
 from cubestack.host.errors import CameraFileError
 from cubestack.host.operator import find_threshold
@@ -67,6 +68,7 @@ def measure_frames(args: argparse.Namespace) -> Iterator[FrameResult]:
     camera = None if args.camera is None else load_camera(args.camera).cropped(*args.crop)
     scene, truth = _first_scene(args, rng)
     with open_session(scene, seed=args.seed, engine=args.engine) as session:
+        inject_plan(session.board.faults, args.faults)
         if camera is not None:
             session.cubestar.configure(calibrate(camera).settings)
         if args.image is not None:

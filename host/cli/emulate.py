@@ -18,6 +18,7 @@ from pathlib import Path
 
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.boards import DEVICES, open_board
+from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
 from cubestack.host.cli.terminal import say
 
@@ -49,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
     )
+    add_faults_argument(parser)
     add_engine_arguments(parser)
     add_layout_argument(parser)
     parser.add_argument(
@@ -69,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
     opened = open_board(args.device, args.scene, seed=args.seed, engine=args.engine, baud=args.baud)
     with ExitStack() as stack:
         stack.callback(opened.board.close)
+        inject_plan(opened.board.faults, args.faults, say)
         if args.tcp and args.tcp + len(opened.lines) - 1 > LAST_PORT:
             raise ValueError(f"{opened.title} needs {len(opened.lines)} ports from {args.tcp} on")
         path = args.pty or Path(f"tty{opened.title.upper()}")

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli import aramis_session
 from cubestack.host.cli.arguments import angle, corner, number, positive, whole
+from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.terminal import console, progress
 
 if TYPE_CHECKING:
@@ -77,6 +78,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--false-stars", type=whole(0), default=0, metavar="N", help="stars in no catalogue"
     )
+    parser.add_argument(
+        "--false-mags",
+        type=_magnitudes,
+        default=(4.5, 6.0),
+        metavar="V,V",
+        help="their brightest and faintest magnitude (default 4.5,6)",
+    )
     parser.add_argument("--no-noise", action="store_true", help="a sensor without any noise")
     parser.add_argument(
         "--without",
@@ -99,6 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y",
         help="with --image: left upper corner of the 1280 x 1024 part",
     )
+    add_faults_argument(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -200,6 +209,16 @@ def _gain(text: str) -> float:
 def _rate(text: str) -> float:
     """Type of a probability."""
     return _between(text, 0.0, 1.0, "a probability in 0..1")
+
+
+def _magnitudes(text: str) -> tuple[float, float]:
+    """Type of a range of magnitudes, the brightest first."""
+    parts = text.split(",")
+    if len(parts) == 2:
+        brightest, faintest = number(parts[0]), number(parts[1])
+        if brightest <= faintest:
+            return brightest, faintest
+    raise argparse.ArgumentTypeError(f"{text!r} is not V,V, the brightest first, as in 4.5,6")
 
 
 def _between(text: str, low: float, high: float, what: str) -> float:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import angle, positive, whole
+from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.session import add_engine_arguments
 from cubestack.host.cli.terminal import console, progress
 
@@ -75,6 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bloom", type=positive, metavar="PX", help="random pose: radius of the Sun's image (7)"
     )
     parser.add_argument("--no-noise", action="store_true", help="random pose: ideal cameras")
+    add_faults_argument(parser)
     add_engine_arguments(parser)
 
 

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import angle, corner, number, whole
+from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
 from cubestack.host.cli.terminal import console, progress
 
@@ -83,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="with --image: JSON with the camera's f_px, cx_px, cy_px, k1, k2, p1, p2",
     )
+    add_faults_argument(parser)
     add_engine_arguments(parser)
     add_layout_argument(parser)
 
