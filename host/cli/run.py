@@ -22,6 +22,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.boards import DEVICES, open_board
@@ -37,6 +41,14 @@ DEFAULT_BUS = 7
 STANDARD_HZ = 100_000
 BOOT_LIMIT_PS = 10**12
 """Virtual time within which the devices have started; the program starts after them."""
+
+ADDRESSES = {
+    "cubestar": CUBESTAR.i2c_address,
+    "cubesense": CUBESENSE.i2c_address,
+    "cubesense-registers": REGISTERS.i2c_address,
+    "aramis": ARAMIS.i2c_address,
+}
+"""What is where at first."""
 
 NACK_ERRORS = ("ENXIO", "EREMOTEIO", "EIO", "ETIMEDOUT")
 """What Linux's drivers report, each its own, when nobody acknowledges an address."""
@@ -65,8 +77,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=_move,
         default=[],
-        metavar="OLD=NEW",
-        help="what answers at OLD answers at NEW, as in 0x1a=0x2a",
+        metavar="NAME=0xNN",
+        help="other address: cubestar, cubesense, cubesense-registers, aramis, or the old one",
     )
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
@@ -161,9 +173,11 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
 
 
 def _move(text: str) -> tuple[int, int]:
-    """Type of a pair of I2C addresses."""
+    """Type of a pair of I2C addresses; the first one may be a name."""
+    name, _, new = text.partition("=")
     try:
-        old, new = (int(part, 0) for part in text.split("="))
+        return ADDRESSES[name] if name in ADDRESSES else int(name, 0), int(new, 0)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not OLD=NEW, as in 0x1a=0x2a") from None
-    return old, new
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not NAME=0xNN, as in cubestar=0x2a; names: {', '.join(ADDRESSES)}"
+        ) from None

@@ -268,7 +268,7 @@ def test_options_of_the_bus(run: Run, tmp_path: Path) -> None:
         "import smbus2\ntry: smbus2.SMBus(12).read_byte(26)\nexcept OSError as e: print(e.errno)"
     )
     script.write_text(f"i2cdetect -y 12\ni2cget -y 12 0x2b 0x83\n{sys.executable} -c '{python}'\n")
-    devices = ("--device", "cubestar", "--device", "cubesense", "--i2c-addr", "0x1a=0x2b")
+    devices = ("--device", "cubestar", "--device", "cubesense", "--i2c-addr", "cubestar=0x2b")
     options = ("--bus", 12, "--nack-errno", "EREMOTEIO", "--hz", 400_000, *devices)
     *detected, value, error = run("sh", script, options=options).out.splitlines()
     assert " ".join(" ".join(detected).split()) == grid(0x1B, 0x1C, 0x2B)
@@ -289,6 +289,14 @@ def test_a_program_that_a_signal_ends(run: Run) -> None:
 def test_a_program_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--", "no-such-program"]) == 2
     assert "no-such-program: no such program" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["cubestarr=0x2a", "0x1a", "0x1a=", "cubestar=x", "0x1a=0x2a=3"])
+def test_a_move_that_makes_no_sense(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        main(["run", "--i2c-addr", text, "--", "true"])
+    assert raised.value.code == 2
+    assert "is not NAME=0xNN, as in cubestar=0x2a" in capsys.readouterr().err
 
 
 def test_attached_to_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
