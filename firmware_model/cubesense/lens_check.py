@@ -1,10 +1,11 @@
 """Whether distortion coefficients have an inverse, quickly enough for a telecommand's acknowledge.
 
 Making the tables takes the part some 0.4 to 0.5 s. What can spoil them is a distorted radius that
-does not rise steadily with the undistorted one, or a correction that an entry can not hold. So
-Newton's method is tried at every 32nd radius only, and the slope, which is cubic, is looked at in
-between, where it can be least: at its ends and where its derivative, a quadratic, is zero. A
-correction between two tried radii is bounded by theirs, because the radii rise.
+does not rise steadily with the undistorted one, or a correction that an entry can not hold; what
+spoils results is an undistorted radius that an int of 1/100 px can not hold. So Newton's method is
+tried at every 32nd radius only, and the slope, which is cubic, is looked at in between, where it
+can be least: at its ends and where its derivative, a quadratic, is zero. A correction between two
+tried radii is bounded by theirs, because the radii rise.
 """
 
 from collections.abc import Sequence
@@ -26,6 +27,9 @@ STEP_PX = 32
 CORRECTION_LIMIT_PX = 254
 """Largest correction; the published table's bytes, which are rounded up, hold 255."""
 
+LARGEST_RADIUS_PX = 320
+"""At the rim; a few pixels beyond it, a radius still fits an int of 1/100 px, which would wrap."""
+
 LEAST_SLOPE = np.float32(0.1)
 LARGEST_RATIO = np.float32(3)
 LARGEST_OFFSET_PX = np.float32(16)
@@ -39,7 +43,7 @@ def invertible(coefficients: Sequence[float], meter: Meter) -> bool:
     """Whether `byte_table` and `fine_table` can be made of ``coefficients``, at any projection.
 
     Some for which they could are refused: a slope below 0.1 somewhere, slopes that differ by more
-    than a factor of 3 (ours by 2.2), or an offset beyond 16 px.
+    than a factor of 3 (ours by 2.2), an offset beyond 16 px, or a rim beyond 320 px (ours at 275).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         terms = [np.float32(value) for value in coefficients]
@@ -89,13 +93,14 @@ def _rises(slopes: list[np.float32], low: np.float32, high: np.float32, meter: M
 
 
 def _fits(new: list[np.float32], meter: Meter) -> bool:
-    """Whether no correction exceeds the tables, in either projection."""
+    """Whether no correction exceeds the tables, and no radius an int, in either projection."""
     for radius, below in zip(new[1:], _TRIED, strict=False):
         half_angle = radius / (2 * FOCAL_PX)
-        meter.charge(f32_div=1, f32_tan=1, f32_mul=1, f32_add=2, f32_compare=3, loop=1)
+        meter.charge(f32_div=1, f32_tan=1, f32_mul=1, f32_add=2, f32_compare=4, loop=1)
         if not half_angle < np.float32(np.pi / 2):
             return False
-        if not max(radius, FOCAL_PX * np.tan(half_angle)) - below <= CORRECTION_LIMIT_PX:
+        largest = max(radius, FOCAL_PX * np.tan(half_angle))
+        if not (largest <= LARGEST_RADIUS_PX and largest - below <= CORRECTION_LIMIT_PX):
             return False
     return True
 

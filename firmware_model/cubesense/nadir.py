@@ -7,8 +7,8 @@ The result codes are public, what leads to them is not; ours:
 
 - too many edges: more than the part keeps.
 - too few edges: fewer than `NadirConfig.min_edges`, here 6, twice the unknowns.
-- bad fit: no circle, an angular radius that no altitude of interest has, a centre so far away that
-  an int of 1/100 px can not hold it (113 deg along an axis), or edges off the circle.
+- bad fit: no circle, an angular radius that no altitude of interest has, a centre more than 100 deg
+  away along an axis, which the interface does not have, or edges off the circle.
   Up to a quarter of the edges may be dropped first, the worst one at a time: hot pixels, the Moon.
 
 Also ours is the fit in the stereographic projection (see `Projection`). A circle there has the
@@ -26,7 +26,11 @@ from cubestack.firmware_model.cubesense.arithmetic import HUNDREDTHS, sequential
 from cubestack.firmware_model.cubesense.circle import Circle, LeastSquaresCircle
 from cubestack.firmware_model.cubesense.distortion import FOCAL_PX, Projection, RadiusTable
 from cubestack.firmware_model.cubesense.edges import EdgeList
-from cubestack.firmware_model.interface.cubesense_codes import PIXELS_PER_DEGREE, DetectResult
+from cubestack.firmware_model.interface.cubesense_codes import (
+    LARGEST_ANGLE_DEG,
+    PIXELS_PER_DEGREE,
+    DetectResult,
+)
 
 __all__ = ["NadirConfig", "NadirResult", "angle_of", "find_nadir"]
 
@@ -40,7 +44,7 @@ In the published projection the limb itself leaves the circle by this much towar
 edges of a sunlit limb stay below 0.35 px, and a looser limit lets fits to the terminator pass.
 """
 
-LARGEST_PX = np.float32(np.iinfo(np.int16).max) / HUNDREDTHS
+LARGEST_PX = np.float32(LARGEST_ANGLE_DEG * PIXELS_PER_DEGREE)
 
 Values = NDArray[np.float32]
 
@@ -111,7 +115,7 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
         centre, radius_deg = _on_the_sky(circle, config.projection, meter)
         low, high = config.radius_deg
         meter.charge(f32_compare=4)
-        in_range = bool(np.all(np.abs(centre) < LARGEST_PX))
+        in_range = bool(np.all(np.abs(centre) <= LARGEST_PX))
         if not (in_range and low <= radius_deg <= high):
             detect = DetectResult.BAD_FIT
             return NadirResult(detect, edges=used, dropped=dropped, radius_deg=radius_deg)

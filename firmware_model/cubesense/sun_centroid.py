@@ -26,7 +26,7 @@ from cubestack.firmware_model.cubesense.arithmetic import sequential_sum
 from cubestack.firmware_model.cubesense.distortion import RIM_PX, RadiusTable
 from cubestack.firmware_model.cubesense.masks import Mask, masked
 from cubestack.firmware_model.cubesense.nadir import angle_of
-from cubestack.firmware_model.interface.cubesense_codes import DetectResult
+from cubestack.firmware_model.interface.cubesense_codes import LARGEST_ANGLE_DEG, DetectResult
 from cubestack.firmware_model.interface.cubesense_fpga import (
     FULL_SIZE,
     SUN_NOT_FOUND,
@@ -38,6 +38,9 @@ __all__ = ["COORDINATE_BYTES", "SunConfig", "SunResult", "find_sun", "window_byt
 
 COORDINATE_BYTES = 4
 """x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
+
+_LARGEST_ANGLE = LARGEST_ANGLE_DEG * 100
+"""In 1/100 deg; only a lens that is not ours images anything beyond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +135,9 @@ def find_sun(
     with meter.phase("undistort"):
         centre = config.table.correct(offset[None], meter)[0]
         angle = angle_of(centre, meter)
+        meter.charge(i16_add=4)
+        if np.abs(angle).max() > _LARGEST_ANGLE:
+            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
     x, y, alpha, beta = (int(value) for value in (*centre, *angle))
     return SunResult(DetectResult.SUCCESS, x, y, alpha, beta, pixels)
 

@@ -17,6 +17,7 @@ __all__ = [
     "EMPTY_FRAME",
     "FRAME_BYTES",
     "IMAGE_BYTES",
+    "LARGEST_ANGLE_DEG",
     "MASK_AREAS",
     "PIXELS_PER_DEGREE",
     "ROWS",
@@ -56,6 +57,9 @@ EDGES_PER_FRAME = 20
 
 #: Undistorted pixels for one degree of field angle.
 PIXELS_PER_DEGREE = 2.9
+
+#: Largest alpha or beta, of either sign, that a result may have.
+LARGEST_ANGLE_DEG = 100
 
 
 class Camera(IntEnum):

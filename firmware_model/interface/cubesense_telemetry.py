@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     EDGES_PER_FRAME,
     EMPTY_FRAME,
     FRAME_BYTES,
+    LARGEST_ANGLE_DEG,
     MASK_AREAS,
     ROWS,
     Camera,
@@ -47,11 +48,21 @@ SCHEDULES: Mapping[int, tuple[Camera, Sram]] = {
 
 def _result_fields() -> tuple[Field, ...]:
     return (
-        Field(
-            "Alpha", "i16", 0, "angle along the rows, x to the right", "deg", 100, None, -100, 100
-        ),
-        Field(
-            "Beta", "i16", 16, "angle along the columns, y downwards", "deg", 100, None, -100, 100
+        *(
+            Field(
+                name,
+                "i16",
+                start,
+                meaning,
+                "deg",
+                100,
+                minimum=-LARGEST_ANGLE_DEG,
+                maximum=LARGEST_ANGLE_DEG,
+            )
+            for name, start, meaning in (
+                ("Alpha", 0, "angle along the rows, x to the right"),
+                ("Beta", 16, "angle along the columns, y downwards"),
+            )
         ),
         Field("Capture", "u8", 32, "what became of the capture", choices=CaptureResult),
         Field(

@@ -63,6 +63,8 @@ def test_what_is_accepted_gives_tables_and_lenses_like_ours_are() -> None:
         ((0, 1, 0, 0, 0), True),
         ((0, 0.75, 0, 0, 0), True),
         ((0, 4, 0, 0, 0), True),
+        ((0, 0.71, 0, 0, 0), True),
+        ((0, 0.7, 0, 0, 0), False),  # the rim at 323 px: results might wrap
         ((0, 0, 0, 0, 0), False),
         ((0, -1, 0, 0, 0), False),
         ((0, 0.5, 0, 0, 0), False),  # too far away

@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.cubesense.distortion import RadiusTable, byte_table
+from cubestack.firmware_model.cubesense.distortion import (
+    Projection,
+    RadiusTable,
+    byte_table,
+    fine_table,
+)
 from cubestack.firmware_model.cubesense.masks import Mask
 from cubestack.firmware_model.cubesense.sun_centroid import SunConfig, find_sun, window_bytes
 from cubestack.firmware_model.interface.cubesense_codes import DetectResult
@@ -133,6 +138,18 @@ def test_light_beyond_the_rim_of_the_field_is_no_sun(
     centre = np.array(SUN_BORESIGHT) + distance * np.array([np.cos(turn), np.sin(turn)])
     detect = find_sun(window(sun(centre, 5)), ours, meter).detect
     assert detect is (DetectResult.SUCCESS if found else DetectResult.SUN_NOT_FOUND)
+
+
+@pytest.mark.parametrize(("slope", "found"), [(0.8, True), (0.72, False)])
+def test_no_angle_is_beyond_the_interface_whatever_the_lens(
+    meter: Meter, slope: float, found: bool
+) -> None:
+    """The Sun 215 px to the left, which such a lens images at 93 or at 103 deg."""
+    config = SunConfig(fine_table(meter, Projection.EQUIDISTANT, (0, slope, 0, 0, 0)))
+    centre = np.array(SUN_BORESIGHT) - (215, 0)
+    result = find_sun(window(sun(centre, 5)), config, meter)
+    assert result.detect is (DetectResult.SUCCESS if found else DetectResult.SUN_NOT_FOUND)
+    assert result.alpha == (pytest.approx(-100 * 215 / slope / 2.9, abs=20) if found else 0)
 
 
 def test_no_angle_is_beyond_the_field_wherever_the_light_is(ours: SunConfig, meter: Meter) -> None:
