@@ -1,5 +1,6 @@
 """CubeSense's ports as unmodified programs use them: pseudo-terminals, and the I2C bus."""
 
+import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -36,12 +37,19 @@ def served(tmp_path: Path) -> Iterator[Path]:
     assert emulator.end() == 0
 
 
-def test_the_bench_client_of_twelve_lines_gets_the_nadir_picture(served: Path) -> None:
-    with serial.Serial(f"{served}.bench", 115_200, timeout=60) as port:
-        port.write(b"a")
-        assert port.read(1) == b"Y"
-        port.write(b"s")
-        picture = np.frombuffer(port.read(307_200), np.uint8).reshape(480, 640)
+def test_the_bench_client_of_the_document_gets_the_nadir_picture(
+    served: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (root / "docs" / "protocols-cubesense.md").read_text(encoding="utf-8")
+    client = text.split("```python\n")[1].split("```")[0]
+    timeout_s = re.search(r"timeout=(\d+)", client)
+    assert timeout_s is not None
+    assert int(timeout_s[1]) > 307_200 * 10 / 115_200  # on a line at its real pace
+    monkeypatch.chdir(served.parent)
+    exec(compile(client, "client.py", "exec"), {})
+    header, data = Path("nadir.pgm").read_bytes().split(b"\n", 1)
+    assert header == b"P5 640 480 255"
+    picture = np.frombuffer(data, np.uint8).reshape(480, 640)
     assert 34 <= np.median(picture) <= 160
     assert picture[236 + 36, 371 - 24] > 100  # the Earth
     assert picture[5, 5] < 50
