@@ -8,6 +8,7 @@ preload  a library in the program takes the calls: programs that are linked dyna
 
 import contextlib
 import ctypes
+import errno
 import os
 import select
 import socket
@@ -19,7 +20,7 @@ from typing import Literal
 
 from cubestack.emulator.i2c_host.device_node import DeviceNode
 from cubestack.emulator.i2c_host.filter import make_filter, native_abi
-from cubestack.emulator.i2c_host.notify import Listener
+from cubestack.emulator.i2c_host.notify import Listener, read_memory
 from cubestack.emulator.i2c_host.supervisor import Files, Supervisor, descriptor_range
 from cubestack.emulator.ports.serial_port import poll_now
 
@@ -120,6 +121,7 @@ def start_filtered(
             close_fds=False,  # what was handed to us is for the program
         )
         theirs.close()
+        _check_access(process)
         ours.send(make_filter(abi, numbers))
         answer, descriptors, _, _ = socket.recv_fds(ours, MESSAGE_BYTES, 1)
     if not descriptors:
@@ -137,6 +139,17 @@ def start_preloaded(command: Sequence[str], environment: dict[str, str], library
         command, env=os.environ | environment | {"LD_PRELOAD": preload}, close_fds=False
     )
     return Program(process, command[0])
+
+
+def _check_access(process: "subprocess.Popen[bytes]") -> None:
+    """Raise RouteError unless we may read the memory of ``process``, which is ended then."""
+    try:
+        read_memory(process.pid, 0, 1)
+    except OSError as error:
+        if error.errno != errno.EFAULT:  # which says that we may, but that nothing is there
+            process.kill()
+            process.wait()
+            raise RouteError(f"no access to the program's memory ({error.strerror})") from None
 
 
 def _bury_children() -> None:
