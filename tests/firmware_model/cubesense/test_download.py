@@ -80,6 +80,16 @@ def test_a_measurement_in_between_costs_a_new_beginning_only(node: Node) -> None
     assert len(node.opened) == 10
 
 
+def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Node) -> None:
+    size = ImageSize.SIDE_64
+    for begun, (sram, number) in enumerate(((Sram.SRAM1, 10), (Sram.SRAM2, 15)), start=1):
+        node.send("StartImageDownload", Sram=sram, Size=size)
+        node.send("NextImageFrame", Frame=number)  # the first one is not read
+        node.run()
+        assert shown(node, number) == expected(node, sram, size)[number]
+        assert len(node.opened) == begun
+
+
 def test_no_frame_is_ready_from_the_request_on(node: Node) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     seen: list[int] = []
