@@ -375,13 +375,16 @@ def _proofs(side: Side) -> dict[str, Proof]:
             _acknowledges,
             Fault("pix_writer.counter.last_row", 1),
         ),
-        f"{side}-idle": Proof(
-            "With the enable high every register but the Sun's coordinates is reset, and they rest",
-            fpga,
-            {},
-            _idle,
-            Fault("pix_writer.pix_rst", 0),
-        ),
+        **{
+            f"{side}-idle{'-addressing' * mcu_addressing}": Proof(
+                "With EN high every register but the Sun's coordinates is reset, and they rest",
+                _fpga(side, mcu_addressing),
+                {},
+                _idle,
+                Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
+            )
+            for mcu_addressing in (False, True)
+        },
         f"{side}-scan": Proof(
             "The nadir scan visits exactly the declared addresses in order",
             fpga,

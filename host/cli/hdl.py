@@ -22,8 +22,8 @@ of a top they share logic.
 examples:
   cubestack hdl area
   cubestack hdl area cubestar "Sun search"
-  cubestack hdl area --ice40         a public yardstick beside it: iCE40 cells
-  cubestack hdl area --ice40 --json  what hdl/area.json tracks"""
+  cubestack hdl area --ice40    a public yardstick beside it: iCE40 cells
+  cubestack hdl area --ice40 --fmax --json    what hdl/area.json tracks"""
 
 VERILOG = """One Verilog file that needs no other: a wrapper with the real pins,
 bidirectional ones too, around the design itself, with a list of the pins and a
@@ -55,6 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     area.add_argument("--json", action="store_true", help="as JSON")
     area.add_argument(
         "--ice40", action="store_true", help="count iCE40 cells too; needs the extra hdl"
+    )
+    area.add_argument(
+        "--fmax", action="store_true", help="place on an iCE40 HX8K; needs the extra place"
     )
     area.set_defaults(act=_area)
     verilog = _subcommand(actions, "verilog", "a top as one Verilog file", VERILOG)
@@ -94,7 +97,9 @@ def _area(args: argparse.Namespace) -> int:
     for name in names:
         if name not in designs():
             raise ValueError(f"{name!r} is no design of one FPGA; there are {', '.join(designs())}")
-    rows = list(progress(areas(names, args.ice40), len(names), "designs", quiet=args.json))
+    rows = list(
+        progress(areas(names, args.ice40, args.fmax), len(names), "designs", quiet=args.json)
+    )
     print(area_json(rows) if args.json else "\n".join(area_table(rows)))
     return 0
 

@@ -19,13 +19,14 @@ from cubestack.hdl.area_report import (
     count_ice40,
     designs,
     grown,
+    ice40_fmax,
 )
 from cubestack.hdl.designs import TOPS, pins_of
 from cubestack.hdl.generate import rtlil_text
-from cubestack.hdl.tools import have_yosys
+from cubestack.hdl.tools import have_nextpnr, have_yosys
 
 #: What to do about growth that is meant.
-WANTED = "if it is worth it: cubestack hdl area --ice40 --json > hdl/area.json"
+WANTED = "if it is worth it: cubestack hdl area --ice40 --fmax --json > hdl/area.json"
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -144,12 +145,29 @@ def test_area_file_lists_all_designs_and_no_other():
 
 
 def test_table_and_json_say_the_same():
-    area = Area("cubestar", True, TileCount(134, 63), Ice40Count(95, 63, 30))
+    rates = {"DCLK": 279.8, "PIXCLK": 163.4}
+    area = Area("cubestar", True, TileCount(134, 63), Ice40Count(95, 63, 30), rates)
     lines = list(area_table([area]))
-    assert lines[1].split() == ["cubestar", "134", "63", "197", "25.7%", "95", "63", "30"]
+    counts = ["cubestar", "134", "63", "197", "25.7%", "95", "63", "30"]
+    assert lines[1].split() == [*counts, "MHz:", "DCLK", "280,", "PIXCLK", "163"]
     (entry,) = json.loads(area_json([area]))["designs"].values()
     assert (entry["tables"], entry["flip_flops"], entry["tiles"]) == (134, 63, 197)
     assert entry["ice40"] == {"lut4": 95, "flip_flops": 63, "carries": 30}
+    assert entry["ice40_fmax_mhz"] == rates
+
+
+@pytest.mark.skipif(not have_nextpnr(), reason="no placer: pip install cubestack[place]")
+def test_clock_rate_on_ice40_is_above_the_cameras():
+    """ALE and ENABLE clock no path from one flip-flop to another, so they have no rate."""
+    rates = ice40_fmax(designs()["cubestar-shared"]())
+    assert set(rates) == {"PIXCLK"}
+    assert rates["PIXCLK"] > 1e3 / TOPS["cubestar-shared"].clocks[0].period_ns
+
+
+def test_recorded_clock_rates_are_of_the_designs_clocks():
+    for name, entry in json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"].items():
+        clocks = {clock.port for clock in TOPS[name].clocks} if name in TOPS else set()
+        assert set(entry.get("ice40_fmax_mhz", {})) <= clocks
 
 
 def test_gray_counter_takes_more_tiles_than_the_matrix_one():
