@@ -102,7 +102,12 @@ class Shell:
             "bench": Command("bench LETTER", "a letter of the bench protocol", self._bench),
             "raw": Command("raw HEX ...", "send bytes, show what comes", self._raw),
             "scene": Command("scene FILE", "show another scene", self._scene, True),
-            "fault": Command("fault [WHAT ...]", "let something break", self._fault, True),
+            "fault": Command(
+                "fault [KIND [TARGET] [PARAMETER=VALUE ...] [for_s=SECONDS]]",
+                "let something break; fault clear ends it",
+                self._fault,
+                True,
+            ),
             "power": Command(
                 "power [CHANNEL on|off]", "supply currents, load switches", self._power, True
             ),

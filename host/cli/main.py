@@ -24,6 +24,7 @@ COMMANDS = {
     "registers": "list a device's telecommands and telemetry",
     "shell": "read, write and watch registers by name",
     "conformance": "check a device's protocol against the tables",
+    "replay": "play a recording to an emulated device, compare what it says",
     "catalogue": "compile the onboard star catalogue and say what is in it",
     "memory": "list the firmware's buffers against the processor's memories",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs",

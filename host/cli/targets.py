@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,12 @@ from cubestack.host.targets import INTERFACES, Target, interface_of, open_target
 __all__ = ["add_target_arguments", "open_any_target"]
 
 EMULATED = "emulated:"
+
+CLEAR = "clear"
+"""Ends all faults."""
+
+TIMES = ("at_s", "for_s")
+"""When a fault begins, and how long it lasts."""
 
 TARGETS = (
     "a serial port, tcp://HOST:PORT, rfc2217://HOST:PORT, i2c:BUS:ADDR, emulated:DEVICE, "
@@ -78,28 +83,35 @@ class _BoardControls:
         self._board = board
         self._device = device
         self.channels = tuple(board.power.table.channels)
-        self._faults = self._make_faults()
-        self.faults = tuple(self._faults)
+        from cubestack.emulator.faults.table import FAULTS
 
-    def _make_faults(self) -> dict[str, Callable[[], None]]:
-        board = self._board
-        faults: dict[str, Callable[[], None]] = {
-            f"latch-up {channel}": _call(board.power.latch_up, channel) for channel in self.channels
-        }
-        if hasattr(board, "fail_camera"):
-            from cubestack.firmware_model.interface.cubesense_codes import Camera, Sram
-
-            for camera in Camera:
-                faults[f"camera {camera.name.lower()}"] = _call(board.fail_camera, camera)
-            for sram in Sram:
-                faults[f"memory {sram.name}"] = _call(board.fail_memory, sram)
-        return faults
+        self.faults = (
+            *(
+                f"{kind} {target}"
+                for kind, fault in FAULTS.items()
+                for target in board.faults.targets(fault.site)
+            ),
+            CLEAR,
+        )
 
     def fault(self, words: list[str]) -> None:
-        text = " ".join(words)
-        if text not in self._faults:
-            raise TargetError(f"no fault {text!r}; known: {', '.join(self.faults)}")
-        self._faults[text]()
+        if words == [CLEAR]:
+            self._board.faults.clear()
+            return
+        kind, *rest = words
+        given = dict(word.split("=", 1) for word in rest if "=" in word)
+        targets = [word for word in rest if "=" not in word]
+        if len(targets) > 1:
+            raise TargetError(f"fault {kind}: one target, not {' '.join(targets)}")
+        times = {name: _seconds(given.pop(name)) for name in TIMES if name in given}
+        if "target" in given:
+            targets.append(given.pop("target"))
+        if "fault" in given:
+            raise TargetError(f"fault {kind}: no parameter 'fault'")
+        parameters = {name: _parameter(text) for name, text in given.items()}
+        self._board.faults.inject(
+            kind, target=targets[0] if targets else None, **times, **parameters
+        )
 
     def scene(self, path: Path) -> None:
         try:
@@ -134,5 +146,18 @@ class _BoardControls:
         self._board.kernel.advance_to(self._board.kernel.now + round(seconds * 1e12))
 
 
-def _call(function: Callable[[Any], None], argument: Any) -> Callable[[], None]:
-    return lambda: function(argument)
+def _seconds(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise TargetError(f"{text!r} is not a number of seconds") from None
+
+
+def _parameter(text: str) -> Any:
+    """A number, true or false, or a word."""
+    for convert in (int, float):
+        try:
+            return convert(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text.lower(), text)

@@ -32,6 +32,7 @@ def test_emulated_cubesense(shell):
     commands = (
         "write CaptureAndDetect SUN SRAM1; time 0.5; read Result1 Detect; bench q;"
         "write SUN_THRESHOLD 30; read SUN_THRESHOLD; fault latch-up SRAM2; time 0.1;"
+        "fault uart-drop rate=0.5 for_s=1; fault clear;"
         "read Power OverCurrent2"
     )
     code, out, err = shell("emulated:cubesense", "--json", "-c", commands)
@@ -40,7 +41,7 @@ def test_emulated_cubesense(shell):
     assert results[2]["values"] == {"Detect": 7}
     assert bytes.fromhex(results[3]["answer"]) == b"Y"
     assert results[5]["values"] == {"SUN_THRESHOLD": 30}
-    assert results[8]["values"] == {"OverCurrent2": 1}
+    assert results[-1]["values"] == {"OverCurrent2": 1}
 
 
 def test_emulated_cubestar_with_a_script(shell, tmp_path):
@@ -60,6 +61,11 @@ def test_emulated_cubestar_with_a_script(shell, tmp_path):
         (["./port", "--script", "no.txt"], 2, "can not read script no.txt"),
         (["./port", "--device", "cubestar", "-c", ""], 1, "can not open ./port"),
         (["emulated:cubesense", "-c", "scene no.toml"], 2, "no.toml"),
+        (["emulated:cubesense", "-c", "fault meteor"], 2, "meteor"),
+        (["emulated:cubesense", "-c", "fault uart-drop rate=7"], 2, "rate"),
+        (["emulated:cubesense", "-c", "fault uart-drop x y"], 2, "one target, not x y"),
+        (["emulated:cubesense", "-c", "fault uart-drop for_s=long"], 2, "'long' is not a number"),
+        (["emulated:cubesense", "-c", "fault uart-drop fault=x"], 2, "no parameter 'fault'"),
     ],
 )
 def test_failures_are_one_line(shell, arguments, code, error):

@@ -1,0 +1,78 @@
+"""Options that say where a device's serial lines are served, and the ports that they open."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cubestack.host.cli.arguments import whole
+
+if TYPE_CHECKING:
+    from cubestack.emulator.ports.serial_port import Endpoint
+    from cubestack.host.cli.boards import Opened, SerialLine
+
+__all__ = ["add_port_arguments", "open_ports"]
+
+LOOPBACK = "127.0.0.1"
+LAST_PORT = 65535
+
+
+def add_port_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options; a line has one end, so they exclude each other."""
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--pty",
+        type=Path,
+        metavar="PATH",
+        help="link to a pseudo-terminal; default: ./ttyCUBESTAR, ./ttyCUBESENSE, ./ttyARAMIS",
+    )
+    where.add_argument(
+        "--tcp", type=whole(0, LAST_PORT), metavar="PORT", help="serial line on a local TCP port"
+    )
+    where.add_argument(
+        "--rfc2217",
+        type=whole(0, LAST_PORT),
+        metavar="PORT",
+        help="the same with RFC 2217: clients set the baud rate, a wrong one gives garbage",
+    )
+    parser.add_argument(
+        "--listen",
+        default=LOOPBACK,
+        metavar="ADDRESS",
+        help=f"of the TCP port (default {LOOPBACK}); others need --allow-remote",
+    )
+    parser.add_argument(
+        "--allow-remote",
+        action="store_true",
+        help="let other machines connect; there is no protection",
+    )
+
+
+def open_ports(args: argparse.Namespace, opened: Opened, stack: ExitStack) -> list[Endpoint]:
+    """A port for each serial line of ``opened``; ``stack`` closes them.
+
+    Raises ValueError when there are not enough ports from the given one on, PortError when one
+    does not open.
+    """
+    endpoints: list[Endpoint] = []
+    for index, line in enumerate(opened.lines):
+        endpoints.append(_open(args, opened, line, index))
+        stack.callback(endpoints[-1].close)
+    return endpoints
+
+
+def _open(args: argparse.Namespace, opened: Opened, line: SerialLine, index: int) -> Endpoint:
+    from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
+    from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
+
+    first = args.tcp if args.rfc2217 is None else args.rfc2217
+    if first is None:
+        path = args.pty or Path(f"tty{opened.title.upper()}")
+        return PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
+    if first and first + len(opened.lines) - 1 > LAST_PORT:
+        raise ValueError(f"{opened.title} needs {len(opened.lines)} ports from {first} on")
+    kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
+    port = first and first + index  # 0 lets the system choose each one
+    return kind(args.listen, port, line.uart, allow_remote=args.allow_remote)

@@ -1,0 +1,66 @@
+"""Options --record and --trace of commands that run an emulated device."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cubestack.emulator.uart import Uart
+    from cubestack.host.cli.boards import Opened
+
+__all__ = ["add_record_arguments", "port_uarts", "record"]
+
+
+def add_record_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="every byte of all ports (docs/recording.md)"
+    )
+    parser.add_argument(
+        "--trace",
+        type=Path,
+        metavar="FILE.vcd",
+        help="lines, buses, FPGA pins and firmware for a waveform viewer",
+    )
+
+
+def port_uarts(opened: Opened) -> dict[str, Uart]:
+    """The device's ends of its serial lines, by the names of ports in recordings."""
+    return {
+        f"{line.suffix[1:]}_uart" if line.suffix else "uart": line.uart for line in opened.lines
+    }
+
+
+def record(args: argparse.Namespace, opened: Opened, stack: ExitStack) -> None:
+    """Start what the options ask for; ``stack`` ends it. Before any port is opened.
+
+    The board's I2C bus is replaced by one that is listened to. Raises ValueError for a file that
+    can not be written.
+    """
+    from cubestack.emulator.probes import firmware_probes
+    from cubestack.emulator.recording import Recorder
+    from cubestack.emulator.trace import VcdTrace
+
+    board: Any = opened.board
+    device, uarts = opened.title.lower(), port_uarts(opened)
+    if args.trace is not None:
+        engine = getattr(board, "engine", None)
+        trace = VcdTrace(
+            _create(args.trace, stack), device, board.kernel, uarts, engine, firmware_probes(board)
+        )
+        stack.callback(trace.close)
+        board.i2c_bus = trace.bus(board.i2c_bus)
+    if args.record is not None:
+        recorder = Recorder(_create(args.record, stack), device, uarts)
+        stack.callback(recorder.close)
+        board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+
+
+def _create(path: Path, stack: ExitStack) -> IO[str]:
+    try:
+        return stack.enter_context(path.open("w", encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"can not write {path}: {error.strerror}") from None

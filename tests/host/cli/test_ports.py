@@ -1,0 +1,78 @@
+"""Options of serial ports: what opens for which line, and what is refused."""
+
+import argparse
+from contextlib import ExitStack
+
+import pytest
+
+from cubestack.emulator.ports.serial_port import PortError
+from cubestack.emulator.uart import Uart
+from cubestack.emulator.virtual_time import Kernel
+from cubestack.host.cli.boards import Opened, SerialLine
+from cubestack.host.cli.ports import add_port_arguments, open_ports
+from cubestack.host.cli.records import port_uarts
+
+
+class Board:
+    def __init__(self) -> None:
+        self.kernel = Kernel()
+
+
+@pytest.fixture
+def opened() -> Opened:
+    board = Board()
+    lines = [
+        SerialLine(name, suffix, Uart(board.kernel, 9600, lambda _b: None, lambda: None,
+                                      silence_bytes=9), 9600)
+        for name, suffix in (("node protocol", ""), ("bench protocol", ".bench"))
+    ]  # fmt: skip
+    return Opened("CubeSense", board, tuple(lines))
+
+
+@pytest.fixture
+def ports(opened, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> list[str]:
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        add_port_arguments(parser)
+        with ExitStack() as stack:
+            return [port.name for port in open_ports(parser.parse_args(arguments), opened, stack)]
+
+    return run
+
+
+def test_terminals_by_default(ports):
+    assert ports() == ["ttyCUBESENSE", "ttyCUBESENSE.bench"]
+
+
+def test_terminals_by_name(ports):
+    assert ports("--pty", "y") == ["y", "y.bench"]
+
+
+@pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
+def test_free_tcp_ports(ports, kind):
+    names = ports(f"--{kind}", "0")
+    assert len(set(names)) == 2
+    assert all(name.startswith(f"{kind}://127.0.0.1:") for name in names)
+
+
+def test_not_enough_ports(ports):
+    with pytest.raises(ValueError, match="CubeSense needs 2 ports from 65535 on"):
+        ports("--rfc2217", "65535")
+
+
+@pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
+def test_other_machines_must_be_allowed(ports, kind):
+    with pytest.raises(PortError, match=r"0\.0\.0\.0 is open to other machines"):
+        ports(f"--{kind}", "0", "--listen", "0.0.0.0")
+    assert len(ports(f"--{kind}", "0", "--listen", "0.0.0.0", "--allow-remote")) == 2
+
+
+def test_one_end_only(ports):
+    with pytest.raises(argparse.ArgumentError, match="not allowed with"):
+        ports("--tcp", "0", "--rfc2217", "0")
+
+
+def test_names_of_ports_in_recordings(opened):
+    assert list(port_uarts(opened)) == ["uart", "bench_uart"]
