@@ -17,7 +17,7 @@ from cubestack.emulator.faults.table import (
 )
 from cubestack.emulator.i2c import LONGEST_STRETCH_PS, I2cBus, I2cNackError
 from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_US, Kernel
+from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
 
 __all__ = ["BusFaults", "LineFaults"]
 
@@ -37,15 +37,18 @@ class LineFaults:
         uart.disturbance = self
 
     def prepare(self, injection: Injection) -> None:
-        """Know of a fault ahead: a byte is judged by its own time."""
+        """Know of a fault ahead, and after its end: a byte is judged by when it began."""
+        past_ps = self._env.now - PS_PER_S
+        self._injections = [
+            known for known in self._injections if known.end_ps is None or known.end_ps > past_ps
+        ]
         self._injections.append(injection)
 
     def begin(self, injection: Injection) -> None:
         """Nothing happens before a byte comes."""
 
     def end(self, injection: Injection) -> None:
-        """Forget it."""
-        self._injections.remove(injection)
+        """A byte may have begun before."""
 
     def to_host(
         self, data: bytes, first_ps: int, byte_ps: int, line: Callable[[bytes, int, int], None]
