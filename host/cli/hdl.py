@@ -37,7 +37,7 @@ examples:
 PROVE = """Prove, by induction, what the designs promise: for every length of time,
 every picture and every order of the clocks' edges. Each proof is then tried
 again on a design with a bug planted in it, which it has to find. Needs the
-extra hdl; all of them take about a minute.
+extra hdl; all of them take one to two minutes.
 
 Exit code 1 when something is not proved or a planted bug is not found.
 

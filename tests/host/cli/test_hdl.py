@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.hdl import tools
 from cubestack.hdl.area_report import AREA_FILE
 from cubestack.hdl.proofs.catalogue import PROOFS
 from cubestack.hdl.proofs.prover import Fault
@@ -30,9 +31,13 @@ def test_area_as_json(capsys: pytest.CaptureFixture[str]) -> None:
         assert "ice40" not in entry
 
 
-@pytest.mark.skipif(have_yosys(), reason="Yosys is there")
-def test_a_missing_yosys_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["hdl", "area", "cubestar", "--ice40"]) == 1
+@pytest.mark.parametrize("arguments", [["area", "cubestar", "--ice40"], ["prove", "cubestar-read"]])
+def test_a_missing_yosys_is_one_line(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tools, "find_spec", lambda _: None)
+    monkeypatch.setenv("PATH", "")
+    assert main(["hdl", *arguments]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "cubestack[hdl]" in line
 
