@@ -13,9 +13,10 @@ import numpy as np
 from cubestack.emulator.camera.ov7620 import Ov7620
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.cubesense_lines import Lines
+from cubestack.emulator.cubesense_processor import Pic18f45k20, ProgramTarget
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.i2c import I2cBus, I2cTarget
+from cubestack.emulator.i2c import I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
 from cubestack.emulator.power_tables import CUBESENSE
@@ -23,7 +24,7 @@ from cubestack.emulator.processor import Processor
 from cubestack.emulator.rtl.engine import make_engine
 from cubestack.emulator.sky.earth_sun import EarthSunScene, SensorTruth
 from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_US, Kernel
+from cubestack.emulator.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
@@ -31,12 +32,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense_bench import BENCH
 from cubestack.firmware_model.interface.cubesense_codes import ROWS, Camera, Sram
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, Action, actions
-from cubestack.firmware_model.interface.cubesense_pins import (
-    ADC_FULL_SCALE,
-    ENABLE,
-    MA_PER_COUNT,
-    Monitor,
-)
+from cubestack.firmware_model.interface.cubesense_pins import ENABLE
 from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
 from cubestack.firmware_model.pic18_costs import PIC18F45K20
 from cubestack.hdl.cubesense_pair import CubeSensePair
@@ -121,10 +117,16 @@ class CubeSenseBoard:
         self._storing_since_ps: dict[Camera, int] = {}
         self._stored: dict[Camera, RollingShutter] = {}
         meter = Meter(PIC18F45K20)
-        self.hardware = _Pic18f45k20(self, mcu_addressing)
+        self.hardware = Pic18f45k20(
+            self.kernel,
+            {Port.NODE: self.uart, Port.BENCH: self.bench_uart},
+            self.power,
+            lambda: self.processor.wake(),
+            mcu_addressing=mcu_addressing,
+        )
 
-        def boot(cause: int) -> CubeSenseProgram:
-            self.hardware.reset_cause = cause
+        def boot(_cause: int) -> CubeSenseProgram:
+            self.hardware.reset()
             self._release_pins()
             return CubeSenseProgram(self.hardware, meter)
 
@@ -140,8 +142,8 @@ class CubeSenseBoard:
             on_pin=lambda pin, _level: self._pin_changed(pin),
         )
         self.i2c_bus = I2cBus(self.kernel)
-        self.i2c_bus.attach(i2c_address, _Target(lambda: self.program.node))
-        self.i2c_bus.attach(register_address, _Target(lambda: self.program.registers))
+        self.i2c_bus.attach(i2c_address, ProgramTarget(lambda: self.program.node))
+        self.i2c_bus.attach(register_address, ProgramTarget(lambda: self.program.registers))
 
     @property
     def program(self) -> CubeSenseProgram:
@@ -306,61 +308,3 @@ def _stores(commanded: dict[Camera, Action], camera: Camera) -> bool:
     """Whether ``camera``'s picture is being stored, in whichever memory."""
     other = Camera(1 - camera)
     return commanded[camera] is Action.STORE or commanded[other] is Action.STORE_OTHER
-
-
-class _Target:
-    """A protocol of the program that runs now, on the satellite's I2C bus."""
-
-    def __init__(self, link: Callable[[], I2cTarget]) -> None:
-        self._link = link
-
-    def i2c_start(self, read: bool) -> None:
-        self._link().i2c_start(read)
-
-    def i2c_write(self, byte: int) -> bool:
-        return self._link().i2c_write(byte)
-
-    def i2c_read(self) -> int | None:
-        return self._link().i2c_read()
-
-    def i2c_stop(self) -> None:
-        self._link().i2c_stop()
-
-
-class _Pic18f45k20:
-    """The processor's peripherals, as its program sees them."""
-
-    serial_number = "CSEMU1"
-
-    def __init__(self, board: CubeSenseBoard, mcu_addressing: bool) -> None:
-        self._board = board
-        self.mcu_addressing = mcu_addressing
-        self.reset_cause = 0
-
-    def _uart(self, port: Port) -> Uart:
-        return self._board.uart if port is Port.NODE else self._board.bench_uart
-
-    def uart_send(self, port: Port, data: bytes) -> None:
-        self._uart(port).send(data)
-
-    def uart_backlog(self, port: Port) -> int:
-        return self._uart(port).backlog
-
-    def wake(self) -> None:
-        self._board.processor.wake()
-
-    def adc_counts(self, monitor: Monitor) -> int:
-        power = self._board.power
-        match monitor:
-            case Monitor.SUPPLY_5V:
-                current = power.current_ma()
-            case Monitor.SUPPLY_3V3:
-                # The cameras' own regulator feeds them from the 5 V supply.
-                cameras = (f"{half}_camera" for half in HALVES.values())
-                current = power.current_ma() - sum(map(power.current_ma, cameras))
-            case Monitor.SRAM1 | Monitor.SRAM2:
-                current = power.current_ma(monitor.value)
-        return min(ADC_FULL_SCALE, round(current / MA_PER_COUNT))
-
-    def uptime_ms(self) -> int:
-        return self._board.kernel.now // PS_PER_MS

@@ -26,12 +26,10 @@ class CubeSenseHardware(Protocol):
     Attributes:
         mcu_addressing: the FPGAs are built with the option that lets the program choose addresses.
         serial_number: ASCII, at most 6 characters.
-        reset_cause: why the processor started: 0 power-up, 1 the program's own reset.
     """
 
     mcu_addressing: bool
     serial_number: str
-    reset_cause: int
 
     def uart_send(self, port: Port, data: bytes) -> None:
         """Queue ``data`` for ``port``; the peripheral sends at its own pace."""
@@ -46,4 +44,4 @@ class CubeSenseHardware(Protocol):
         """Result of a conversion, 0 to 1023; the program charges its time."""
 
     def uptime_ms(self) -> int:
-        """Time since power-up in ms, read in an interrupt."""
+        """Time since the latest reset in ms, read in an interrupt."""

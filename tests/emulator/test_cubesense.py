@@ -177,6 +177,7 @@ def test_reset_of_the_processor_releases_every_pin(board: CubeSenseBoard) -> Non
     let_pass(board, 500)
     assert board.processor.resets == 1
     assert all(board.power.is_on(channel) for channel in CHANNELS.values())
+    assert board.hardware.uptime_ms() == pytest.approx(500, abs=5)  # the timer has started anew
 
 
 def test_lines_are_open_drain(board: CubeSenseBoard) -> None:

@@ -157,7 +157,6 @@ class Bench:
         self.sent = {port: bytearray() for port in Port}
         self.backlog = dict.fromkeys(Port, 0)
         self.pins: dict[str, int] = {}
-        self.reset_cause = 0
         self.now_ns = 0
         self.meter = Meter(PIC18F45K20)
         self._boot()
@@ -204,7 +203,6 @@ class Bench:
             request = self._request
             if isinstance(request, Reset):
                 self.resets.append(request.cause)
-                self.reset_cause = request.cause
                 self._boot()
                 continue
             if isinstance(request, Sleep):

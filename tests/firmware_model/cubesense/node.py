@@ -70,7 +70,6 @@ class Node:
         self.amps = {monitor: 1.5 + index for index, monitor in enumerate(Monitor)}
         self.mcu_addressing = mcu_addressing
         self.serial_number = "CS0042"
-        self.reset_cause = 0
         self._open: Sram | None = None
         self._position = 0
 
