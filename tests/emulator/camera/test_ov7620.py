@@ -212,6 +212,9 @@ def test_automatic_gain_acts_on_a_fixed_exposure(scene: EarthSunScene) -> None:
     assert low > picture(make(scene)).mean() + 10
     # Its gain takes the place of the register's.
     assert picture(make(scene, **fixed, GAIN=0x3F)).mean() == low
+    # Without its own bit it does not act.
+    off = {**fixed, "COMMON_A": 0}
+    assert picture(make(scene, **off)).mean() == picture(make(scene)).mean()
 
 
 def test_reset_bit_restores_the_registers_and_itself(scene: EarthSunScene) -> None:
