@@ -11,6 +11,7 @@ import ctypes
 import errno
 import os
 import select
+import shutil
 import socket
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Literal
 
 from cubestack.emulator.i2c_host.device_node import DeviceNode
+from cubestack.emulator.i2c_host.elf import is_static
 from cubestack.emulator.i2c_host.filter import make_filter, native_abi
 from cubestack.emulator.i2c_host.notify import Listener, read_memory
 from cubestack.emulator.i2c_host.supervisor import Files, Supervisor, descriptor_range
@@ -31,6 +33,9 @@ Route = Literal["seccomp", "preload"]
 LAUNCHER = Path(__file__).with_name("launcher.py")
 MESSAGE_BYTES = 4096
 PR_SET_CHILD_SUBREAPER = 36
+SEPARATORS = frozenset(": \t\n")
+"""What separates libraries in LD_PRELOAD."""
+
 SIGNALLED = 128
 """Exit code of a program that a signal ended, less the signal: as shells have it."""
 
@@ -132,7 +137,17 @@ def start_filtered(
 
 
 def start_preloaded(command: Sequence[str], environment: dict[str, str], library: Path) -> Program:
-    """Start ``command`` with the shim ``library``; the socket that it will use must be served."""
+    """Start ``command`` with the shim ``library``; the socket that it will use must be served.
+
+    Raises RouteError when nothing can be loaded into it.
+    """
+    program = shutil.which(command[0])
+    if program is not None and is_static(Path(program)):
+        raise RouteError(f"{program} is linked statically, so no library can be loaded into it")
+    if SEPARATORS & set(str(library)):
+        raise RouteError(
+            f"{library} has a blank or colon; XDG_CACHE_HOME names another folder"
+        )
     others = os.environ.get("LD_PRELOAD")
     preload = f"{library} {others}" if others else str(library)
     process = subprocess.Popen(

@@ -12,7 +12,6 @@ from cubestack.emulator.i2c_host.device_file import DeviceFile
 from cubestack.emulator.i2c_host.device_node import DeviceNode
 from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely, wait_until
 from cubestack.emulator.i2c_host.program import (
-    SIGNALLED,
     Program,
     Route,
     RouteError,
@@ -104,17 +103,21 @@ def run_program(
         CompilerError: the library of the preload route can not be built.
     """
     running: list[_Ports] = []
+    early: list[int] = []
 
     def end(number: int, _frame: object) -> None:
-        if not running:
-            raise SystemExit(SIGNALLED + number)
-        running[0].signalled(number)
+        if running:
+            running[0].signalled(number)
+        else:
+            early.append(number)  # perhaps the program runs, and we do not know it yet
 
     handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
     try:
         program, supervisor, reason = _start(command, number, bus, route)
         ports = _Ports(bus, program, supervisor, fast=pace == "fast")
         running.append(ports)
+        for each in early:
+            ports.signalled(each)
         say(f"/dev/i2c-{number} by way of {reason}")
         sharpen_timers()
         if bus.adapter is None:
@@ -134,8 +137,8 @@ def run_program(
     finally:
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
-        for each in running:
-            each.close()
+        for ports in running:
+            ports.close()
     return program.exit_code
 
 
@@ -248,11 +251,13 @@ def _start(
             )
         except RouteError as error:
             if route == "seccomp":
-                raise RouteError(f"--route seccomp: {error}; try --route preload") from None
+                raise RouteError(f"seccomp: {error}; try --route preload") from None
             refused = f", as seccomp is not there: {error}"
         else:
             asked = "as asked" if route else "which any program can take"
             return program, supervisor, f"seccomp, {asked}"
-    library = shim_library()
-    program = start_preloaded(command, environment, library)
+    try:
+        program = start_preloaded(command, environment, shim_library())
+    except RouteError as error:
+        raise RouteError(f"preload: {error}{refused}") from None
     return program, None, f"preload{refused or ', as asked'}"

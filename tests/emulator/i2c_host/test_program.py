@@ -9,7 +9,6 @@ from cubestack.emulator.i2c_host import program
 from cubestack.emulator.i2c_host.device_node import DeviceNode
 from cubestack.emulator.i2c_host.filter import native_abi
 
-
 needs_abi = pytest.mark.skipif(native_abi() is None, reason="no filter for this machine")
 
 
@@ -50,3 +49,14 @@ def test_exit_codes(tmp_path):
         assert running.ended
         assert running.watched() == []
         running.close()
+
+
+def test_a_library_that_can_not_be_named(tmp_path):
+    with pytest.raises(program.RouteError, match="has a blank or colon"):
+        program.start_preloaded(["sh"], {}, tmp_path / "a b.so")
+
+
+def test_a_static_program_is_not_preloaded(tmp_path, monkeypatch):
+    monkeypatch.setattr(program, "is_static", lambda _path: True)
+    with pytest.raises(program.RouteError, match=r"sh is linked statically, so no library"):
+        program.start_preloaded(["sh"], {}, tmp_path / "none.so")
