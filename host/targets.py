@@ -28,6 +28,7 @@ from cubestack.host.i2c_client import I2cBus, I2cClient
 from cubestack.host.node_client import NodeClient
 from cubestack.host.recording import RecordedI2c, RecordedTransport
 from cubestack.host.register_client import RegisterClient
+from cubestack.host.tape import Tape
 from cubestack.host.transport import Transport, open_transport
 
 __all__ = ["INTERFACES", "Controls", "Target", "interface_of", "open_target", "with_i2c"]
@@ -106,7 +107,12 @@ def interface_of(device: str | None, target: str) -> Interface:
 
 
 def open_target(
-    text: str, device: str | None = None, *, bench: str | None = None, baud: int | None = None
+    text: str,
+    device: str | None = None,
+    *,
+    bench: str | None = None,
+    baud: int | None = None,
+    tape: Tape | None = None,
 ) -> Target:
     """Open the target that ``text`` names.
 
@@ -115,28 +121,44 @@ def open_target(
         device: name of the device; not needed for recordings and default I2C addresses.
         bench: another serial line, with the bench protocol.
         baud: of the node protocol's line; None for the published one.
+        tape: records what is said; not for recordings.
 
     Raises:
         TargetError: the text names nothing, or the device is not told.
         TransportError: it does not open.
         RecordingError: a file is no recording.
     """
-    if text.startswith(I2C):
-        target = _open_i2c(text, device)
-    elif text.startswith(RECORDED):
+    if text.startswith(RECORDED):
         return _open_recorded(text)
+    if text.startswith(I2C):
+        target = _open_i2c(text, device, tape)
+        bauds: dict[str, int] = {}
     else:
         interface = interface_of(device, text)
-        line = open_transport(text, baud or interface.baud)
+        baud = baud or interface.baud
+        line = open_transport(text, baud)
+        if tape is not None:
+            line = tape.line(line, "uart", baud)
         target = Target(text, interface, NodeClient(line, interface), line)
         target.on_close.append(line.close)
+        bauds = {"uart": baud}
     if bench is not None:
-        if target.interface.bench is None:
-            target.close()
-            raise TargetError(f"{target.interface.name} has no bench protocol: leave out --bench")
-        target.bench = open_transport(bench, target.interface.bench.baud)
-        target.on_close.append(target.bench.close)
+        bauds["bench_uart"] = _open_bench(target, bench, tape)
+    if tape is not None:
+        tape.begin(target.interface.name.lower(), bauds)
     return target
+
+
+def _open_bench(target: Target, text: str, tape: Tape | None) -> int:
+    """Open the line with the bench protocol; returns its baud rate."""
+    if target.interface.bench is None:
+        target.close()
+        raise TargetError(f"{target.interface.name} has no bench protocol: leave out --bench")
+    baud = target.interface.bench.baud
+    line = open_transport(text, baud)
+    target.bench = line if tape is None else tape.line(line, "bench_uart", baud)
+    target.on_close.append(line.close)
+    return baud
 
 
 def with_i2c(
@@ -147,7 +169,7 @@ def with_i2c(
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 
 
-def _open_i2c(text: str, device: str | None) -> Target:
+def _open_i2c(text: str, device: str | None, tape: Tape | None) -> Target:
     bus_text, _, address_text = text.removeprefix(I2C).partition(":")
     try:
         number = int(bus_text)
@@ -163,13 +185,14 @@ def _open_i2c(text: str, device: str | None) -> Target:
     from smbus2 import SMBus
 
     try:
-        bus = SMBus(number)
+        opened = SMBus(number)
     except OSError as error:
         raise PortOpenError(f"can not open /dev/i2c-{number}: {error.strerror}") from error
+    bus: I2cBus = opened if tape is None else tape.bus(opened)
     own = None if address in _addresses(interface)[1:] else address
     target = Target(text, interface, I2cClient(bus, interface, own))
     target.registers = with_i2c(target, bus)
-    target.on_close.append(bus.close)
+    target.on_close.append(opened.close)
     return target
 
 

@@ -20,7 +20,7 @@ from cubestack.host.conformance import Check, Outcome, Suite, compare
 
 __all__ = ["add_arguments", "run"]
 
-MARKS = {Outcome.PASSED: "ok", Outcome.FAILED: "FAILED", Outcome.SKIPPED: "-"}
+MARKS = {Outcome.PASSED: "ok", Outcome.FAILED: "FAILED"}
 NAME_COLUMNS = 52
 DETAIL_COLUMNS = 100
 
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     suites = []
     for number, text in enumerate([args.target, args.compare][: 1 + (args.compare is not None)]):
         if number:  # options are the first target's, but for the device
-            args.bench = args.scene = args.baud = None
+            args.bench = args.scene = args.baud = args.record = None
         target = open_any_target(text, args)
         try:
             suite = Suite(target, args.allow_write)
@@ -59,6 +59,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show_text(check: Check) -> None:
+    if check.outcome is Outcome.SKIPPED:
+        return  # summed up at the end
     detail = check.detail
     if len(detail) > DETAIL_COLUMNS and check.outcome is Outcome.PASSED:
         detail = detail[: DETAIL_COLUMNS - 3] + "..."
@@ -77,6 +79,9 @@ def _summarise(suites: list[Suite], difference: str | None, *, as_json: bool) ->
         if as_json:
             print(json.dumps({"target": suite.target.name, **numbers}))
         else:
+            reasons = Counter(c.detail for c in suite.checks if c.outcome is Outcome.SKIPPED)
+            for reason, number in reasons.items():
+                print(f"{number} left out: {reason}")
             text = ", ".join(f"{number} {name}" for name, number in numbers.items())
             print(f"{suite.target.name}: {text}")
     if len(suites) == 2:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.uart import Uart
     from cubestack.host.cli.boards import Opened
 
-__all__ = ["add_record_arguments", "port_uarts", "record"]
+__all__ = ["add_record_arguments", "create_file", "port_uarts", "record"]
 
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,17 +49,23 @@ def record(args: argparse.Namespace, opened: Opened, stack: ExitStack) -> None:
     if args.trace is not None:
         engine = getattr(board, "engine", None)
         trace = VcdTrace(
-            _create(args.trace, stack), device, board.kernel, uarts, engine, firmware_probes(board)
+            create_file(args.trace, stack),
+            device,
+            board.kernel,
+            uarts,
+            engine,
+            firmware_probes(board),
         )
         stack.callback(trace.close)
         board.i2c_bus = trace.bus(board.i2c_bus)
     if args.record is not None:
-        recorder = Recorder(_create(args.record, stack), device, uarts)
+        recorder = Recorder(create_file(args.record, stack), device, uarts)
         stack.callback(recorder.close)
         board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
 
 
-def _create(path: Path, stack: ExitStack) -> IO[str]:
+def create_file(path: Path, stack: ExitStack) -> IO[str]:
+    """``path`` for writing, closed by ``stack``; ValueError when it can not be written."""
     try:
         return stack.enter_context(path.open("w", encoding="utf-8"))
     except OSError as error:

@@ -11,6 +11,7 @@ examples:
   cubestack shell emulated:cubesense --json -c 'write CaptureAndDetect SUN SRAM1;
       time 0.5; read Result1'
   cubestack shell i2c:7:0x1b --script commands.txt
+  cubestack shell /dev/ttyUSB0 --device cubesense --record bench.rec
 """
 
 from __future__ import annotations
