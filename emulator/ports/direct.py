@@ -31,6 +31,11 @@ class DirectSerial:
         self._env = env
         self._line = HostLine(uart)
 
+    @property
+    def now_ps(self) -> int:
+        """Virtual time."""
+        return self._env.now
+
     def write(self, data: bytes) -> None:
         """Start sending ``data`` now."""
         self._line.write(data)

@@ -14,11 +14,21 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 if TYPE_CHECKING:
     from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.i2c import I2cBus
+    from cubestack.emulator.sky.earth_sun import EarthSunScene
+    from cubestack.emulator.sky.scene import Scene
     from cubestack.emulator.uart import Uart
     from cubestack.emulator.virtual_time import Kernel
     from cubestack.host.cli.session import Engine
 
-__all__ = ["DEVICES", "Board", "Opened", "SerialLine", "open_board"]
+__all__ = [
+    "DEVICES",
+    "Board",
+    "Opened",
+    "SerialLine",
+    "cubesense_scene",
+    "cubestar_scene",
+    "open_board",
+]
 
 DEFAULT_POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 DEFAULT_MAG_LIMIT = 3.8
@@ -80,36 +90,42 @@ def open_board(
     return DEVICES[device](scene, seed, engine, baud)
 
 
+def cubestar_scene(path: Path | None) -> Scene:
+    """The scene in ``path``; None is Orion's belt."""
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.scene import SkyScene, load_scene
+
+    if path is not None:
+        return load_scene(path)
+    return SkyScene(quaternion_from_pointing(*DEFAULT_POINTING_DEG), mag_limit=DEFAULT_MAG_LIMIT)
+
+
+def cubesense_scene(path: Path | None) -> EarthSunScene:
+    """The scene in ``path``; None has Sun and Earth in view."""
+    from cubestack.emulator.sky.earth_sun import EarthSunScene
+    from cubestack.emulator.sky.earth_sun_file import load_earth_sun_scene
+
+    if path is not None:
+        return load_earth_sun_scene(path)
+    angles = DEFAULT_ANGLES_DEG
+    return EarthSunScene.facing(sun_deg=angles["sun"], nadir_deg=angles["nadir"])
+
+
 def _cubestar(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
     from cubestack.emulator.cubestar import CubeStarBoard
     from cubestack.emulator.onboard_catalogue import onboard_catalogue
-    from cubestack.emulator.sky.attitude import quaternion_from_pointing
-    from cubestack.emulator.sky.scene import Scene, SkyScene, load_scene
 
-    scene: Scene
-    if path is None:
-        scene = SkyScene(
-            quaternion_from_pointing(*DEFAULT_POINTING_DEG), mag_limit=DEFAULT_MAG_LIMIT
-        )
-    else:
-        scene = load_scene(path)
     baud = baud or CUBESTAR.baud
+    scene = cubestar_scene(path)
     board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine, baud=baud)
     return Opened("CubeStar", board, (SerialLine("node protocol", "", board.uart, baud),))
 
 
 def _cubesense(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
     from cubestack.emulator.cubesense import CubeSenseBoard
-    from cubestack.emulator.sky.earth_sun import EarthSunScene
-    from cubestack.emulator.sky.earth_sun_file import load_earth_sun_scene
 
-    if path is None:
-        angles = DEFAULT_ANGLES_DEG
-        scene = EarthSunScene.facing(sun_deg=angles["sun"], nadir_deg=angles["nadir"])
-    else:
-        scene = load_earth_sun_scene(path)
     baud = baud or CUBESENSE.baud
-    board = CubeSenseBoard(scene, seed=seed, engine=engine, baud=baud)
+    board = CubeSenseBoard(cubesense_scene(path), seed=seed, engine=engine, baud=baud)
     lines = (
         SerialLine("node protocol", "", board.uart, baud),
         SerialLine("bench protocol", ".bench", board.bench_uart, BENCH.baud),
