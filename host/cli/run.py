@@ -29,6 +29,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.boards import DEVICES, open_board
+from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.session import add_engine_arguments
 from cubestack.host.cli.terminal import say
 
@@ -86,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
     )
+    add_faults_argument(parser)
     add_engine_arguments(parser)
     parser.add_argument(
         "--hz", type=whole(1), default=STANDARD_HZ, help="bits a second (default 100000)"
@@ -145,14 +147,15 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     from cubestack.emulator.virtual_time import PS_PER_S
 
     names = args.device or ["cubestar"]
-    if args.scene is not None and len(names) > 1:
-        raise ValueError("--scene is of one device; several devices have their own scenes")
+    if len(names) > 1 and (args.scene or args.faults):
+        raise ValueError("--scene and --faults are of one device, and several are on the bus")
     boards = []
     for name in names:
         opened = open_board(name, args.scene, seed=args.seed, engine=args.engine, baud=None)
         stack.callback(opened.board.close)
         boards.append(opened.board)
     first = boards[0]
+    inject_plan(first.faults, args.faults, None if args.quiet else say)
     bus = first.i2c_bus
     bus.bit_ps = PS_PER_S // args.hz
     join_buses(*((board.kernel, board.i2c_bus) for board in boards))
