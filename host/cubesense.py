@@ -7,7 +7,6 @@ first pixel.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ from cubestack.firmware_model.interface.cubesense_telecommands import DISTORTION
 from cubestack.firmware_model.interface.cubesense_telemetry import RESULTS, SCHEDULES
 from cubestack.firmware_model.interface.message import Value
 from cubestack.host.client import Client
+from cubestack.host.cubesense_values import CameraSettings, Mask, Measurement, Power, direction
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
 __all__ = [
@@ -47,84 +47,8 @@ CAPTURE_TIMEOUT_S = 1.0
 #: What we give a detection after its capture; assumed, a good ten times the published 245 ms.
 DETECT_TIMEOUT_S = 3.0
 
-
-def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:
-    """Unit vector (3,) in camera axes of a measurement's two angles.
-
-    Both are parts of the field angle: it is their root of squares, towards (alpha, beta).
-    """
-    theta = math.radians(math.hypot(alpha_deg, beta_deg))
-    phi = math.atan2(beta_deg, alpha_deg)
-    return np.array(
-        [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
-    )
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """What a camera measured.
-
-    Attributes:
-        camera: the camera.
-        alpha_deg, beta_deg: parts of the field angle along x and y; they count when ``detected``.
-        capture: what became of the capture.
-        detect: what became of the detection.
-    """
-
-    camera: Camera
-    alpha_deg: float
-    beta_deg: float
-    capture: CaptureResult
-    detect: DetectResult
-
-    @property
-    def detected(self) -> bool:
-        """Whether the angles are a measurement."""
-        return self.detect is DetectResult.SUCCESS
-
-    @property
-    def pending(self) -> bool:
-        """Whether the node still works on it."""
-        return self.capture is CaptureResult.PENDING or self.detect is DetectResult.PENDING
-
-    @property
-    def vector(self) -> NDArray[np.float64]:
-        """Unit vector (3,) in camera axes."""
-        return direction(self.alpha_deg, self.beta_deg)
-
-
-@dataclass(frozen=True)
-class CameraSettings:
-    """Exposure in units of two line times (127 us), gain, and gains of the two colours."""
-
-    exposure: int
-    gain: int = 0
-    blue_gain: int = 0x80
-    red_gain: int = 0x80
-
-
-@dataclass(frozen=True)
-class Mask:
-    """A rectangle of pixels, ends included."""
-
-    x_min: int
-    x_max: int
-    y_min: int
-    y_max: int
-
-
 #: What an area without a mask reads as.
 _NO_MASK = Mask(0, 0, 0, 0)
-
-
-@dataclass(frozen=True)
-class Power:
-    """Supply currents in mA, and whether each memory drew too much since its flag was cleared."""
-
-    current_3v3_ma: float
-    current_sram_ma: tuple[float, float]
-    current_5v_ma: float
-    over_current: tuple[bool, bool]
 
 
 class CubeSense:
