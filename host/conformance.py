@@ -16,6 +16,7 @@ from enum import Enum
 from cubestack.firmware_model.interface.message import Message, Value
 from cubestack.host.errors import NodeError
 from cubestack.host.node_client import NodeClient
+from cubestack.host.shell import has_side_effect
 from cubestack.host.targets import Target
 
 __all__ = ["Check", "Outcome", "Suite", "compare"]
@@ -23,8 +24,12 @@ __all__ = ["Check", "Outcome", "Suite", "compare"]
 LATE_S = 0.04
 """What an answer may take beside its time on the wire: the poll period of real hosts."""
 
+ATTEMPTS = 3
 BITS_PER_BYTE = 10
 FRAMING_BYTES = 4
+I2C_HZ = 100_000  # standard mode: a host does not know better
+I2C_BITS_PER_BYTE = 9
+I2C_OVERHEAD_BYTES = 3  # two addresses and the ID
 
 MEASURED_UNITS = {"s", "ms", "us", "mA", "C", "deg C", "degC"}
 """Units of fields whose values two devices need not share."""
@@ -141,16 +146,24 @@ class Suite:
         return node.request(payload)
 
     def telemetry(self, message: Message) -> dict[str, Value]:
-        """A telemetry frame, its time taken."""
+        """A telemetry frame, its time taken: the best of three, as hosts have hiccups."""
+        values, latency_s = self._timed(message)
+        for _ in range(ATTEMPTS - 1):
+            if latency_s <= LATE_S or has_side_effect(message):
+                break
+            latency_s = min(latency_s, self._timed(message)[1])
+        self.latencies_s[message.name] = latency_s
+        return values
+
+    def _timed(self, message: Message) -> tuple[dict[str, Value], float]:
         start_s = self.now_s()
         values = self.target.node.telemetry(message.name)
-        wire_s = 0.0
         if isinstance(self.target.node, NodeClient):
             frames = 2 * FRAMING_BYTES + 1 + message.length
             wire_s = frames * BITS_PER_BYTE / self.target.interface.baud
-        latency_s = self.now_s() - start_s - wire_s
-        self.latencies_s[message.name] = max(latency_s, self.latencies_s.get(message.name, 0.0))
-        return values
+        else:
+            wire_s = (I2C_OVERHEAD_BYTES + message.length) * I2C_BITS_PER_BYTE / I2C_HZ
+        return values, max(0.0, self.now_s() - start_s - wire_s)
 
     def now_s(self) -> float:
         """The device's time where it is emulated here, else the wall's."""

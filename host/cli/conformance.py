@@ -8,7 +8,8 @@ or differs.
 examples:
   cubestack conformance emulated:cubestar --allow-write
   cubestack conformance /dev/ttyUSB0 --device cubesense
-  cubestack conformance /dev/ttyUSB0 --device cubesense --compare emulated:cubesense
+  cubestack conformance /dev/ttyUSB0 --device cubesense \\
+      --compare emulated:cubesense
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Play a recording's host to an emulated device and compare what the device says.
 
-The device is powered up like the recorded one: with the same --scene, --seed and
---faults. Exit code 0 when every byte came at the same time, 1 when one differs:
-the first one of each port is named with its field.
+The device is powered up like the recorded one: with the same --scene, --seed
+and --faults. Exit code 0 when every byte came at the same time, 1 when one
+differs: the first one of each port is named with its field.
 
 examples:
   cubestack emulate cubesense --record run.rec

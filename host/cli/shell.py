@@ -8,7 +8,7 @@ the run: exit code 1 when the device failed, 2 when the command makes no sense.
 examples:
   cubestack shell emulated:cubesense
   cubestack shell ./ttyCUBESTAR --device cubestar -c 'read Identification'
-  cubestack shell emulated:cubesense --json -c 'write CaptureAndDetect SUN SRAM1;
+  cubestack shell emulated:cubesense --json -c 'write CaptureOnly SUN SRAM1 TOP;
       time 0.5; read Result1'
   cubestack shell i2c:7:0x1b --script commands.txt
   cubestack shell /dev/ttyUSB0 --device cubesense --record bench.rec

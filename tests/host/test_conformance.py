@@ -138,6 +138,23 @@ def test_deaf_decoder_is_found(good, uart, monkeypatch):
     assert set(found) == {"framing: noise before a frame"}
 
 
+@pytest.mark.parametrize(("late", "failed"), [(1, False), (3, True)])
+def test_late_answers_are_found_and_hiccups_forgiven(good, uart, monkeypatch, late, failed):
+    """The clock of the suite jumps during some answers to one frame."""
+    run, now_s, left = suite(good, uart), [0.0], [late]
+    monkeypatch.setattr(run, "now_s", lambda: now_s[0])
+    answer = good.answer
+
+    def slow(payload):
+        if payload == b"\x87" and left[0]:
+            left[0] -= 1
+            now_s[0] += 0.1
+        return answer(payload)
+
+    monkeypatch.setattr(good, "answer", slow)
+    assert ("times of answers" in failures(run)) is failed
+
+
 @pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 def test_values_to_try_are_allowed_and_differ(interface):
     for message in interface.telecommands:
