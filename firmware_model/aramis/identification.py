@@ -12,7 +12,7 @@ attitude is solved again with all stars that confirm it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -58,6 +58,23 @@ def identify(
             and `verification`.
         hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
     """
+    smeared = measured.smear_px > profile.smear_px
+    if smeared and profile.verify and measured.skew_px > profile.skew_px:
+        return unsolved(Outcome.NONE, Reason.SMEAR, measured)
+    solution = _identify(measured, field, profile, database, meter, hint)
+    if smeared and solution.outcome is Outcome.NONE:
+        return replace(solution, reason=Reason.SMEAR)
+    return solution
+
+
+def _identify(
+    measured: StarList,
+    field: Field,
+    profile: Profile,
+    database: Database,
+    meter: Meter,
+    hint: NDArray[np.float32] | None,
+) -> Solution:
     if len(measured) < 3:
         return unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, measured)
     vectors = field.directions(measured.centroids, meter)

@@ -201,6 +201,8 @@ class Measuring:
         if stars is None:
             nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
             return unsolved(Outcome.NONE, Finding.TOO_MANY_PIXELS, nothing)
+        exposure = int(self._state.settings.get("SetExposure", "Rows"))
+        stars = replace(stars, skew_px=stars.smear_px * settings.field.rows / exposure)
         return identify(stars, settings.field, settings.profile, database, self._meter, hint)
 
     @contextmanager

@@ -38,6 +38,7 @@ class Reason(Enum):
     NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
     UNCONFIRMED = "no attitude was confirmed"
     FAR_FROM_HINT = "the boresight is far from the rough direction"
+    SMEAR = "motion drew the stars out"
 
     @classmethod
     def of(cls, end: MatchEnd) -> "Reason":
@@ -63,6 +64,8 @@ class Profile:
         candidates: with verification, so many candidates of a triple are tried at most, and pivots
             only serve to leave no more.
         hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (ours).
+        smear_px: where stars are drawn out farther, that is why there is no attitude (ours).
+        skew_px: with verification, stars that also moved farther from row to row are refused.
     """
 
     sigma_rad: float = 0.26 * 0.3759 / 582
@@ -75,6 +78,8 @@ class Profile:
     triple_stars: int = 10
     candidates: int = 40
     hint_tolerance_deg: float = 6.0
+    smear_px: float = 4.0
+    skew_px: float = 4.0
 
     def __post_init__(self) -> None:
         """Refuse settings with which nothing can be found."""
@@ -88,6 +93,8 @@ class Profile:
             "triple_stars": (3, 64),
             "candidates": (1, 1000),
             "hint_tolerance_deg": (0, 180),
+            "smear_px": (1, 1000),
+            "skew_px": (0, 1000),
         }
         for name, (low, high) in bounds.items():
             value = getattr(self, name)
@@ -102,10 +109,14 @@ class StarList:
     Attributes:
         centroids: (n, 2) x and y in px, float32.
         brightness: (n,) sum of grey levels, falling, float32.
+        smear_px: length of the streaks that motion made of them.
+        skew_px: how far they moved while the rows were exposed one after the other.
     """
 
     centroids: NDArray[np.float32]
     brightness: NDArray[np.float32]
+    smear_px: float = 0.0
+    skew_px: float = 0.0
 
     def __len__(self) -> int:
         """Number of stars."""

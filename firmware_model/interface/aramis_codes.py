@@ -70,9 +70,11 @@ class Reason(IntEnum):
     NO_SHARED_PAIR = 8
     """No candidate shared two stars with a pivot triangle's."""
     UNCONFIRMED = 9
-    """No attitude was confirmed by further stars."""
+    """No attitude was confirmed."""
     FAR_FROM_HINT = 10
     """The boresight is far from the rough direction."""
+    SMEAR = 11
+    """Motion drew the stars out."""
     NOT_ACTIVE = 16
     CAMERA_OFF = 17
     """Its supply is switched off (latch-up action)."""
