@@ -126,7 +126,7 @@ class EmulatedDevice(Generic[C]):
         self.board = board
         self.faults: Faults = board.faults
         self.seed = seed
-        self._device = device
+        self._device: type[C] = device
         self._interface = interface
         self._client: C | None = None
 

@@ -1,0 +1,110 @@
+"""Every program in examples/ does what it says, as a user would run it."""
+
+import shutil
+import subprocess
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.host.cli.cubestar_frames import compare
+from cubestack.host.cli.emulated_device import open_cubestar_device
+
+HERE = Path(__file__).parents[2] / "examples"
+PLUGIN = "cubestack.host.cli.pytest_plugin"
+
+
+@pytest.fixture
+def device() -> Any:
+    device = open_cubestar_device(seed=4)
+    yield device
+    device.close()
+
+
+@pytest.fixture(scope="session")
+def flight_driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The C driver, compiled without a warning."""
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    program = tmp_path_factory.mktemp("flight") / "flight_driver"
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1"]
+    subprocess.run([compiler, *flags, "-o", program, HERE / "flight_driver.c"], check=True)
+    return program
+
+
+def check_attitude(device: Any, output: str) -> None:
+    """What a program printed is the attitude that the camera had."""
+    quaternion = np.array([float(word) for word in output.split()])
+    cross, roll = compare(quaternion / np.linalg.norm(quaternion), device.board.truth())
+    assert cross is not None
+    assert roll is not None
+    assert cross < 0.02  # telemetry counts in steps of 1e-4
+    assert abs(roll) < 0.05
+
+
+def test_flight_driver(device: Any, flight_driver: Path) -> None:
+    done = device.run(flight_driver, "{port}")
+    assert (done.returncode, done.stderr) == (0, "")
+    check_attitude(device, done.stdout)
+
+
+def test_flight_driver_on_a_bad_line(device: Any, flight_driver: Path) -> None:
+    """For a while every answer is spoilt, so the driver has to ask again."""
+    device.faults.inject("uart-corrupt", direction="to-host", at_s=0.3, for_s=0.3)
+    done = device.run(flight_driver, "{port}", pace="real")
+    assert done.returncode == 0, done.stderr
+    assert device.faults.events > 0
+    check_attitude(device, done.stdout)
+
+
+def test_flight_driver_with_a_dead_camera(device: Any, flight_driver: Path) -> None:
+    device.faults.inject("camera-dead")
+    done = device.run(flight_driver, "{port}")
+    assert done.returncode == 1
+    assert done.stderr == "flight_driver: no attitude in this picture\n"
+
+
+def test_flight_driver_without_a_port(flight_driver: Path) -> None:
+    done = subprocess.run([flight_driver, "/nowhere"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, "flight_driver: No such file or directory\n")
+
+
+def test_smbus2_attitude(device: Any, capfd: pytest.CaptureFixture[str]) -> None:
+    assert device.run_on_i2c(sys.executable, HERE / "smbus2_attitude.py", "7") == 0
+    check_attitude(device, capfd.readouterr().out)
+
+
+def test_bringup(device: Any) -> None:
+    done = device.run(sys.executable, HERE / "bringup.py", "{port}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert [line.split()[1] for line in done.stdout.splitlines()] == ["ok"] * 6
+
+
+def test_bringup_names_the_step_that_fails(device: Any) -> None:
+    device.faults.inject("blooming", threshold=20, length=400)
+    done = device.run(sys.executable, HERE / "bringup.py", "{port}")
+    assert done.returncode == 1
+    assert done.stdout.splitlines()[-1].startswith("5 FAIL")
+
+
+def test_suite_of_a_driver(tmp_path: Path) -> None:
+    suite = tmp_path / "test_my_driver.py"
+    shutil.copy(HERE / suite.name, suite)
+    report = tmp_path / "report.xml"
+    # An installation that is older than the entry point has to be told.
+    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+    plugin = [] if installed else ["-p", PLUGIN]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *plugin, "-q", f"--junitxml={report}", str(suite)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "5 passed" in done.stdout
+    assert 'name="cubestack.cubestar.fault_events"' in report.read_text(encoding="utf-8")
