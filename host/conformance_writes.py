@@ -46,6 +46,10 @@ NOT_SHOWN = {
 #: Settings of which some values need an option of the hardware; without it they are refused.
 OPTIONAL = {"SetNadirSearch", "NADIR_SEARCH"}
 
+#: Fields that say which of several settings a telecommand is for; telemetry shows them all, each
+#: with its number behind the name.
+KEYS = ("Area",)
+
 #: What ends a mode that a telecommand starts.
 ENDED_BY = {"Trigger": "StopLoop", "StartLoop": "StopLoop"}
 
@@ -120,7 +124,8 @@ def _check_effect(suite: Suite, message: Message, seen: list[str]) -> None:
             _perform(suite, suite.target.interface.telecommand(ENDED_BY[message.name]), {})
         return
     refused = 0
-    for values in [*values_to_try(message), before]:
+    for tried in [*values_to_try(message), before]:
+        values = tried | _keys(message)
         try:
             _perform(suite, message, values)
         except CommandRefusedError:
@@ -146,28 +151,41 @@ def _perform_any(suite: Suite, message: Message) -> None:
 
 
 def read_back(suite: Suite, message: Message) -> dict[str, tuple[Message, Field]]:
-    """Where each of a telecommand's fields is shown in telemetry; empty unless all are.
+    """Where each of a telecommand's fields but keys is shown in telemetry; empty unless all are.
 
-    By name: the field's own, with the telecommand's number behind it, or the telecommand's.
+    By name: the field's own, with the telecommand's number or the key behind it, or the
+    telecommand's.
     """
     if message.name in NOT_SHOWN:
         return {}
+    keys = _keys(message)
     number = re.sub(r".*?(\d*)$", r"\1", message.name)
     found = {}
     for field in message.fields:
-        names = [field.name + number] if number else [field.name]
+        if field.name in keys:
+            continue
+        behind = "".join(str(key) for key in keys.values()) or number
+        names = [field.name + behind]
         if len(message.fields) == 1:
             names.append(message.name)
-        place = _place(suite, field, [name.lower() for name in names])
+        ending = number if keys else ""
+        place = _place(suite, field, [name.lower() for name in names], ending)
         if place is None:
             return {}
         found[field.name] = place
     return found
 
 
-def _place(suite: Suite, field: Field, names: list[str]) -> tuple[Message, Field] | None:
+def _keys(message: Message) -> dict[str, Value]:
+    """Key fields, at the values that are tried."""
+    return {name: value for name, value in message.reset_values().items() if name in KEYS}
+
+
+def _place(
+    suite: Suite, field: Field, names: list[str], ending: str
+) -> tuple[Message, Field] | None:
     for telemetry in suite.target.interface.telemetries:
-        if telemetry.supported and not telemetry.steps:
+        if telemetry.supported and not telemetry.steps and telemetry.name.endswith(ending):
             for shown in telemetry.fields:
                 same = (shown.type, shown.scale, shown.unit) == (
                     field.type,
@@ -252,8 +270,7 @@ def _shown(suite: Suite, message: Message) -> dict[str, Value] | None:
     frames = {telemetry.name for telemetry, _ in places.values()}
     read = {name: suite.target.node.telemetry(name) for name in sorted(frames)}
     values = {name: read[place.name][field.name] for name, (place, field) in places.items()}
-    data = message.pack(**values)
-    return message.unpack(data)
+    return message.unpack(message.pack(**values, **_keys(message)))
 
 
 def _expect_shown(suite: Suite, message: Message, wanted: Mapping[str, Value]) -> None:

@@ -164,6 +164,20 @@ def test_values_to_try_are_allowed_and_differ(interface):
         assert all(tried.count(values) == 1 for values in tried)
 
 
+def test_masks_are_read_back_by_camera_and_area(sense, sense_uart):
+    run = suite(sense, sense_uart)
+    for number in (1, 2):
+        places = read_back(run, CUBESENSE.telecommand(f"Mask{number}"))
+        shown = {name: (frame.name, place.name) for name, (frame, place) in places.items()}
+        assert shown == {
+            name: (f"Masks{number}", f"{name}1") for name in ("XMin", "XMax", "YMin", "YMax")
+        }
+
+
+def test_measurements_are_no_settings(node, uart):
+    assert read_back(suite(node, uart), CUBESTAR.telecommand("setTrackingMode")) == {}
+
+
 def runs(*checks: Check) -> Suite:
     made = Suite(Target("x", CUBESTAR, None))
     made.checks = list(checks)
