@@ -34,6 +34,18 @@ extras=""
 if [ "$kind" = dev ]; then
     extras="dev"
     command -v iverilog >/dev/null 2>&1 || need "Icarus Verilog, for the HDL tests" iverilog
+    # Programs of others that tests point at the emulator; without them those tests are skipped.
+    missing=""
+    for program in i2cget:i2c-tools socat:socat picocom:picocom; do
+        PATH=$PATH:/usr/sbin command -v "${program%%:*}" >/dev/null 2>&1 ||
+            missing="$missing ${program#*:}"
+    done
+    if [ -n "$missing" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
+        say "installing$missing (tests with unmodified programs)"
+        # shellcheck disable=SC2086
+        { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $missing; } \
+            >/dev/null 2>&1 || say "could not install$missing; tests that need them are skipped"
+    fi
 fi
 compiler() { command -v "${CXX:-c++}" || command -v g++ || command -v clang++; }
 if ! compiler >/dev/null 2>&1; then

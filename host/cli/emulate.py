@@ -1,50 +1,57 @@
-"""Serve an emulated device until Ctrl-C; any program can open its ports.
+"""Serve emulated devices until Ctrl-C; any program can open their ports.
 
 A CubeSense has two serial lines: the node protocol on PATH or PORT, the bench
-protocol on PATH.bench or PORT + 1.
+protocol on PATH.bench or PORT + 1. Several devices take ports one after the
+other, and share one I2C bus.
 
 examples:
   cubestack emulate cubestar --pty ./ttyCUBESTAR
       then, in a second terminal:
       .venv/bin/python examples/plain_pyserial.py ./ttyCUBESTAR
   cubestack emulate cubestar --scene sky.toml --tcp 4000 --pace fast
-  cubestack emulate cubesense --pty ./ttyCUBESENSE
+  cubestack emulate cubesense --pty ./ttyCUBESENSE --record session.jsonl
+  cubestack emulate cubestar cubesense aramis --i2c 7
+      then: cubestack run --attach -- i2cdetect -y 7
 """
 
 import argparse
 import signal
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from cubestack.firmware_model.interface.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.boards import DEVICES, open_board
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
+from cubestack.host.cli.ports import add_port_arguments, open_ports
+from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
 from cubestack.host.cli.terminal import say
 
-__all__ = ["add_arguments", "run"]
+if TYPE_CHECKING:
+    from cubestack.emulator.i2c_host.adapter import I2cAdapter
+    from cubestack.emulator.virtual_time import Kernel
+    from cubestack.host.cli.boards import Opened
 
-LOOPBACK = "127.0.0.1"
-LAST_PORT = 65535
+__all__ = ["add_arguments", "run"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("device", choices=DEVICES, help="device to emulate")
+    parser.add_argument(
+        "devices", nargs="+", choices=DEVICES, metavar="device", help=", ".join(DEVICES)
+    )
     parser.add_argument(
         "--scene",
         type=Path,
         metavar="FILE",
-        help="TOML scene; default: Orion to V 3.8, or Earth and Sun",
+        help="TOML scene of the one device; default: Orion, or Earth and Sun",
     )
+    add_port_arguments(parser)
     parser.add_argument(
-        "--pty",
-        type=Path,
-        metavar="PATH",
-        help="link to a pseudo-terminal; default without --tcp: ./ttyCUBESTAR, ./ttyCUBESENSE",
-    )
-    parser.add_argument(
-        "--tcp", type=whole(0, LAST_PORT), metavar="PORT", help="serial line on a local TCP port"
+        "--i2c", type=whole(0, 255), metavar="BUS", help="I2C bus, for cubestack run --attach"
     )
     parser.add_argument("--baud", type=whole(1), help="of the node protocol; default 57600")
     parser.add_argument(
@@ -59,43 +66,70 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="real",
         help="real: virtual time is wall time; fast: ahead while there is work",
     )
+    add_record_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    from cubestack.emulator.ports.endpoint import Endpoint, PtyEndpoint, TcpEndpoint
-    from cubestack.emulator.ports.pump import Pump
+    from cubestack.emulator.ports.pump import Pump, wait_ready
 
-    if args.pty is not None and args.tcp is not None:
-        raise ValueError("a serial line is either a terminal or a port: give --pty or --tcp")
-    opened = open_board(args.device, args.scene, seed=args.seed, engine=args.engine, baud=args.baud)
+    if len(set(args.devices)) < len(args.devices):
+        raise ValueError(f"name each device once: {' '.join(args.devices)}")
+    if len(args.devices) > 1:
+        for name in ("scene", "faults", "record", "trace"):
+            if getattr(args, name) is not None:
+                raise ValueError(f"--{name} belongs to one device, and there are several")
     with ExitStack() as stack:
-        stack.callback(opened.board.close)
-        inject_plan(opened.board.faults, args.faults, say)
-        if args.tcp and args.tcp + len(opened.lines) - 1 > LAST_PORT:
-            raise ValueError(f"{opened.title} needs {len(opened.lines)} ports from {args.tcp} on")
-        path = args.pty or Path(f"tty{opened.title.upper()}")
-        endpoints: list[Endpoint] = []
-        for index, line in enumerate(opened.lines):
-            endpoint: Endpoint
-            if args.tcp is None:
-                endpoint = PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
-            else:
-                # Port 0 lets the system choose each one.
-                endpoint = TcpEndpoint(LOOPBACK, args.tcp and args.tcp + index, line.uart)
-            stack.callback(endpoint.close)
-            endpoints.append(endpoint)
-        pump = Pump(opened.board.kernel, endpoints, opened.board.busy, pace=args.pace, report=say)
+        devices = []
+        for name in args.devices:
+            devices.append(
+                open_board(name, args.scene, seed=args.seed, engine=args.engine, baud=args.baud)
+            )
+            stack.callback(devices[-1].board.close)
+        if len(devices) == 1:
+            inject_plan(devices[0].board.faults, args.faults, say)
+            record(args, devices[0], stack)
+        kernel, adapter = _joined(devices)
+        served = open_ports(args, devices, stack)
+        endpoints = [endpoint for _, _, endpoint in served]
+        wait = wait_ready
+        if args.i2c is not None:
+            from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely
+            from cubestack.emulator.i2c_host.server import I2cServer
+
+            server = I2cServer(socket_path(args.i2c), adapter)
+            stack.callback(server.close)
+            endpoints.append(server)
+            sharpen_timers()
+            wait = wait_precisely
+
+        def busy() -> bool:
+            return adapter.busy or any(device.board.busy() for device in devices)
+
+        pump = Pump(kernel, endpoints, busy, pace=args.pace, report=say, wait=wait)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: pump.stop())
-        ports = [
-            f"{endpoint.name} at {line.baud} baud"
-            for line, endpoint in zip(opened.lines, endpoints, strict=True)
-        ]
-        others = [
-            f", {line.name} on {port}"
-            for line, port in zip(opened.lines[1:], ports[1:], strict=True)
-        ]
-        say(f"{opened.title} serves on {ports[0]}{''.join(others)}; Ctrl-C ends it")
+        for device in devices:
+            ports = [
+                f"{endpoint.name} at {line.baud} baud"
+                if not line.suffix
+                else f"{line.name} on {endpoint.name} at {line.baud} baud"
+                for owner, line, endpoint in served
+                if owner is device
+            ]
+            say(f"{device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
+        if args.i2c is not None:
+            say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
         pump.run()
     return 0
+
+
+def _joined(devices: Sequence["Opened"]) -> tuple["Kernel", "I2cAdapter"]:
+    """What drives all devices, and the master of their one I2C bus."""
+    from cubestack.emulator.i2c_host.adapter import I2cAdapter
+    from cubestack.emulator.i2c_host.joined import JoinedKernel, join_buses
+
+    boards = [device.board for device in devices]
+    join_buses(*((board.kernel, board.i2c_bus) for board in boards))
+    kernel = boards[0].kernel if len(boards) == 1 else JoinedKernel([b.kernel for b in boards])
+    return kernel, I2cAdapter(boards[0].kernel, boards[0].i2c_bus)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,7 +27,8 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         "--pty",
         type=Path,
         metavar="PATH",
-        help="link to a pseudo-terminal; default: ./ttyCUBESTAR, ./ttyCUBESENSE, ./ttyARAMIS",
+        help="link to a pseudo-terminal, of several devices what comes before their names; "
+        "default: ./ttyCUBESTAR, ./ttyCUBESENSE, ./ttyARAMIS",
     )
     where.add_argument(
         "--tcp", type=whole(0, LAST_PORT), metavar="PORT", help="serial line on a local TCP port"
@@ -50,29 +52,44 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def open_ports(args: argparse.Namespace, opened: Opened, stack: ExitStack) -> list[Endpoint]:
-    """A port for each serial line of ``opened``; ``stack`` closes them.
+def open_ports(
+    args: argparse.Namespace, devices: Sequence[Opened], stack: ExitStack
+) -> list[tuple[Opened, SerialLine, Endpoint]]:
+    """A port for each serial line of each device, in order; ``stack`` closes them.
 
     Raises ValueError when there are not enough ports from the given one on, PortError when one
     does not open.
     """
-    endpoints: list[Endpoint] = []
-    for index, line in enumerate(opened.lines):
-        endpoints.append(_open(args, opened, line, index))
-        stack.callback(endpoints[-1].close)
-    return endpoints
+    lines = [(opened, line) for opened in devices for line in opened.lines]
+    served = []
+    for index, (opened, line) in enumerate(lines):
+        endpoint = _open(args, len(devices) > 1, opened, line, index, len(lines))
+        stack.callback(endpoint.close)
+        served.append((opened, line, endpoint))
+    return served
 
 
-def _open(args: argparse.Namespace, opened: Opened, line: SerialLine, index: int) -> Endpoint:
+def _open(
+    args: argparse.Namespace,
+    several: bool,
+    opened: Opened,
+    line: SerialLine,
+    index: int,
+    count: int,
+) -> Endpoint:
     from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
     from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     if first is None:
-        path = args.pty or Path(f"tty{opened.title.upper()}")
+        name = opened.title.upper()
+        if args.pty is None:
+            path = Path(f"tty{name}")
+        else:
+            path = args.pty.with_name(args.pty.name + name) if several else args.pty
         return PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
-    if first and first + len(opened.lines) - 1 > LAST_PORT:
-        raise ValueError(f"{opened.title} needs {len(opened.lines)} ports from {first} on")
+    if first and first + count - 1 > LAST_PORT:
+        raise ValueError(f"{opened.title} needs {count} ports from {first} on")
     kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
     port = first and first + index  # 0 lets the system choose each one
     return kind(args.listen, port, line.uart, allow_remote=args.allow_remote)

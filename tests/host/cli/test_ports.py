@@ -33,11 +33,12 @@ def opened() -> Opened:
 def ports(opened, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: str) -> list[str]:
+    def run(*arguments: str, devices: int = 1) -> list[str]:
         parser = argparse.ArgumentParser(exit_on_error=False)
         add_port_arguments(parser)
         with ExitStack() as stack:
-            return [port.name for port in open_ports(parser.parse_args(arguments), opened, stack)]
+            served = open_ports(parser.parse_args(arguments), [opened] * devices, stack)
+            return [port.name for _, _, port in served]
 
     return run
 
@@ -50,6 +51,17 @@ def test_terminals_by_name(ports):
     assert ports("--pty", "y") == ["y", "y.bench"]
 
 
+def test_of_several_devices_the_name_is_what_comes_before_theirs(opened, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parser = argparse.ArgumentParser()
+    add_port_arguments(parser)
+    other = Opened("CubeStar", opened.board, opened.lines[:1])
+    with ExitStack() as stack:
+        served = open_ports(parser.parse_args(["--pty", "x_"]), [other, opened], stack)
+        names = [port.name for _, _, port in served]
+    assert names == ["x_CUBESTAR", "x_CUBESENSE", "x_CUBESENSE.bench"]
+
+
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
 def test_free_tcp_ports(ports, kind):
     names = ports(f"--{kind}", "0")
@@ -57,9 +69,10 @@ def test_free_tcp_ports(ports, kind):
     assert all(name.startswith(f"{kind}://127.0.0.1:") for name in names)
 
 
-def test_not_enough_ports(ports):
-    with pytest.raises(ValueError, match="CubeSense needs 2 ports from 65535 on"):
-        ports("--rfc2217", "65535")
+@pytest.mark.parametrize("devices", [1, 2])
+def test_not_enough_ports(ports, devices):
+    with pytest.raises(ValueError, match=f"CubeSense needs {2 * devices} ports from 65535 on"):
+        ports("--rfc2217", "65535", devices=devices)
 
 
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
