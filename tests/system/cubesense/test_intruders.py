@@ -1,0 +1,86 @@
+"""False lights beside the Sun and the Earth, and what the published search makes of them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.fisheye import LENSES, angles_from_vector, vector_from_angles
+from cubestack.emulator.sky.earth_sun import EarthSunScene, Reflection
+from cubestack.firmware_model.interface.cubesense_codes import Camera
+from cubestack.host.cubesense import Measurement
+
+from .conftest import NADIR_DEG, SUN_DEG
+
+TRUTH = {Camera.SUN: SUN_DEG, Camera.NADIR: NADIR_DEG}
+
+
+def seen_by(scene: EarthSunScene, camera: Camera, alpha: float, beta: float) -> Any:
+    """Direction in scene axes of what ``camera`` sees at these angles."""
+    mounting = scene.sun_camera if camera is Camera.SUN else scene.nadir_camera
+    return mounting.matrix.T @ vector_from_angles(alpha, beta)
+
+
+def measure(opened: Callable[..., Any], scene: EarthSunScene, camera: Camera) -> Measurement:
+    with opened(scene) as session:
+        session.cubesense.client.pause(0.3)
+        found: Measurement = session.cubesense.capture_and_detect(camera)
+    return found
+
+
+def check(found: Measurement, expected: tuple[float, float]) -> None:
+    assert found.detected
+    np.testing.assert_allclose((found.alpha_deg, found.beta_deg), expected, atol=0.1)
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(30.0, -40.0), (17.0, 9.0), (-80.0, 20.0)])
+def test_the_moon_is_too_faint_for_the_sun_sensor(
+    opened: Callable[..., Any], scene: EarthSunScene, alpha: float, beta: float
+) -> None:
+    moon = seen_by(scene, Camera.SUN, alpha, beta)
+    check(measure(opened, replace(scene, moon=moon), Camera.SUN), SUN_DEG)
+
+
+@pytest.mark.parametrize("camera", Camera)
+def test_hot_pixels_do_not_move_a_direction(
+    opened: Callable[..., Any], scene: EarthSunScene, camera: Camera
+) -> None:
+    found = measure(opened, replace(scene, hot_pixels=200, hot_pairs=50), camera)
+    check(found, TRUTH[camera])
+
+
+def test_a_light_beside_the_earth_is_dropped_from_its_limb(
+    opened: Callable[..., Any], scene: EarthSunScene
+) -> None:
+    """A disc on a sample of a scanned row: two edges more, which the fit leaves out."""
+    (sample,) = LENSES[Camera.NADIR].unproject([(511, 79)])
+    light = Reflection(Camera.NADIR, *angles_from_vector(sample), radius_px=9.0, level=200.0)
+    with opened(replace(scene, reflections=(light,))) as session:
+        session.cubesense.client.pause(0.3)
+        found = session.cubesense.capture_and_detect(Camera.NADIR)
+        edges = session.cubesense.edges()
+        used = int(session.cubesense.details(Camera.NADIR)["Points"])
+    check(found, NADIR_DEG)
+    assert used == len(edges) - 2
+
+
+@pytest.mark.parametrize(
+    ("beta", "level", "expected"),
+    [
+        (-30.0, 150.0, SUN_DEG),  # below the FPGA's level
+        (40.0, 221.0, SUN_DEG),  # later in the picture than the Sun
+        (-30.0, 221.0, (0.0, -30.0)),  # earlier: it is taken for the Sun
+    ],
+)
+def test_the_first_bright_light_of_the_picture_is_the_sun(
+    opened: Callable[..., Any],
+    scene: EarthSunScene,
+    beta: float,
+    level: float,
+    expected: tuple[float, float],
+) -> None:
+    light = Reflection(Camera.SUN, 0.0, beta, radius_px=5.0, level=level)
+    found = measure(opened, replace(scene, reflections=(light,)), Camera.SUN)
+    check(found, expected)
