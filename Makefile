@@ -7,7 +7,7 @@ PHOTOGRAPHS ?= ../shared/data/sky
 .PHONY: help venv run test lint bench clean
 
 help:
-	@echo "make run    set up, then boot both sensors, measure over their serial ports, and draw what they saw"
+	@echo "make run    set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test   set up, then run all tests"
 	@echo "make lint   ruff and mypy"
 	@echo "make bench  measure the cost of the hot paths"

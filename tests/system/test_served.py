@@ -98,7 +98,7 @@ def code_block(text: str, language: str, word: str) -> str:
 
 def test_first_script_of_the_readme(emulate: Emulate, root: Path, tmp_path: Path) -> None:
     readme = (root / "README.md").read_text(encoding="utf-8")
-    command = code_block(readme, "sh", "cubestack emulate").split()
+    command = code_block(readme, "sh", "emulate cubestar --pty").split()
     assert command[:3] == [".venv/bin/cubestack", "emulate", "cubestar"]
     script = code_block(readme, "python", "NodeClient")
     with emulate(*command[3:]):
