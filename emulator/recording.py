@@ -12,7 +12,8 @@ from typing import IO, Any, Self
 
 import simpy
 
-from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError, I2cTarget
+from cubestack.emulator.bus_tap import BusTap
+from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.interface.message import Interface
@@ -111,20 +112,15 @@ class _Tap:
             self._data.clear()
 
 
-class RecordedBus(I2cBus):
+class RecordedBus(BusTap):
     """An I2C bus with its transfers on record."""
 
     def __init__(self, kernel: Kernel, bus: I2cBus, port: str, writer: RecordingWriter) -> None:
         """Stand in for ``bus``."""
         self._kernel = kernel
-        self._bus = bus
+        super().__init__(bus)
         self._port = port
         self._writer = writer
-        self.bit_ps = bus.bit_ps
-
-    def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
-        """See I2cBus."""
-        self._bus.attach(address, target, general_call=general_call)
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         """See I2cBus."""

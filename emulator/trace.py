@@ -18,7 +18,8 @@ from typing import IO, Any
 import simpy
 from vcd import VCDWriter
 
-from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cTarget
+from cubestack.emulator.bus_tap import BusTap
+from cubestack.emulator.i2c import I2cBus, I2cMessage
 from cubestack.emulator.rtl.engine import RtlEngine
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import Kernel
@@ -169,22 +170,17 @@ class _LineTap:
                 last = level
 
 
-class TracedBus(I2cBus):
+class TracedBus(BusTap):
     """An I2C bus with its transfers in a trace."""
 
     def __init__(self, trace: VcdTrace, bus: I2cBus, port: str) -> None:
         """Stand in for ``bus``."""
         self._trace = trace
-        self._bus = bus
+        super().__init__(bus)
         self._port = port
-        self.bit_ps = bus.bit_ps
         trace.declare(f"{port}.busy", 1)
         trace.declare(f"{port}.address", 8)
         trace.declare(f"{port}.transfer", None, "")
-
-    def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
-        """See I2cBus."""
-        self._bus.attach(address, target, general_call=general_call)
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         """See I2cBus."""
