@@ -51,7 +51,7 @@ class Parameter:
             return " or ".join(self.choices)
         if self.low == -math.inf:
             return "any"
-        return f"{self.low:g} to {self.high:g}{' ' if self.unit else ''}{self.unit}"
+        return f"{self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
 
 
 def number(default: float, text: str, unit: str, low: float, high: float) -> Any:

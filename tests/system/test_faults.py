@@ -128,6 +128,16 @@ def test_a_changed_byte_to_the_device_is_refused(opened: Any) -> None:
     assert flags(opened) == {"UART_ProtocolError"}
 
 
+def test_a_changed_parameter_in_its_range_is_believed(opened: Any) -> None:
+    client = patient(opened)
+    at_s = opened.board.kernel.now / 1e12 + 2.5 * BYTE_S
+    opened.board.faults.inject(
+        "uart-corrupt", direction="to-device", mask=0x04, at_s=at_s, for_s=BYTE_S
+    )
+    client.command("SetDiscardDelay", Delay=100)
+    assert opened.board.program._state.settings.get("SetDiscardDelay", "Delay") != 100
+
+
 def test_a_late_byte_makes_the_answer_late(opened: Any) -> None:
     line, kernel = opened.board.serial(), opened.board.kernel
     lasted = []

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.sky.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubesense_codes import (
     Camera,
     CaptureResult,
@@ -14,9 +15,12 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     Sram,
 )
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
+from cubestack.firmware_model.interface.node_codes import AckError
 from cubestack.host.errors import NoAnswerError
+from cubestack.host.i2c_client import I2cClient
 
 CLEAN_DEG = (-7.98, 12.02)
+BYTE_S = 10 / CUBESENSE.baud
 
 
 @pytest.fixture
@@ -167,3 +171,63 @@ def test_the_bench_line_has_faults_of_its_own(board: Any) -> None:
     assert board.cubesense.serial_number()
     board.board.faults.clear()
     board.bench.take(Camera.SUN)
+
+
+# --- serial line and I2C --------------------------------------------------------------------------
+
+
+def line_flags(board: Any) -> set[str]:
+    """Flags of telemetry CommunicationStatus."""
+    values = board.cubesense.client.telemetry("CommunicationStatus")
+    return {name for name, value in values.items() if value and not name.endswith("Count")}
+
+
+def now_s(board: Any) -> float:
+    return float(board.board.kernel.now / 1e12)
+
+
+@pytest.mark.parametrize("kind", ["uart-drop", "uart-corrupt"])
+def test_a_spoilt_byte_to_the_device_is_asked_for_again(board: Any, kind: str) -> None:
+    board.board.faults.inject(kind, direction="to-device", for_s=BYTE_S / 2)
+    assert board.cubesense.serial_number()
+    assert board.board.faults.events == 1
+    assert line_flags(board) == {"UartProtocolError"}
+
+
+def test_a_message_held_up_in_the_middle_is_given_up(board: Any) -> None:
+    at_s = now_s(board) + 2.5 * BYTE_S
+    board.board.faults.inject(
+        "uart-delay", direction="to-device", delay_ms=60, at_s=at_s, for_s=0.05
+    )
+    assert board.cubesense.serial_number()
+    assert line_flags(board) == {"UartMsgIncomplete", "UartProtocolError"}
+
+
+def test_a_byte_without_acknowledge_cuts_a_telecommand_short(board: Any) -> None:
+    client = I2cClient(board.board.i2c(), CUBESENSE, wait=board.board.i2c().wait)
+    at_s = now_s(board) + 0.00015  # the address ends after 0.1 ms, a byte takes 0.09 ms
+    board.board.faults.inject("i2c-nack", on="byte", at_s=at_s, for_s=0.0003)
+    with pytest.raises(NoAnswerError):
+        client.command("SetNadirSearch", Search=0)
+    assert board.board.faults.events == 1
+    assert client.telemetry("TcmdProcessed")["Error"] in (0, AckError.WRONG_LENGTH)
+    assert client.telemetry("Identification")["InterfaceVersion"] == CUBESENSE.version
+
+
+@pytest.mark.parametrize("line", ["SDA", "SCL"])
+def test_a_stuck_line_blocks_the_bus_until_it_is_free(board: Any, line: str) -> None:
+    bus = board.board.i2c()
+    board.board.faults.inject("i2c-stuck", line=line, for_s=1.3)
+    client = I2cClient(bus, CUBESENSE, wait=bus.wait)
+    began_s = now_s(board)
+    assert client.telemetry("Identification")["InterfaceVersion"] == CUBESENSE.version
+    assert now_s(board) - began_s > 1.3  # the first attempt had failed after 1 s
+    assert line_flags(board) == set()
+
+
+def test_a_stretched_clock_only_takes_time(board: Any) -> None:
+    bus = board.board.i2c()
+    client = I2cClient(bus, CUBESENSE, wait=bus.wait)
+    board.board.faults.inject("i2c-stretch", stretch_us=900)
+    assert client.telemetry("Identification")["InterfaceVersion"] == CUBESENSE.version
+    assert board.board.faults.events == 1 + CUBESENSE.telemetry("Identification").length

@@ -1,0 +1,181 @@
+"""A source with faults: edges and pixels that come out, against a list of clocks made by hand."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.stream import StreamSegment
+from cubestack.emulator.faults.injection import Injection
+from cubestack.emulator.faults.pixels import FaultySource
+from cubestack.emulator.faults.table import (
+    Blooming,
+    CameraDead,
+    ClockExtra,
+    ClockLost,
+    ColumnDefect,
+    LineMissing,
+    PixelDead,
+    PixelHot,
+)
+from cubestack.emulator.rtl.pixel_clock import LoadedSegment
+
+ROWS, COLUMNS, LINE = 5, 6, 9
+PERIOD = Fraction(1000, 3)
+BLANK = 40
+FRAME_PS = int((ROWS * LINE + BLANK) * PERIOD)
+
+
+@dataclass
+class Camera:
+    """Frames one after the other, each with blanking behind it; pixels count up."""
+
+    period: Fraction = PERIOD
+    line_clocks: int = LINE
+    active_columns: int = COLUMNS
+    picture: np.ndarray = field(
+        default_factory=lambda: np.arange(ROWS * COLUMNS, dtype=np.uint8).reshape(ROWS, COLUMNS)
+    )
+
+    def segment_at(self, time_ps: int) -> StreamSegment:
+        number = 0
+        while True:
+            first = number * (ROWS * LINE + BLANK)
+            for clocks, rows in ((ROWS * LINE, ROWS), (BLANK, 0)):
+                start = int(first * PERIOD)
+                if start + int(clocks * PERIOD) > time_ps:
+                    pixels = (lambda: self.picture) if rows else None
+                    return StreamSegment(start, clocks, int(rows > 0), rows, pixels)
+                first += clocks
+            number += 1
+
+
+Clock = tuple[int, int, int, int]  # time, line pin, pixel, frame pin
+
+
+def clocks(source: Any, until_ps: int) -> Iterator[Clock]:
+    """Rising edges with what stands on the lines, as an engine follows a source."""
+    time_ps = 0
+    while (segment := source.segment_at(time_ps)) is not None:
+        loaded = LoadedSegment.of(source, segment)
+        if segment.rows:
+            loaded.render()
+        for sample in range(segment.clocks):
+            rise_ps = loaded.time_of(2 * sample)
+            if rise_ps >= until_ps:
+                return
+            yield (rise_ps, *loaded.sample(sample), segment.vsync)
+        following = source.segment_at(loaded.end_ps)
+        same = following is not None and following.start_ps == segment.start_ps
+        time_ps = loaded.end_ps + same
+
+
+def faulty(*faults: Any, seed: int = 1) -> tuple[FaultySource, list[str]]:
+    log: list[str] = []
+    source = FaultySource(Camera(), lambda _time, injection, text: log.append(text))
+    for number, fault in enumerate(faults):
+        source.injections.append(Injection(number, fault, "imager", 0, None, seed))
+    return source, log
+
+
+def near(found: list[Clock], expected: list[Clock]) -> None:
+    """The same clocks, but for 1 ps of rounding."""
+    assert [clock[1:] for clock in found] == [clock[1:] for clock in expected]
+    assert all(abs(a[0] - b[0]) <= 1 for a, b in zip(found, expected, strict=True))
+
+
+CLEAN = list(clocks(Camera(), 3 * FRAME_PS))
+
+
+def test_without_faults_nothing_changes() -> None:
+    assert list(clocks(faulty()[0], 3 * FRAME_PS)) == CLEAN
+    near(list(clocks(faulty(ClockLost(rate=0.0, row=1))[0], 3 * FRAME_PS)), CLEAN)
+
+
+@pytest.mark.parametrize("column", range(COLUMNS))
+@pytest.mark.parametrize("row", [0, 2, ROWS - 1])
+def test_a_lost_clock_is_one_edge_less(row: int, column: int) -> None:
+    source, log = faulty(ClockLost(row=row, column=column))
+    lost = {n * (ROWS * LINE + BLANK) + row * LINE + column for n in range(3)}
+    expected = [clock for number, clock in enumerate(CLEAN) if number not in lost]
+    near(list(clocks(source, 3 * FRAME_PS)), expected)
+    assert log[:3] == [f"line {row}, column {column}"] * 3
+
+
+@pytest.mark.parametrize("column", range(COLUMNS))
+def test_an_extra_clock_is_half_a_period_later(column: int) -> None:
+    source, _ = faulty(ClockExtra(row=2, column=column))
+    expected = list(CLEAN)
+    for n in reversed(range(3)):
+        place = n * (ROWS * LINE + BLANK) + 2 * LINE + column
+        time_ps, *levels = CLEAN[place]
+        expected.insert(place + 1, (time_ps + int(PERIOD / 2), *levels))  # type: ignore[arg-type]
+    near(list(clocks(source, 3 * FRAME_PS)), expected)
+
+
+def test_a_missing_line_is_blank() -> None:
+    source, _ = faulty(LineMissing(row=3))
+    expected = []
+    for number, clock in enumerate(CLEAN):
+        line = number % (ROWS * LINE + BLANK) // LINE
+        expected.append((clock[0], 0, 0, clock[3]) if line == 3 else clock)
+    near(list(clocks(source, 3 * FRAME_PS)), expected)
+
+
+def test_faults_of_several_lines_add_up() -> None:
+    source, log = faulty(
+        ClockLost(row=1, column=1), LineMissing(row=3), ClockExtra(row=4, column=0)
+    )
+    found = [clock for clock in clocks(source, FRAME_PS) if clock[0] < FRAME_PS]
+    assert len(found) == ROWS * LINE + BLANK
+    assert log[:3] == ["line 1, column 1", "line 3", "line 4, column 0"]
+
+
+def test_drawn_places_repeat_with_the_seed() -> None:
+    logs = []
+    for seed in (1, 1, 2):
+        source, log = faulty(ClockLost(), seed=seed)
+        list(clocks(source, 9 * FRAME_PS))
+        logs.append(log)
+    assert logs[0] == logs[1] != logs[2]
+    assert len(set(logs[0])) > 5
+
+
+def rendered(*faults: Any) -> np.ndarray:
+    segment = faulty(*faults)[0].segment_at(0)
+    assert segment is not None
+    assert segment.pixels is not None
+    return segment.pixels()
+
+
+def test_pixels() -> None:
+    clean = Camera().picture
+    expected = clean.copy()
+    expected[1, 2], expected[3, 4], expected[:, 5] = 255, 0, 9
+    found = rendered(PixelHot(x=2, y=1), PixelDead(x=4, y=3), ColumnDefect(x=5, level=9))
+    np.testing.assert_array_equal(found, expected)
+    assert clean[1, 2] == 8  # the camera's own picture is not touched
+
+
+def test_blooming_goes_along_the_column() -> None:
+    expected = Camera().picture.copy()
+    expected[2:, 5] = 255
+    np.testing.assert_array_equal(rendered(Blooming(threshold=29, length=2)), expected)
+
+
+def test_lines_outside_of_the_time_are_good() -> None:
+    source, _ = faulty(ColumnDefect(x=0))
+    source.injections[0].start_ps = int(LINE * PERIOD)
+    source.injections[0].end_ps = int(3 * LINE * PERIOD)
+    segment = source.segment_at(0)
+    assert segment is not None
+    assert segment.pixels is not None
+    assert list(segment.pixels()[:, 0] == 255) == [False, True, True, False, False]
+
+
+def test_a_dead_camera_has_no_clock() -> None:
+    source, _ = faulty(CameraDead())
+    assert source.segment_at(0) is None

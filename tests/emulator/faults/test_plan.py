@@ -1,0 +1,82 @@
+"""Plans: what a file says is what is injected, and nonsense is refused with its place."""
+
+import random
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.faults.declaration import FaultError
+from cubestack.emulator.faults.plan import PlannedFault, load_plan, parse_plan
+from cubestack.emulator.faults.table import AckLost, LatchUp, UartDrop
+
+PLAN = """
+seed = 7
+[[fault]]
+kind = "uart-drop"
+at = 2
+for = 0.5
+rate = 0.25
+[[fault]]
+kind = "latch-up"
+target = "memory"
+lasting = true
+[[fault]]
+kind = "ack-lost"
+"""
+
+
+def test_a_plan(tmp_path: Path) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN)
+    plan = load_plan(path)
+    assert plan.seed == 7
+    assert plan.name == str(path)
+    assert plan.faults == (
+        PlannedFault(UartDrop(rate=0.25), None, 2, 0.5),
+        PlannedFault(LatchUp(lasting=True), "memory"),
+        PlannedFault(AckLost()),
+    )
+
+
+def test_an_empty_plan_does_nothing() -> None:
+    assert parse_plan("").faults == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("seed = -1", "seed must be a whole number from 0, not -1"),
+        ("seed = true", "seed must be"),
+        ("speed = 1", "no key 'speed'; a plan has seed and"),
+        ("fault = 3", r"faults are written as \[\[fault\]\]"),
+        ("seed = ", "plan: "),
+        ("[[fault]]", "fault 1: it needs a kind"),
+        ('[[fault]]\nkind = "ack-lost"\n[[fault]]\nkind = 3', "fault 2: kind must be a text"),
+        ('[[fault]]\nkind = "smoke"', "fault 1: no fault 'smoke'; there are uart-drop"),
+        ('[[fault]]\nkind = "uart-drop"\nat = "noon"', "fault 1: at must be a number of s"),
+        ('[[fault]]\nkind = "uart-drop"\nrate = 7', "uart-drop: rate must be 0 to 1, not 7"),
+        ('[[fault]]\nkind = "ack-lost"\nrate = 1', "no parameter 'rate'; it has no parameters"),
+    ],
+)
+def test_nonsense_is_refused_with_its_place(text: str, message: str) -> None:
+    with pytest.raises(FaultError, match=message):
+        parse_plan(text)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(FaultError, match=r"none\.toml: No such file"):
+        load_plan(tmp_path / "none.toml")
+    (tmp_path / "noise").write_bytes(b"\xff\xfe")
+    with pytest.raises(FaultError, match="no UTF-8 text"):
+        load_plan(tmp_path / "noise")
+
+
+def test_damaged_plans_raise_nothing_else() -> None:
+    generator = random.Random(5)
+    for _ in range(2000):
+        text = list(PLAN)
+        for _ in range(generator.randrange(1, 6)):
+            text[generator.randrange(len(text))] = chr(generator.randrange(10, 127))
+        with suppress(FaultError):
+            parse_plan("".join(text))

@@ -1,0 +1,59 @@
+"""The declarations: every fault has all that reader, documents and completion derive from."""
+
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.emulator.faults import table
+from cubestack.emulator.faults.declaration import FaultError, Parameter
+from cubestack.emulator.faults.document import markdown_table
+from cubestack.emulator.faults.table import FAULTS, make_fault
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "faults.md"
+PARAMETERS = [(kind, name) for kind, fault in FAULTS.items() for name in fault.parameters()]
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_fault_is_declared_in_full(kind: str) -> None:
+    fault = FAULTS[kind]
+    assert fault.kind == kind
+    assert fault.effect().endswith(".")
+    assert fault() == make_fault(kind)  # every parameter has a default
+    assert fault.__name__ in table.__all__
+    assert fault.__doc__ != "Base of all faults."
+
+
+def value_outside(parameter: Parameter) -> object:
+    return "sideways" if parameter.choices is not None else parameter.high * 2 + 1
+
+
+@pytest.mark.parametrize(("kind", "name"), PARAMETERS)
+def test_a_wrong_value_is_refused_by_name(kind: str, name: str) -> None:
+    parameter = FAULTS[kind].parameters()[name]
+    assert parameter.text
+    if parameter.range == "any":
+        return
+    for value in (value_outside(parameter), [], b"1"):
+        with pytest.raises(FaultError, match=f"{kind}: {name} must be"):
+            make_fault(kind, **{name: value})
+
+
+@given(st.text(max_size=8), st.one_of(st.none(), st.text(), st.integers(), st.floats()))
+def test_no_value_does_worse_than_a_fault_error(name: str, value: object) -> None:
+    for kind, fault in FAULTS.items():
+        for known in (name, *fault.parameters()):
+            with suppress(FaultError):
+                make_fault(kind, **{known: value})
+
+
+def test_the_document_has_the_table_as_declared() -> None:
+    assert markdown_table() in DOCUMENT.read_text(encoding="utf-8")
+
+
+def test_the_document_has_a_reaction_to_every_fault() -> None:
+    reactions = DOCUMENT.read_text(encoding="utf-8").split("## What the firmware does about it")[1]
+    for kind in FAULTS:
+        assert f"| `{kind}` |" in reactions
