@@ -244,6 +244,8 @@ class _Search:
             )
             if found.chance > self.profile.largest_chance:
                 return None
+            if found.spread_rad < self.profile.spread_rad:
+                return None
             refined = self._attitude(found.measured, found.stars)
             if refined is None:
                 return None

@@ -14,7 +14,7 @@ from cubestack.firmware_model.aramis.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.identification import identify
 from cubestack.firmware_model.aramis.regions import find_regions, locate_stars
-from cubestack.firmware_model.aramis.smear import smear_px, streak_px
+from cubestack.firmware_model.aramis.smear import DRAWN_OUT_PX, smear_px, streak_px
 from cubestack.firmware_model.aramis.solution import (
     Outcome,
     Profile,
@@ -123,8 +123,10 @@ def detect(
         )
         inside = np.flatnonzero(field.inside(stars.centroids, meter))[: settings.max_stars]
         smear = smear_px(picture, regions, background.mean(meter), meter)
-        # Hardly a star means that even one long streak is telling.
-        smear = max(smear, streak_px(picture, field, 1 if len(inside) < 3 else 2, meter))
+        if len(inside) < 3:
+            smear = max(smear, streak_px(picture, field, 1, meter))
+        elif smear > DRAWN_OUT_PX:
+            smear = max(smear, streak_px(picture, field, 2, meter))
     return StarList(stars.centroids[inside], stars.brightness[inside], smear)
 
 

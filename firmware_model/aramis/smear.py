@@ -14,13 +14,16 @@ from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.regions import Regions, find_regions
 from cubestack.firmware_model.costs import Meter
 
-__all__ = ["smear_px", "streak_px"]
+__all__ = ["DRAWN_OUT_PX", "smear_px", "streak_px"]
 
 LARGEST = 10
 """Regions looked at."""
 
 UPPER_QUARTILE = 75
 """Of the lengths: long streaks fall apart, and their pieces are shorter."""
+
+DRAWN_OUT_PX = 3.0
+"""Stars that do not move seldom look so long."""
 
 BLOCK = 8
 """Pixels along a side of a block."""

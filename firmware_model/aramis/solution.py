@@ -59,6 +59,7 @@ class Profile:
         side_tolerance_rad: largest difference of a side, with verification or a rough direction;
             three sigma of a difference of two stars' places by default.
         largest_chance: an attitude is confirmed when chance would do it less often.
+        spread_rad: stars that confirm are at least so far from their middle, root mean square.
         triples: triples tried at most, with verification.
         triple_stars: triples are made of so many of the brightest stars, with verification.
         candidates: with verification, so many candidates of a triple are tried at most, and pivots
@@ -74,6 +75,7 @@ class Profile:
     tolerance_rad: float = 1.2e-3
     side_tolerance_rad: float = 7e-4
     largest_chance: float = 1e-4
+    spread_rad: float = 0.03
     triples: int = 120
     triple_stars: int = 10
     candidates: int = 40
@@ -89,6 +91,7 @@ class Profile:
             "tolerance_rad": (1e-5, 0.05),
             "side_tolerance_rad": (1e-6, 0.05),
             "largest_chance": (0, 1),
+            "spread_rad": (0, 1),
             "triples": (1, 1000),
             "triple_stars": (3, 64),
             "candidates": (1, 1000),

@@ -5,7 +5,8 @@ three sides must first agree one by one, because area and moment leave one measu
 free; so must its sense of rotation. Then every catalogue star that the attitude puts into the field
 is looked for among the measured ones. The attitude is believed when chance would place so many so
 seldom: hypotheses * C(n, k) * p^k, for k found of the n expected besides the triangle's, where p is
-the part of the field within reach of a measured star.
+the part of the field within reach of a measured star. In a cluster, such as the Pleiades, one right
+place makes others likely, so stars that are all close together confirm nothing.
 """
 
 from dataclasses import dataclass
@@ -31,12 +32,14 @@ class Confirmation:
         stars: (k,) those catalogue stars, indices into the database's list.
         expected: catalogue stars that the attitude puts into the field.
         chance: expected number of attitudes that chance confirms as well.
+        spread_rad: root mean square distance of the measured stars from their middle.
     """
 
     measured: NDArray[np.intp]
     stars: NDArray[np.intp]
     expected: int
     chance: float
+    spread_rad: float
 
 
 def sides_agree(
@@ -107,7 +110,18 @@ def confirm(
         if found > 0:
             chance *= comb(further, found) * reach**found
             meter.charge(f32_mul=3 * found + 3, f32_div=found + 1)
-        return Confirmation(measured, seen[stars], len(seen), chance)
+        spread = _spread(vectors[measured], meter)
+        return Confirmation(measured, seen[stars], len(seen), chance, spread)
+
+
+def _spread(vectors: NDArray[np.float32], meter: Meter) -> float:
+    """Root mean square distance of unit vectors (n, 3) from their mean, 0 without any."""
+    count = len(vectors)
+    if count == 0:
+        return 0.0
+    meter.charge(f32_add=8 * count, f32_mul=3 * count, f32_div=4, f32_sqrt=1, loop=2 * count)
+    apart = vectors - vectors.mean(axis=0)
+    return float(np.sqrt(np.sum(apart**2) / np.float32(count)))
 
 
 def _nearest(

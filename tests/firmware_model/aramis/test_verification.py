@@ -5,7 +5,9 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
+from cubestack.emulator.sky.hipparcos import load_sky
 from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.pipeline import VERIFIED
 from cubestack.firmware_model.aramis.verification import Confirmation, confirm, sides_agree
 from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
 from cubestack.firmware_model.costs import Meter
@@ -133,3 +135,19 @@ def test_a_mirror_image_does_not_agree() -> None:
     vectors = np.array([[0, 0, 1], [0.1, 0.1, 1], [-0.1, 0.1, 1]], dtype=np.float32)
     assert sides_agree(vectors, vectors, 1e-6, meter())
     assert not sides_agree(vectors, vectors[[0, 2, 1]], 1e-3, meter())
+
+
+def test_stars_of_a_cluster_alone_confirm_nothing() -> None:
+    """Beside the Pleiades, a turn of 1.2 deg about them keeps all of them within reach."""
+    sky = load_sky(mag_limit=6.0)
+    pleiad = sky.vectors[np.searchsorted(sky.hip, 17702)]
+    turn = Rotation.from_rotvec(np.radians(1.2) * pleiad)
+    cluster = sky.vectors[np.degrees(np.arccos(np.clip(sky.vectors @ pleiad, -1, 1))) < 0.8]
+    truth, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [pleiad])
+    measured = truth.apply(cluster).astype(np.float32)
+    quaternion = (truth * turn).as_quat().astype(np.float32)
+    found = confirm(quaternion, measured, database(), Field(), TOLERANCE, 1, meter())
+    assert len(found.measured) >= 3
+    assert found.spread_rad < VERIFIED.profile.spread_rad
+    (made,) = pictures(1, 4)
+    assert check(made, made.attitude).spread_rad > 2 * VERIFIED.profile.spread_rad
