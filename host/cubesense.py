@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubesense_codes import (
+    EDGES_PER_FRAME,
     MASK_AREAS,
     Camera,
     CaptureResult,
@@ -213,9 +214,14 @@ class CubeSense:
         return self.client.telemetry(f"Details{camera + 1}")
 
     def edges(self) -> NDArray[np.float64]:
-        """Pixels (n, 2), column and row, of the edges that the latest nadir search found."""
+        """Pixels (n, 2), column and row, of the edges that the latest nadir search found.
+
+        Raises BadAnswerError when there are more than both frames hold.
+        """
         parts = [self.client.telemetry(f"NadirEdges{part}") for part in (1, 2)]
-        count = int(parts[0]["Count"])
+        count, most = int(parts[0]["Count"]), len(parts) * EDGES_PER_FRAME
+        if count > most:
+            raise BadAnswerError(f"telemetry NadirEdges1: {count} edges, where {most} have room")
         values = {name: value for part in parts for name, value in part.items()}
         found = [[float(values[f"{axis}{n}"]) for axis in "XY"] for n in range(1, count + 1)]
         return np.array(found, np.float64).reshape(-1, 2)

@@ -267,3 +267,15 @@ def test_times_and_details(cubesense: CubeSense, sense: Any) -> None:
     sense.values["Details1"] = {"X": -1.25, "Points": 49}
     details = cubesense.details(Camera.SUN)
     assert (details["X"], details["Points"]) == (-1.25, 49)
+
+
+def test_edges_are_columns_and_rows_from_both_frames(cubesense: CubeSense, sense: Any) -> None:
+    assert cubesense.edges().shape == (0, 2)
+    sense.values["NadirEdges1"] = {"Count": 21, "X1": 12.5, "Y1": 47.0, "X20": 3.25}
+    sense.values["NadirEdges2"] = {"Count": 21, "X21": 639.0, "Y21": 15.0, "X22": 1.0}
+    edges = cubesense.edges()
+    assert edges.shape == (21, 2)
+    assert edges[[0, 19, 20]].tolist() == [[12.5, 47], [3.25, 0], [639, 15]]
+    sense.values["NadirEdges1"] = {"Count": 41}
+    with pytest.raises(BadAnswerError, match="41 edges, where 40 have room"):
+        cubesense.edges()
