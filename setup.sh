@@ -32,7 +32,7 @@ command -v "$PYTHON" >/dev/null 2>&1 || need "Python 3.11 or newer" python3 pyth
 
 extras=""
 if [ "$kind" = dev ]; then
-    extras="dev"
+    extras="dev,hdl"
     command -v iverilog >/dev/null 2>&1 || need "Icarus Verilog, for the HDL tests" iverilog
     # Programs of others that tests point at the emulator; without them those tests are skipped.
     missing=""
