@@ -80,6 +80,24 @@ def test_monitors_show_what_the_parts_draw(board: CubeSenseBoard) -> None:
     assert hardware.adc_counts(Monitor.SRAM2) == 1023  # no more than full scale
 
 
+@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.parametrize("sram", Sram)
+def test_a_picture_on_its_way_takes_current(
+    board: CubeSenseBoard, camera: Camera, sram: Sram
+) -> None:
+    """Storing takes it in one memory; FPGAs take it on their own, or both of them linked."""
+    let_pass(board, 500)
+    idle_ma = board.power.current_ma()
+    board.serial().write(bytes([0x1F, 0x7F, 20, camera, sram, 0x1F, 0xFF]))
+    let_pass(board, 10)
+    taken = [board.power.current_ma(half.name) for half in Sram]
+    assert taken == [7.6 if half is sram else 4.6 for half in Sram]
+    fpgas = 1 if sram == camera else 2
+    assert board.power.current_ma() - idle_ma == pytest.approx(3.0 + 4.3 * fpgas)
+    let_pass(board, 500)
+    assert board.power.current_ma() == pytest.approx(idle_ma)
+
+
 def test_a_memory_loses_its_content_with_its_supply(board: CubeSenseBoard) -> None:
     let_pass(board, 500)
     before = {half: memory.copy() for half, memory in board.engine.memories.items()}
