@@ -58,8 +58,9 @@ def identify(
             and `verification`.
         hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
     """
-    smeared = measured.smear_px > profile.smear_px
-    if smeared and profile.verify and measured.skew_px > profile.skew_px:
+    # As published, there is no such reason, and its spike removal cuts stars into long pieces.
+    smeared = profile.verify and measured.smear_px > profile.smear_px
+    if smeared and measured.skew_px > profile.skew_px:
         return unsolved(Outcome.NONE, Reason.SMEAR, measured)
     solution = _identify(measured, field, profile, database, meter, hint)
     if smeared and solution.outcome is Outcome.NONE:

@@ -32,6 +32,9 @@ BLOCK_SIGMAS = 4.0
 SHORTEST_PX = 40.0
 """Of a streak among blocks; a group of stars that do not move may look half as long."""
 
+ALIKE = 0.7
+"""Of the longest, to agree with it."""
+
 QUARTILES_APART = 1.349
 """Between the quartiles of a normal distribution, in standard deviations."""
 
@@ -52,7 +55,7 @@ def streak_px(picture: NDArray[np.uint8], field: Field, agreeing: int, meter: Me
     Args:
         picture: (rows, columns) grey levels.
         field: the camera; blocks that are not wholly in its field do not count.
-        agreeing: so many streaks must be as long.
+        agreeing: so many streaks must be about as long: stray light makes one, not two alike.
         meter: charged.
     """
     sums = _blocks(picture).sum(axis=(1, 3), dtype=np.int32)
@@ -66,8 +69,10 @@ def streak_px(picture: NDArray[np.uint8], field: Field, agreeing: int, meter: Me
     if regions is None:
         return 0.0
     lengths = sorted(_lengths(regions, np.ones(len(regions.labels), np.float32), meter))
-    longest = BLOCK * lengths[-agreeing] if len(lengths) >= agreeing else 0.0
-    return longest if longest >= SHORTEST_PX else 0.0
+    if len(lengths) < agreeing or lengths[-agreeing] < ALIKE * lengths[-1]:
+        return 0.0
+    length = BLOCK * lengths[-agreeing]
+    return length if length >= SHORTEST_PX else 0.0
 
 
 def _blocks(pixels: NDArray[Any]) -> NDArray[Any]:

@@ -65,7 +65,8 @@ class Profile:
         candidates: with verification, so many candidates of a triple are tried at most, and pivots
             only serve to leave no more.
         hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (ours).
-        smear_px: where stars are drawn out farther, that is why there is no attitude (ours).
+        smear_px: with verification, where stars are drawn out farther, that is why there is no
+            attitude.
         skew_px: with verification, stars that also moved farther from row to row are refused.
     """
 

@@ -11,14 +11,21 @@ pair_linked_ms    CubeSense: one frame across the link
 pair_both_ms      CubeSense: both frames at once
 pair_scan_ms      CubeSense: one nadir scan, SRAM to microcontroller
 pair_build_s      as cold_build_s, both of CubeSense's FPGAs
+aramis_ratio      as realtime_ratio, AraMiS, lost in space with verification
+aramis_frame_ms   AraMiS: rendering one frame with all its stars and noise
+aramis_solve_ms   AraMiS: one solve, from the picture to the attitude
 """
 
 import argparse
 import json
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from cubestack.firmware_model.interface.aramis import MeasurementMode
 from cubestack.firmware_model.interface.cubesense_codes import Camera
+from cubestack.firmware_model.interface.mt9m001 import REGISTERS
+from cubestack.host.cli.aramis_session import aramis_catalogue, open_aramis
 from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.cli.terminal import console
 
@@ -29,6 +36,7 @@ __all__ = ["add_arguments", "run"]
 
 LOOP_ITERATIONS = 10
 CAPTURES = 5
+HIGHEST_GAIN = 15.0
 PS_PER_S = 10**12
 
 
@@ -63,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
         figures[f"pair_{way}_ms"] = round(pair_store_ms(way), 1)
     figures["pair_scan_ms"] = round(pair_scan_ms(), 1)
     figures["pair_build_s"] = round(cold_build_s(cubesense_wiring()), 1)
+    figures |= _aramis()
     if args.json:
         print(json.dumps(figures))
         return 0
@@ -107,6 +116,52 @@ def _realtime_ratio(session: "Session") -> float:
     ratio = (kernel.now - virtual) / PS_PER_S / (time.perf_counter() - wall)
     client.command("StopLoop")
     return ratio
+
+
+def _aramis() -> dict[str, float]:
+    """The loop of the third sensor, and the wall times of what it spends them on."""
+    from cubestack.emulator.camera.mt9m001_imager import Mt9m001Imager
+    from cubestack.emulator.camera.mt9m001_lens import aramis_lens
+    from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
+    from cubestack.emulator.camera.mt9m001_registers import read_settings
+    from cubestack.emulator.camera.register_file import RegisterFile
+    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.sky.scene import SkyScene
+    from cubestack.firmware_model.aramis.background import Background
+    from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
+    from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
+    from cubestack.firmware_model.costs import Meter
+
+    database = aramis_catalogue()
+    scene = SkyScene(quaternion_from_pointing(84.0, -1.0, 0.0), optics=aramis_lens())
+    with open_aramis(scene) as session:
+        session.aramis.activate()
+        client, kernel = session.aramis.client, session.board.kernel
+        client.command("StartLoop", Period=1000, Mode=MeasurementMode.LOST_IN_SPACE)
+        client.pause(2.0)
+        virtual, wall = kernel.now, time.perf_counter()
+        client.pause(float(LOOP_ITERATIONS))
+        ratio = (kernel.now - virtual) / PS_PER_S / (time.perf_counter() - wall)
+        client.command("StopLoop")
+        frames: list[float] = []
+        imager = Mt9m001Imager(0, NoiseTerms(), None)
+        settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(HIGHEST_GAIN,) * 4)
+        shutter = session.board.ppi.stored
+        assert shutter is not None
+        for _ in range(CAPTURES):
+            started = time.perf_counter()
+            picture = imager.picture(scene, shutter, settings)
+            frames.append(time.perf_counter() - started)
+    solves: list[float] = []
+    for _ in range(CAPTURES):
+        started = time.perf_counter()
+        solve(picture, Background(), VERIFIED, database, Meter(BLACKFIN_BF533))
+        solves.append(time.perf_counter() - started)
+    return {
+        "aramis_ratio": round(ratio, 2),
+        "aramis_frame_ms": round(1000 * min(frames), 1),
+        "aramis_solve_ms": round(1000 * min(solves), 1),
+    }
 
 
 def _sensors_ratio(sensors: "CubeSenseSession") -> float:

@@ -1,0 +1,63 @@
+"""`cubestack measure aramis` with the whole catalogue: rates, accuracy, motion, upsets."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+Frames = list[dict[str, Any]]
+
+GOAL_DEG = 200 / 3600
+"""AraMiS thesis, section 2.1: hundreds of seconds of arc."""
+
+
+def test_lost_in_space_among_false_stars(measure: Callable[..., Frames]) -> None:
+    for frame in measure("--frames", 8, "--seed", 21, "--false-stars", 5):
+        assert (frame["right"], frame["reason"], frame["wrong"]) == (True, "confirmed", 0)
+        assert frame["error_cross_deg"] < GOAL_DEG
+
+
+def test_near_a_rough_direction_as_published_nothing_is_wrong(
+    measure: Callable[..., Frames],
+) -> None:
+    frames = measure(
+        "--frames", 8, "--seed", 22, "--published", "--mode", "assisted", "--hint-error", 2
+    )
+    assert sum(frame["right"] for frame in frames) >= 6
+    for frame in frames:
+        assert frame["right"] == frame["solved"]
+        if frame["solved"]:
+            assert frame["error_cross_deg"] < GOAL_DEG
+
+
+def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Callable[..., Frames]) -> None:
+    for frame in measure("--frames", 2, "--seed", 23, "--roll-rate", 10):
+        assert frame["right"]
+        assert frame["error_cross_deg"] < 0.1
+        assert abs(frame["error_roll_deg"]) < 0.1
+    for frame in measure("--frames", 2, "--seed", 24, "--rate", 10):
+        assert (frame["solved"], frame["outcome"], frame["reason"]) == (False, "none", "smear")
+
+
+def test_upsets_in_flash_are_corrected(measure: Callable[..., Frames]) -> None:
+    for frame in measure("--frames", 3, "--seed", 25, "--bit-flips", 1e-6):
+        assert frame["right"]
+        assert frame["corrected"] <= frame["flips"]
+        assert frame["flips"] > 10
+        assert frame["corrected"] > 10
+        assert frame["lost"] == 0
+
+
+def test_a_second_takes_less_than_a_second(measure: Callable[..., Frames]) -> None:
+    """With room for a machine that has more to do: half of it is usual."""
+    frames = measure("--frames", 5, "--seed", 26)
+    virtual = frames[-1]["image_time_s"] - frames[0]["image_time_s"]
+    wall = sum(frame["wall_ms"] for frame in frames[1:]) / 1000
+    assert wall < 4 * virtual
+
+
+@pytest.mark.parametrize("field", [18.0])
+def test_the_likely_lens(measure: Callable[..., Frames], field: float) -> None:
+    for frame in measure("--frames", 3, "--seed", 27, "--field", field):
+        assert frame["right"]
+        assert frame["error_cross_deg"] < GOAL_DEG

@@ -1,0 +1,82 @@
+"""AraMiS' ports as unmodified programs use them: terminal, I2C bus; and the demonstration."""
+
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+from PIL import Image
+
+from cubestack.emulator.camera.mt9m001_lens import aramis_lens
+from cubestack.emulator.sky.attitude import attitude_error_deg, quaternion_from_pointing
+from cubestack.emulator.sky.scene import SkyScene
+from cubestack.firmware_model.interface.aramis import INTERFACE, CatalogueState
+from cubestack.host.aramis import Aramis
+from cubestack.host.cli.aramis_session import open_aramis
+from cubestack.host.cli.main import main
+from cubestack.host.i2c_client import I2cClient
+from tests.system.conftest import COMMAND, Served
+
+POINTING_DEG = (84.0, -1.0, 20.0)
+TRUTH = quaternion_from_pointing(*POINTING_DEG)
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Path]:
+    """An emulator process of its own; the path of its port."""
+    ra, dec, roll = POINTING_DEG
+    (tmp_path / "sky.toml").write_text(
+        f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\n'
+    )
+    command = [*COMMAND, "emulate", "aramis", "--scene", "sky.toml", "--pty", "ttyARAMIS"]
+    emulator = Served([*command, "--pace", "fast"], tmp_path)
+    yield tmp_path / "ttyARAMIS"
+    assert emulator.end() == 0
+
+
+def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
+    with serial.Serial(str(served), 57_600, timeout=30) as port:
+
+        def command(*payload: int) -> None:
+            port.write(bytes([0x1F, 0x7F, *payload, 0x1F, 0xFF]))
+            assert port.read(5) == bytes.fromhex("1F7F 00 1FFF")
+            deadline = time.monotonic() + 30
+            while time.monotonic() < deadline:
+                port.write(bytes.fromhex("1F7F 83 1FFF"))
+                if port.read_until(b"\x1f\xff")[2] == 1:
+                    return
+            raise AssertionError("never done")
+
+        command(1)
+        command(4)
+        port.write(bytes.fromhex("1F7F 86 1FFF"))
+        answer = port.read_until(b"\x1f\xff")[2:-2].replace(b"\x1f\x1f", b"\x1f")
+    *quaternion, _, _, _, _ = struct.unpack_from("<4fIIII", answer)
+    outcome, reason, mode, valid = answer[32:36]
+    assert (outcome, reason, mode, valid) == (1, 2, 0, 1)
+    cross, roll = attitude_error_deg(np.array(quaternion), TRUTH)
+    assert cross < 0.01
+    assert abs(roll) < 0.05
+
+
+def test_the_same_over_i2c() -> None:
+    with open_aramis(SkyScene(TRUTH, optics=aramis_lens())) as session:
+        bus = session.board.i2c()
+        bus.wait(0.1)
+        client = I2cClient(bus, INTERFACE, 0x1D, wait=bus.wait)
+        aramis = Aramis(client)
+        assert aramis.activate() is CatalogueState.GOOD
+        found = aramis.measure()
+        assert found.valid
+        assert found.quaternion is not None
+        assert attitude_error_deg(found.quaternion, TRUTH)[0] < 0.01
+
+
+def test_demonstration(tmp_path: Path) -> None:
+    assert main(["demo", "aramis", "--out", str(tmp_path)]) == 0
+    for name in ("aramis-raw.png", "aramis-stars.png"):
+        with Image.open(tmp_path / name) as picture:
+            assert picture.size >= (1280, 1024)
