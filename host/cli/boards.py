@@ -81,12 +81,23 @@ class Opened:
 
 
 def open_board(
-    device: str, scene: Path | None, *, seed: int, engine: Engine, baud: int | None
+    device: str,
+    scene: Path | None,
+    *,
+    seed: int,
+    engine: Engine,
+    baud: int | None,
+    mcu_addressing: bool = False,
 ) -> Opened:
     """Power up ``device`` (a name of ``DEVICES``); ``scene`` None is its default scene.
 
-    ``baud`` is of the node protocol's line, None for the published one.
+    ``baud`` is of the node protocol's line, None for the published one. ``mcu_addressing`` is an
+    option of CubeSense's FPGAs; ValueError for another device.
     """
+    if mcu_addressing:
+        if device != "cubesense":
+            raise ValueError(f"--mcu-addressing is an option of cubesense, not of {device}")
+        return _cubesense(scene, seed, engine, baud, mcu_addressing=True)
     return DEVICES[device](scene, seed, engine, baud)
 
 
@@ -121,11 +132,20 @@ def _cubestar(path: Path | None, seed: int, engine: Engine, baud: int | None) ->
     return Opened("CubeStar", board, (SerialLine("node protocol", "", board.uart, baud),))
 
 
-def _cubesense(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+def _cubesense(
+    path: Path | None,
+    seed: int,
+    engine: Engine,
+    baud: int | None,
+    *,
+    mcu_addressing: bool = False,
+) -> Opened:
     from cubestack.emulator.cubesense import CubeSenseBoard
 
     baud = baud or CUBESENSE.baud
-    board = CubeSenseBoard(cubesense_scene(path), seed=seed, engine=engine, baud=baud)
+    board = CubeSenseBoard(
+        cubesense_scene(path), seed=seed, engine=engine, baud=baud, mcu_addressing=mcu_addressing
+    )
     lines = (
         SerialLine("node protocol", "", board.uart, baud),
         SerialLine("bench protocol", ".bench", board.bench_uart, BENCH.baud),

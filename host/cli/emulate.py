@@ -61,6 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_engine_arguments(parser)
     add_layout_argument(parser)
     parser.add_argument(
+        "--mcu-addressing",
+        action="store_true",
+        help="cubesense: FPGAs that let the processor choose addresses (telecommand 100)",
+    )
+    parser.add_argument(
         "--pace",
         choices=("real", "fast"),
         default="real",
@@ -83,7 +88,14 @@ def run(args: argparse.Namespace) -> int:
         devices = []
         for name in args.devices:
             devices.append(
-                open_board(name, args.scene, seed=args.seed, engine=args.engine, baud=args.baud)
+                open_board(
+                    name,
+                    args.scene,
+                    seed=args.seed,
+                    engine=args.engine,
+                    baud=args.baud,
+                    mcu_addressing=args.mcu_addressing,
+                )
             )
             stack.callback(devices[-1].board.close)
         if len(devices) == 1:

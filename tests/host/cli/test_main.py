@@ -85,6 +85,7 @@ def test_help(run: Run, command: str | None) -> None:
         (("emulate", "cubestar", "--tcp", "70000"), ("70000", "65535")),
         (("emulate", "aramis", "--engine", "compiled"), ("--engine", "FPGA")),
         (("emulate", "cubestar", "cubestar"), ("once", "cubestar")),
+        (("emulate", "cubestar", "--mcu-addressing"), ("--mcu-addressing", "cubesense")),
         (("emulate", "cubestar", "aramis", "--scene", "a.toml"), ("--scene", "several")),
         (("emulate", "cubestar", "aramis", "--record", "a"), ("--record", "several")),
         (("emulate", "cubestar", "--i2c", "256"), ("256", "255")),
