@@ -22,7 +22,7 @@ LARGEST = 10
 UPPER_QUARTILE = 75
 """Of the lengths: long streaks fall apart, and their pieces are shorter."""
 
-DRAWN_OUT_PX = 3.0
+DRAWN_OUT_PX = 2.5
 """Stars that do not move seldom look so long."""
 
 BLOCK = 8
@@ -32,7 +32,7 @@ BLOCK_SIGMAS = 4.0
 SHORTEST_PX = 40.0
 """Of a streak among blocks; a group of stars that do not move may look half as long."""
 
-ALIKE = 0.7
+ALIKE = 0.4
 """Of the longest, to agree with it."""
 
 QUARTILES_APART = 1.349
