@@ -17,7 +17,7 @@ from cubestack.host.transport import open_transport
 
 __all__ = ["show"]
 
-POINTING_DEG = (56.9, 24.0, 0.0)  # the Pleiades
+POINTING_DEG = (84.0, -1.0, 20.0)  # Orion
 ROUGHLY_OFF_DEG = 2.0
 
 
@@ -26,7 +26,7 @@ def show(args: argparse.Namespace) -> bool:
     from cubestack.emulator.sky.attitude import matrix_from_quaternion, quaternion_from_pointing
 
     started = time.monotonic()
-    console.rule("star tracker without FPGA: the Pleiades, 21.5 deg, 2026")
+    console.rule("star tracker without FPGA: Orion, 21.5 deg, 2026")
     ra, dec, roll = POINTING_DEG
     truth = quaternion_from_pointing(ra, dec, roll)
     scene = args.out / "aramis-sky.toml"
