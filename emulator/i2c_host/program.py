@@ -145,9 +145,7 @@ def start_preloaded(command: Sequence[str], environment: dict[str, str], library
     if program is not None and is_static(Path(program)):
         raise RouteError(f"{program} is linked statically, so no library can be loaded into it")
     if SEPARATORS & set(str(library)):
-        raise RouteError(
-            f"{library} has a blank or colon; XDG_CACHE_HOME names another folder"
-        )
+        raise RouteError(f"{library} has a blank or colon; XDG_CACHE_HOME names another folder")
     others = os.environ.get("LD_PRELOAD")
     preload = f"{library} {others}" if others else str(library)
     process = subprocess.Popen(
