@@ -4,7 +4,8 @@
 /dev/ttyUSB0, ./ttyCUBE     a serial port
 tcp://HOST:PORT             a serial line on TCP
 rfc2217://HOST:PORT         a serial port on TCP whose rate the client sets
-i2c:BUS[:ADDR]              /dev/i2c-BUS, 7-bit address of the node (default: the device's)
+i2c:BUS[:ADDR]              /dev/i2c-BUS, or the emulated bus where there is no such file; 7-bit
+                            address of the node (default: the device's)
 recorded:FILE               a recording, which answers like the device did
 ==========================  ===================================================================
 
@@ -15,7 +16,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from smbus2 import SMBus
 
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
@@ -182,18 +186,31 @@ def _open_i2c(text: str, device: str | None, tape: Tape | None) -> Target:
         found = [name for name, known in INTERFACES.items() if address in _addresses(known)]
         device = found[0] if found else None
     interface = interface_of(device, text)
-    from smbus2 import SMBus
-
-    try:
-        opened = SMBus(number)
-    except OSError as error:
-        raise PortOpenError(f"can not open /dev/i2c-{number}: {error.strerror}") from error
+    opened = _open_bus(number)
     bus: I2cBus = opened if tape is None else tape.bus(opened)
     own = None if address in _addresses(interface)[1:] else address
     target = Target(text, interface, I2cClient(bus, interface, own))
     target.registers = with_i2c(target, bus)
     target.on_close.append(opened.close)
     return target
+
+
+def _open_bus(number: int) -> "SMBus":
+    """The device file of bus ``number``; where there is none, the emulated bus of that number."""
+    from smbus2 import SMBus
+
+    try:
+        return SMBus(number)
+    except FileNotFoundError as error:
+        from cubestack.host.smbus import CubeSMBus
+
+        try:
+            return CubeSMBus(number)
+        except PortOpenError as emulated:
+            reason = f"can not open /dev/i2c-{number}: {error.strerror}; {emulated}"
+            raise PortOpenError(reason) from error
+    except OSError as error:
+        raise PortOpenError(f"can not open /dev/i2c-{number}: {error.strerror}") from error
 
 
 def _addresses(interface: Interface) -> list[int]:

@@ -1,0 +1,76 @@
+"""Three devices on one I2C bus of an emulation, reached by other processes."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.linux_i2c import socket_path
+from cubestack.host.targets import INTERFACES, open_target
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
+BUS = 16 + os.getpid() % 200
+ADDRESSES = [interface.i2c_address for interface in INTERFACES.values()]
+READ_ALL = (
+    "import smbus2\n"
+    f"bus = smbus2.SMBus({BUS})\n"
+    f"print(*(bus.read_byte_data(node, 0x80) for node in {ADDRESSES}))\n"
+)
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """`emulate` with all three, whose sockets are in a folder of their own."""
+    folder = tmp_path_factory.mktemp("run", numbered=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        patch.delenv("CUBESTACK_I2C_SOCKET", raising=False)
+        process = subprocess.Popen(
+            [*COMMAND, "emulate", "cubestar", "cubesense", "aramis", "--i2c", str(BUS)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            cwd=folder,
+            env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        )
+        assert process.stdout is not None
+        lines = []
+        for line in process.stdout:
+            lines.append(line)
+            if socket_path(BUS).exists():
+                break
+        try:
+            assert socket_path(BUS).exists(), "".join(lines)
+            yield
+        finally:
+            process.terminate()
+            process.communicate(timeout=30)
+
+
+@pytest.mark.parametrize("route", ["seccomp", "preload"])
+def test_a_program_finds_every_device(served: None, route: str) -> None:
+    run = [*COMMAND, "run", "--bus", str(BUS), "--attach", "--route", route, "--"]
+    probe = subprocess.run([*run, "true"], capture_output=True, text=True, timeout=60)
+    if probe.returncode != 0:
+        pytest.skip(f"no {route} route here: {probe.stderr.strip()}")
+    program = [*run, sys.executable, "-c", READ_ALL]
+    outcome = subprocess.run(program, capture_output=True, text=True, timeout=60)
+    assert outcome.returncode == 0, outcome.stderr
+    assert len(outcome.stdout.split()) == len(ADDRESSES)
+
+
+@pytest.mark.skipif(Path(f"/dev/i2c-{BUS}").exists(), reason="a real bus of that number")
+def test_a_target_without_a_device_file_is_the_emulated_bus(served: None) -> None:
+    target = open_target(f"i2c:{BUS}:{INTERFACE.i2c_address:#04x}")
+    try:
+        assert target.interface is INTERFACE
+        assert target.node.telemetry("Identification")
+    finally:
+        target.close()
