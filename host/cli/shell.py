@@ -39,7 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("target", metavar="TARGET", help=TARGETS)
     source = parser.add_mutually_exclusive_group()
-    source.add_argument("-c", dest="commands", metavar="COMMANDS", help="separated by semicolons")
+    source.add_argument(
+        "-c",
+        dest="commands",
+        action="append",
+        metavar="COMMANDS",
+        help="separated by semicolons; may be given again",
+    )
     source.add_argument("--script", type=Path, metavar="FILE", help="one command a line")
     parser.add_argument("--json", action="store_true", help="one object for each command")
     add_target_arguments(parser)
@@ -68,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _lines(args: argparse.Namespace) -> list[str] | None:
     if args.commands is not None:
-        return list(split_commands(args.commands))
+        return [line for text in args.commands for line in split_commands(text)]
     if args.script is None:
         return None
     try:

@@ -81,6 +81,12 @@ def test_first_failure_ends_the_run(shell):
     assert "nothing is called 'x'" in err
 
 
+def test_commands_of_several_options_all_run(shell):
+    code, out, err = shell("emulated:cubesense", "-c", "read SUN_GAIN", "-c", "read x")
+    assert (code, out.count("SUN_GAIN")) == (2, 1)
+    assert "nothing is called 'x'" in err
+
+
 def test_semicolons_in_quotes_are_kept():
     assert list(split_commands("a; b 'x;y' ;\nc")) == ["a", " b 'x;y' ", "", "c"]
 
