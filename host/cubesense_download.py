@@ -5,6 +5,7 @@ telemetry ImageFrameInfo is polled until it is ready, then it is read and its ch
 """
 
 import math
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     checksum,
 )
 from cubestack.host.client import Client, Progress
-from cubestack.host.errors import BadAnswerError, NoAnswerError
+from cubestack.host.errors import BadAnswerError, HostError, NoAnswerError
 
 __all__ = ["download_image", "picture_of"]
 
@@ -43,7 +44,7 @@ def download_image(
     for number in range(size.frames):
         if number:
             _prepare(client, number)
-        square[number] = np.frombuffer(_read(client, number), np.uint8)
+        square[number] = np.frombuffer(_read(client, number, sram), np.uint8)
         if progress is not None:
             progress(number + 1, size.frames)
     return square.reshape(size.side, size.side)
@@ -73,9 +74,9 @@ def _prepare(client: Client, number: int) -> None:
                 raise
 
 
-def _read(client: Client, number: int) -> bytes:
+def _read(client: Client, number: int, sram: Sram) -> bytes:
     """The frame, once it is ready."""
-    expected = _wait_ready(client, number)
+    expected = _wait_ready(client, number, sram)
     for _ in range(ATTEMPTS):
         frame = client.telemetry("ImageFrame")["Frame"]
         assert isinstance(frame, bytes)
@@ -87,11 +88,15 @@ def _read(client: Client, number: int) -> bytes:
     )
 
 
-def _wait_ready(client: Client, number: int) -> int:
+def _wait_ready(client: Client, number: int, sram: Sram) -> int:
     """Poll until the frame is ready; returns its checksum."""
     for _ in range(math.ceil(FRAME_TIMEOUT_S / POLL_PERIOD_S)):
         values = client.telemetry("ImageFrameInfo")
         if values["FrameNumber"] == number:
             return int(values["Checksum"])
         client.pause(POLL_PERIOD_S)
-    raise NoAnswerError(f"image frame {number} not ready within {FRAME_TIMEOUT_S:g} s")
+    late = f"image frame {number} not ready within {FRAME_TIMEOUT_S:g} s"
+    with suppress(HostError):
+        if client.telemetry("Power")[f"OverCurrent{sram + 1}"]:
+            late += f": {sram.name} drew too much current and may be off (see telemetry Power)"
+    raise NoAnswerError(late)

@@ -87,6 +87,16 @@ def test_commands_of_several_options_all_run(shell):
     assert "nothing is called 'x'" in err
 
 
+def test_a_picture_whose_memory_is_cut_off(shell, tmp_path):
+    commands = (
+        "write CaptureOnly SUN SRAM1 TOP; time 1; fault latch-up SRAM1;"
+        f"image '{tmp_path / 'x.png'}'"
+    )
+    code, _, err = shell("emulated:cubesense", "-c", commands)
+    assert code == 1
+    assert "SRAM1 drew too much current" in err
+
+
 def test_semicolons_in_quotes_are_kept():
     assert list(split_commands("a; b 'x;y' ;\nc")) == ["a", " b 'x;y' ", "", "c"]
 
