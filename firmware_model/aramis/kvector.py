@@ -25,6 +25,9 @@ VALUES_PER_BIN = 4
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
+_NARROWEST = np.finfo(np.float32).tiny
+"""A list that spans less is one bin: the inverse of its span is no number."""
+
 
 @dataclass(frozen=True)
 class Range:
@@ -90,7 +93,7 @@ class KVector:
     def _bin(self, values: NDArray[np.float32]) -> NDArray[np.intp]:
         """Bins of values of any shape: the parabola (top - y)^2 = (top - lowest)^2 (1 - x)."""
         span = self.highest - self.lowest
-        scale = _ONE / span if span > 0 else _ZERO
+        scale = _ONE / span if span >= _NARROWEST else _ZERO
         below = np.clip((self.highest - values) * scale, _ZERO, _ONE)
         bins = len(self.starts) - 1
         numbers: NDArray[np.float32] = (_ONE - below * below) * np.float32(bins - 1)

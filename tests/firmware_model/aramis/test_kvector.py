@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -29,6 +29,7 @@ def found(rising: Values, low: float, high: float, per_bin: int = 4) -> list[int
 floats = st.floats(-1e6, 1e6, width=32)
 
 
+@example([0.0, 1e-45], 0.0, 0.0, 1)
 @given(st.lists(floats, min_size=1, max_size=200), floats, floats, st.integers(1, 30))
 @settings(max_examples=300, deadline=None)
 def test_any_list_and_any_range(values: list[float], a: float, b: float, per_bin: int) -> None:
