@@ -20,7 +20,7 @@ from cubestack.emulator.camera.ppi import Ppi
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.i2c import I2cBus
+from cubestack.emulator.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.no_fpga import NoFpga
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
@@ -146,7 +146,7 @@ class AramisBoard:
         )
         self.power.on_switch = self._supply_switched
         self.i2c_bus = I2cBus(self.kernel)
-        self.i2c_bus.attach(i2c_address, _SatelliteTarget(self))
+        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
         self._show_camera()
 
     @cached_property
@@ -278,22 +278,3 @@ class _CameraBus:
             return None
         self._board._show_camera()
         return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)
-
-
-class _SatelliteTarget:
-    """The program that runs now, on the satellite's I2C bus."""
-
-    def __init__(self, board: AramisBoard) -> None:
-        self._board = board
-
-    def i2c_start(self, read: bool) -> None:
-        self._board.program.link.i2c_start(read)
-
-    def i2c_write(self, byte: int) -> bool:
-        return self._board.program.link.i2c_write(byte)
-
-    def i2c_read(self) -> int:
-        return self._board.program.link.i2c_read()
-
-    def i2c_stop(self) -> None:
-        self._board.program.link.i2c_stop()

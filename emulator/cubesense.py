@@ -13,10 +13,10 @@ import numpy as np
 from cubestack.emulator.camera.ov7620 import Ov7620
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.cubesense_lines import Lines
-from cubestack.emulator.cubesense_processor import Pic18f45k20, ProgramTarget
+from cubestack.emulator.cubesense_processor import Pic18f45k20
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.i2c import I2cBus
+from cubestack.emulator.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
 from cubestack.emulator.power_tables import CUBESENSE
@@ -142,8 +142,8 @@ class CubeSenseBoard:
             on_pin=lambda pin, _level: self._pin_changed(pin),
         )
         self.i2c_bus = I2cBus(self.kernel)
-        self.i2c_bus.attach(i2c_address, ProgramTarget(lambda: self.program.node))
-        self.i2c_bus.attach(register_address, ProgramTarget(lambda: self.program.registers))
+        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.node))
+        self.i2c_bus.attach(register_address, CurrentTarget(lambda: self.program.registers))
 
     @property
     def program(self) -> CubeSenseProgram:

@@ -1,4 +1,4 @@
-"""CubeSense's microcontroller: its peripherals as its program sees them, and its I2C addresses.
+"""CubeSense's microcontroller: its peripherals as its program sees them.
 
 CubeSense thesis, table 3.3: two serial ports, the converter behind the current monitors, a timer.
 """
@@ -6,7 +6,6 @@ CubeSense thesis, table 3.3: two serial ports, the converter behind the current 
 from collections.abc import Callable, Mapping
 
 from cubestack.emulator.cubesense_lines import CHANNELS
-from cubestack.emulator.i2c import I2cTarget
 from cubestack.emulator.power import PowerModel
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import PS_PER_MS, Kernel
@@ -18,7 +17,7 @@ from cubestack.firmware_model.interface.cubesense_pins import (
     Monitor,
 )
 
-__all__ = ["Pic18f45k20", "ProgramTarget"]
+__all__ = ["Pic18f45k20"]
 
 
 class Pic18f45k20:
@@ -75,27 +74,3 @@ class Pic18f45k20:
     def uptime_ms(self) -> int:
         """Time since the latest reset in ms."""
         return (self._kernel.now - self._reset_ps) // PS_PER_MS
-
-
-class ProgramTarget:
-    """A protocol of the program that runs now, on the satellite's I2C bus."""
-
-    def __init__(self, link: Callable[[], I2cTarget]) -> None:
-        """``link`` gives the protocol's side of that program."""
-        self._link = link
-
-    def i2c_start(self, read: bool) -> None:
-        """See I2cTarget."""
-        self._link().i2c_start(read)
-
-    def i2c_write(self, byte: int) -> bool:
-        """See I2cTarget."""
-        return self._link().i2c_write(byte)
-
-    def i2c_read(self) -> int | None:
-        """See I2cTarget."""
-        return self._link().i2c_read()
-
-    def i2c_stop(self) -> None:
-        """See I2cTarget."""
-        self._link().i2c_stop()

@@ -15,7 +15,7 @@ from cubestack.emulator.camera.optics import ROWS
 from cubestack.emulator.camera.shutter import RollingShutter
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.i2c import I2cBus
+from cubestack.emulator.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
 from cubestack.emulator.power_tables import CUBESTAR
@@ -116,7 +116,7 @@ class CubeStarBoard:
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
         self.i2c_bus = I2cBus(self.kernel)
-        self.i2c_bus.attach(i2c_address, _SatelliteTarget(self))
+        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
         self._pins = {"ENABLE": 0, "RNW": 0}
         self._storing_since_ps = 0
         self._stored: RollingShutter | None = None
@@ -252,22 +252,3 @@ class _CameraBus:
         if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
             return None
         return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)
-
-
-class _SatelliteTarget:
-    """The program that runs now, on the satellite's I2C bus."""
-
-    def __init__(self, board: CubeStarBoard) -> None:
-        self._board = board
-
-    def i2c_start(self, read: bool) -> None:
-        self._board.program.link.i2c_start(read)
-
-    def i2c_write(self, byte: int) -> bool:
-        return self._board.program.link.i2c_write(byte)
-
-    def i2c_read(self) -> int:
-        return self._board.program.link.i2c_read()
-
-    def i2c_stop(self) -> None:
-        self._board.program.link.i2c_stop()

@@ -7,7 +7,7 @@ transfers queue for the wire.
 """
 
 import errno
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -15,7 +15,7 @@ import simpy
 
 from cubestack.emulator.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["I2cBus", "I2cDisturbance", "I2cMessage", "I2cNackError", "I2cTarget"]
+__all__ = ["CurrentTarget", "I2cBus", "I2cDisturbance", "I2cMessage", "I2cNackError", "I2cTarget"]
 
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
@@ -89,6 +89,30 @@ class I2cDisturbance(Protocol):
 
     def after_byte(self, address: int, read: bool) -> Generator[simpy.Event, Any, None]:
         """A byte was sent by the host, or by the target, and is not acknowledged yet."""
+
+
+class CurrentTarget:
+    """Hands every call on to the program that runs now, which a reset replaces."""
+
+    def __init__(self, link: Callable[[], I2cTarget]) -> None:
+        """Ask ``link`` for the program's end of the bus at each call."""
+        self._link = link
+
+    def i2c_start(self, read: bool) -> None:
+        """See I2cTarget."""
+        self._link().i2c_start(read)
+
+    def i2c_write(self, byte: int) -> bool:
+        """See I2cTarget."""
+        return self._link().i2c_write(byte)
+
+    def i2c_read(self) -> int | None:
+        """See I2cTarget."""
+        return self._link().i2c_read()
+
+    def i2c_stop(self) -> None:
+        """See I2cTarget."""
+        self._link().i2c_stop()
 
 
 class I2cBus:

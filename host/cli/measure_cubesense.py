@@ -15,7 +15,6 @@ examples:
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from cubestack.host.cli.arguments import angle, positive, whole
 from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.session import add_engine_arguments
-from cubestack.host.cli.terminal import console, progress
+from cubestack.host.cli.terminal import collect, console
 
 if TYPE_CHECKING:
     from cubestack.host.cli.cubesense_frames import SensorResult
@@ -95,13 +94,9 @@ def run(args: argparse.Namespace) -> int:
     for name, value in POSE_DEFAULTS.items():
         if getattr(args, name) is None:
             setattr(args, name, value)
-    results: list[SensorResult] = []
     count = args.frames * (2 if args.sensor == "both" else 1)
     started = time.monotonic()
-    for result in progress(measure_sensors(args), count, "measuring", quiet=args.json):
-        results.append(result)
-        if args.json:
-            print(json.dumps(result.as_dict()), flush=True)
+    results = collect(measure_sensors(args), count, as_json=args.json)
     if not args.json:
         _report(results, time.monotonic() - started)
     return 0

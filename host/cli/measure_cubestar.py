@@ -18,7 +18,6 @@ examples:
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from cubestack.host.cli.arguments import angle, corner, number, whole
 from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
-from cubestack.host.cli.terminal import console, progress
+from cubestack.host.cli.terminal import collect, console
 
 if TYPE_CHECKING:
     from cubestack.host.cli.cubestar_frames import FrameResult
@@ -101,12 +100,8 @@ def run(args: argparse.Namespace) -> int:
             "--mag-limit, --false-stars and --no-noise belong to the random sky; a scene file "
             "has the keys mag_limit, false_stars and noise"
         )
-    results: list[FrameResult] = []
     started = time.monotonic()
-    for result in progress(measure_frames(args), args.frames, "measuring", quiet=args.json):
-        results.append(result)
-        if args.json:
-            print(json.dumps(result.as_dict()), flush=True)
+    results = collect(measure_frames(args), args.frames, as_json=args.json)
     if not args.json:
         _report(results, time.monotonic() - started)
     return 0

@@ -1,7 +1,8 @@
 """What the terminal shows: results on standard output, progress on standard error."""
 
+import json
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 from rich.console import Console
 from rich.progress import (
@@ -13,12 +14,22 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-__all__ = ["console", "progress", "progress_bar", "say"]
+__all__ = ["collect", "console", "progress", "progress_bar", "say"]
 
 console = Console()
 _errors = Console(stderr=True)
 
 T = TypeVar("T")
+
+
+class Result(Protocol):
+    """What a command measured."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+
+
+R = TypeVar("R", bound=Result)
 
 
 def say(text: str) -> None:
@@ -50,3 +61,13 @@ def progress(items: Iterable[T], total: int, label: str, *, quiet: bool = False)
         for item in items:
             yield item
             bar.advance(task)
+
+
+def collect(results: Iterable[R], total: int, *, as_json: bool) -> list[R]:
+    """All ``results``, ``total`` of them: behind a progress bar, or printed as JSON, one a line."""
+    collected = []
+    for result in progress(results, total, "measuring", quiet=as_json):
+        collected.append(result)
+        if as_json:
+            print(json.dumps(result.as_dict()), flush=True)
+    return collected

@@ -21,7 +21,7 @@ NODE = DeviceNode(7)
         ("/proc/bus/i2c", Found.LISTING),
         ("/dev/i2c-77", None),
         ("/dev/i2c-", None),
-        ("/tmp/i2c-7", None),
+        ("/var/i2c-7", None),
         ("/dev/shm/../xi2c-7", None),
         ("/dev/xi2c-7", None),
         ("i2c-7", None),
