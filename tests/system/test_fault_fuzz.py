@@ -7,37 +7,69 @@ byte.
 import hashlib
 import os
 from collections.abc import Callable
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.mt9m001_lens import aramis_lens
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.i2c import I2cMessage, I2cNackError
+from cubestack.emulator.sky.attitude import quaternion_from_pointing
 from cubestack.emulator.sky.earth_sun import EarthSunScene
 from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.frames import encode_frame
 from cubestack.firmware_model.interface.message import TELEMETRY_BIT
+from cubestack.host.cli.aramis_session import open_aramis
 from cubestack.host.cli.session import open_cubesense, open_session
+from cubestack.host.i2c_client import I2cClient
 from cubestack.host.node_client import NodeClient
+from cubestack.host.shell import has_side_effect
 
-EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "6000"))
+EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
 QUIET_S = 0.2
+ANSWER_S = 0.5
+LONGEST_STREAM_S = 600
+READ_BYTES = 1 << 16
 
 #: Share of each kind of turn; one byte, one message, one disconnect or one fault is one event.
 TURNS = {
     "noise": 0.25,
-    "telemetry": 0.35,
+    "telemetry": 0.34,
     "command": 0.02,
     "i2c": 0.25,
+    "bench": 0.01,
     "disconnect": 0.06,
     "inject": 0.05,
     "clear": 0.02,
 }
+#: Faults that a board with such targets refuses all the same.
+REFUSED = {"CubeStar": (), "CubeSense": (), "AraMiS": ("memory-stuck",)}
+
 UPSETS = {"memory-upsets": 1e-7, "register-upsets": 0.05}
+
+
+class Ear:
+    """Hears what a device sends on a line, and when to the picosecond."""
+
+    def __init__(self, trace: Any, uart: Any) -> None:
+        self.trace = trace
+        uart.taps.append(self)
+
+    def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
+        self.trace.update(b"%d %d " % (first_ps, byte_ps) + data)
+
+    def device_heard(self, byte: int, start_ps: int) -> None:
+        pass
+
+    def framing_error(self, time_ps: int) -> None:
+        self.trace.update(b"framing %d " % time_ps)
 
 
 class Fuzzer:
@@ -45,28 +77,41 @@ class Fuzzer:
 
     Attributes:
         events: how many there were.
-        trace: of all that came back, with its time.
+        trace: of all that came out of it, with its time, and of what reached the host.
     """
 
     def __init__(self, session: Any, interface: Any, seed: int) -> None:
         self.board, self.interface = session.board, interface
+        self.kernel = self.board.kernel
         self.rng = np.random.default_rng(seed)
-        self.line = self.board.serial()
-        self.bus = self.board.i2c_bus
+        self.plugs = {"uart": self.board.serial}
+        uarts = [self.board.uart]
+        if interface.bench is not None:
+            self.plugs["bench"] = self.board.bench_serial
+            uarts.append(self.board.bench_uart)
+        self.lines = {name: plug() for name, plug in self.plugs.items()}
+        self.addresses = [interface.i2c_address]
+        if interface.registers is not None:
+            self.addresses.append(interface.registers.i2c_address)
         self.trace = hashlib.sha256()
+        self.ears = [Ear(self.trace, uart) for uart in uarts]
         self.events = 0
         self.board.faults.seed = seed
         self.kinds = [
-            kind for kind, fault in FAULTS.items() if self.board.faults.targets(fault.site)
+            kind
+            for kind, fault in FAULTS.items()
+            if self.board.faults.targets(fault.site) and kind not in REFUSED[interface.name]
         ]
         self.turns = [getattr(self, f"_{name}") for name in TURNS]
-        self.shares = list(TURNS.values())
+        self.shares = list(accumulate(TURNS.values()))
+        self.steady = [m for m in interface.telemetries if m.supported and not has_side_effect(m)]
 
     def run(self, events: int) -> tuple[int, str]:
         """Make ``events``; how many faults did something, and the trace."""
         due = CHECK_EVERY
         while self.events < events:
-            self.turns[self.rng.choice(len(self.turns), p=self.shares)]()
+            turn = np.searchsorted(self.shares, self.rng.random())
+            self.turns[turn]()
             self._listen(float(self.rng.exponential(0.002)))
             if self.events >= due:
                 due = self.events + CHECK_EVERY
@@ -74,35 +119,35 @@ class Fuzzer:
         return self.board.faults.events, self.trace.hexdigest()
 
     def check(self) -> None:
-        """Without faults, a good frame is answered."""
+        """Without faults, every good frame is answered the first time, on each way in."""
         self.board.faults.clear()
         self._listen(QUIET_S)
         self._calm()
-        client = NodeClient(self.board.serial(), self.interface, timeout_s=0.5)
-        values = client.telemetry("Identification")
-        assert values["InterfaceVersion"] == self.interface.version
-        assert self.board.uart.disturbance is None or not self.board.faults._running
-        self.line = self.board.serial()
+        node = NodeClient(self.board.serial(), self.interface, timeout_s=ANSWER_S, retries=0)
+        bus = self.board.i2c()
+        clients = [node, I2cClient(bus, self.interface, wait=bus.wait, retries=0)]
+        for client in clients:
+            version = client.telemetry("Identification")["InterfaceVersion"]
+            assert version == self.interface.version
+            client.telemetry(self.steady[self.rng.integers(len(self.steady))].name)
+        self.lines["uart"] = self.board.serial()
 
     def _calm(self) -> None:
-        """A stream or a picture may be on its way: wait for its end, at most 200 s."""
-        for _ in range(1000):
+        """A stream or a picture may be on its way: wait for its end."""
+        until_ps = self.kernel.now + LONGEST_STREAM_S * PS_PER_S
+        while self.kernel.now < until_ps:
             if not self._listen(QUIET_S):
                 return
         pytest.fail("the device does not stop talking")
 
     def _listen(self, seconds: float) -> bool:
         """Let time pass; whether the device said something."""
-        until = self.board.kernel.now + int(seconds * 1e12)
+        self.kernel.advance_to(self.kernel.now + int(seconds * PS_PER_S))
         heard = False
-        while self.board.kernel.now < until:
-            left_s = (until - self.board.kernel.now) / 1e12
-            data = self.line.read(4096, left_s)
-            if data:
+        for line in self.lines.values():
+            while data := line.read(READ_BYTES, 0.0):
                 heard = True
-                self.trace.update(b"%d " % self.board.kernel.now + data)
-            elif left_s < 1e-9:
-                break
+                self.trace.update(data)
         return heard
 
     def _pick(self) -> Any:
@@ -113,7 +158,7 @@ class Fuzzer:
         if self.rng.random() < 0.3:
             data = data.replace(data[:1], b"\x1f")
         self.events += len(data)
-        self.line.write(data)
+        self.lines["uart"].write(data)
 
     def _frame(self, commands: bool) -> None:
         message = self._pick()
@@ -123,7 +168,7 @@ class Fuzzer:
         if self.rng.random() < 0.1:
             length += 1
         self.events += 1
-        self.line.write(encode_frame(bytes([message.id]) + self.rng.bytes(length)))
+        self.lines["uart"].write(encode_frame(bytes([message.id]) + self.rng.bytes(length)))
 
     def _telemetry(self) -> None:
         self._frame(commands=False)
@@ -131,9 +176,15 @@ class Fuzzer:
     def _command(self) -> None:
         self._frame(commands=True)
 
+    def _bench(self) -> None:
+        """Any byte, now and then one that takes or sends a picture."""
+        if "bench" in self.lines:
+            self.events += 1
+            self.lines["bench"].write(self.rng.bytes(1))
+
     def _i2c(self) -> None:
         self.events += 1
-        address = self.interface.i2c_address
+        address = self.addresses[self.rng.integers(len(self.addresses))]
         if self.rng.random() < 0.1:
             address = int(self.rng.integers(8, 0x78))
         messages = []
@@ -143,9 +194,8 @@ class Fuzzer:
             messages.append(I2cMessage(address, bytearray(data)))
         if self.rng.random() < 0.6 or not messages:
             messages.append(I2cMessage(address, read=int(self.rng.integers(1, 30))))
-        kernel = self.board.kernel
         try:
-            kernel.run(until=kernel.process(self.bus.transfer(messages)))
+            self.kernel.run(until=self.kernel.process(self.board.i2c_bus.transfer(messages)))
         except I2cNackError as error:
             self.trace.update(b"%d" % (error.errno or 0))
         for message in messages:
@@ -153,9 +203,10 @@ class Fuzzer:
 
     def _disconnect(self) -> None:
         self.events += 1
-        self.line.close()
-        self.board.kernel.advance_to(self.board.kernel.now + int(self.rng.integers(1, 10**9)))
-        self.line = self.board.serial()
+        name = str(self.rng.choice(list(self.lines)))
+        self.lines[name].close()
+        self.kernel.advance_to(self.kernel.now + int(self.rng.integers(1, 10**9)))
+        self.lines[name] = self.plugs[name]()
 
     def _inject(self) -> None:
         self.events += 1
@@ -168,7 +219,7 @@ class Fuzzer:
         if not FAULTS[kind].momentary:
             options["for_s"] = float(self.rng.exponential(0.05)) + 1e-6
         if self.rng.random() < 0.5:
-            options["at_s"] = self.board.kernel.now / 1e12 + float(self.rng.exponential(0.02))
+            options["at_s"] = self.kernel.now / 1e12 + float(self.rng.exponential(0.02))
         faults.inject(kind, **options)
 
     def _clear(self) -> None:
@@ -184,9 +235,16 @@ def cubesense() -> Any:
     return open_cubesense(EarthSunScene.facing(nadir_deg=(5, 5)), seed=4)
 
 
+def aramis() -> Any:
+    orion = SkyScene(quaternion_from_pointing(84, -1, 0), optics=aramis_lens())
+    return open_aramis(orion, seed=4)
+
+
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
-    ("open_board", "interface"), [(cubestar, CUBESTAR), (cubesense, CUBESENSE)]
+    ("open_board", "interface"),
+    [(cubestar, CUBESTAR), (cubesense, CUBESENSE), (aramis, ARAMIS)],
+    ids=lambda value: value.__name__ if callable(value) else "",
 )
 def test_nothing_upsets_a_board_for_good(open_board: Callable[[], Any], interface: Any) -> None:
     runs = []
