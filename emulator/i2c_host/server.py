@@ -138,9 +138,13 @@ class _Client:
         if self._waiting or self._unsent:
             self.gone = self.gone or hung_up
             return
+        received = False
         while not (self._waiting or self._unsent or self.gone):
-            if not self._take_call() and not self._receive():
+            if self._take_call():
+                continue
+            if received or not self._receive():
                 break
+            received = True  # once: a client that asks as fast as it is answered is not alone
 
     def _receive(self) -> bool:
         """Read what is there; returns whether anything came."""

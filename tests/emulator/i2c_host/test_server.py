@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cubestack.emulator.i2c_host.server import MAX_CLIENTS
+from cubestack.emulator.i2c_host.server import MAX_CLIENTS, _Client
 from cubestack.emulator.ports.serial_port import PortError
 from cubestack.firmware_model.interface.linux_i2c import (
     LENGTH,
@@ -100,6 +100,33 @@ def test_a_client_that_does_not_read_holds_up_nobody(served):
     served.serve()
     served.ask(other, Call.IOCTL, SLAVE)
     assert served.ask(other, Call.READ, pack_read(1))[0] == 1
+
+
+class Babbler:
+    """A connection whose client asks again before the last answer is out."""
+
+    def __init__(self) -> None:
+        data = request(0, Call.IOCTL, SLAVE)
+        self.frame = LENGTH.pack(len(data)) + data
+        self.looks = 0
+
+    def setblocking(self, _flag: bool) -> None: ...
+
+    def recv(self, _size: int) -> bytes:
+        self.looks += 1
+        assert self.looks < 10
+        return self.frame
+
+    def send(self, data: bytes) -> int:
+        return len(data)
+
+
+def test_a_client_that_never_pauses_is_left_for_the_next(adapter):
+    babbler = Babbler()
+    client = _Client(babbler, adapter, {})
+    client.exchange(hung_up=False)
+    client.exchange(hung_up=False)
+    assert babbler.looks == 2
 
 
 def test_a_flood_waits_in_the_operating_system(served, registers):
