@@ -1,40 +1,44 @@
-"""Builds designs for Icarus Verilog and runs cocotb modules on them."""
+"""Builds designs and runs cocotb modules on them; keeps the waveform of a test that fails."""
 
+import os
 import re
 import shutil
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 from amaranth.lib.wiring import Component
-from cocotb_tools.runner import Runner, get_runner
+from cocotb_tools.runner import Runner
+
+sys.path.append(str(Path(__file__).parent))
+
+import waves
+from regression import BASE_SEED, HERE, SIMULATOR, build, frame_environment, simulate
 
 from cubestack.hdl.generate import verilog_text
-
-HERE = Path(__file__).parent
 
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.
 INITIALISER = re.compile(r"^(\s*reg (?:\[\d+:0\] )?[^$;=]*?) = \d+'h\w+;$", re.MULTILINE)
 
-# A warning in a simulation's log. Icarus has no instances to iterate over, of which GPI warns.
-WARNING = re.compile(r"WARNING +(?! |gpi +vpi_iterate returned NULL)|[Ww]arning:")
-
 
 class Icarus:
-    """Builds each design once, then runs any number of cocotb modules on it."""
+    """Builds each design once, then runs any number of cocotb modules on it.
 
-    def __init__(self, folder: Path) -> None:
+    With ``HDL_SIMULATOR`` another simulator does, except for runs that need unknown levels.
+    """
+
+    def __init__(self, folder: Path, kept: Path = waves.FOLDER) -> None:
         self._folder = folder
+        self._kept = kept
         self._built: dict[str, Runner] = {}
         self._runs = 0
 
     def run(
         self,
-        design: type[Component],
+        design: Callable[[int, int], Component],
         columns: int,
         rows: int,
         *modules: str,
@@ -42,82 +46,57 @@ class Icarus:
         harness: str | None = None,
         initialised: bool = True,
         text: Callable[[Component, str], str] = verilog_text,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         """Run the cocotb ``modules`` on ``design``, or on the Verilog file ``harness`` around it.
 
         ``text`` makes Verilog of the design, as module of the name that it is given.
-        Fails with the names of the cocotb tests that failed and the end of their log.
+        Fails with the names of the cocotb tests that failed, the first one's waveform and the end
+        of the log.
         """
-        print(f"{design.__name__} {columns}x{rows} COCOTB_RANDOM_SEED={seed}")
+        if SIMULATOR != "icarus" and (harness or not initialised):
+            pytest.skip(f"needs Icarus: {harness or 'unknown levels'}")
+        print(f"{design.__name__} {columns}x{rows} COCOTB_RANDOM_SEED={seed + BASE_SEED}")
         top = harness or "dut"
         name = f"{design.__name__}-{columns}x{rows}-{top}-{initialised}-{text.__name__}"
-        if name not in self._built:
-            verilog = text(design(columns, rows), "dut")
-            self._built[name] = self._build(name, verilog, columns, rows, top, initialised)
-        self._runs += 1
-        results = self._folder / f"{self._runs}.xml"
-        log = self._folder / f"{self._runs}.log"
-        with pytest.MonkeyPatch.context() as patch, suppress(SystemExit):
-            patch.setattr(sys, "path", [str(HERE), *sys.path])
-            self._built[name].test(
-                test_module=modules,
-                hdl_toplevel=top,
-                seed=seed,
-                plusargs=[f"+seed={seed}"],
-                extra_env={"FRAME_COLUMNS": str(columns), "FRAME_ROWS": str(rows)},
-                test_dir=self._folder / f"{self._runs}",
-                results_xml=str(results),
-                log_file=log,
-            )
-        text = log.read_text(encoding="utf-8", errors="replace")
-        assert results.exists(), f"the simulation gave no results\n{text[-4000:]}"
-        cases = list(ElementTree.parse(results).iter("testcase"))
-        ran = {str(case.get("classname")).split(".")[-1] for case in cases}
-        assert ran == set(modules), f"no test ran in {set(modules) - ran}"
-        failed = [
-            case.get("name")
-            for case in cases
-            if any(case.find(outcome) is not None for outcome in ("failure", "error", "skipped"))
-        ]
-        assert not failed, f"cocotb tests failed: {failed}\n{text[-6000:]}"
-        warned = [line for line in text.splitlines() if WARNING.search(line)]
-        assert not warned, "\n".join(warned)
-
-    def _build(
-        self,
-        name: str,
-        text: str,
-        columns: int,
-        rows: int,
-        top: str,
-        initialised: bool,
-    ) -> Runner:
         folder = self._folder / name
-        folder.mkdir()
-        if not initialised:
-            text, changed = INITIALISER.subn(r"\1;", text)
-            assert changed
-        (folder / "dut.v").write_text(text, encoding="utf-8")
-        sources = [folder / "dut.v"]
-        if top != "dut":
-            sources.append(Path(shutil.copy(HERE / f"{top}.v", folder)))
-        runner = get_runner("icarus")
-        runner.build(
-            sources=sources,
-            parameters={"COLUMNS": columns, "ROWS": rows} if top != "dut" else {},
-            hdl_toplevel=top,
-            build_dir=folder,
-            build_args=["-Wall", "-Wno-timescale"],
-            timescale=("1ps", "1ps"),
-            log_file=folder / "build.log",
+        make = partial(
+            build,
+            folder / "dut.v",
+            top=top,
+            further=[HERE / f"{harness}.v"] if harness else [],
+            parameters={"COLUMNS": columns, "ROWS": rows} if harness else {},
         )
-        warnings = (folder / "build.log").read_text(encoding="utf-8")
-        assert not warnings, warnings
-        return runner
+        if name not in self._built:
+            folder.mkdir()
+            verilog = text(design(columns, rows), "dut")
+            if not initialised:
+                verilog, changed = INITIALISER.subn(r"\1;", verilog)
+                assert changed
+            (folder / "dut.v").write_text(verilog, encoding="utf-8")
+            self._built[name] = make(folder)
+        settings = {**frame_environment(columns, rows), **(environment or {})}
+        run = partial(simulate, seed=seed, top=top, environment=settings)
+        self._runs += 1
+        place = self._folder / f"{self._runs}"
+        outcome = run(self._built[name], modules, place)
+        node = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]
+        waves.forget(self._kept, node)
+        if outcome.failed:
+            # The seed makes it the same run again.
+            first = outcome.failed[0]
+            path = waves.path_of(self._kept, node, first)
+            traced = make(folder / "traced", traced=True)
+            again = run(traced, modules, place / "traced", only=first, waveform=path)
+            kept = waves.describe(path, node, first, seed, again)
+            raise AssertionError(
+                f"cocotb tests failed: {list(outcome.failed)}\n{kept}\n{outcome.log[-6000:]}"
+            )
+        assert not outcome.problem, f"{outcome.problem}\n{outcome.log[-4000:]}"
 
 
 @pytest.fixture(scope="session")
 def icarus(tmp_path_factory: pytest.TempPathFactory) -> Icarus:
-    if shutil.which("iverilog") is None:
+    if SIMULATOR == "icarus" and shutil.which("iverilog") is None:
         pytest.fail("Icarus Verilog is needed: apt-get install iverilog")
     return Icarus(tmp_path_factory.mktemp("icarus"))

@@ -1,0 +1,275 @@
+"""Runs cocotb modules on a Verilog file: what pytest's fixtures and the mutants share.
+
+:func:`simulate` runs any modules. :func:`run_tier` runs the tier of a top on a GIVEN file, which
+need not be what the top's source gives::
+
+    outcome = run_tier("cubestar", Path("mutant.v"), Path("scratch"))
+    outcome.passed, outcome.failed
+
+From the environment: ``HDL_SEED`` is added to every seed, ``HDL_SIMULATOR`` is ``icarus`` (default)
+or ``verilator``.
+"""
+
+import json
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import pytest
+from amaranth.lib.wiring import Component
+from cocotb_tools.runner import Runner, get_runner
+
+from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
+from cubestack.hdl.cubestar_double_top import CubeStarDouble
+from cubestack.hdl.cubestar_shared_top import CubeStarShared
+from cubestack.hdl.cubestar_top import CubeStarTop
+
+HERE = Path(__file__).parent
+
+#: Folders that the simulated Python finds its modules in.
+PATHS = (str(HERE), str(HERE / "cubesense"))
+
+SIMULATOR = os.environ.get("HDL_SIMULATOR", "icarus")
+BASE_SEED = int(os.environ.get("HDL_SEED", "0"))
+
+#: Wall-clock seconds after which a simulation hangs; the slowest takes a tenth of it when idle.
+LIMIT_S = 600
+
+# A warning in a simulation's log. Icarus has no instances to iterate over, of which GPI warns.
+WARNING = re.compile(r"WARNING +(?! |gpi +vpi_iterate returned NULL)|[Ww]arning:")
+
+
+class Outcome(NamedTuple):
+    """How a simulation ended: the cocotb tests that ran and failed, its log and its duration.
+
+    ``problem`` says what else went wrong: no results at all, a module without a test, a warning.
+    ``error`` is the first failed test's.
+    """
+
+    ran: tuple[str, ...]
+    failed: tuple[str, ...]
+    problem: str
+    log: str
+    seconds: float
+    error: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return not self.failed and not self.problem
+
+
+@dataclass(frozen=True)
+class Tier:
+    """What a top has to pass.
+
+    Attributes:
+        make: the top, of a small picture.
+        columns, rows: its size.
+        modules: cocotb modules, those that find most first.
+        environment: what they need besides the size.
+    """
+
+    make: Callable[[], Component]
+    columns: int
+    rows: int
+    modules: tuple[str, ...]
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+
+#: The least picture that has all of CubeSense's cases.
+SMALLEST = ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1)
+
+PAIR_MODULES = (
+    "benches_pair_modes",
+    "benches_pair_read",
+    "benches_pair_store",
+    "benches_pair_failures",
+)
+
+
+def pair_environment(read_out: ReadOut, mcu_addressing: bool = False) -> dict[str, str]:
+    """What the modules of CubeSense's folder read."""
+    return {"READ_OUT": json.dumps(asdict(read_out)), "MCU_ADDRESSING": str(int(mcu_addressing))}
+
+
+def _pair(mcu_addressing: bool) -> Tier:
+    modules = PAIR_MODULES + ("benches_pair_addressing",) * mcu_addressing
+    environment = pair_environment(SMALLEST, mcu_addressing)
+    make = partial(CubeSensePair, SMALLEST, mcu_addressing)
+    return Tier(make, SMALLEST.columns, SMALLEST.rows, modules, environment)
+
+
+#: By the tops' names in ``cubestack.hdl.designs``.
+TIERS = {
+    "cubestar": Tier(
+        partial(CubeStarTop, 5, 3), 5, 3, ("benches_read", "benches_modes", "benches_store")
+    ),
+    "cubestar-shared": Tier(partial(CubeStarShared, 5, 3), 5, 3, ("benches_shared",)),
+    "cubestar-double": Tier(partial(CubeStarDouble, 5, 3), 5, 3, ("benches_double",)),
+    "cubestar-boards": Tier(partial(CubeStarTwoBoards, 5, 3), 5, 3, ("benches_boards",)),
+    "cubesense-pair": _pair(mcu_addressing=False),
+    "cubesense-pair-addressing": _pair(mcu_addressing=True),
+}
+
+
+def run_tier(
+    top: str, verilog: Path, folder: Path, *, seed: int = 1, limit_s: int = LIMIT_S
+) -> Outcome:
+    """Run the tier of ``top`` on the file ``verilog``, whose top module is ``dut``.
+
+    The file has the ports and the picture's size of ``TIERS[top].make()``, for instance
+    ``verilog_text(TIERS[top].make(), "dut")`` or a mutant of it. Stops at the first cocotb test
+    that fails. ``folder`` is made, and takes what the simulator writes. Whatever the design does,
+    this returns: one that does not compile or hangs for ``limit_s`` seconds has a ``problem``.
+    """
+    tier = TIERS[top]
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        runner = build(verilog, folder / "build", strict=False)
+    except (RuntimeError, SystemExit):
+        log = folder / "build" / "build.log"
+        text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+        return Outcome((), (), "does not compile", text, 0.0)
+    return simulate(
+        runner,
+        tier.modules,
+        folder / "run",
+        seed=seed,
+        environment={**frame_environment(tier.columns, tier.rows), **tier.environment},
+        limit_s=limit_s,
+        failures=1,
+    )
+
+
+def frame_environment(columns: int, rows: int) -> dict[str, str]:
+    """What geometry.py reads."""
+    return {"FRAME_COLUMNS": str(columns), "FRAME_ROWS": str(rows)}
+
+
+def build(
+    verilog: Path,
+    folder: Path,
+    *,
+    top: str = "dut",
+    further: Sequence[Path] = (),
+    parameters: Mapping[str, object] | None = None,
+    strict: bool = True,
+    traced: bool = False,
+) -> Runner:
+    """Compile module ``top`` of ``verilog`` and ``further`` files.
+
+    RuntimeError when that fails, and with ``strict`` when the compiler warns of anything. What is
+    ``traced`` can write waveforms.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    log = folder / "build.log"
+    runner = get_runner(SIMULATOR)
+    runner.build(
+        sources=[verilog, *further],
+        parameters=parameters or {},
+        hdl_toplevel=top,
+        build_dir=folder,
+        build_args=["-Wall", "-Wno-timescale"],
+        timescale=("1ps", "1ps"),
+        waves=traced,
+        log_file=log,
+    )
+    warnings = log.read_text(encoding="utf-8")
+    if strict and warnings:
+        raise RuntimeError(warnings)
+    return runner
+
+
+def simulate(
+    runner: Runner,
+    modules: Sequence[str],
+    folder: Path,
+    *,
+    seed: int,
+    top: str = "dut",
+    environment: Mapping[str, str],
+    limit_s: int = LIMIT_S,
+    failures: int = 0,
+    only: str = "",
+    waveform: Path | None = None,
+) -> Outcome:
+    """Run cocotb ``modules`` on what :func:`build` made; the same seed gives the same run.
+
+    Stops after so many ``failures`` unless that is 0; runs but one test with ``only``. Writes all
+    signals to the VCD file ``waveform`` when the design was built as traced.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    results, log = folder / "results.xml", folder / "simulation.log"
+    seed += BASE_SEED
+    start = time.monotonic()
+    plusargs = [f"+seed={seed}"]
+    if waveform:
+        plusargs.append(f"+dumpfile_path={waveform}")
+    with _surroundings(limit_s, waveform is not None), suppress(SystemExit, RuntimeError):
+        runner.test(
+            test_module=modules,
+            hdl_toplevel=top,
+            seed=seed,
+            plusargs=plusargs,
+            extra_env={
+                **environment,
+                "PYTHONHASHSEED": "0",
+                "COCOTB_MAX_FAILURES": str(failures),
+                "NO_COLOR": "1",
+            },
+            testcase=only or None,
+            waves=waveform is not None,
+            test_dir=folder,
+            results_xml=str(results.resolve()),
+            log_file=log,
+        )
+    return _outcome(results, log, modules, failures, time.monotonic() - start)
+
+
+@contextmanager
+def _surroundings(limit_s: int, vcd: bool) -> Iterator[None]:
+    """The modules' folders, a limit that ends a simulation which hangs, the waveforms' format."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", [*PATHS, *(path for path in sys.path if path not in PATHS)])
+        if shutil.which("timeout"):
+            patch.setenv("SIM_CMD_PREFIX", f"timeout --kill-after=5 {limit_s}")
+        if vcd and SIMULATOR == "icarus":
+            patch.setenv("SIM_CMD_SUFFIX", "-vcd")
+        yield
+
+
+def _outcome(
+    results: Path, log: Path, modules: Sequence[str], failures: int, seconds: float
+) -> Outcome:
+    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    try:
+        cases = list(ElementTree.parse(results).iter("testcase"))
+    except (OSError, ElementTree.ParseError):
+        return Outcome((), (), "the simulation gave no results", text, seconds)
+    failed = tuple(
+        str(case.get("name"))
+        for case in cases
+        if any(case.find(outcome) is not None for outcome in ("failure", "error", "skipped"))
+    )
+    failed = failed[: failures or None]  # cocotb has what it did not come to fail too
+    errors = [str(part.get("message")) for case in cases for part in case.findall("failure")]
+    ran = tuple(f"{case.get('classname')}.{case.get('name')}" for case in cases)
+    problem = ""
+    if not failed:
+        found = {str(case.get("classname")).split(".")[-1] for case in cases}
+        if found != set(modules):
+            problem = f"no test ran in {sorted(set(modules) - found)}"
+        elif warned := [line for line in text.splitlines() if WARNING.search(line)]:
+            problem = "\n".join(warned)
+    return Outcome(ran, failed, problem, text, seconds, "".join(errors[:1]))
