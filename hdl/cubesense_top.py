@@ -21,15 +21,13 @@ Sun picture is stored and stand still whenever a data clock looks at them.
 
 from typing import NamedTuple
 
-from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal, Value
-from amaranth.lib.cdc import ResetSynchronizer
+from amaranth.hdl import Cat, Module, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense_dataflow import DataflowControl, Side
 from cubestack.hdl.cubesense_reader import CubeSenseReader
-from cubestack.hdl.frame_gap import FrameGap
-from cubestack.hdl.frame_writer import FrameWriter
+from cubestack.hdl.cubesense_writer import add_writer
 from cubestack.hdl.matrix_counter import MatrixCounter
 from cubestack.hdl.sun_search import SunSearch
 
@@ -134,9 +132,10 @@ class CubeSenseFpga(Component):
         addressing = self.mcu_addressing
         m.submodules.dataflow = mode = DataflowControl(self.side, mcu_addressing=addressing)
         m.submodules.reader = reader = CubeSenseReader(self.read_out, mcu_addressing=addressing)
-        own_writer = self._writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y)
-        link_writer = self._writer(
-            m, "link", mode.store_other, self.LINK_C_I[0], self.LINK_C_I[1], self.LINK_D_I
+        own_writer = add_writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y, self.read_out)
+        link_clock, link_href = self.LINK_C_I[0], self.LINK_C_I[1]
+        link_writer = add_writer(
+            m, "link", mode.store_other, link_clock, link_href, self.LINK_D_I, self.read_out
         )
         # The Sun is looked for in the sun camera's picture, whichever memory it goes to.
         m.submodules.search = search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
@@ -197,22 +196,3 @@ class CubeSenseFpga(Component):
             ),
         ]
         return m
-
-    def _writer(
-        self, m: Module, domain: str, wanted: Signal, clock: Value, href: Value, pixel: Signal
-    ) -> FrameWriter:
-        """A writer in a domain of its own, which is in reset unless ``wanted``."""
-        m.domains += ClockDomain(domain, async_reset=True, local=True)
-        m.d.comb += ClockSignal(domain).eq(clock)
-        m.submodules[f"{domain}_reset"] = ResetSynchronizer(~wanted, domain=domain)
-        m.submodules[f"{domain}_gap"] = gap = FrameGap(self.read_out.frame_gap, domain=domain)
-        m.submodules[f"{domain}_writer"] = writer = FrameWriter(
-            self.read_out.columns, self.read_out.rows, domain=domain
-        )
-        m.d.comb += [
-            gap.href.eq(href),
-            writer.hsync.eq(href),
-            writer.vsync.eq(gap.vsync),
-            writer.pixel.eq(pixel),
-        ]
-        return writer
