@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "AwaitPin",
+    "BusAccess",
     "CameraTransfer",
     "FlashStore",
     "Hardware",
@@ -90,6 +91,30 @@ class StrobeRead:
 
 
 @dataclass(frozen=True)
+class BusAccess:
+    """Read or write bytes on the external bus, one transaction after the other.
+
+    The answer is how many were made: all of them, or fewer when a byte that was read is above
+    ``above``; that one is the last.
+
+    Attributes:
+        addresses: (n,) int32, of 24 bits each.
+        data: (n,) uint8: the bytes to be written, or where the bytes read go.
+        write: to write them.
+        cycles: of the processor from one to the next.
+        select: number of the chip select.
+        above: 0 to 255.
+    """
+
+    addresses: NDArray[np.int32]
+    data: NDArray[np.uint8]
+    write: bool
+    cycles: int
+    select: int = 0
+    above: int = 255
+
+
+@dataclass(frozen=True)
 class CameraTransfer:
     """One message on the camera's control bus: write ``data``, then read ``read`` bytes.
 
@@ -112,7 +137,16 @@ class Reset:
 
 
 Request = (
-    Pay | ReadTimer | SetPin | ReadPin | AwaitPin | Sleep | StrobeRead | CameraTransfer | Reset
+    Pay
+    | ReadTimer
+    | SetPin
+    | ReadPin
+    | AwaitPin
+    | Sleep
+    | StrobeRead
+    | BusAccess
+    | CameraTransfer
+    | Reset
 )
 
 T = TypeVar("T")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.external_bus import STEPS, Transactions
 from cubestack.emulator.rtl.build import library_for
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
@@ -55,6 +56,16 @@ class _Violation(ctypes.Structure):
     ]
 
 
+class _Transactions(ctypes.Structure):
+    _fields_ = [
+        ("addresses", ctypes.c_void_p),
+        ("data", ctypes.c_void_p),
+        *((name, ctypes.c_int64) for name in ("count", "write", "select", "above")),
+        *((name, ctypes.c_int64) for name in ("start", "numerator", "denominator", "cycles")),
+        ("offsets", ctypes.c_int64 * STEPS),
+    ]
+
+
 _INT, _LONG, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "driver_new": (_POINTER, (ctypes.POINTER(_POINTER), ctypes.POINTER(_Timing), _LONG, _INT)),
@@ -72,6 +83,10 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
         (_POINTER, _LONG, ctypes.c_uint32, ctypes.POINTER(_LONG), ctypes.POINTER(_INT)),
     ),
     "driver_strobe": (None, (_POINTER, _POINTER, _LONG, _LONG, _LONG, _LONG, _LONG)),
+    "driver_access": (
+        _LONG,
+        (_POINTER, ctypes.POINTER(_Transactions), _LONG, ctypes.c_uint32, ctypes.POINTER(_INT)),
+    ),
     "driver_violations": (_LONG, (_POINTER, _LONG, _POINTER)),
     "driver_violation_count": (_LONG, (_POINTER, _INT)),
 }
@@ -221,6 +236,31 @@ class CompiledEngine(SteppingEngine):
             int(fraction * half.denominator),
         )
         self._collect_violations()
+
+    def _access(self, transactions: Transactions) -> int:
+        start, period = self.now_ps, transactions.cycle
+        given = _Transactions(
+            transactions.addresses.ctypes.data,
+            transactions.data.ctypes.data,
+            len(transactions),
+            transactions.write,
+            transactions.select,
+            transactions.above,
+            start,
+            period.numerator,
+            period.denominator,
+            transactions.cycles,
+            (ctypes.c_int64 * STEPS)(*transactions.offsets),
+        )
+        event, over = 0, ctypes.c_int32(not len(transactions))
+        while not over.value:
+            running = sum(1 << camera.number for camera in self._running())
+            event = self._library.driver_access(self._handle, given, event, running, over)
+            self._collect_violations()
+            if not over.value:
+                # A camera wants something before this event.
+                self.run(start + transactions.time_of(event))
+        return event // STEPS
 
     def _collect_violations(self) -> None:
         known = len(self._log.kept)

@@ -191,6 +191,24 @@ struct Stream {
     }
 };
 
+#ifdef BUS_HIGH
+// Transactions as external_bus.py describes them; an event's cycle k is at
+// start + floor(k * numerator / denominator).
+struct Transactions {
+    const int32_t *addresses;
+    uint8_t *data;
+    int64_t count, write, select, above;
+    int64_t start, numerator, denominator, cycles;
+    int64_t offsets[6];
+
+    int64_t time(int64_t event) const {
+        return start + (event / 6 * cycles + offsets[event % 6]) * numerator / denominator;
+    }
+};
+#else
+struct Transactions;
+#endif
+
 // In the order of Outcome.
 enum Outcome : int32_t { TIME_REACHED, ACKNOWLEDGE_CHANGED, SEGMENT_OVER };
 
@@ -280,6 +298,60 @@ public:
         }
     }
 
+#ifdef BUS_HIGH
+    // Makes the events of `wanted` from number `event` on, with the edges of the cameras in the
+    // mask `running` up to each. Returns the next event: the one before which a camera's segment is
+    // over or an acknowledge changed, or, with `over`, the one after the last.
+    __attribute__((flatten)) int64_t access(const Transactions &wanted, int64_t event,
+                                            uint32_t running, int32_t &over) {
+        int64_t reached;
+        int32_t camera;
+        for (; event < 6 * wanted.count; event++) {
+            const int64_t time = wanted.time(event), index = event / 6;
+            if (running && burst_on(top, time, running, reached, camera) != TIME_REACHED)
+                return event;
+            const uint32_t address = (uint32_t)wanted.addresses[index];
+            switch (event % 6) {
+            case 0:
+                top.BUS_HIGH.set<uint8_t>(address >> 16 & 0xFF);
+                top.BUS_LOW_I.set<uint8_t>(address >> 8 & 0xFF);
+                top.BUS_LATCH.set<bool>(true);
+                break;
+            case 1:
+                top.BUS_LATCH.set<bool>(false);
+                break;
+            case 2:
+                top.BUS_HIGH.set<uint8_t>(address & 0xFF);
+                if (wanted.write)
+                    top.BUS_LOW_I.set<uint8_t>(wanted.data[index]);
+                select(wanted.select, false);
+                break;
+            case 3:
+                strobe_line(wanted.write, false);
+                break;
+            case 4:
+                if (!wanted.write) {
+                    wanted.data[index] = top.BUS_LOW_OE.get<bool>() ? top.BUS_LOW_O.get<uint8_t>()
+                                                                     : top.BUS_LOW_I.get<uint8_t>();
+                    sample(time);
+                }
+                strobe_line(wanted.write, true);
+                break;
+            case 5:
+                select(wanted.select, true);
+                break;
+            }
+            settle(time);
+            if (event % 6 == 5 && !wanted.write && wanted.data[index] > wanted.above) {
+                event++;
+                break;
+            }
+        }
+        over = true;
+        return event;
+    }
+#endif
+
 private:
     const bool skipping;
     std::vector<Sram> srams;
@@ -332,12 +404,33 @@ private:
         return top.Model::commit();
     }
 
-    // Only registers listen to the memories, so nothing else has to follow them.
+    // Only registers listen to the memories, and the external bus: nothing else has to follow them.
     template <class Model, int... N>
     void drive_memories(Model &top, int64_t time, std::integer_sequence<int, N...>) {
         (srams[N].drive(time, Memory<N>::pins(top)), ...);
         (Memory<N>::offer(top, srams[N].bus()), ...);
+#ifdef BUS_HIGH
+        if ((srams[N].reads() || ...))
+            eval(top);
+#endif
     }
+
+#ifdef BUS_HIGH
+    void select(int64_t number, bool level) {
+#define SELECT(n, port) \
+    if (number == n) \
+        top.port.set<bool>(level);
+        BUS_SELECTS
+#undef SELECT
+    }
+
+    void strobe_line(bool write, bool level) {
+        if (write)
+            top.BUS_WRITE.set<bool>(level);
+        else
+            top.BUS_READ.set<bool>(level);
+    }
+#endif
 
     void sample(int64_t time) {
         for (Sram &sram : srams)
@@ -508,6 +601,17 @@ int32_t driver_burst(Driver *driver, int64_t until, uint32_t running, int64_t *r
 void driver_strobe(Driver *driver, uint8_t *out, int64_t count, int64_t start, int64_t numerator,
                    int64_t denominator, int64_t offset) {
     driver->strobe(out, count, start, Steps(numerator, denominator, offset));
+}
+
+// See Driver::access; -1 for a design without an external bus.
+int64_t driver_access(Driver *driver, const Transactions *wanted, int64_t event, uint32_t running,
+                      int32_t *over) {
+#ifdef BUS_HIGH
+    return driver->access(*wanted, event, running, *over);
+#else
+    (void)driver, (void)wanted, (void)event, (void)running, (void)over;
+    return -1;
+#endif
 }
 
 // Number of violations kept; `out`, unless null, receives those from number `first` on.

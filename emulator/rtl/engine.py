@@ -14,6 +14,7 @@ import numpy as np
 from amaranth.lib.wiring import Component
 from numpy.typing import NDArray
 
+from cubestack.emulator.external_bus import Transactions
 from cubestack.emulator.rtl.wiring import Wiring, wiring_of
 from cubestack.emulator.sram import SramTiming, Violation, ViolationKind
 
@@ -90,9 +91,9 @@ class PinEvent(NamedTuple):
 class RtlEngine(Protocol):
     """A wiring's design, cycle for cycle, and its SRAMs.
 
-    Time only moves in ``run``, ``apply`` and ``strobe_read``. At one instant, edges of the first
-    camera's pixel clock come first, then those of the next one's, then what the caller does to the
-    microcontroller's pins.
+    Time only moves in ``run``, ``apply``, ``strobe_read`` and ``access``. At one instant, edges of
+    the first camera's pixel clock come first, then those of the next one's, then what the caller
+    does to the microcontroller's pins.
     """
 
     @property
@@ -170,6 +171,14 @@ class RtlEngine(Protocol):
         after half the period, and the clock falls. Only cycles that end by ``until_ps`` are made.
         Returns how many, n; ``now_ps`` advances by floor(n * period). The fraction cut off there is
         kept for a burst of the same period that follows at once, so that bursts do not drift.
+        """
+
+    def access(self, transactions: Transactions, until_ps: int) -> int:
+        """Make transactions on the microcontroller's external bus from ``now_ps``.
+
+        A read of which no byte comes back takes what the lines kept: address bits 15..8. Only
+        transactions that end by ``until_ps`` are made. Returns how many, n; ``now_ps`` advances by
+        floor(n * period). ValueError for a design without that bus.
         """
 
     def apply(self, events: Sequence[PinEvent]) -> NDArray[np.int64]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from cubestack.emulator.rtl.variants import members
-from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
+from cubestack.emulator.rtl.wiring import BusPins, CameraPins, MemoryPins, Wiring
 
 __all__ = ["pins_header"]
 
@@ -22,6 +22,8 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - CAMERAS: CAMERA(number, clock, data, line, how the frame pin follows ``level``).
     - MEMORIES: MEMORY(number, A, D_I, D_O, D_OE, CE_N, OE_N, WE_N).
     - DATA_CLOCK_NAME, DATA_CLOCK, DATA: of the transfer loop.
+    - BUS_HIGH, BUS_LOW_I, BUS_LOW_O, BUS_LOW_OE, BUS_LATCH, BUS_READ, BUS_WRITE: of the external
+      bus, where there is one; BUS_SELECTS: SELECT(number, port) of every chip select.
     - ACKNOWLEDGES, CONTENTION: levels in one word each.
     - REGISTERS: REGISTER(name, port, bits) of every register.
     - derived_edge(top): whether a clock that is no pin has an edge that takes effect;
@@ -44,6 +46,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
         "ACKNOWLEDGES": f"({acknowledges})",
         "CONTENTION": "0u" if wiring.contention is None else _level(wiring.contention),
         "REGISTERS": " \\\n    ".join(_registers(design)),
+        **_bus(wiring.bus),
         "VARIANTS": " ".join(f"VARIANT({n})" for n in range(len(variants))),
     }
     text = "".join(f"#define {name} {text}\n" for name, text in definitions.items())
@@ -76,6 +79,23 @@ def _camera(number: int, camera: CameraPins) -> str:
 
 def _memory(number: int, memory: MemoryPins) -> str:
     return f"MEMORY({number}, {', '.join(_port(memory[pin]) for pin in _MEMORY_PINS)})"
+
+
+def _bus(bus: BusPins | None) -> dict[str, str]:
+    if bus is None:
+        return {}
+    pins = {
+        "HIGH": bus.high,
+        **{f"LOW_{side}": f"{bus.low}_{side}" for side in ("I", "O", "OE")},
+        "LATCH": bus.latch,
+        "READ": bus.read,
+        "WRITE": bus.write,
+    }
+    selects = (f"SELECT({number}, {_port(name)})" for number, name in enumerate(bus.selects))
+    return {
+        **{f"BUS_{name}": _port(pin) for name, pin in pins.items()},
+        "BUS_SELECTS": " ".join(selects),
+    }
 
 
 def _registers(design: str) -> list[str]:

@@ -87,6 +87,8 @@ public:
 
     bool writes() const { return pins.writes(); }
 
+    bool reads() const { return pins.reads(); }
+
     // Without supply it takes no writes, offers 0 and breaks no rules.
     void power(bool on) {
         powered = on;

@@ -14,6 +14,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.external_bus import STEPS, TAKE, Transactions
 from cubestack.emulator.rtl.engine import PinEvent, PixelSource
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.wiring import CameraPins, Wiring
@@ -216,6 +217,40 @@ class SteppingEngine(ABC):
         self.run(start + whole)
         self._next_strobe = (self.now_ps, period, fraction)
         return cycles
+
+    def access(self, transactions: Transactions, until_ps: int) -> int:
+        """Make transactions on the external bus."""
+        bus = self.wiring.bus
+        if bus is None:
+            raise ValueError(f"{type(self.wiring.component).__name__} has no external bus")
+        if not 0 <= transactions.select < len(bus.selects):
+            selects = " and ".join(bus.selects)
+            raise ValueError(f"there is no chip select {transactions.select}, only {selects}")
+        self.run(self.now_ps)
+        start, period = self.now_ps, transactions.period
+        # Transaction n ends at floor(n * period): the largest n that keeps it within reach.
+        reach = (until_ps - start + 1) / period
+        fitting = max(0, -(-reach.numerator // reach.denominator) - 1)
+        done = self._access(transactions.first(min(fitting, len(transactions))))
+        self.run(start + int(done * period))
+        return done
+
+    def _access(self, transactions: Transactions) -> int:
+        """Make transactions pin by pin, until a byte read is above the limit; how many."""
+        bus, start = self.wiring.bus, self.now_ps
+        assert bus is not None
+        for event in range(STEPS * len(transactions)):
+            index, step = divmod(event, STEPS)
+            self.run(start + transactions.time_of(event))
+            if step == TAKE and not transactions.write:
+                driven = self._get(f"{bus.low}_OE")
+                transactions.data[index] = self._get(f"{bus.low}_{'O' if driven else 'I'}")
+            for pin, level in transactions.levels(bus, event):
+                self._set(pin, level)
+            last = step == STEPS - 1 and not transactions.write
+            if last and transactions.data[index] > transactions.above:
+                return index + 1
+        return len(transactions)
 
     def apply(self, events: Sequence[PinEvent]) -> NDArray[np.int64]:
         """Drive input pins one event after the other; returns the outputs after each."""

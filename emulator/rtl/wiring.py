@@ -11,9 +11,23 @@ from amaranth.lib.wiring import Component, In
 
 from cubestack.firmware_model.interface.cubesense_fpga import COMMANDS, Action, actions
 from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
+from cubestack.hdl.cubestar_double_top import CubeStarDouble
+from cubestack.hdl.cubestar_shared_top import CubeStarShared
 from cubestack.hdl.cubestar_top import CubeStarTop
 
-__all__ = ["CameraPins", "MemoryPins", "Wiring", "cubesense_wiring", "cubestar_wiring", "wiring_of"]
+__all__ = [
+    "BusPins",
+    "CameraPins",
+    "MemoryPins",
+    "Wiring",
+    "cubesense_wiring",
+    "cubestar_double_wiring",
+    "cubestar_shared_wiring",
+    "cubestar_two_boards_wiring",
+    "cubestar_wiring",
+    "wiring_of",
+]
 
 Level = Callable[[str], int]
 
@@ -50,14 +64,36 @@ class MemoryPins:
     Attributes:
         name: of the memory.
         prefix: what goes before the pins' names.
+        part: what stands for SRAM in them.
     """
 
     name: str
     prefix: str = ""
+    part: str = "SRAM"
 
     def __getitem__(self, pin: str) -> str:
         """Pin of the design at ``pin`` of the memory: A, D_I, D_O, D_OE, CE_N, OE_N or WE_N."""
-        return f"{self.prefix}SRAM_{pin}"
+        return f"{self.prefix}{self.part}_{pin}"
+
+
+@dataclass(frozen=True)
+class BusPins:
+    """Pins to the microcontroller's external bus, whose lower lines are an i / o / oe triple.
+
+    Attributes:
+        selects: chip selects, low active.
+        high: address bits 23..16, then 7..0.
+        low: address bits 15..8, then the byte, as ``low_I``, ``low_O`` and ``low_OE``.
+        latch: address latch enable, high active.
+        read, write: strobes, low active.
+    """
+
+    selects: tuple[str, ...]
+    high: str = "AD_HIGH"
+    low: str = "AD_LOW"
+    latch: str = "ALE"
+    read: str = "RE_N"
+    write: str = "WE_N"
 
 
 @dataclass(frozen=True)
@@ -71,8 +107,9 @@ class Wiring:
         component: the design.
         cameras: at one instant, edges of the first one's clock come first.
         memories: the SRAMs.
-        data_clock: the clock of the microcontroller's transfer loop, which samples the memories.
-        data: what the loop takes.
+        data_clock: the clock of the microcontroller's transfer loop, or its read strobe: at its
+            rise what the memories offer is taken.
+        data: what is taken.
         acknowledges: outputs that ``run`` may stop on.
         storing: names of the cameras whose pixel clocks may change anything, by the levels of the
             other pins. Changes with those pins and the acknowledges only.
@@ -81,6 +118,7 @@ class Wiring:
         contention: output that is not 0 while two drivers are on one wire; None for no such.
         burst_levels: levels of inputs at which the compiled engine is to be quickest; each takes
             longer to build.
+        bus: the microcontroller's external bus; None where it does not lead here.
     """
 
     component: Component
@@ -93,6 +131,7 @@ class Wiring:
     settling_clocks: int
     contention: str | None = None
     burst_levels: tuple[tuple[tuple[str, int], ...], ...] = ()
+    bus: BusPins | None = None
 
     @cached_property
     def widths(self) -> dict[str, int]:
@@ -149,6 +188,54 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
     )
 
 
+def cubestar_shared_wiring(top: CubeStarShared | None = None) -> Wiring:
+    """CubeStar's FPGA board with one shared memory, "SRAM"."""
+    return _on_bus(top or CubeStarShared(), (MemoryPins("SRAM"),))
+
+
+def cubestar_double_wiring(top: CubeStarDouble | None = None) -> Wiring:
+    """CubeStar's FPGA board with two memories in turn, "SRAM1" and "SRAM2"."""
+    names = ("SRAM1", "SRAM2")
+    memories = tuple(MemoryPins(name, part=name) for name in names)
+    return _on_bus(top or CubeStarDouble(), memories)
+
+
+def cubestar_two_boards_wiring(boards: CubeStarTwoBoards | None = None) -> Wiring:
+    """Two of CubeStar's boards with one shared memory each, "SRAM1" and "SRAM2"."""
+    prefixes = ("BOARD1_", "BOARD2_")
+    memories = tuple(MemoryPins(f"SRAM{n}", prefix) for n, prefix in enumerate(prefixes, 1))
+    return _on_bus(boards or CubeStarTwoBoards(), memories, prefixes, contention="CONTENTION")
+
+
+def _on_bus(
+    component: Component,
+    memories: tuple[MemoryPins, ...],
+    boards: tuple[str, ...] = ("",),
+    contention: str | None = None,
+) -> Wiring:
+    """CubeStar's boards on the external bus; ``boards`` goes before the names of their own pins."""
+
+    def storing(level: Level) -> Collection[str]:
+        stores = any(
+            level(f"{board}ENABLE") and not level(f"{board}RNW") and not level(f"{board}ACK")
+            for board in boards
+        )
+        return ("imager",) if stores else ()
+
+    return Wiring(
+        component,
+        cameras=(CameraPins("imager", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"),),
+        memories=memories,
+        data_clock="RE_N",
+        data="AD_LOW_O",
+        acknowledges=tuple(f"{board}ACK" for board in boards),
+        storing=storing,
+        settling_clocks=8,  # as above
+        contention=contention,
+        bus=BusPins(tuple(f"{board}CS_N" for board in boards)),
+    )
+
+
 def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool = False) -> Wiring:
     """CubeSense's two FPGAs: cameras and memories "sun" and "nadir".
 
@@ -195,6 +282,12 @@ def wiring_of(design: Wiring | Component | None) -> Wiring:
             return cubestar_wiring(design)
         case CubeSensePair():
             return cubesense_wiring(design)
+        case CubeStarShared():
+            return cubestar_shared_wiring(design)
+        case CubeStarDouble():
+            return cubestar_double_wiring(design)
+        case CubeStarTwoBoards():
+            return cubestar_two_boards_wiring(design)
     raise TypeError(f"{type(design).__name__} has no ready wiring: make a Wiring for it")
 
 

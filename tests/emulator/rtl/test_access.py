@@ -1,0 +1,195 @@
+"""Transactions on the external bus: in bulk and pin by pin, on every design that has the bus."""
+
+from dataclasses import replace
+from fractions import Fraction
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.external_bus import Transactions
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.compiled import CompiledEngine
+from cubestack.emulator.rtl.engine import RtlEngine, make_engine
+from cubestack.emulator.rtl.stepping import SteppingEngine
+from cubestack.emulator.rtl.wiring import Wiring, wiring_of
+from cubestack.firmware_model.external_bus import BusTiming
+from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
+from cubestack.hdl.cubestar_double_top import CubeStarDouble
+from cubestack.hdl.cubestar_shared_top import CubeStarShared
+from cubestack.hdl.cubestar_top import CubeStarTop
+
+from .comparison import Step, assert_same, engines
+
+COLUMNS, ROWS = 8, 4
+CYCLE = Fraction(10**12, 48_000_000)
+DESIGNS = (CubeStarShared, CubeStarDouble, CubeStarTwoBoards)
+
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="there is no C++ compiler")
+
+
+def transactions(addresses, data=None, **options) -> Transactions:
+    addresses = np.ascontiguousarray(addresses, np.int32)
+    write = data is not None
+    data = np.array(data, np.uint8) if write else np.zeros(len(addresses), np.uint8)
+    return Transactions(addresses, data, write, CYCLE, options.pop("cycles", 8), **options)
+
+
+def controls(wiring: Wiring) -> list[str]:
+    """Pins of the microcontroller that are not the bus's."""
+    assert wiring.bus is not None
+    mine = {*wiring.bus.selects, "AD_HIGH", "AD_LOW_I", "ALE", "RE_N", "WE_N"}
+    return [pin for pin in wiring.mcu_pins if pin not in mine]
+
+
+def random_access(rng: np.random.Generator, wiring: Wiring) -> tuple[Transactions, int]:
+    """Any transactions, and time for some or all of them."""
+    assert wiring.bus is not None
+    count = int(rng.integers(0, 12))
+    addresses = rng.integers(0, 1 << 24 if rng.random() < 0.1 else 4 * COLUMNS * ROWS, count)
+    timing = BusTiming(*(int(cycles) for cycles in rng.integers(1, 4, 5)))
+    made = transactions(
+        addresses,
+        rng.integers(0, 256, count) if rng.random() < 0.5 else None,
+        cycles=timing.cycles + int(rng.integers(0, 4)),
+        select=int(rng.integers(len(wiring.bus.selects))),
+        above=int(rng.choice([255, 255, 128])),
+        timing=timing,
+    )
+    return made, int(made.period * int(rng.integers(0, 14)))
+
+
+def accessed(engine: RtlEngine, made: Transactions, reach_ps: int) -> tuple[int, bytes]:
+    mine = replace(made, data=made.data.copy())
+    return engine.access(mine, engine.now_ps + reach_ps), mine.data.tobytes()
+
+
+def random_step(rng: np.random.Generator, wiring: Wiring) -> Step:
+    """What a microcontroller might do, at any moment."""
+    kind = rng.random()
+    if kind < 0.3:
+        pin, level = str(rng.choice(controls(wiring))), int(rng.random() < 0.6)
+        return lambda engine: engine.set_pin(pin, level)
+    if kind < 0.5:
+        wait_ps = int(rng.integers(0, 5_000_000))
+        return lambda engine: engine.run(engine.now_ps + wait_ps)
+    made, reach_ps = random_access(rng, wiring)
+    return lambda engine: accessed(engine, made, reach_ps)
+
+
+@needs_compiler
+@pytest.mark.parametrize("design", DESIGNS)
+def test_every_engine_makes_the_same_transactions(design, make_random_camera) -> None:
+    """At any time: beside pixels that are stored, in standby, over the ends of segments."""
+    rng = np.random.default_rng(7)
+    wiring = wiring_of(design(COLUMNS, ROWS))
+    all_engines = engines(wiring)
+    camera = make_random_camera(rng, COLUMNS, ROWS)
+    assert_same(all_engines, lambda engine: engine.attach(camera), "camera")
+    for turn in range(120):
+        assert_same(all_engines, random_step(rng, wiring), turn)
+
+
+@needs_compiler
+def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin(make_camera) -> None:
+    """Beside a picture that is stored in the other memory, at every engine's own speed."""
+    rng = np.random.default_rng(3)
+    wiring = wiring_of(CubeStarDouble())
+    found = []
+    for bulk in (True, False):
+        engine = make_engine(wiring, "compiled")
+        assert isinstance(engine, CompiledEngine)
+        camera = make_camera(1024, 512, 1, period=100_000, line_clocks=1322, blank=2000)
+        engine.attach(camera)
+        rng = np.random.default_rng(3)
+        engine.memories["SRAM2"][:] = rng.integers(0, 256, 1 << 19, dtype=np.uint8)
+        for pin, level in (("RNW", 1), ("INTO", 0), ("ENABLE", 1), ("RNW", 0)):
+            engine.set_pin(pin, level)
+        places = rng.integers(0, 1 << 19, 4000) | 1 << 19
+        read = transactions(places)
+        way = CompiledEngine._access if bulk else SteppingEngine._access
+        with patch.object(CompiledEngine, "_access", way):
+            assert engine.access(read, 10**12) == len(places)
+        assert np.array_equal(read.data, engine.memories["SRAM2"][places & (1 << 19) - 1])
+        engine.run(90 * 10**9, ("ACK", 1))
+        assert np.array_equal(engine.memories["SRAM1"].reshape(512, 1024), camera.images[0])
+        assert not engine.violation_counts
+        found.append((engine.now_ps, read.data.tobytes()))
+        engine.close()
+    assert found[0] == found[1]
+
+
+@pytest.fixture
+def shared() -> RtlEngine:
+    kind = "python" if find_compiler() is None else "compiled"
+    return make_engine(CubeStarShared(COLUMNS, ROWS), kind)
+
+
+def opened(engine: RtlEngine) -> RtlEngine:
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    return engine
+
+
+def test_what_is_written_is_read_back_in_time(shared: RtlEngine) -> None:
+    opened(shared)
+    places, values = np.arange(64), np.arange(64)[::-1] * 3
+    write = transactions(places, values)
+    assert shared.access(write, 10**9) == 64
+    assert shared.now_ps == int(64 * 8 * CYCLE)
+    read = transactions(places)
+    assert shared.access(read, 10**9) == 64
+    assert np.array_equal(read.data, values)
+    assert np.array_equal(shared.sram, values)
+    assert not shared.violation_counts
+
+
+def test_only_what_fits_is_made(shared: RtlEngine) -> None:
+    opened(shared)
+    read = transactions(np.arange(64))
+    assert shared.access(read, int(10 * read.period)) == 10
+    assert shared.access(read, shared.now_ps) == 0
+    assert shared.access(read.first(0), 10**9) == 0
+
+
+def test_a_search_ends_with_the_first_byte_above(shared: RtlEngine) -> None:
+    opened(shared).sram[:] = 6
+    shared.sram[[17, 20]] = 7
+    read = transactions(np.arange(64), above=6)
+    assert shared.access(read, 10**9) == 18
+    assert read.data[17] == 7
+    assert not read.data[18:].any()
+    assert shared.now_ps == int(18 * read.period)
+
+
+def test_a_read_that_nobody_answers_takes_what_the_lines_kept(shared: RtlEngine) -> None:
+    shared.sram[:] = 0xA5
+    read = transactions([0x123456])
+    assert shared.access(read, 10**9) == 1
+    assert read.data[0] == 0x34
+
+
+def test_a_strobe_too_short_for_the_memory_is_noticed(shared: RtlEngine) -> None:
+    """The limits are those of the memory: a core clock of 100 MHz leaves it 10 ns."""
+    opened(shared)
+    fast = BusTiming(1, 1, 1, 1, 1)
+    read = Transactions(
+        np.zeros(1, np.int32), np.zeros(1, np.uint8), False, Fraction(5000), 5, timing=fast
+    )
+    shared.access(read, 10**9)
+    assert shared.violation_counts["read-access"] == 1
+
+
+def test_errors_say_what_would_be_right(shared: RtlEngine) -> None:
+    with pytest.raises(ValueError, match="no chip select 1, only CS_N"):
+        shared.access(transactions([1], select=1), 10**9)
+    with pytest.raises(ValueError, match="CubeStarTop has no external bus"):
+        make_engine(CubeStarTop(COLUMNS, ROWS), "python").access(transactions([1]), 10**9)
+    with pytest.raises(ValueError, match="takes 6 cycles, not 5"):
+        transactions([1], cycles=5)
+    with pytest.raises(ValueError, match="2 addresses have 1 bytes: one each"):
+        transactions([1, 2], [3])
+    with pytest.raises(ValueError, match="contiguous int32"):
+        Transactions(np.arange(4)[::2], np.zeros(2, np.uint8), False, CYCLE, 8)
+    with pytest.raises(ValueError, match="strobe must be 1 to 63 cycles, not 64"):
+        BusTiming(1, 1, 1, 64, 1)
