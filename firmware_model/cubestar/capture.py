@@ -82,6 +82,7 @@ class ImageCapture:
                 failure = "ImageCaptureError"
         if failure is not None:
             state.raise_flag(failure)
+            self.sensor.forget_set_up()
             state.retained.image_present = 0
             state.task_status = TaskStatus.CAPTURE_FAILED
             return False
@@ -131,6 +132,7 @@ class ImageCapture:
         self._state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
         if not (yield from self.sensor.enable(False)):
             self._state.raise_flag("ISDisableError")  # the picture is good all the same
+            self.sensor.forget_set_up()
         return None if stored else "ImageCaptureError"
 
     def _image_transfer(self) -> Routine[None]:

@@ -57,6 +57,14 @@ class ImageSensor:
         yield Sleep(now_us + SETTLE_US, wakeable=False)
         self._state.retained.camera_setup = 0
 
+    def forget_set_up(self) -> None:
+        """Something failed, so the sensor may have lost its supply: set it up again.
+
+        Appendix D sets the registers up before pictures, and the software reset of section 5.3.6
+        leaves the published program no memory of having done so.
+        """
+        self._state.retained.camera_setup = 0
+
     def configure(self) -> Routine[str | None]:
         """Set up for stars, unless that is done already; the flag of an unanswered write."""
         retained, settings = self._state.retained, self._state.settings

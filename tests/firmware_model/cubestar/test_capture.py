@@ -104,6 +104,23 @@ def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(bench: Bench, sk
     assert bench.flags() == {"ISDisableError"}
 
 
+@pytest.mark.parametrize("failure", ["no frame", "not disabled"])
+def test_a_camera_that_failed_is_set_up_again(bench: Bench, failure: str) -> None:
+    bench.command("CaptureImage")
+    set_up = dict(bench.camera)
+    bench.camera.clear()  # it lost its supply
+    if failure == "no frame":
+        bench.frame_us = None
+    else:
+        bench.camera_refuses = lambda data: data == DISABLE
+    bench.command("CaptureImage")
+    assert len(bench.camera) < len(set_up)
+    bench.frame_us = FRAME_US
+    bench.camera_refuses = lambda _data: False
+    bench.command("CaptureImage")
+    assert bench.camera == set_up
+
+
 def test_a_frame_that_never_comes(bench: Bench, sky: Sky) -> None:
     bench.picture = sky.picture
     bench.command("CaptureImage")
