@@ -5,7 +5,8 @@ and only ever writes: start, eight bits, a ninth in which the camera may answer,
 pulled up; level 1 releases it. Charged cycles keep the clock below the bus' 400 kHz.
 
 The published program sets the nadir camera's exposure once. Ours sets all registers again when a
-setting changed, or the camera lost its supply, before the next picture is taken.
+setting changed, or the camera lost its supply, before the next picture is taken. It can not see the
+latter, so a camera that sends no picture counts as such.
 """
 
 from cubestack.firmware_model.costs import Meter
@@ -105,6 +106,10 @@ class CameraControl:
             self._written[camera] = None
         yield from self._pause(OFF_TIME_US)
         yield from self.start()
+
+    def forget_set_up(self, camera: Camera) -> None:
+        """It sent no picture, so it may have lost its supply: set it up again before the next."""
+        self._written[camera] = None
 
     def prepare(self, camera: Camera) -> Routine[None]:
         """Bring ``camera`` to its settings before a picture, and wait until they count.

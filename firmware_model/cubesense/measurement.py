@@ -97,6 +97,8 @@ class Measurement:
         yield from self._cameras.prepare(camera)
         started = yield from read_ticks()
         capture = yield from self._acquisition.store(camera, sram)
+        if capture is CaptureResult.CAMERA_TIMEOUT:
+            self._cameras.forget_set_up(camera)
         yield from self._stored(result, capture, started)
         if detect and capture.stored:
             measured = self._measure_nadir if camera == Camera.NADIR else self._measure_sun

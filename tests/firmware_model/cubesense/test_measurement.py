@@ -188,6 +188,24 @@ def test_a_dead_camera(bench: Bench, camera: Camera, sram: Sram) -> None:
 
 
 @pytest.mark.parametrize("camera", Camera)
+@pytest.mark.parametrize("sram", Sram)
+def test_a_camera_that_sent_no_picture_is_set_up_again(
+    bench: Bench, camera: Camera, sram: Sram
+) -> None:
+    registers = dict(bench.cameras[camera].registers)
+    other = dict(bench.cameras[Camera(1 - camera)].registers)
+    scene, bench.scenes[camera] = bench.scenes[camera], None
+    bench.cameras[camera].power_up()  # after a dip of its supply
+    bench.cameras[camera].writes.clear()
+    measure(bench, camera, sram)
+    assert not bench.cameras[camera].writes
+    bench.scenes[camera] = scene
+    measure(bench, camera, sram)
+    assert bench.cameras[camera].registers == registers
+    assert bench.cameras[Camera(1 - camera)].registers == other
+
+
+@pytest.mark.parametrize("camera", Camera)
 def test_a_memory_that_is_off(bench: Bench, camera: Camera) -> None:
     no_memory(bench, Sram.SRAM1)
     measured = measure(bench, camera, Sram.SRAM1)
