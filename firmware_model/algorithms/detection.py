@@ -15,15 +15,35 @@ CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is
 - The dark value is the mean of the samples that were not bright enough to start an area.
 - Visited pixels are zeroed during the search and written back from a list at its end, because the
   ground downloads the same picture afterwards.
+
+The search names the pixels that it reads and writes, in its order, and leaves the accesses to
+whoever has the picture: an array here, a memory behind an FPGA elsewhere.
 """
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.costs import Meter
+
+__all__ = [
+    "Detection",
+    "DetectionConfig",
+    "DetectionConfigError",
+    "Look",
+    "Put",
+    "Search",
+    "SearchEnd",
+    "detect_stars",
+    "search_stars",
+]
+
+BLOCK = 1024
+"""Pixels of an array that are compared at once: speed only."""
 
 
 class DetectionConfigError(ValueError):
@@ -125,6 +145,29 @@ class Detection:
 
 
 @dataclass(frozen=True)
+class Look:
+    """Read pixels one after the other, up to and with the first one above ``above``.
+
+    The answer are the values read, uint8, at most as many as ``offsets``, (n,) int32.
+    """
+
+    offsets: NDArray[np.int32]
+    above: int
+
+
+@dataclass(frozen=True)
+class Put:
+    """Write pixels: ``offsets`` (n,) int32, ``values`` (n,) uint8."""
+
+    offsets: NDArray[np.int32]
+    values: NDArray[np.uint8]
+
+
+Search = Generator[Look | Put, Any, Detection]
+"""A search; whoever runs it performs the accesses and charges them."""
+
+
+@dataclass(frozen=True)
 class _Area:
     """Pixels in the order in which growing met them, as offsets into the picture."""
 
@@ -137,31 +180,59 @@ class _Area:
 def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter) -> Detection:
     """Find the stars of a picture (rows, columns) of 8-bit values; the picture is not changed.
 
-    Charges every sample, every neighbour looked at, the marking and the restoring. Phases:
-    `search` and `centroid`.
+    Charges what ``search_stars`` charges, and every access to the picture.
 
     Raises:
         DetectionConfigError: when the region reaches beyond the picture.
     """
     rows, columns = image.shape
+    pixels = image.reshape(-1).copy()
+    search, answer = search_stars(rows, columns, config, meter), None
+    while True:
+        try:
+            access = search.send(answer)
+        except StopIteration as done:
+            detection: Detection = done.value
+            return detection
+        match access:
+            case Look():
+                answer = _looked_at(pixels, access)
+                meter.charge(ebi_read=len(answer))
+            case Put():
+                pixels[access.offsets] = access.values
+                meter.charge(ebi_write=len(access.offsets))
+
+
+def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
+    """Find the stars of a picture of so many 8-bit values that is somewhere else.
+
+    Charges all but the accesses that it yields. Phases: `search` and `centroid`. Raises as
+    ``detect_stars`` does.
+    """
     if config.x_end > columns:
         raise DetectionConfigError("x_end", f"at most {columns}, not {config.x_end}")
     if config.y_end > rows:
         raise DetectionConfigError("y_end", f"at most {rows}, not {config.y_end}")
-    samples = _Samples(image, config)
-    pixels = bytearray(image.tobytes())
+    samples = _samples(columns, config)
     centroids: list[tuple[np.float32, np.float32]] = []
     areas: list[_Area] = []
-    invalid = noise = visited = 0
+    visited: list[int] = []
+    values: list[int] = []
+    invalid = noise = read = total = background = 0
     end = SearchEnd.COMPLETE
     with meter.phase("search"):
-        for index in samples.hits():
-            seed = samples.offset(index)
-            if pixels[seed] <= config.seed_threshold:
-                continue
-            area = _grow(pixels, seed, columns, rows, config)
-            samples.zero(area.offsets, after=index)
-            visited += len(area.offsets)
+        while read < len(samples) and end is SearchEnd.COMPLETE:
+            found = yield Look(samples[read:], config.seed_threshold)
+            read += len(found)
+            hit = int(found[-1]) > config.seed_threshold
+            dark = found[:-1] if hit else found
+            total += int(dark.sum(dtype=np.int64))
+            background += len(dark)
+            if not hit:
+                break
+            area = yield from _grow(int(samples[read - 1]), int(found[-1]), columns, rows, config)
+            visited += area.offsets
+            values += area.values
             _charge_growing(area, meter)
             if not area.complete:
                 invalid += 1
@@ -177,117 +248,90 @@ def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter
                 end = SearchEnd.INVALID
             elif noise > config.max_noise:
                 end = SearchEnd.NOISE
-            if end is not SearchEnd.COMPLETE:
-                samples.stop_after(index)
-                break
-        dark_value = samples.charge_and_average(meter)
-        meter.charge(ram_read=visited, ebi_write=visited, loop=visited)
+        meter.charge(i32_add=2 * read + 2 * background, loop=read, i32_div=1)
+        meter.charge(ram_read=len(visited), loop=len(visited))
+        yield Put(np.array(visited, np.int32), np.array(values, np.uint8))
     return Detection(
         centroids=np.array(centroids, dtype=np.float32).reshape(-1, 2),
         sizes=np.array([len(area.offsets) for area in areas], dtype=np.uint8),
         intensities=np.array([sum(area.values) for area in areas], dtype=np.uint16),
         invalid=invalid,
         noise=noise,
-        dark_value=dark_value,
+        dark_value=(total + background // 2) // background if background else 0,
         end=end,
     )
 
 
-class _Samples:
-    """The sampled pixels in the order of the search, as the search reads them."""
-
-    def __init__(self, image: NDArray[np.uint8], config: DetectionConfig) -> None:
-        self._config = config
-        self._picture_columns: int = image.shape[1]
-        region = image[
-            config.y_start : config.y_end : config.step, config.x_start : config.x_end : config.step
-        ]
-        self._columns: int = region.shape[1]
-        self._rows: int = region.shape[0]
-        self._values = region.reshape(-1).copy()
-
-    def hits(self) -> list[int]:
-        """Indices of the samples above the threshold before anything is zeroed."""
-        found: list[int] = np.flatnonzero(self._values > self._config.seed_threshold).tolist()
-        return found
-
-    def offset(self, index: int) -> int:
-        """Place of a sample in the picture."""
-        row, column = divmod(index, self._columns)
-        y = self._config.y_start + row * self._config.step
-        return y * self._picture_columns + self._config.x_start + column * self._config.step
-
-    def zero(self, offsets: list[int], after: int) -> None:
-        """Let the search, which is at sample `after`, read 0 at picture places still to come."""
-        step = self._config.step
-        for offset in offsets:
-            y, x = divmod(offset, self._picture_columns)
-            row, off_row = divmod(y - self._config.y_start, step)
-            column, off_column = divmod(x - self._config.x_start, step)
-            if off_row or off_column or not 0 <= row < self._rows:
-                continue
-            if 0 <= column < self._columns and row * self._columns + column > after:
-                self._values[row * self._columns + column] = 0
-
-    def stop_after(self, index: int) -> None:
-        """Forget the samples that the search did not reach."""
-        self._values = self._values[: index + 1]
-
-    def charge_and_average(self, meter: Meter) -> int:
-        """Charge the reading of the samples; mean of those not above the threshold, rounded."""
-        background = self._values[self._values <= self._config.seed_threshold]
-        count = len(background)
-        read = len(self._values)
-        meter.charge(ebi_read=read, i32_add=2 * read + 2 * count, loop=read, i32_div=1)
-        total = int(background.sum(dtype=np.int64))
-        return (total + count // 2) // count if count else 0
+def _looked_at(pixels: NDArray[np.uint8], look: Look) -> NDArray[np.uint8]:
+    """Answer to ``look`` for a picture that is an array."""
+    blocks = []
+    for start in range(0, len(look.offsets), BLOCK):
+        values = pixels[look.offsets[start : start + BLOCK]]
+        above = values > look.above
+        first = int(above.argmax())
+        if above[first]:
+            return np.concatenate([*blocks, values[: first + 1]])
+        blocks.append(values)
+    return np.concatenate(blocks)
 
 
-def _grow(pixels: bytearray, seed: int, columns: int, rows: int, config: DetectionConfig) -> _Area:
+def _samples(columns: int, config: DetectionConfig) -> NDArray[np.int32]:
+    """Places of the sampled pixels in the order of the search."""
+    rows = np.arange(config.y_start, config.y_end, config.step, dtype=np.int32)
+    along = np.arange(config.x_start, config.x_end, config.step, dtype=np.int32)
+    return (rows[:, None] * columns + along).reshape(-1)
+
+
+def _grow(
+    seed: int, value: int, columns: int, rows: int, config: DetectionConfig
+) -> Generator[Look | Put, Any, _Area]:
     """Collect the seed's area depth first and zero its pixels.
 
-    The stack holds for each pixel of the recursion which neighbour comes next.
+    What the recursion still has to look at is a stack, its top the next place.
     """
-    threshold, limit, last = config.star_threshold, config.max_pixels, columns * rows
-    offsets, values = [seed], [pixels[seed]]
-    pixels[seed] = 0
-    stack = [(seed, 0)]
+    threshold, limit = config.star_threshold, config.max_pixels
+    offsets, values = [seed], [value]
+    yield _zero(seed)
+    stack = _neighbours(seed, columns, rows)
     looked_at = 0
     while stack:
-        offset, direction = stack.pop()
-        if direction < 3:
-            stack.append((offset, direction + 1))
-        column = offset % columns
-        if direction == 0:
-            inside, neighbour = column > 0, offset - 1
-        elif direction == 1:
-            inside, neighbour = column < columns - 1, offset + 1
-        elif direction == 2:
-            inside, neighbour = offset >= columns, offset - columns
-        else:
-            inside, neighbour = offset + columns < last, offset + columns
-        if not inside:
-            continue
-        looked_at += 1
-        value = pixels[neighbour]
-        if value > threshold:
-            if len(offsets) == limit:
-                return _Area(offsets, values, False, looked_at)
-            offsets.append(neighbour)
-            values.append(value)
-            pixels[neighbour] = 0
-            stack.append((neighbour, 0))
+        found = yield Look(np.array(stack[::-1], np.int32), threshold)
+        looked_at += len(found)
+        place, value = stack[-len(found)], int(found[-1])
+        del stack[-len(found) :]
+        if value <= threshold:
+            break
+        if len(offsets) == limit:
+            return _Area(offsets, values, False, looked_at)
+        offsets.append(place)
+        values.append(value)
+        yield _zero(place)
+        stack += _neighbours(place, columns, rows)
     return _Area(offsets, values, True, looked_at)
 
 
+def _zero(place: int) -> Put:
+    return Put(np.array([place], np.int32), np.zeros(1, np.uint8))
+
+
+def _neighbours(place: int, columns: int, rows: int) -> list[int]:
+    """Down, up, right, left, as far as they are in the picture: the last is looked at first."""
+    column = place % columns
+    around = (
+        (place + columns < columns * rows, place + columns),
+        (place >= columns, place - columns),
+        (column < columns - 1, place + 1),
+        (column > 0, place - 1),
+    )
+    return [neighbour for inside, neighbour in around if inside]
+
+
 def _charge_growing(area: _Area, meter: Meter) -> None:
-    """Per pixel: a call, zeroing, its list entry and its brightness; per neighbour: a test."""
+    """Per pixel: a call, its list entry and its brightness; per neighbour: a test."""
     count = len(area.offsets)
     meter.charge(
         call=count,
-        ebi_write=count,
         ram_write=2 * count,
-        ebi_read=area.looked_at,
         loop=area.looked_at,
         i32_add=5 * count + 3 * area.looked_at,
     )
