@@ -1,12 +1,11 @@
-"""Records what goes over a board's serial lines and I2C bus, and plays it back to a board.
+"""Records what goes over a board's serial lines and I2C bus.
 
-Every byte with its side, port and virtual time; the format is that of
-``firmware_model.interface.recording``. A replay sends the host's part at the same virtual times to
-a board that was powered up like the recorded one, and compares what the device says.
+Every byte with its side, port and virtual time, as its sender sent it: what a fault does to it on
+its way is not on record, so that it can be done again. The format is that of
+``firmware_model.interface.recording``; ``replay`` plays it back.
 """
 
 from collections.abc import Generator, Mapping
-from itertools import zip_longest
 from types import TracebackType
 from typing import IO, Any, Self
 
@@ -15,40 +14,46 @@ import simpy
 from cubestack.emulator.bus_tap import BusTap
 from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError
 from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.interface.message import Interface
+from cubestack.emulator.virtual_time import Kernel
 from cubestack.firmware_model.interface.recording import (
     BusMessage,
     BusTransfer,
+    Control,
     LineBytes,
     LineError,
-    Recording,
     RecordingWriter,
     Side,
 )
-from cubestack.firmware_model.interface.transcript import name_answer_byte, name_bus_byte
+from cubestack.firmware_model.interface.recording_setup import Setup
 
-__all__ = ["RecordedBus", "Recorder", "Replay"]
+__all__ = ["RecordedBus", "Recorder"]
 
 BLOCK_BYTES = 256
 """Longest run of bytes in one event."""
-
-SETTLE_PS = PS_PER_S
-"""How long a replay goes on after the last event: what comes late is different, too."""
 
 
 class Recorder:
     """Writes a recording; attach it before anything is said."""
 
-    def __init__(self, stream: IO[str], device: str, uarts: Mapping[str, Uart]) -> None:
+    def __init__(
+        self,
+        stream: IO[str],
+        device: str,
+        uarts: Mapping[str, Uart],
+        setup: Setup | None = None,
+    ) -> None:
         """Record ``uarts`` by the names of their ports; ``stream`` stays its owner's."""
         bauds = {port: uart.form.baud for port, uart in uarts.items()}
-        self._writer = RecordingWriter(stream, device, bauds)
+        self._writer = RecordingWriter(stream, device, bauds, setup)
         self._taps = [_Tap(self._writer, port, uart) for port, uart in uarts.items()]
 
     def bus(self, kernel: Kernel, bus: I2cBus, port: str = "i2c") -> "RecordedBus":
         """``bus``, with its transfers on record; to be used in its place."""
         return RecordedBus(kernel, bus, port, self._writer)
+
+    def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
+        """The device was told so, from outside of its ports; see ``Control``."""
+        self._writer.write(Control(time_ps, words, text))
 
     def close(self) -> None:
         """Write what is pending and detach."""
@@ -80,11 +85,15 @@ class _Tap:
         self._data = bytearray()
         self._start_ps = 0
         uart.taps.append(self)
+        uart.host_taps.append(self._host_sent)
 
     def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         self._add("device", data, first_ps - byte_ps)
 
     def device_heard(self, byte: int, start_ps: int) -> None:
+        pass
+
+    def _host_sent(self, byte: int, start_ps: int) -> None:
         self._add("host", bytes([byte]), start_ps)
 
     def framing_error(self, time_ps: int) -> None:
@@ -94,6 +103,7 @@ class _Tap:
     def close(self) -> None:
         self._flush()
         self._uart.taps.remove(self)
+        self._uart.host_taps.remove(self._host_sent)
 
     def _add(self, side: Side, data: bytes, start_ps: int) -> None:
         next_ps = self._start_ps + len(self._data) * self._uart.byte_ps
@@ -134,130 +144,3 @@ class RecordedBus(BusTap):
             found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
             event = BusTransfer(start_ps, self._port, self._kernel.now, found, errno)
             self._writer.write(event)
-
-
-class Replay:
-    """Plays a recording's host to a board that has just been powered up.
-
-    Attributes:
-        differences: one line for each port where the device says something else, the first byte
-            that differs and its field named; complete after ``run``.
-    """
-
-    def __init__(
-        self, recording: Recording, kernel: Kernel, uarts: Mapping[str, Uart], bus: I2cBus
-    ) -> None:
-        """Prepare; raises ValueError for a recording with ports that the board lacks."""
-        missing = set(recording.bauds) - set(uarts)
-        if missing:
-            raise ValueError(
-                f"{recording.name} has port {', '.join(sorted(missing))}, "
-                f"this device has {', '.join(uarts)}"
-            )
-        self._recording = recording
-        self._kernel = kernel
-        self._heard: dict[str, _Listener] = {}
-        self._bus_found: list[BusTransfer] = []
-        self.differences: list[str] = []
-        for port, uart in uarts.items():
-            self._heard[port] = _Listener(uart)
-            kernel.process(self._write(port, uart))
-        kernel.process(self._transfer(bus))
-
-    def run(self, interface: Interface) -> list[str]:
-        """Play to the end; returns ``differences``."""
-        self._kernel.advance_to(self._recording.end_ps + SETTLE_PS)
-        for port, listener in self._heard.items():
-            self._compare_line(interface, port, listener)
-        self._compare_bus(interface)
-        return self.differences
-
-    def _write(self, port: str, uart: Uart) -> Generator[simpy.Event, Any, None]:
-        for block in self._recording.line(port):
-            if block.side == "host":
-                yield self._kernel.timeout(max(0, block.time_ps - self._kernel.now))
-                uart.host_writes(block.data)
-
-    def _transfer(self, bus: I2cBus) -> Generator[simpy.Event, Any, None]:
-        for transfer in self._recording.transfers:
-            yield self._kernel.timeout(max(0, transfer.time_ps - self._kernel.now))
-            messages = [
-                I2cMessage(m.address, read=len(m.data), probe_read=not m.data)
-                if m.read
-                else I2cMessage(m.address, bytearray(m.data))
-                for m in transfer.messages
-            ]
-            errno = 0
-            try:
-                yield from bus.transfer(messages)
-            except I2cNackError as error:
-                errno = error.errno or 0
-            found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
-            now_ps = self._kernel.now
-            self._bus_found.append(
-                BusTransfer(transfer.time_ps, transfer.port, now_ps, found, errno)
-            )
-
-    def _compare_line(self, interface: Interface, port: str, listener: "_Listener") -> None:
-        expected, times = self._recording.sent(port, "device")
-        found = bytes(listener.data)
-        index = _first_difference(expected, found)
-        if index is not None:
-            name = name_answer_byte(interface, self._recording, port, index)
-            self.differences.append(f"{name}: {_bytes(expected, found, index)}")
-            return
-        for index, (then_ps, now_ps) in enumerate(zip(times, listener.times, strict=True)):
-            if then_ps != now_ps:
-                name = name_answer_byte(interface, self._recording, port, index)
-                change_us = (now_ps - then_ps) / 1e6
-                self.differences.append(f"{name}: same bytes, {change_us:+.3f} us in time")
-                return
-
-    def _compare_bus(self, interface: Interface) -> None:
-        for then, now in zip(self._recording.transfers, self._bus_found, strict=False):
-            for number, (before, after) in enumerate(zip(then.messages, now.messages, strict=True)):
-                index = _first_difference(before.data, after.data)
-                if index is not None:
-                    name = name_bus_byte(interface, then, number, index)
-                    what = _bytes(before.data, after.data, index)
-                    self.differences.append(f"{name}: {what}")
-                    return
-            if then.errno != now.errno:
-                self.differences.append(
-                    f"{then.port}: transfer at {then.time_ps} ps: errno {now.errno}, "
-                    f"recorded {then.errno}"
-                )
-                return
-
-
-class _Listener:
-    """Keeps what the device sends on a line."""
-
-    def __init__(self, uart: Uart) -> None:
-        self.data = bytearray()
-        self.times: list[int] = []
-        uart.taps.append(self)
-
-    def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        self.data += data
-        self.times += [first_ps + (index - 1) * byte_ps for index in range(len(data))]
-
-    def device_heard(self, byte: int, start_ps: int) -> None:
-        """The replay said so itself."""
-
-    def framing_error(self, time_ps: int) -> None:
-        """Not a byte from the device."""
-
-
-def _first_difference(expected: bytes, found: bytes) -> int | None:
-    for index, (one, other) in enumerate(zip_longest(expected, found)):
-        if one != other:
-            return index
-    return None
-
-
-def _bytes(expected: bytes, found: bytes, index: int) -> str:
-    def show(data: bytes) -> str:
-        return f"{data[index]:#04x}" if index < len(data) else "nothing"
-
-    return f"{show(found)}, recorded {show(expected)}"

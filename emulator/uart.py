@@ -59,6 +59,8 @@ class Uart:
         on_silence: interrupt: nothing was received for ``silence_bytes`` byte times. Raised once,
             and again only after a byte came.
         taps: who else listens.
+        host_taps: told of every byte at its end on the line to the device, and when it began;
+            before anything disturbs it.
         disturbance: what is in the line, if anything.
         framing_errors: characters that the device dropped.
     """
@@ -80,6 +82,7 @@ class Uart:
         self.on_silence = on_silence
         self.line: Callable[[bytes, int, int], None] = lambda _data, _first_ps, _byte_ps: None
         self.taps: list[UartTap] = []
+        self.host_taps: list[Callable[[int, int], None]] = []
         self.disturbance: Disturbance | None = None
         self.framing_errors = 0
         self._silence_ps = silence_bytes * self.byte_ps
@@ -182,6 +185,8 @@ class Uart:
             tap.framing_error(self._env.now)
 
     def _hear(self, byte: int, start_ps: int) -> None:
+        for tell in self.host_taps:
+            tell(byte, start_ps)
         if self.disturbance is None:
             self._receive(byte, start_ps)
         else:

@@ -17,6 +17,7 @@ from cubestack.firmware_model.interface.recording import (
     RecordingWriter,
     Side,
 )
+from cubestack.firmware_model.interface.recording_setup import Setup
 from cubestack.host.i2c_client import I2cBus
 from cubestack.host.transport import Transport
 
@@ -31,16 +32,26 @@ I2C_M_RD = 0x0001
 class Tape:
     """Stands between a host tool and its lines and bus."""
 
-    def __init__(self, stream: IO[str], *, clock_ns: Callable[[], int] = time.monotonic_ns) -> None:
-        """Write to ``stream``, which stays its owner's; ``clock_ns`` never runs back."""
+    def __init__(
+        self,
+        stream: IO[str],
+        setup: Setup | None = None,
+        *,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        """Write to ``stream``, which stays its owner's; ``clock_ns`` never runs back.
+
+        ``setup`` says what is recorded.
+        """
         self._stream = stream
+        self._setup = setup
         self._clock_ns = clock_ns
         self._start_ns = clock_ns()
         self._writer: RecordingWriter | None = None
 
     def begin(self, device: str, bauds: Mapping[str, int]) -> None:
         """Write the header: name of the device, baud rate by port."""
-        self._writer = RecordingWriter(self._stream, device, dict(bauds))
+        self._writer = RecordingWriter(self._stream, device, dict(bauds), self._setup)
 
     def line(self, transport: Transport, port: str, baud: int) -> Transport:
         """``transport``, with its bytes on the tape."""

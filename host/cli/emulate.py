@@ -28,6 +28,7 @@ from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
+from cubestack.host.cli.setups import emulated_setup
 from cubestack.host.cli.terminal import say
 
 if TYPE_CHECKING:
@@ -100,7 +101,9 @@ def run(args: argparse.Namespace) -> int:
             stack.callback(devices[-1].board.close)
         if len(devices) == 1:
             inject_plan(devices[0].board.faults, args.faults, say)
-            record(args, devices[0], stack)
+            options = {"mcu_addressing": True} if args.mcu_addressing else {}
+            setup = emulated_setup(args.seed, args.scene, args.faults, options)
+            record(args, devices[0], stack, setup)
         kernel, adapter = _joined(devices)
         served = open_ports(args, devices, stack)
         endpoints = [endpoint for _, _, endpoint in served]

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cubestack.emulator.recording import Recorder
     from cubestack.emulator.uart import Uart
+    from cubestack.firmware_model.interface.recording_setup import Setup
     from cubestack.host.cli.boards import Opened
 
 __all__ = ["add_record_arguments", "create_file", "port_uarts", "record"]
@@ -34,11 +36,13 @@ def port_uarts(opened: Opened) -> dict[str, Uart]:
     }
 
 
-def record(args: argparse.Namespace, opened: Opened, stack: ExitStack) -> None:
+def record(
+    args: argparse.Namespace, opened: Opened, stack: ExitStack, setup: Setup | None = None
+) -> Recorder | None:
     """Start what the options ask for; ``stack`` ends it. Before any port is opened.
 
-    The board's I2C bus is replaced by one that is listened to. Raises ValueError for a file that
-    can not be written.
+    The board's I2C bus is replaced by one that is listened to. ``setup`` is for the recording's
+    header. Returns what records, if anything. Raises ValueError for a file that can not be written.
     """
     from cubestack.emulator.probes import firmware_probes
     from cubestack.emulator.recording import Recorder
@@ -58,10 +62,12 @@ def record(args: argparse.Namespace, opened: Opened, stack: ExitStack) -> None:
         )
         stack.callback(trace.close)
         board.i2c_bus = trace.bus(board.i2c_bus)
-    if args.record is not None:
-        recorder = Recorder(create_file(args.record, stack), device, uarts)
-        stack.callback(recorder.close)
-        board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+    if args.record is None:
+        return None
+    recorder = Recorder(create_file(args.record, stack), device, uarts, setup)
+    stack.callback(recorder.close)
+    board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+    return recorder
 
 
 def create_file(path: Path, stack: ExitStack) -> IO[str]:

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError
 from cubestack.emulator.line_format import LineFormat
-from cubestack.emulator.recording import Recorder, Replay
+from cubestack.emulator.recording import Recorder
+from cubestack.emulator.replay import Replay
 from cubestack.emulator.uart import Uart
 from cubestack.emulator.virtual_time import PS_PER_MS, Kernel
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.recording import Recording, load_recording
+from cubestack.firmware_model.interface.recording import Control, Recording, load_recording
 
 
 class Memory:
@@ -148,3 +149,66 @@ def test_recording_of_other_ports(tmp_path):
     device = Device()
     with pytest.raises(ValueError, match=r"x\.rec has port bench_uart, this device has uart"):
         device.replay(recording)
+
+
+def test_dropped_characters_are_dropped_again(tmp_path):
+    device, stream = Device(), io.StringIO()
+    with Recorder(stream, "cubesense", {"uart": device.uart}):
+        device.uart.host_writes(b"a")
+        device.kernel.run()
+        device.uart.host_form = LineFormat(57_600, parity="S")
+        device.uart.host_writes(b"bc")
+        device.kernel.run()
+    (tmp_path / "a.rec").write_text(stream.getvalue())
+    again = Device()
+    assert again.replay(load_recording(tmp_path / "a.rec")) == []
+    assert again.uart.framing_errors == device.uart.framing_errors == 2
+
+
+class Losing:
+    """A line that loses every second byte to the device."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def to_host(self, data, first_ps, byte_ps, line) -> None:
+        line(data, first_ps, byte_ps)
+
+    def to_device(self, byte, start_ps, hear) -> None:
+        self.count += 1
+        if self.count % 2:
+            hear(byte, start_ps)
+
+
+def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
+    device, stream = Device(), io.StringIO()
+    device.uart.disturbance = Losing()
+    with Recorder(stream, "cubesense", {"uart": device.uart}):
+        device.uart.host_writes(b"abcd")
+        device.kernel.run()
+    (tmp_path / "a.rec").write_text(stream.getvalue())
+    recording = load_recording(tmp_path / "a.rec")
+    assert recording.sent("uart", "host")[0] == b"abcd"
+    assert recording.sent("uart", "device")[0] == b"bd"
+    again = Device()
+    again.uart.disturbance = Losing()
+    assert again.replay(recording) == []
+    assert len(Device().replay(recording)) == 1
+
+
+def test_what_was_done_meanwhile_is_done_again(tmp_path):
+    device, stream = Device(), io.StringIO()
+    with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
+        device.kernel.advance_to(PS_PER_MS)
+        recorder.control(device.kernel.now, ("scene", "x.toml"), "text")
+    (tmp_path / "a.rec").write_text(stream.getvalue())
+    recording = load_recording(tmp_path / "a.rec")
+    again, done = Device(), []
+
+    def act(control: Control) -> None:
+        done.append((again.kernel.now, control))
+
+    Replay(recording, again.kernel, {"uart": again.uart}, again.bus, act).run(INTERFACE)
+    assert done == [(PS_PER_MS, Control(PS_PER_MS, ("scene", "x.toml"), "text"))]
+    with pytest.raises(ValueError, match=r"a\.rec: scene x\.toml can not be done here"):
+        Device().replay(recording)

@@ -10,9 +10,13 @@ from cubestack.emulator.rtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.cli.boards import open_board
+from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.main import main
 from cubestack.host.cli.records import record
+from cubestack.host.cli.setups import emulated_setup
 from cubestack.host.node_client import NodeClient
+
+HEADER = '{"recording":1,"device":"cubesense","lines":{}'
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -25,7 +29,7 @@ def recording(tmp_path):
     with ExitStack() as stack:
         opened = open_board("cubesense", None, seed=3, engine="auto", baud=None)
         stack.callback(opened.board.close)
-        record(args, opened, stack)
+        record(args, opened, stack, emulated_setup(3, None))
         from cubestack.emulator.ports.direct import DirectSerial
 
         client = NodeClient(DirectSerial(opened.board.kernel, opened.lines[0].uart), INTERFACE)
@@ -38,8 +42,10 @@ def recording(tmp_path):
 
 def test_no_difference(recording, capsys, tmp_path):
     again = tmp_path / "b.rec"
-    assert main(["replay", str(recording), "--seed", "3", "--record", str(again)]) == 0
-    assert "no difference" in capsys.readouterr().out
+    assert main(["replay", str(recording), "--record", str(again)]) == 0
+    output = capsys.readouterr()
+    assert "no difference" in output.out
+    assert output.err == ""
     assert again.read_text() == recording.read_text()
 
 
@@ -52,14 +58,100 @@ def test_changed_default_is_named(recording, capsys, monkeypatch):
         return settings
 
     monkeypatch.setattr(CameraSettings, "at_reset", changed)
-    assert main(["replay", str(recording), "--seed", "3", "--json"]) == 1
+    assert main(["replay", str(recording), "--json"]) == 1
     (difference,) = json.loads(capsys.readouterr().out)["differences"]
     assert "telemetry Configuration, field Threshold1: 0xe2, recorded 0xe1" in difference
+
+
+SUN = 'kind = "earth-sun"\nsun_deg = [{}, 10]\n'
+
+SESSION = (
+    "write CaptureAndDetect SUN SRAM1; time 0.5; read Result1; fault uart-drop rate=0.3 for_s=9;"
+    "raw 1f7f801fff; raw 1f7f801fff; raw 1f7f801fff; raw 1f7f801fff; fault clear; power SRAM1 off;"
+    "time 0.1; scene {}; power SRAM1 on; write CaptureAndDetect SUN SRAM1; time 0.5; read Result1"
+)
+
+
+@pytest.fixture
+def session(tmp_path, capsys):
+    """A CubeSense that is mistreated by the shell, its scene files, and what it said."""
+    scenes = [tmp_path / "first.toml", tmp_path / "second.toml"]
+    for number, path in enumerate(scenes):
+        path.write_text(SUN.format(10 * number))
+    made = tmp_path / "session.rec"
+    options = ["--scene", str(scenes[0]), "--seed", "5", "--record", str(made)]
+    assert main(["shell", "emulated:cubesense", *options, "-c", SESSION.format(scenes[1])]) == 0
+    return made, scenes, capsys.readouterr().out
+
+
+def test_a_session_says_how_it_was_made(session, capsys, tmp_path):
+    """Seed, scene, faults and switches come from the recording, its scene files gone or not."""
+    made, scenes, said = session
+    results = [line.split()[1:] for line in said.splitlines() if line.startswith("Alpha")]
+    assert len(results) == 2
+    assert results[0] != results[1]
+    again = tmp_path / "again.rec"
+    assert main(["replay", str(made), "--record", str(again)]) == 0
+    assert capsys.readouterr().err == ""
+    assert again.read_text() == made.read_text()
+    for scene in scenes:
+        scene.unlink()
+    assert main(["replay", str(made)]) == 0
+    assert "no difference" in capsys.readouterr().out
+
+
+def test_what_is_not_as_it_was_is_told(session, capsys, tmp_path):
+    made, scenes, _ = session
+    (tmp_path / "plan.toml").write_text("seed = 1\n")
+    other = ["--seed", "6", "--scene", str(scenes[1]), "--faults", str(tmp_path / "plan.toml")]
+    assert main(["replay", str(made), *other]) == 1
+    output = capsys.readouterr()
+    assert "field" in output.out
+    assert "".join(output.err.split()) == "".join(
+        [
+            "seed6insteadof5,withwhichitwasrecorded",
+            f"scene{scenes[1]}isnotwhatitwasrecordedwith,{scenes[0]}",
+            f"planoffaults{tmp_path}/plan.toml:itwasrecordedwithoutone",
+        ]
+    )
+    assert main(["replay", str(made), "--seed", "5", "--scene", str(scenes[0])]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys):
+    plan = tmp_path / "plan.toml"
+    plan.write_text('seed = 9\n[[fault]]\nkind = "uart-drop"\nrate = 0.2\n')
+    made = tmp_path / "a.rec"
+    args = argparse.Namespace(record=made, trace=None)
+    with ExitStack() as stack:
+        opened = open_board(
+            "cubesense", None, seed=3, engine="auto", baud=9600, mcu_addressing=True
+        )
+        stack.callback(opened.board.close)
+        inject_plan(opened.board.faults, plan)
+        setup = emulated_setup(3, None, plan, {"mcu_addressing": True})
+        record(args, opened, stack, setup)
+        line = opened.board.serial()
+        for _ in range(20):
+            line.write(b"\x1f\x7f\x80\x1f\xff")
+            line.read(100, 0.1)
+    plan.unlink()
+    assert main(["replay", str(made)]) == 0
+    assert "no difference" in capsys.readouterr().out
+    changed = made.read_text().replace("seed = 9", "seed = 8")
+    made.write_text(changed)
+    assert main(["replay", str(made)]) == 1
+    made.write_text(changed.replace("mcu_addressing", "x"))
+    capsys.readouterr()
+    assert main(["replay", str(made)]) == 2
+    assert "its setup has an unknown option 'x'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("content", "code", "error"),
     [
+        (HEADER + ',"setup":{"seed":-1}}', 2, '"seed" must be a whole number from 0, not -1'),
+        (HEADER + '}\n{"ps":1,"control":["fly"]}', 2, "nothing does 'fly'"),
         ("nonsense", 2, "is no recording of version 1: line 1"),
         ('{"recording":1,"device":"mars","lines":{}}', 2, "no device 'mars'"),
         ('{"recording":1,"device":"cubestar","lines":{"bench_uart":1}}', 2, "has port bench_uart"),

@@ -5,7 +5,8 @@ import io
 import pytest
 
 from cubestack.emulator.probes import firmware_probes
-from cubestack.emulator.recording import Recorder, Replay
+from cubestack.emulator.recording import Recorder
+from cubestack.emulator.replay import Replay
 from cubestack.emulator.trace import VcdTrace
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.firmware_model.interface.cubesense import INTERFACE

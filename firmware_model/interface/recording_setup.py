@@ -1,0 +1,95 @@
+"""How a recorded device was made, for the header of a recording: enough to make it once more."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = ["Document", "Option", "Setup"]
+
+Option = bool | int | float | str
+"""Value of an option."""
+
+
+@dataclass(frozen=True)
+class Document:
+    """A file that the device was made from.
+
+    Attributes:
+        name: its path, as the user gave it.
+        text: what was in it.
+    """
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How a device was made.
+
+    Attributes:
+        version: of this project.
+        target: what was recorded, as the user gave it; empty where it was emulated here.
+        seed: of everything random.
+        scene: what it saw; None for the device's default.
+        faults: plan of faults.
+        options: others that are not at their default, by name.
+    """
+
+    version: str
+    target: str = ""
+    seed: int = 0
+    scene: Document | None = None
+    faults: Document | None = None
+    options: Mapping[str, Option] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, object]:
+        """All of it, what is not given left out; of a real device, version and target."""
+        content: dict[str, object] = {"version": self.version}
+        if self.target:
+            return content | {"target": self.target}
+        content["seed"] = self.seed
+        for name, document in (("scene", self.scene), ("faults", self.faults)):
+            if document is not None:
+                content[name] = {"name": document.name, "text": document.text}
+        return content | ({"options": dict(self.options)} if self.options else {})
+
+    @classmethod
+    def from_json(cls, content: Any) -> "Setup":
+        """Read what ``to_json`` gives; raises ValueError."""
+        if not isinstance(content, dict):
+            raise ValueError('"setup" must be an object')
+        unknown = set(content) - {"version", "target", "seed", "scene", "faults", "options"}
+        if unknown:
+            raise ValueError(f'"setup" has no member {min(unknown)!r}')
+        seed, options = content.get("seed", 0), content.get("options", {})
+        if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+            raise ValueError(f'"seed" must be a whole number from 0, not {seed!r}')
+        if not isinstance(options, dict) or not all(
+            isinstance(value, Option) for value in options.values()
+        ):
+            raise ValueError('"options" must be an object of numbers, texts, true and false')
+        return cls(
+            _text(content, "version"),
+            _text(content, "target"),
+            seed,
+            _document(content, "scene"),
+            _document(content, "faults"),
+            options,
+        )
+
+
+def _document(content: dict[str, Any], name: str) -> Document | None:
+    found = content.get(name)
+    if found is None:
+        return None
+    if not isinstance(found, dict):
+        raise ValueError(f'"{name}" must be an object with "name" and "text"')
+    return Document(_text(found, "name"), _text(found, "text"))
+
+
+def _text(content: dict[str, Any], name: str) -> str:
+    found = content.get(name, "")
+    if not isinstance(found, str):
+        raise ValueError(f'"{name}" must be a text, not {found!r}')
+    return found
