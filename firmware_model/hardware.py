@@ -208,6 +208,12 @@ class Hardware(Protocol):
     def switch_supply(self, channel: str, on: bool) -> None:
         """Turn the load switch of supply ``channel`` on or off."""
 
+    def bus_read(self, select: int, address: int, count: int) -> bytes:
+        """Load bytes over the external bus, in an interrupt: their cycles are still to be charged.
+
+        Only where that bus leads to the FPGA; see ``BusAccess``.
+        """
+
     def supply_current_ma(self, channel: str) -> float:
         """Current that the monitor of supply ``channel`` shows, in mA."""
 

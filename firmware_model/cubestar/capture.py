@@ -8,23 +8,13 @@ frame (section 5.3.6).
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.phases import Phases
+from cubestack.firmware_model.cubestar.pictures import CopiedPictures, Pictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.hardware import (
-    AwaitPin,
-    Hardware,
-    ReadTimer,
-    Routine,
-    SetPin,
-    Sleep,
-    StrobeRead,
-)
-from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
+from cubestack.firmware_model.hardware import AwaitPin, ReadTimer, Routine, Sleep
 from cubestack.firmware_model.interface.cubestar_codes import TaskStatus
-from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
 
 __all__ = ["ImageCapture"]
 
@@ -36,35 +26,31 @@ ACK_TIMEOUT_US = 2_000_000
 
 
 class ImageCapture:
-    """The capture functions; the newest picture lies at the start of the external RAM.
+    """The capture functions.
 
     Attributes:
         sensor: the image sensor.
+        pictures: where the newest picture lies.
     """
 
     def __init__(
-        self,
-        hardware: Hardware,
-        state: State,
-        phases: Phases,
-        supply: SupplyMonitor,
-        meter: Meter,
+        self, state: State, phases: Phases, supply: SupplyMonitor, pictures: Pictures
     ) -> None:
-        """Use ``hardware`` as the settings in ``state`` say."""
-        self._hardware = hardware
+        """Capture into ``pictures`` as the settings in ``state`` say."""
         self._state = state
         self._phases = phases
         self._supply = supply
-        self._transfer_cycles = meter.table.operations["transfer_byte"].cycles
         self.sensor = ImageSensor(state, phases)
+        self.pictures = pictures
 
     @property
     def image(self) -> NDArray[np.uint8]:
-        """The newest picture, shape (512, 1024), a live view of the external RAM."""
-        return self._hardware.external_ram[:IMAGE_BYTES].reshape(ROWS, COLUMNS)
+        """The newest picture where the processor has a memory of its own, shape (512, 1024)."""
+        assert isinstance(self.pictures, CopiedPictures)
+        return self.pictures.image
 
     def get_image(self, meanwhile: Routine[bool] | None = None) -> Routine[bool]:
-        """Capture a picture into the external RAM; False, with a flag raised, when it failed.
+        """Capture a picture; False, with a flag raised, when it failed.
 
         ``meanwhile`` runs while the FPGA waits for the frame, or at once when there will be none.
         After a failure there is no picture to process.
@@ -92,7 +78,7 @@ class ImageCapture:
         return True
 
     def replaced(self) -> Routine[None]:
-        """The picture in the external RAM was made by other means than a capture."""
+        """The picture was made by other means than a capture."""
         now_us: int = yield ReadTimer()
         self._state.retained.image_ms = now_us // 1000
         self._state.retained.image_present = 1
@@ -113,20 +99,19 @@ class ImageCapture:
         return None
 
     def _store_frame(self, meanwhile: Routine[bool] | None) -> Routine[str | None]:
-        """Get a frame into the FPGA's SRAM (fpgaWriteToRam); returns a failure's flag.
+        """Have the FPGA store a frame (fpgaWriteToRam); returns a failure's flag.
 
         The picture's time is that of ACK's poll: late by as much as ``meanwhile`` outlasts the
         frame.
         """
         started_us: int = yield ReadTimer()
-        yield SetPin("BANK", self._state.settings.get("SelectImageBank", "Bank"))
-        yield SetPin("RNW", 0)
-        yield SetPin("ENABLE", 1)
+        yield from self.pictures.begin()
         self._supply.sample()
         if meanwhile is not None:
             yield from meanwhile
-        stored: bool = yield AwaitPin("ACK", 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
-        yield SetPin("ENABLE", 0)
+        acknowledge = self.pictures.acknowledge
+        stored: bool = yield AwaitPin(acknowledge, 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
+        yield from self.pictures.end(stored)
         yield from self._phases.end("capture_us", started_us)
         ended_us: int = yield ReadTimer()
         self._state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
@@ -136,12 +121,7 @@ class ImageCapture:
         return None if stored else "ImageCaptureError"
 
     def _image_transfer(self) -> Routine[None]:
-        """Copy the frame from the FPGA's SRAM to the external RAM (imageTransfer)."""
+        """Copy the frame to where the program works on it (imageTransfer)."""
         started_us: int = yield ReadTimer()
-        yield SetPin("RNW", 1)
-        yield SetPin("ENABLE", 1)
-        self._supply.sample()
-        yield StrobeRead(self._hardware.external_ram[:IMAGE_BYTES], self._transfer_cycles)
-        yield SetPin("ENABLE", 0)
-        yield SetPin("RNW", 0)
-        yield from self._phases.end("transfer_us", started_us)
+        if (yield from self.pictures.fetch()):
+            yield from self._phases.end("transfer_us", started_us)

@@ -75,7 +75,6 @@ class Commands:
             "ClearWDGResetCounter": self._clear_watchdog_count,
             "ClearErrorFlags": lambda _: state.flags.clear(),
             "ImageBlockSet": self._select_block,
-            "UploadBlock": self._upload_block,
             "setTrackingMode": self._set_hint,
             "ReadConfig": lambda _: state.load_config(),
             "SaveConfig": lambda _: state.save_config(),
@@ -91,6 +90,7 @@ class Commands:
             "CaptureTestPatern": self._test_pattern,
             "CaptureImage": lambda _: capture.get_image(),
             "UploadImage": self._begin_upload,
+            "UploadBlock": self._upload_block,
             "StreamDownImage": self._stream_image,
             "DetectStars": lambda _: processing.detect(),
             "IDStars": lambda _: processing.identify(),
@@ -143,19 +143,8 @@ class Commands:
         self._state.retained.watchdog_resets = 0
 
     def _test_memory(self, _command: Command) -> Routine[None]:
-        """Write a pattern and read it back, then its complement; the picture is lost."""
         self._state.retained.image_present = 0
-        memory = self._hardware.external_ram
-        size = len(memory)
-        passed = True
-        pattern = (np.arange(size) * 167 >> 3).astype(np.uint8)  # differs between rows
-        for wanted in (pattern, ~pattern):
-            memory[:] = wanted
-            self._meter.charge(ebi_write=size, loop=size)
-            yield Pay()
-            passed &= bool(np.array_equal(memory, wanted))
-            self._meter.charge(ebi_read=size, loop=size)
-            yield Pay()
+        passed = yield from self._capture.pictures.test_memory()
         self.memory_test = MemoryTest.PASSED if passed else MemoryTest.FAILED
 
     # --- image sensor -------------------------------------------------------------------------
@@ -188,22 +177,23 @@ class Commands:
                 pattern = row
             case TestPattern.DIAGONAL_RAMP:
                 pattern = row + column
-        self._capture.image[:] = pattern.astype(np.uint8)
-        self._meter.charge(ebi_write=IMAGE_BYTES, i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
+        pixels = np.broadcast_to(pattern, (ROWS, COLUMNS)).astype(np.uint8)
+        yield from self._capture.pictures.write(0, pixels.reshape(-1))
+        self._meter.charge(i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
         yield from self._capture.replaced()
 
     def _begin_upload(self, _command: Command) -> Routine[None]:
         self.next_block = self.blocks_received = 0
-        self._capture.image[:] = 0
-        self._meter.charge(ebi_write=IMAGE_BYTES, loop=IMAGE_BYTES)
+        yield from self._capture.pictures.write(0, np.zeros(IMAGE_BYTES, np.uint8))
+        self._meter.charge(loop=IMAGE_BYTES)
         yield from self._capture.replaced()
 
-    def _upload_block(self, command: Command) -> None:
+    def _upload_block(self, command: Command) -> Routine[None]:
         number, data = int(command.values["BlockNumber"]), bytes(command.values["Data"])
         start = number * UPLOAD_BLOCK_BYTES
         pixels = np.frombuffer(data, np.uint8)
-        self._hardware.external_ram[start : start + UPLOAD_BLOCK_BYTES] = pixels
-        self._meter.charge(ebi_write=UPLOAD_BLOCK_BYTES, loop=UPLOAD_BLOCK_BYTES)
+        yield from self._capture.pictures.write(start, pixels)
+        self._meter.charge(loop=UPLOAD_BLOCK_BYTES)
         self.next_block = number + 1
         self.blocks_received += 1
 
@@ -216,9 +206,9 @@ class Commands:
             while self._hardware.uart_backlog() > STREAM_BACKLOG_BYTES:
                 now_us: int = yield ReadTimer()
                 yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
-            block = self._hardware.external_ram[start : start + step].tobytes()
+            block = yield from self._capture.pictures.read(start, step)
             self._hardware.uart_send(encode_frame(block))
-            self._meter.charge(ebi_read=step, loop=step)
+            self._meter.charge(loop=step)
 
     # --- stars --------------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.algorithms.assisted import CUT_RADIUS_DEG, identify_assisted
-from cubestack.firmware_model.algorithms.detection import Detection, SearchEnd, detect_stars
+from cubestack.firmware_model.algorithms.detection import Detection, SearchEnd
 from cubestack.firmware_model.algorithms.geometry import direction_of, undistort, unit_vectors
 from cubestack.firmware_model.algorithms.identification import Identification, Outcome
 from cubestack.firmware_model.algorithms.quest import AttitudeError, dcm, quest
@@ -144,7 +144,7 @@ class Processing:
         self._state.task_status = TaskStatus.DETECTING
         started_us: int = yield ReadTimer()
         with self._cycles():
-            detection = detect_stars(self._capture.image, detection_config(settings), self._meter)
+            detection = yield from self._capture.pictures.search(detection_config(settings))
             camera = camera_parameters(settings)
             with self._meter.phase("correction"):
                 points = undistort(detection.centroids, camera, self._meter)

@@ -2,26 +2,28 @@
 
 CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new picture, the processor
 works on the previous one; then the picture is transferred, and a software reset ends the iteration.
+With one shared memory (section 7.2) the processor works on a picture as soon as it is stored.
 Ours: the reset waits until shortly before the next iteration, so that results can be read until
 then, and leaves out a turn when the host is in the middle of a message.
 """
 
 from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.host_link import HostLink
 from cubestack.firmware_model.cubestar.phases import Phases
+from cubestack.firmware_model.cubestar.pictures import ITERATION_US
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry import Telemetry
 from cubestack.firmware_model.hardware import Hardware, Pay, ReadTimer, Reset, Routine
 from cubestack.firmware_model.interface.cubestar_codes import ResetCause
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 from cubestack.firmware_model.star_catalogue import StarCatalogue
 
 __all__ = ["ITERATION_US", "RESET_LEAD_US", "CubeStarProgram"]
-
-ITERATION_US = 1_000_000
 
 RESET_LEAD_US = 10_000
 """From the reset to the next iteration: more than the few milliseconds that the reset takes."""
@@ -39,13 +41,20 @@ class CubeStarProgram:
         commands: the telecommands.
     """
 
-    def __init__(self, hardware: Hardware, meter: Meter, catalogue: StarCatalogue) -> None:
+    def __init__(
+        self,
+        hardware: Hardware,
+        meter: Meter,
+        catalogue: StarCatalogue,
+        layout: Layout = Layout.COPIED,
+    ) -> None:
         """Reset: set up RAM from the retention registers and flash."""
         self._hardware = hardware
         self._state = state = State(hardware)
         self._phases = Phases(state)
         self.supply = SupplyMonitor(hardware, state)
-        self._capture = ImageCapture(hardware, state, self._phases, self.supply, meter)
+        self._pictures = pictures_of(layout, hardware, state, meter, self.supply)
+        self._capture = ImageCapture(state, self._phases, self.supply, self._pictures)
         self._processing = Processing(meter, state, self._capture, self._phases, catalogue)
         self.commands = Commands(
             hardware, meter, state, self._capture, self._processing, self.supply
@@ -67,6 +76,7 @@ class CubeStarProgram:
     def main(self) -> Routine[None]:
         """Run until a reset."""
         yield from self._phases.started()
+        yield from self._pictures.start()
         retained = self._state.retained
         if self._hardware.reset_cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
             yield from self._capture.sensor.power_up()
@@ -105,11 +115,16 @@ class CubeStarProgram:
         if started_us > retained.loop_due_us + LATE_US:
             self._state.raise_flag("TimingError")
             retained.loop_due_us = started_us
-        retained.loop_due_us += ITERATION_US
+        retained.loop_due_us += self._pictures.iteration_us
         retained.delaying = 0
 
-        previous = self._processing.process() if retained.image_present else None
-        yield from self._capture.get_image(meanwhile=previous)
+        if self._pictures.while_storing:
+            previous = self._processing.process() if retained.image_present else None
+            yield from self._capture.get_image(meanwhile=previous)
+        elif (yield from self._capture.get_image()):
+            yield from self._processing.process()
+        else:
+            self._processing.discard_results()
         retained.iterations += 1
         yield from self._phases.end("loop_us", started_us)
         retained.longest_loop_us = max(retained.longest_loop_us, retained.loop_us)

@@ -87,6 +87,7 @@ class Retained:
     frame: int = 0
     image_ms: int = 0
     image_present: int = 0
+    image_place: int = 0
     solved: int = 0
     hint_present: int = 0
     cut: int = 0

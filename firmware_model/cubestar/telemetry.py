@@ -199,13 +199,15 @@ class Telemetry:
         setting = self._state.settings.all("ImageBlockSet")
         length = ImageBlockSize(setting["BlockSize"]).length
         start = setting["BlockNumber"] * length
-        data = self._hardware.external_ram[start : start + length].tobytes()
-        if length > ImageBlockSize.BYTES_128.length:  # 256 bytes come as two reads
-            half = len(data) // 2
-            data = data[half:] if self._commands.second_half else data[:half]
+        longest = ImageBlockSize.BYTES_128.length
+        if length > longest:  # 256 bytes come as two reads
+            start += longest if self._commands.second_half else 0
             self._commands.second_half = not self._commands.second_half
-        self._meter.charge(ebi_read=len(data))
-        return {"Block": data.ljust(ImageBlockSize.BYTES_128.length, b"\0")}
+        data = self._capture.pictures.read_now(start, min(length, longest))
+        if data is None:
+            self._state.raise_flag("StatusError")
+            data = b""
+        return {"Block": data.ljust(longest, b"\0")}
 
     def _phase_times(self) -> Values:
         retained = self._state.retained

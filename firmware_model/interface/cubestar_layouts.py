@@ -1,0 +1,24 @@
+"""Memory layouts of CubeStar: how camera, FPGA, SRAM and processor are connected.
+
+CubeStar thesis, options 1 to 3 of section 3.3, and section 7.2.
+"""
+
+from enum import Enum
+
+__all__ = ["Layout"]
+
+
+class Layout(Enum):
+    """A layout; its value is its name on the command line."""
+
+    COPIED = "1"
+    """Option 1, the published one: an SRAM for the FPGA, one for the processor."""
+
+    SHARED = "2"
+    """Option 2: one SRAM, the FPGA as bus switch."""
+
+    TWO_MEMORIES = "3"
+    """Option 3: two SRAMs at one FPGA, in turn."""
+
+    TWO_BOARDS = "two-boards"
+    """Section 7.2: two boards of option 2 on one bus, in turn."""
