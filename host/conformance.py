@@ -16,7 +16,7 @@ from enum import Enum
 from cubestack.firmware_model.interface.message import Message, Value
 from cubestack.host.errors import NodeError
 from cubestack.host.node_client import NodeClient
-from cubestack.host.shell import has_side_effect
+from cubestack.host.shell_names import has_side_effect
 from cubestack.host.targets import Target
 
 __all__ = ["Check", "Outcome", "Suite", "compare"]

@@ -14,7 +14,7 @@ from cubestack.host.conformance import (
     show_values,
 )
 from cubestack.host.node_client import NodeClient
-from cubestack.host.shell import SCHEDULING
+from cubestack.host.shell_names import SCHEDULING
 
 __all__ = ["check_reads"]
 

@@ -15,7 +15,8 @@ from cubestack.firmware_model.interface.field import InterfaceError
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
 from cubestack.host.node_client import NodeClient
 from cubestack.host.register_client import RegisterClient
-from cubestack.host.shell import Shell, ShellError, has_side_effect
+from cubestack.host.shell import Shell, ShellError
+from cubestack.host.shell_names import has_side_effect
 from cubestack.host.shell_values import parse_value, parse_values
 from cubestack.host.targets import Target
 
@@ -111,6 +112,27 @@ def test_telecommand_by_place_and_by_name(node, shell):
     assert node.log == [("setDetectionThresholds", {"DetectionThreshold": 16, "StarThreshold": 9})]
 
 
+def test_messages_by_number(node, shell, sense_shell):
+    assert shell.execute("read 128").data == shell.execute("read Identification").data
+    assert shell.execute("read 0x80 NodeType").rows == [("NodeType", "0")]
+    shell.execute("write 21 0x10 9")
+    assert node.log == [("setDetectionThresholds", {"DetectionThreshold": 16, "StarThreshold": 9})]
+    assert shell.execute("watch 128 2 0").data["name"] == "Identification"
+    sense_shell.execute("write @0x08 30")
+    assert sense_shell.execute("read @8").data["values"] == {"NADIR_THRESHOLD": 30}
+
+
+@pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
+def test_every_number_that_is_listed_means_its_name(interface):
+    registers = interface.registers and RegisterClient(Bus(), interface.registers)
+    shell = Shell(Target("fake", interface, NodeClient(BenchLine(), interface), None, registers))
+    listed = shell.execute("list")
+    assert [name for _, name in listed.rows] == listed.data["names"]
+    assert len({number for number, _ in listed.rows}) == len(listed.rows)
+    for number, name in listed.rows:
+        assert shell.execute(f"list {number}").data["name"] == name
+
+
 def test_choices_by_name(sense, sense_shell):
     sense_shell.execute("write CaptureAndDetect nadir SRAM2")
     assert sense.log == [("CaptureAndDetect", {"Camera": 1, "Sram": 1})]
@@ -184,6 +206,13 @@ def test_controls_of_a_device_that_is_not_emulated(shell, command):
         ("raed x", "no command 'raed'; did you mean read"),
         ("read", r"read: 0 words; usage: read NAME \[FIELD\]"),
         ("read Identifcation", "nothing is called 'Identifcation'; did you mean Identification"),
+        ("read threshold", "nothing is called 'threshold'; did you mean Detection"),
+        ("read zzzzz", "nothing is called 'zzzzz'; list shows what there is"),
+        ("read 250", r"no telemetry has number 250; near: \d+ \(\w+\), \d+"),
+        ("read 37", "no telemetry has number 37; near: 128"),
+        ("write 128", "no telecommand has number 128; near: "),
+        ("list 999", "no telemetry or telecommand has number 999"),
+        ("read @5", "no register at '@5'; registers are @ADDRESS, over I2C"),
         ("write Identification", "write: nothing is called 'Identification'"),
         ("read Identification NodTyp", "did you mean NodeType"),
         ("read 'x", "No closing quotation"),
@@ -204,6 +233,18 @@ def test_line_that_makes_no_sense(node, shell, line, text):
         shell.execute(line)
     assert "\n" not in str(raised.value)
     assert node.log == []
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("read @0x99", r"near: @0x\w\w \(\w+\), @0x"),
+        ("write @x 1", "no register at '@x'; as in @0x05"),
+    ],
+)
+def test_addresses_that_are_none(sense_shell, line, text):
+    with pytest.raises(ShellError, match=text):
+        sense_shell.execute(line)
 
 
 @given(st.text(max_size=40))

@@ -69,7 +69,7 @@ def memory_bytes(process: subprocess.Popen[bytes]) -> int:
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
-@pytest.mark.filterwarnings("ignore:setDaemon:DeprecationWarning")  # pyserial's RFC 2217
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's RFC 2217
 @pytest.mark.parametrize("transport", ["tcp", "pty", "rfc2217"])
 def test_others_are_served_and_memory_stays_flat(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, transport: str

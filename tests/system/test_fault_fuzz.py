@@ -29,7 +29,7 @@ from cubestack.host.cli.aramis_session import open_aramis
 from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.i2c_client import I2cClient
 from cubestack.host.node_client import NodeClient
-from cubestack.host.shell import has_side_effect
+from cubestack.host.shell_names import has_side_effect
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
