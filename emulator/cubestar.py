@@ -1,9 +1,11 @@
 """The CubeStar stack: which pin goes where.
 
 CubeStar thesis, section 5.2 and tables C.1 to C.4. Camera to FPGA and SRAM, FPGA to processor,
-processor to the satellite's UART and I2C, and the supplies of all three boards.
+processor to the satellite's UART and I2C, and the supplies of all three boards. Other memory
+layouts than the published one are in :mod:`cubestack.emulator.cubestar_layouts`.
 """
 
+from collections import deque
 from functools import cached_property
 from typing import Literal
 
@@ -13,12 +15,12 @@ from numpy.typing import NDArray
 from cubestack.emulator.camera.mlx75412 import Mlx75412
 from cubestack.emulator.camera.optics import ROWS
 from cubestack.emulator.camera.shutter import RollingShutter
+from cubestack.emulator.cubestar_layouts import BOARDS
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.power import PowerModel
-from cubestack.emulator.power_tables import CUBESTAR
 from cubestack.emulator.processor import Processor
 from cubestack.emulator.rtl.engine import make_engine
 from cubestack.emulator.sky.scene import Scene
@@ -30,6 +32,7 @@ from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.hardware import CameraTransfer, FlashStore
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar_codes import ResetCause
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 from cubestack.firmware_model.interface.mlx75412 import REGISTERS
 from cubestack.firmware_model.star_catalogue import StarCatalogue
 
@@ -56,6 +59,8 @@ class CubeStarBoard:
         processor: EFM32GG with the running program.
         uart: the satellite's serial line.
         i2c_bus: the satellite's I2C bus.
+        stored: exposures of the frames stored last, the newest one at the end; None for a frame
+            that was not sent.
     """
 
     def __init__(
@@ -67,6 +72,7 @@ class CubeStarBoard:
         engine: Literal["auto", "compiled", "python"] = "auto",
         baud: int = INTERFACE.baud,
         i2c_address: int = INTERFACE.i2c_address,
+        layout: Layout = Layout.COPIED,
     ) -> None:
         """Power up.
 
@@ -77,13 +83,15 @@ class CubeStarBoard:
             engine: see ``make_engine``.
             baud: of the satellite's UART.
             i2c_address: 7-bit address on the satellite's bus.
+            layout: memory layout, with the program that belongs to it.
         """
         self.kernel = Kernel()
         self._seed = seed
         self._rng = np.random.default_rng(seed)
-        self.engine = make_engine(kind=engine)
+        self._layout = BOARDS[layout]
+        self.engine = make_engine(self._layout.wiring(), kind=engine)
         self.camera = Mlx75412(scene, seed=seed)
-        self.power = PowerModel(self.kernel, CUBESTAR)
+        self.power = PowerModel(self.kernel, self._layout.power)
         self.uart = Uart(
             self.kernel,
             baud,
@@ -93,14 +101,15 @@ class CubeStarBoard:
         )
         self._hardware = _Efm32gg(self)
         self._scramble(self._hardware.external_ram)
-        self._scramble(self.engine.sram)
+        for memory in self.engine.memories.values():
+            self._scramble(memory)
         self.engine.attach(self.camera)
         self.camera.on_change = self._camera_changed
         meter = Meter(CORTEX_M3)
 
         def boot(cause: int) -> CubeStarProgram:
             self._hardware.reset_cause = cause
-            return CubeStarProgram(self._hardware, meter, catalogue)
+            return CubeStarProgram(self._hardware, meter, catalogue, layout)
 
         self.processor = Processor(
             self.kernel,
@@ -112,14 +121,16 @@ class CubeStarBoard:
             boot_us=BOOT_US,
             on_pin=self._pin_changed,
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
+            on_access=self._accessed,
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
         self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
-        self._pins = {"ENABLE": 0, "RNW": 0}
+        self._pins = dict(self._layout.controls)
+        self._accesses = False
         self._storing_since_ps = 0
-        self._stored: RollingShutter | None = None
+        self.stored: deque[RollingShutter | None] = deque([None], maxlen=4)
 
     @property
     def program(self) -> CubeStarProgram:
@@ -138,9 +149,9 @@ class CubeStarBoard:
             {"i2c": self.i2c_bus},
             self.power,
             self.engine,
-            controls=("ENABLE", "RNW"),
+            controls=tuple(self._layout.controls),
             cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
-            memories={"external": self._hardware.external_ram},
+            memories={"external": self._hardware.external_ram} if self._layout.external_ram else {},
         )
         return Faults(sites, self._seed)
 
@@ -173,35 +184,44 @@ class CubeStarBoard:
 
         For whoever compares results; None when nothing was stored or the scene has no attitude.
         """
-        if self._stored is None:
+        latest = self.stored[-1]
+        if latest is None:
             return None
-        return self.camera.scene.truth(self._stored.mid_exposure_ps((ROWS - 1) / 2))
+        return self.camera.scene.truth(latest.mid_exposure_ps((ROWS - 1) / 2))
 
     def _pin_changed(self, pin: str, level: int) -> None:
-        if pin == "ENABLE" and not self._pins["RNW"]:
-            if level:
-                self._storing_since_ps = self.kernel.now
-            else:
-                # The first whole frame was stored, however long the program left ENABLE high.
-                self._stored = self.camera.frame_from(self._storing_since_ps)
-        self._pins[pin] = level
-        state = "standby"
-        if self._pins["ENABLE"]:
-            state = "reading" if self._pins["RNW"] else "storing"
-        self.power.set_state("fpga", state)
-        self.power.set_state("memory", "transfer" if state == "reading" else "standby")
+        stored, self._pins[pin] = self._layout.storing(self._pins), level
+        stores = self._layout.storing(self._pins)
+        if stores > stored:
+            self._storing_since_ps = self.kernel.now
+        elif stores < stored:
+            # The first whole frame was stored, however long the program let the FPGA go on.
+            self.stored.append(self.camera.frame_from(self._storing_since_ps))
+        self._set_states()
+
+    def _accessed(self, busy: bool) -> None:
+        self._accesses = busy
+        self._set_states()
+
+    def _set_states(self) -> None:
+        for part, state in self._layout.states(self._pins, self._accesses).items():
+            self.power.set_state(part, state)
 
     def _supply_switched(self, channel: str, on: bool) -> None:
         # A latch-up comes from outside, so the FPGA may have run ahead; see emulator/processor.py.
         now_ps = max(self.kernel.now, self.engine.now_ps)
         self.engine.run(now_ps)
-        if channel == "memory":
-            if not on:
-                self._scramble(self._hardware.external_ram)
-            return
-        self.camera.power(on, now_ps)
-        if not on:
-            self._scramble(self.engine.sram)
+        behind = "imager" if self._layout.external_ram else "memory"
+        if channel == "memory" and not on:
+            self._scramble(self._hardware.external_ram)
+        if channel == "imager":
+            self.camera.power(on, now_ps)
+        if channel == behind:
+            for name, memory in self.engine.memories.items():
+                if not self._layout.external_ram:
+                    self.engine.power_memory(name, on)
+                if not on:
+                    self._scramble(memory)
 
 
 class _Efm32gg:
@@ -209,7 +229,8 @@ class _Efm32gg:
 
     def __init__(self, board: CubeStarBoard) -> None:
         self._board = board
-        self.external_ram = np.zeros(EXTERNAL_RAM_BYTES, np.uint8)
+        bytes_there = EXTERNAL_RAM_BYTES if board._layout.external_ram else 0
+        self.external_ram = np.zeros(bytes_there, np.uint8)
         self.retention = bytearray(RETENTION_BYTES)
         self.flash = FlashStore()
         self.reset_cause = int(ResetCause.POWER_ON)
@@ -219,6 +240,9 @@ class _Efm32gg:
 
     def uart_backlog(self) -> int:
         return self._board.uart.backlog
+
+    def bus_read(self, select: int, address: int, count: int) -> bytes:
+        return self._board.processor.load(select, address, count)
 
     def wake(self) -> None:
         self._board.processor.wake()

@@ -9,13 +9,16 @@ from collections.abc import Callable, Generator
 from fractions import Fraction
 from typing import Any, Protocol
 
+import numpy as np
 import simpy
 
+from cubestack.emulator.external_bus import Transactions
 from cubestack.emulator.rtl.engine import RtlEngine
 from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
 from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.hardware import (
     AwaitPin,
+    BusAccess,
     CameraTransfer,
     Pay,
     ReadPin,
@@ -89,6 +92,7 @@ class Processor:
         other_pins: Pins | None = None,
         on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
         on_activity: Callable[[bool], None] = lambda _busy: None,
+        on_access: Callable[[bool], None] = lambda _busy: None,
     ) -> None:
         """Power up.
 
@@ -103,6 +107,7 @@ class Processor:
             other_pins: pins that do not lead to the FPGA.
             on_pin: told about every output pin change, after it happened.
             on_activity: told when the processor falls asleep (False), starts or awakes (True).
+            on_access: told when the program begins (True) and ends to use the external bus.
         """
         self._env = env
         self._meter = meter
@@ -113,6 +118,7 @@ class Processor:
         self._other_pins = other_pins
         self._on_pin = on_pin
         self._on_activity = on_activity
+        self._on_access = on_access
         self._clock = CycleClock(meter.table.clock_hz)
         self._wake = env.event()
         self.resets = 0
@@ -124,6 +130,24 @@ class Processor:
         """End the running wakeable sleep, or the next one at once."""
         if not self._wake.triggered:
             self._wake.succeed()
+
+    def load(self, select: int, address: int, count: int) -> bytes:
+        """Read bytes over the external bus in an interrupt, which still has to charge them.
+
+        The engine is ahead of the kernel then, until they are paid.
+        """
+        self._follow()
+        addresses = np.arange(address, address + count, dtype=np.int32)
+        reads = Transactions(
+            addresses,
+            np.zeros(count, np.uint8),
+            False,
+            self._cycle,
+            self._meter.table.operations["ebi_read"].cycles,
+            select,
+        )
+        self.engine.access(reads, self.engine.now_ps + int(count * reads.period))
+        return reads.data.tobytes()
 
     def _run(self) -> Steps:
         self._on_activity(True)
@@ -162,7 +186,7 @@ class Processor:
             case ReadTimer():
                 return self._env.now // PS_PER_US
             case SetPin(pin, level):
-                self.engine.run(self._env.now)
+                self._follow()
                 if self._other_pins is not None and pin in self._other_pins:
                     self._other_pins.set(pin, level)
                 else:
@@ -171,7 +195,7 @@ class Processor:
                 self._on_pin(pin, level)
                 return None
             case ReadPin(pin):
-                self.engine.run(self._env.now)
+                self._follow()
                 self._meter.charge(port_read=1)
                 if self._other_pins is not None and pin in self._other_pins:
                     return self._other_pins.get(pin)
@@ -182,13 +206,23 @@ class Processor:
                 return (yield from self._sleep(request))
             case StrobeRead():
                 return (yield from self._strobe_read(request))
+            case BusAccess():
+                return (yield from self._bus_access(request))
             case CameraTransfer():
                 assert self._camera_bus is not None
                 yield self._env.timeout(self._camera_bus.transfer_ps(request))
-                self.engine.run(self._env.now)
+                self._follow()
                 return self._camera_bus.transfer(request, self._env.now)
             case _:
                 raise TypeError(f"a program can not request {request!r}")
+
+    @property
+    def _cycle(self) -> Fraction:
+        return Fraction(PS_PER_S, self._clock.hz)
+
+    def _follow(self) -> None:
+        """Let the FPGA be where the processor is; after an interrupt's accesses it is ahead."""
+        self.engine.run(max(self._env.now, self.engine.now_ps))
 
     def _horizon(self) -> int:
         """Nothing else happens before this time, so the FPGA may run ahead up to it."""
@@ -199,12 +233,13 @@ class Processor:
     def _await_pin(self, request: AwaitPin) -> Steps:
         start = self._env.now
         deadline = start + request.timeout_us * PS_PER_US
-        self.engine.run(start)
+        self._follow()
         reached = start
         while self.engine.get_pin(request.pin) != request.level:
             if self._env.now >= deadline:
                 return False
-            reached = self.engine.run(min(deadline, self._horizon()), (request.pin, request.level))
+            until = max(self.engine.now_ps, min(deadline, self._horizon()))
+            reached = self.engine.run(until, (request.pin, request.level))
             yield self._env.timeout(reached - self._env.now)
         poll = request.poll_cycles * PS_PER_S
         polls = max(1, -(-(reached - start) * self._clock.hz // poll))
@@ -235,9 +270,34 @@ class Processor:
         done = 0
         while done < len(request.target):
             yield from self._pay()
-            self.engine.run(self._env.now)
+            self._follow()
             # At least one cycle: an event inside it is an interrupt in the middle of the loop.
             limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
             done += self.engine.strobe_read(request.target[done:], period, limit)
             yield self._env.timeout(self.engine.now_ps - self._env.now)
         return None
+
+    def _bus_access(self, request: BusAccess) -> Steps:
+        self._on_access(True)
+        done, total = 0, len(request.addresses)
+        while done < total:
+            yield from self._pay()
+            self._follow()
+            wanted = Transactions(
+                request.addresses[done:],
+                request.data[done:],
+                request.write,
+                self._cycle,
+                request.cycles,
+                request.select,
+                request.above,
+            )
+            # At least one, as above.
+            one = -(-wanted.period.numerator // wanted.period.denominator)
+            limit = max(self._horizon(), self.engine.now_ps + one)
+            done += self.engine.access(wanted, limit)
+            yield self._env.timeout(self.engine.now_ps - self._env.now)
+            if not request.write and request.data[done - 1] > request.above:
+                break
+        self._on_access(False)
+        return done

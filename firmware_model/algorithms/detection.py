@@ -264,7 +264,7 @@ def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter)
 
 def _looked_at(pixels: NDArray[np.uint8], look: Look) -> NDArray[np.uint8]:
     """Answer to ``look`` for a picture that is an array."""
-    blocks = []
+    blocks: list[NDArray[np.uint8]] = []
     for start in range(0, len(look.offsets), BLOCK):
         values = pixels[look.offsets[start : start + BLOCK]]
         above = values > look.above
