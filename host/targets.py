@@ -228,7 +228,7 @@ def _open_recorded(text: str) -> Target:
     interface = interface_of(recording.device, text)
     bus = RecordedI2c(recording, interface)
     spoken = [port for port in recording.bauds if recording.sent(port, "host")[0]]
-    if "uart" in spoken or not recording.transfers:
+    if "uart" in spoken or (not recording.transfers and "uart" in recording.bauds):
         line = RecordedTransport(recording, interface)
         target = Target(text, interface, NodeClient(line, interface), line)
     else:

@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.recording import (
     LineBytes,
     RecordingWriter,
 )
-from cubestack.host.errors import HostError, TargetError
+from cubestack.host.errors import HostError, RecordingMismatchError, TargetError
 from cubestack.host.i2c_client import I2cClient
 from cubestack.host.targets import open_target
 
@@ -73,6 +73,13 @@ def test_recording_of_a_bus(tmp_path):
     target = open_target(f"recorded:{path}")
     assert isinstance(target.node, I2cClient)
     assert target.node.telemetry("Identification")["NodeType"] == 0
+
+
+def test_recording_of_a_bus_on_which_nothing_was_said(tmp_path):
+    path = tmp_path / "a.rec"
+    path.write_text('{"recording":1,"device":"cubesense","lines":{}}\n')
+    with pytest.raises(RecordingMismatchError, match="the recording ends after 0 transfers"):
+        open_target(f"recorded:{path}").node.telemetry("Identification")
 
 
 def test_bench_of_a_device_without_one(tmp_path):

@@ -1,0 +1,89 @@
+"""`cubestack shell`: the same words give the same answers on every kind of target."""
+
+import contextlib
+import os
+import threading
+
+import pytest
+
+from cubestack.emulator.i2c_host.adapter import I2cAdapter
+from cubestack.emulator.i2c_host.server import I2cServer
+from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
+from cubestack.emulator.ports.pump import Pump
+from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.firmware_model.interface.linux_i2c import socket_path
+from cubestack.host.cli.boards import open_board
+from cubestack.host.cli.main import main
+
+pytestmark = [
+    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
+    # pyserial's RFC 2217
+    pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning"),
+]
+
+BUS = 16 + os.getpid() % 200
+TIMEOUT_S = 60
+COMMANDS = (
+    "read 128 NodeType; write DetectionThreshold1 77; read Configuration Threshold1;"
+    "write 41 Threshold=78; read Configuration;"
+    "watch Configuration 2 0.01; list 41; read 250"
+)
+SAID = ("NodeType  4", "Threshold1  77", "Threshold2   78 DN", "DetectionThreshold2: done")
+KINDS = ("emulated", "pty", "tcp", "rfc2217", "i2c", "recorded", "recorded i2c")
+
+
+@contextlib.contextmanager
+def serving(kind, folder):
+    """A CubeSense on a port of that kind, and the target that leads to it."""
+    board = open_board("cubesense", None, seed=0, engine="auto", baud=None).board
+    with contextlib.ExitStack() as stack:
+        stack.callback(board.close)
+        adapter = I2cAdapter(board.kernel, board.i2c_bus)
+        if kind == "pty":
+            port, target = PtyEndpoint(folder / "tty", board.uart), str(folder / "tty")
+        elif kind == "i2c":
+            port, target = I2cServer(socket_path(BUS), adapter), f"i2c:{BUS}:0x1b"
+        else:
+            make = TcpEndpoint if kind == "tcp" else Rfc2217Endpoint
+            port = make("127.0.0.1", 0, board.uart)
+            target = port.name
+        stack.callback(port.close)
+        pump = Pump(board.kernel, [port], lambda: board.busy() or adapter.busy, pace="fast")
+        thread = threading.Thread(target=pump.run)
+        thread.start()
+        stack.callback(thread.join, TIMEOUT_S)
+        stack.callback(pump.stop)
+        yield target
+
+
+@pytest.fixture
+def shell_on(tmp_path, monkeypatch, capsys):
+    """Runs commands on a kind of target; exit code, output, errors."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+    def run(kind, commands, *options):
+        if kind.startswith("recorded"):
+            made = tmp_path / "session.rec"
+            run("i2c" if "i2c" in kind else "tcp", commands, "--record", str(made))
+            code = main(["shell", f"recorded:{made}", "-c", commands])
+        elif kind == "emulated":
+            code = main(["shell", "emulated:cubesense", "-c", commands, *options])
+        else:
+            with serving(kind, tmp_path) as target:
+                words = [target, "--device", "cubesense", "-c", commands, *options]
+                code = main(["shell", *words])
+        return code, *capsys.readouterr()
+
+    return run
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_same_words_say_the_same(shell_on, kind):
+    """The last of them makes no sense."""
+    code, out, err = shell_on(kind, COMMANDS)
+    assert code == 2
+    for text in SAID:
+        assert text in out
+    assert "near: " in err
+    assert (code, out, err) == shell_on("emulated", COMMANDS)
