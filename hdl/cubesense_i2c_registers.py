@@ -82,7 +82,7 @@ class CubeSenseI2cRegisters(Component):
         ]
 
         command = Signal(4, init=RESET_COMMAND)
-        chosen = {register: target.number == register for register in Register}
+        chosen = {register: _is(target.number, register) for register in Register}
         taken = target.write & target.writable
         with m.If(taken & chosen[Register.COMMAND]):
             m.d[self._domain] += command.eq(target.byte)
@@ -130,6 +130,11 @@ class CubeSenseI2cRegisters(Component):
         ]
         m.d.comb += target.value.eq(reduce(or_, selected))
         return m
+
+
+def _is(number: Signal, register: Register) -> Value:
+    """Whether it is that register's; a comparison with 0 is no Verilog that linters like."""
+    return number == register if register else ~number.any()
 
 
 def _fits(command: Signal, row: Command) -> Value:

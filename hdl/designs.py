@@ -9,9 +9,20 @@ from amaranth.hdl import Shape
 from amaranth.lib.wiring import Component, Out
 
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.hdl import cubesense_top, cubestar_double_top, cubestar_shared_top, cubestar_top
+from cubestack.firmware_model.interface.cubesense_fpga_registers import ADDRESSES, GROUP_ADDRESS
+from cubestack.hdl import (
+    cubesense_i2c_top,
+    cubesense_top,
+    cubestar_double_top,
+    cubestar_shared_top,
+    cubestar_top,
+)
 from cubestack.hdl.cubesense_dataflow import Side
+from cubestack.hdl.cubesense_i2c_pair import CubeSenseI2cPair
+from cubestack.hdl.cubesense_i2c_registers import CubeSenseI2cRegisters
+from cubestack.hdl.cubesense_i2c_top import CubeSenseI2cFpga
 from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.cubesense_pointer import MemoryPointer
 from cubestack.hdl.cubesense_reader import CubeSenseReader
 from cubestack.hdl.cubesense_top import CubeSenseFpga
 from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
@@ -22,6 +33,7 @@ from cubestack.hdl.frame_gap import FrameGap
 from cubestack.hdl.frame_reader import FrameReader
 from cubestack.hdl.frame_writer import FrameWriter
 from cubestack.hdl.gray_counter import GrayCounter
+from cubestack.hdl.i2c_target import I2cTarget
 from cubestack.hdl.matrix_counter import MatrixCounter
 from cubestack.hdl.nadir_scan import NadirScan
 from cubestack.hdl.sun_search import SunSearch
@@ -65,6 +77,7 @@ class Top:
         meanings: of its ports.
         parts: AGLN030s that it fills; more than one for a model of several chips.
         pulled_up: pins that need a pull-up.
+        reset: what makes the registers' state.
     """
 
     make: Callable[[], Component]
@@ -73,6 +86,7 @@ class Top:
     meanings: dict[str, str]
     parts: int = 1
     pulled_up: tuple[str, ...] = ()
+    reset: str = "standby"
 
 
 _SRAM = {
@@ -113,6 +127,19 @@ _PAIR = {
     "CONTENTION": "model only: DATA, link data, link control lines 0 and 1 have two drivers",
 }
 
+_CUBESENSE_I2C = {port: pins.meaning for pins in cubesense_i2c_top.PINS for port in pins.ports}
+_PAIR_I2C = {
+    **{
+        f"{prefix}_{port}": f"{side}: {meaning}"
+        for prefix, side in (("SUN", "sun"), ("NAD", "nadir"))
+        for port, meaning in _CUBESENSE_I2C.items()
+    },
+    **_CUBESENSE_I2C,
+    "SDA_I": "model only: what all others make of SDA",
+    "SDA": "I2C data with both FPGAs, open drain",
+    "CONTENTION": "model only: link data, link control lines have two drivers",
+}
+
 _PIXCLK = Clock("PIXCLK", 100, "image sensor at 10 MHz")
 _DCLK = Clock("DCLK", 770.8, "37 cycles of the microcontroller's 48 MHz")
 _ENABLE = Clock("ENABLE", 1000, "microcontroller, a few times a second; latches BANK")
@@ -120,6 +147,8 @@ _ALE = Clock("ALE", 83, "bus accesses of four cycles at 48 MHz")
 _PCLK = Clock("PCLK", 74, "OV7620 at 13.5 MHz")
 _CLK = Clock("CLK", 400, "two instructions of the microcontroller at 5 MHz")
 _LINK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
+_SCL = Clock("SCL", 1000, "I2C at 1 MHz, both edges")
+_SDA = Clock("SDA", 1000, "I2C's START and STOP, both edges")
 
 
 def _cubesense(side: Side, mcu_addressing: bool) -> Top:
@@ -141,6 +170,17 @@ def _pair(mcu_addressing: bool) -> Top:
         (_PCLK._replace(port="SUN_PCLK"), _PCLK._replace(port="NAD_PCLK"), _CLK),
         _PAIR,
         parts=2,
+    )
+
+
+def _cubesense_i2c(side: Side) -> Top:
+    return Top(
+        partial(CubeSenseI2cFpga, side),
+        f"CubeSense, {side} sensor's FPGA on an I2C bus",
+        (_PCLK, _LINK, _SCL, _SDA),
+        _CUBESENSE_I2C,
+        pulled_up=("SCL", "SDA", "LINK_C"),
+        reset="RESET_N low",
     )
 
 
@@ -172,6 +212,16 @@ TOPS = {
     "cubesense-nadir-addressing": _cubesense("nadir", mcu_addressing=True),
     "cubesense-pair": _pair(mcu_addressing=False),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),
+    "cubesense-sun-i2c": _cubesense_i2c("sun"),
+    "cubesense-nadir-i2c": _cubesense_i2c("nadir"),
+    "cubesense-pair-i2c": Top(
+        CubeSenseI2cPair,
+        "CubeSense, model of both FPGAs, their link and their I2C bus",
+        (_PCLK._replace(port="SUN_PCLK"), _PCLK._replace(port="NAD_PCLK"), _SCL),
+        _PAIR_I2C,
+        parts=2,
+        reset="RESET_N low",
+    ),
 }
 
 #: Blocks by name, at full size.
@@ -188,6 +238,9 @@ BLOCKS: dict[str, Callable[[], Component]] = {
     "Sun window": partial(SunWindow, FULL_SIZE),
     "CubeSense reader": partial(CubeSenseReader, FULL_SIZE),
     "the same, addressing": partial(CubeSenseReader, FULL_SIZE, mcu_addressing=True),
+    "I2C target": partial(I2cTarget, ADDRESSES["sun"], GROUP_ADDRESS),
+    "memory pointer": partial(MemoryPointer, FULL_SIZE),
+    "I2C registers with these two": partial(CubeSenseI2cRegisters, "sun", FULL_SIZE),
 }
 
 

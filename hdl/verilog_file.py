@@ -93,8 +93,8 @@ def _header(name: str, module: str, top: Top) -> Iterator[str]:
     yield ""
     yield from wrap(
         f"Module {module} has the package's pins; {module}_core below it has each bidirectional "
-        "pin as NAME_I, NAME_O and NAME_OE. No register has an initial value: standby resets all "
-        "but what it is to keep, so start in standby.",
+        f"pin as NAME_I, NAME_O and NAME_OE. No register has an initial value: {top.reset} resets "
+        f"all but what it is to keep, so start with {top.reset}.",
         width=96,
     )
     if top.pulled_up:
