@@ -36,7 +36,7 @@ __all__ = [
     "library_for",
 ]
 
-SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py", "variants.py")
+SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py", "clock_steps.py", "variants.py")
 FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-fno-semantic-interposition", "-shared")
 
 

@@ -268,6 +268,7 @@ public:
 #define VARIANT(number) \
     if (suits_##number(top)) { \
         copy_##number(top, variant_##number); \
+        hold_##number(top, variant_##number); \
         variant_##number.eval(nullptr); \
         if (same_##number(top, variant_##number)) { \
             const Outcome outcome = burst_on(variant_##number, until, running, reached, camera); \
@@ -359,7 +360,7 @@ private:
     uint32_t contention = 0;
 
     // The design at some levels of its pins; variants.py says more.
-#define VARIANT(number) cxxrtl_variant_##number::p_top variant_##number;
+#define VARIANT(number) variant_##number##_steps variant_##number;
     VARIANTS
 #undef VARIANT
 
@@ -467,7 +468,7 @@ private:
         if (stream.edge % 2 == 0) {
             const bool wrote = writes();
             Camera<N>::clock(top, true);
-            const bool changed = settle(top, time);
+            const bool changed = settle_rise<N>(top, time);
             stream.next_edge();
             if (skipping && !changed && !wrote && !stream.inside())
                 stream.skip_low_samples(until);
@@ -477,8 +478,52 @@ private:
                 stream.next_sample();
                 put_sample<N>(top);
             }
-            settle(top, time);
+            settle_fall<N>(top, time);
             stream.next_edge();
+        }
+    }
+
+    template <int N> bool settle_rise(Top &top, int64_t time) { return settle(top, time); }
+    template <int N> void settle_fall(Top &top, int64_t time) { settle(top, time); }
+
+    template <int N, class Model> bool settle_rise(Model &top, int64_t time) {
+        constexpr std::integral_constant<int, N> camera;
+        if (top.in_reset(camera))
+            return settle_in_reset(top, time);
+        const bool changed = top.rise(camera);
+        if (top.in_reset(camera))
+            return settle_in_reset(top, time) | changed;
+        follow<N>(top, time);
+        return changed;
+    }
+
+    template <int N, class Model> void settle_fall(Model &top, int64_t time) {
+        constexpr std::integral_constant<int, N> camera;
+        if (top.in_reset(camera)) {
+            settle_in_reset(top, time);
+            return;
+        }
+        top.fall(camera);
+        follow<N>(top, time);
+    }
+
+    template <class Model>
+    __attribute__((noinline)) bool settle_in_reset(Model &top, int64_t time) {
+        return settle(top, time);
+    }
+
+    // Lets the memories follow that a camera's clock can move.
+    template <int N, class Model> void follow(Model &top, int64_t time) {
+        follow<N>(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
+    }
+    template <int N, class Model, int... M>
+    void follow(Model &top, int64_t time, std::integer_sequence<int, M...>) {
+        (follow_one<N, M>(top, time), ...);
+    }
+    template <int N, int M, class Model> void follow_one(Model &top, int64_t time) {
+        if constexpr (Model::may_move(std::integral_constant<int, N>(), M)) {
+            srams[M].drive(time, Memory<M>::pins(top));
+            Memory<M>::offer(top, srams[M].bus());
         }
     }
 

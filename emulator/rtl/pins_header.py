@@ -3,14 +3,13 @@
 import re
 from collections.abc import Sequence
 
-from cubestack.emulator.rtl.variants import members
-from cubestack.emulator.rtl.wiring import BusPins, CameraPins, MemoryPins, Wiring
+from cubestack.emulator.rtl.clock_steps import clock_steps, port
+from cubestack.emulator.rtl.variants import held, members
+from cubestack.emulator.rtl.wiring import MEMORY_PINS, BusPins, CameraPins, MemoryPins, Wiring
 
 __all__ = ["pins_header"]
 
 _ESCAPE = re.compile("__|_([0-9a-f]{2})_")
-
-_MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 
 def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> str:
@@ -29,7 +28,8 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - derived_edge(top): whether a clock that is no pin has an edge that takes effect;
       forget_derived_edges(top) has none of them seen.
     - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
-      its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state.
+      its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state that can
+      change, hold_0(from, to) the rest to the copy.
     """
     acknowledges = " | ".join(
         f"{_level(pin)} << {bit}" for bit, pin in enumerate(wiring.acknowledges)
@@ -41,8 +41,8 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
         "MEMORY_COUNT": str(len(wiring.memories)),
         "MEMORIES": " ".join(_memory(n, memory) for n, memory in enumerate(wiring.memories)),
         "DATA_CLOCK_NAME": f'"{wiring.data_clock}"',
-        "DATA_CLOCK": _port(wiring.data_clock),
-        "DATA": _port(wiring.data),
+        "DATA_CLOCK": port(wiring.data_clock),
+        "DATA": port(wiring.data),
         "ACKNOWLEDGES": f"({acknowledges})",
         "CONTENTION": "0u" if wiring.contention is None else _level(wiring.contention),
         "REGISTERS": " \\\n    ".join(_registers(design)),
@@ -56,29 +56,24 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     return text
 
 
-def _port(name: str) -> str:
-    """Member of CXXRTL's class."""
-    return "p_" + name.replace("_", "__")
-
-
 def _level(name: str) -> str:
-    return f"top.{_port(name)}.template get<uint32_t>()"
+    return f"top.{port(name)}.template get<uint32_t>()"
 
 
 def _pin(wiring: Wiring, name: str) -> str:
     if name in wiring.initial:
-        return f'INPUT("{name}", {_port(name)}, {wiring.initial[name]}u)'
-    return f'OUTPUT("{name}", {_port(name)})'
+        return f'INPUT("{name}", {port(name)}, {wiring.initial[name]}u)'
+    return f'OUTPUT("{name}", {port(name)})'
 
 
 def _camera(number: int, camera: CameraPins) -> str:
-    ports = ", ".join(_port(pin) for pin in (camera.clock, camera.data, camera.line))
-    frame = "(void)level" if camera.frame is None else f"top.{_port(camera.frame)}.set<bool>(level)"
+    ports = ", ".join(port(pin) for pin in (camera.clock, camera.data, camera.line))
+    frame = "(void)level" if camera.frame is None else f"top.{port(camera.frame)}.set<bool>(level)"
     return f"CAMERA({number}, {ports}, {frame})"
 
 
 def _memory(number: int, memory: MemoryPins) -> str:
-    return f"MEMORY({number}, {', '.join(_port(memory[pin]) for pin in _MEMORY_PINS)})"
+    return f"MEMORY({number}, {', '.join(port(memory[pin]) for pin in MEMORY_PINS)})"
 
 
 def _bus(bus: BusPins | None) -> dict[str, str]:
@@ -91,9 +86,9 @@ def _bus(bus: BusPins | None) -> dict[str, str]:
         "READ": bus.read,
         "WRITE": bus.write,
     }
-    selects = (f"SELECT({number}, {_port(name)})" for number, name in enumerate(bus.selects))
+    selects = (f"SELECT({number}, {port(name)})" for number, name in enumerate(bus.selects))
     return {
-        **{f"BUS_{name}": _port(pin) for name, pin in pins.items()},
+        **{f"BUS_{name}": port(pin) for name, pin in pins.items()},
         "BUS_SELECTS": " ".join(selects),
     }
 
@@ -114,7 +109,7 @@ def _plain(escape: re.Match[str]) -> str:
 
 def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
     """Ask CXXRTL's own edge detectors, but for those of the pins."""
-    pins = {_port(name) for name in wiring.initial}
+    pins = {port(name) for name in wiring.initial}
     detectors = re.findall(r"bool ((?:pos|neg)edge_(\w+))\(\) const", design)
     edges = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
     clocks = [clock for clock in re.findall(r"prev_(p_\w+) = \1;", design) if clock not in pins]
@@ -135,8 +130,13 @@ def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
         if whole.get(name) == kind
         for side in ((".curr", ".next") if kind.startswith("wire") else ("",))
     ]
+    holding = " ".join(
+        f"to.{name} = from.{name}.curr;"
+        for name in held(variant)
+        if whole.get(name, "").startswith("wire")
+    )
     suits = " && ".join(f"{_level(pin)} == {level}u" for pin, level in wiring.burst_levels[number])
-    same = " && ".join(f"a.{_port(pin)} == b.{_port(pin)}" for pin in wiring.output_pins)
+    same = " && ".join(f"a.{port(pin)} == b.{port(pin)}" for pin in wiring.output_pins)
     return (
         f"#define cxxrtl_design {namespace}\n"
         f"#define cxxrtl_design_create {namespace}_create\n"
@@ -150,4 +150,8 @@ def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
         "template <class From, class To> "
         f"void copy_{number}(const From &from, To &to) "
         f"{{ {' '.join(f'to.{name} = from.{name};' for name in shared)} }}\n"
+        "template <class From, class To> "
+        f"void hold_{number}(const From &from, To &to) "
+        f"{{ (void)from, (void)to; {holding} }}\n"
+        + clock_steps(wiring, variant, dict(part), number)
     )

