@@ -105,7 +105,8 @@ class PinFaults:
         late = [fault for _, fault in self._on(pin) if isinstance(fault, AckLate)]
         if level and late and pin in self._rose_ps:
             seen_ps = self._rose_ps[pin] + max(map(_delay_ps, late))
-            until_ps = min(until_ps, max(seen_ps, self._engine.now_ps))
+            if seen_ps > self._engine.now_ps:  # else another fault hides it
+                until_ps = min(until_ps, seen_ps)
         return self._engine.run(until_ps)
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:

@@ -1,0 +1,71 @@
+"""A processor that waits for an acknowledge about which any faults lie: it never waits for ever."""
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cubestack.emulator.faults.injection import Injection
+from cubestack.emulator.faults.pins import PinFaults
+from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck
+from cubestack.firmware_model.hardware import AwaitPin
+
+ROSE_US, TIMEOUT_US = 40, 200
+MOST_BURSTS = 100
+
+FAULTS = st.lists(
+    st.builds(AckLate, delay_us=st.sampled_from([0, 10, 60, 500]))
+    | st.builds(AckLost)
+    | st.builds(AckStuck, level=st.integers(0, 1)),
+    max_size=4,
+)
+
+
+def sees(faults) -> bool:
+    """Whether the processor sees the rise in time: the last that holds a level decides."""
+    stuck = [fault.level for fault in faults if isinstance(fault, AckStuck)]
+    if stuck:
+        return bool(stuck[-1])
+    if any(isinstance(fault, AckLost) for fault in faults):
+        return False
+    delays = [fault.delay_us for fault in faults if isinstance(fault, AckLate)]
+    return ROSE_US + max(delays, default=0) <= TIMEOUT_US
+
+
+@pytest.fixture
+def waiting(desk_of):
+    """A processor with such faults; what it has seen in the end."""
+
+    def wait(faults):
+        def body(desk):
+            desk.note((yield AwaitPin("ACK", 1, TIMEOUT_US, poll_cycles=1)))
+
+        desk = desk_of(body)
+        desk.ack_at(ROSE_US)
+        pins = PinFaults(desk.kernel, desk.engine, lambda _time_ps, _injection, _text: None)
+        desk.processor.engine = pins
+        for number, fault in enumerate(faults):
+            pins.begin(Injection(number, fault, "ACK", 0, None, 0))
+        run, bursts = desk.engine.run, []
+
+        def counted(*arguments):
+            bursts.append(arguments)
+            assert len(bursts) < MOST_BURSTS
+            return run(*arguments)
+
+        desk.engine.run = counted
+        ((us, seen),) = desk.run().log
+        assert us <= TIMEOUT_US + 1
+        return seen
+
+    return wait
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])  # makes each one anew
+@given(FAULTS)
+def test_a_wait_ends(waiting, faults):
+    assert waiting(faults) is sees(faults)
+
+
+def test_a_rise_that_is_late_and_never_seen(waiting):
+    assert not waiting([AckLate(delay_us=10), AckLost()])
+    assert not waiting([AckLate(delay_us=10), AckStuck(level=0)])
