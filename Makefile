@@ -4,11 +4,15 @@ BIN := .venv/bin
 # Real photographs of the sky with their truth.json, when there are any.
 PHOTOGRAPHS ?= ../shared/data/sky
 
-.PHONY: help venv run test lint bench clean
+# What `make mutants` tries, for instance MUTANTS="cubestar --all"; --help says what there is.
+MUTANTS ?=
+
+.PHONY: help venv run test mutants lint bench clean
 
 help:
 	@echo "make run    set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test   set up, then run all tests"
+	@echo "make mutants  score the HDL test benches by wrong gates that they notice; takes an hour"
 	@echo "make lint   ruff and mypy"
 	@echo "make bench  measure the cost of the hot paths"
 	@echo "make clean  remove .venv, out and caches"
@@ -28,6 +32,9 @@ run: .venv/ready-run
 
 test: .venv/ready-dev
 	@$(BIN)/pytest -n auto
+
+mutants: .venv/ready-dev
+	@$(BIN)/python tests/hdl/mutants $(MUTANTS)
 
 lint: .venv/ready-dev
 	@$(BIN)/ruff check .

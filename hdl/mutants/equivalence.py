@@ -1,0 +1,263 @@
+"""Whether a mutant differs from its design at any pin, ever: a proof, or a way to see it.
+
+Both stand side by side with the same inputs. Yosys turns all clocks and asynchronous resets into
+steps of one time (its ``clk2fflogic``), so clocks may come in any order and inputs do what they
+like. The first step is in standby; registers that no reset reaches start with the same unknown
+value in both, every other one with any value of its own. The level of a pin that is not driven is
+no difference.
+
+A proof is by induction over one step, and what makes it inductive is found, not given: of many
+guesses (each bit that the two have in common is equal; no two values of narrow registers of a
+block come together) those are kept that hold in standby, and hold in the next step whenever all
+kept ones hold. Where the pins' equality is not among them a counterexample is looked for.
+"""
+
+import json
+import re
+import tempfile
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations, product
+from pathlib import Path
+from typing import NamedTuple
+
+from cubestack.hdl.designs import Pin
+from cubestack.hdl.mutants.netlist import Mutant, Netlist
+from cubestack.hdl.tools import run_yosys
+
+__all__ = ["Equivalence", "Verdict"]
+
+_EXPOSE = """
+hierarchy -top dut
+setattr -mod -unset keep_hierarchy *
+flatten
+expose dut/w:* dut/w:$* %d
+"""
+
+_GOLD = f"""
+read_rtlil netlist.il
+{_EXPOSE}
+write_json flat.json
+rename dut gold
+write_rtlil gold.il
+"""
+
+_JOIN = f"""
+read_rtlil netlist.il
+{{mutation}}
+{_EXPOSE}
+rename dut gate
+read_rtlil gold.il
+read_verilog harness.v
+hierarchy -top harness
+proc
+flatten
+clk2fflogic
+opt -full
+"""
+
+#: Registers wider than this are not guessed about.
+_NARROW_BITS = 4
+
+#: Counterexamples looked for at once.
+_GROUPS = 12
+
+#: Steps of a counterexample at most; a clock takes two. Seconds for it at most.
+STEPS = 120
+LIMIT = 60
+
+_UNRESET = ("$dff", "$dffe")
+_MODEL = re.compile(r"^ +(\d+) \\(guess\d+) .* ([01]+) *$", re.MULTILINE)
+
+
+class Verdict(NamedTuple):
+    """What is known of a mutant: ``equivalent``, or else the steps to a difference if one is known.
+
+    With neither, nothing is known.
+    """
+
+    equivalent: bool
+    steps: int | None
+    seconds: float
+
+
+class Equivalence:
+    """Compares mutants of one design."""
+
+    def __init__(self, design: Netlist, pins: Iterable[Pin], standby: Mapping[str, int]) -> None:
+        """Take a design with these ``pins`` and these levels of inputs in ``standby``.
+
+        ToolMissingError without a Yosys.
+        """
+        self._netlist = design
+        with _folder() as name:
+            folder = Path(name)
+            (folder / "netlist.il").write_text(design.text, encoding="utf-8")
+            run_yosys(_GOLD, folder)
+            self._gold = (folder / "gold.il").read_text(encoding="utf-8")
+            flat = json.loads((folder / "flat.json").read_text(encoding="utf-8"))
+        module = flat["modules"]["dut"]
+        ports = {name: (p["direction"], p["bits"]) for name, p in module["ports"].items()}
+        self._inputs = {n: len(bits) for n, (way, bits) in ports.items() if way == "input"}
+        outputs = {n: bits for n, (way, bits) in ports.items() if way == "output"}
+        self._wires = {name: len(bits) for name, bits in outputs.items()}
+        self._index = {name: number for number, name in enumerate(self._wires)}
+        self._standby = " & ".join(f"\\{n} == {level}" for n, level in standby.items())
+        self._pins = " & ".join(self._pin_is_same(pin) for pin in pins if pin.level_out)
+        registers: dict[int, bool] = {
+            bit: cell["type"] in _UNRESET
+            for cell in module["cells"].values()
+            if "dff" in cell["type"]
+            for bit in cell["connections"]["Q"]
+        }
+        retained = [
+            self._same(name, n)
+            for name, bits in outputs.items()
+            for n, bit in enumerate(bits)
+            if registers.get(bit)
+        ]
+        self._retained = " & ".join(retained) or "1"
+        self._narrow = [
+            name
+            for name, bits in outputs.items()
+            if len(bits) <= _NARROW_BITS and all(bit in registers for bit in bits)
+        ]
+        self._invariants: list[str] | None = None
+
+    def compare(self, mutant: Mutant) -> Verdict:
+        """Prove that the design with this change is no other one, or look for the difference."""
+        start = time.monotonic()
+        common = [self._same(name, n) for name, width in self._wires.items() for n in range(width)]
+        equal = self._pins in self._kept(mutant, [self._pins, *common], [])
+        if not equal:
+            if self._invariants is None:
+                self._invariants = self._kept(None, self._guesses(), [])
+            equal = self._pins in self._kept(mutant, [self._pins, *common], self._invariants)
+        steps = None if equal else self._counterexample(mutant)
+        return Verdict(equal, steps, time.monotonic() - start)
+
+    def _same(self, wire: str, bit: int) -> str:
+        number = self._index[wire]
+        return f"(gold{number}[{bit}] == gate{number}[{bit}])"
+
+    def _pin_is_same(self, pin: Pin) -> str:
+        level = self._index[str(pin.level_out)]
+        if pin.enable is None:
+            return f"(gold{level} == gate{level})"
+        enable = self._index[pin.enable]
+        mask = f"gold{enable}"
+        if pin.enable_width == 1:
+            mask = f"{{{pin.width}{{gold{enable}}}}}"
+        equal = f"(((gold{level} ^ gate{level}) & {mask}) == 0)"
+        return f"((gold{enable} == gate{enable}) & {equal})"
+
+    def _guesses(self) -> list[str]:
+        """That a block's narrow registers never have some value, or some two values together."""
+        levels = {
+            name: [
+                f"(gold{self._index[name]} == {value})" for value in range(1 << self._wires[name])
+            ]
+            for name in self._narrow
+        }
+        several = [values for values in levels.values() if len(values) > 2]
+        single = [f"~{level}" for values in several for level in values]
+        pairs = [
+            f"~({a} & {b})"
+            for one, other in combinations(sorted(levels), 2)
+            if self._block(one) == self._block(other)
+            for a, b in product(levels[one], levels[other])
+        ]
+        return single + pairs
+
+    @staticmethod
+    def _block(name: str) -> str:
+        """Where a signal belongs, a counter being a part of what it counts for."""
+        return name.rpartition(".")[0].removesuffix("counter").removesuffix(".")
+
+    def _kept(self, mutant: Mutant | None, guesses: list[str], known: Sequence[str]) -> list[str]:
+        """The largest inductive set of ``guesses``, while ``known`` holds at any time."""
+        first = "-seq 1 -set-at 1 standby 1 -set-at 1 retained 1"
+        for steps, options in ((1, first), (2, "-seq 2 -set-at 1 all 1")):
+            while guesses:
+                wrong = self._refuted(mutant, guesses, known, steps, options)
+                if not wrong:
+                    break
+                guesses = [guess for n, guess in enumerate(guesses) if n not in wrong]
+        return guesses
+
+    def _refuted(
+        self,
+        mutant: Mutant | None,
+        guesses: Sequence[str],
+        known: Sequence[str],
+        steps: int,
+        options: str,
+    ) -> set[int]:
+        """Indices of guesses that can be wrong in the last step: some, if there are any."""
+        size = -(-len(guesses) // _GROUPS)
+        groups = [guesses[at : at + size] for at in range(0, len(guesses), size)]
+        show = " ".join(f"-show guess{n}" for n in range(len(groups)))
+        calls = [
+            f"sat {options} -set known 1 -set-at {steps} all{n} 0 {show}"
+            for n in range(len(groups))
+        ]
+        report = self._run(mutant, groups, known, calls)
+        wrong = set()
+        for step, name, bits in _MODEL.findall(report):
+            if int(step) == steps:
+                offset = int(name.removeprefix("guess")) * size
+                wrong |= {offset + n for n, bit in enumerate(bits[::-1]) if bit == "0"}
+        return wrong
+
+    def _counterexample(self, mutant: Mutant) -> int | None:
+        """Steps from standby to a difference at the pins."""
+        call = (
+            f"sat -tempinduct-baseonly -maxsteps {STEPS} -timeout {LIMIT} "
+            "-set-at 1 standby 1 -set-at 1 retained 1 -prove all 1 -show all"
+        )
+        report = self._run(mutant, [[self._pins]], [], [call])
+        if "model found for base case: FAIL!" not in report:
+            return None
+        return len(re.findall(r"^\[base case \d+\]", report, re.MULTILINE))
+
+    def _run(
+        self,
+        mutant: Mutant | None,
+        groups: Sequence[Sequence[str]],
+        known: Sequence[str],
+        calls: Sequence[str],
+    ) -> str:
+        script = _JOIN.format(mutation=mutant.command() if mutant else "")
+        with _folder() as name:
+            folder = Path(name)
+            (folder / "netlist.il").write_text(self._netlist.text, encoding="utf-8")
+            (folder / "gold.il").write_text(self._gold, encoding="utf-8")
+            (folder / "harness.v").write_text(self._harness(groups, known), encoding="utf-8")
+            return run_yosys(script + "\n".join(calls), folder)
+
+    def _harness(self, groups: Sequence[Sequence[str]], known: Sequence[str]) -> str:
+        """Verilog of both side by side; group n of guesses is ``guess<n>``, and ``all<n>``."""
+        outputs = [("standby", self._standby), ("retained", self._retained)]
+        vectors = {f"guess{n}": group for n, group in enumerate(groups)}
+        vectors["known_one"] = known or ["1'b1"]
+        outputs.append(("known", "&known_one"))
+        outputs += [(f"all{n}", f"&guess{n}") for n in range(len(groups))]
+        outputs.append(("all", " & ".join(f"all{n}" for n in range(len(groups)))))
+        ports = [f"  input [{width - 1}:0] \\{name} " for name, width in self._inputs.items()]
+        ports += [f"  output {name}" for name, _ in outputs]
+        ports += [f"  output [{len(v) - 1}:0] {name}" for name, v in vectors.items()]
+        lines = ["module harness (", ",\n".join(ports), ");"]
+        for side in ("gold", "gate"):
+            wires = [(name, f"{side}{number}") for name, number in self._index.items()]
+            lines += [f"  wire [{self._wires[name] - 1}:0] {wire};" for name, wire in wires]
+            pins = [f"    .\\{name} (\\{name} )" for name in self._inputs]
+            pins += [f"    .\\{name} ({wire})" for name, wire in wires]
+            lines += [f"  {side} {side} (", ",\n".join(pins), "  );"]
+        lines += [f"  assign {name} = {value};" for name, value in outputs]
+        for name, values in vectors.items():
+            lines += [f"  assign {name}[{n}] = {value};" for n, value in enumerate(values)]
+        return "\n".join([*lines, "endmodule\n"])
+
+
+def _folder() -> "tempfile.TemporaryDirectory[str]":
+    return tempfile.TemporaryDirectory()

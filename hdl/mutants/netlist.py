@@ -1,0 +1,185 @@
+"""A design as a netlist of word-wide cells, and mutants of it.
+
+Yosys' ``mutate`` changes one bit at one port of one cell: inverted, stuck at 0 or 1, or inverted
+under another bit of the same port. The netlist is simplified first, so few mutants differ in
+nothing. All of them can be in one Verilog text, which then needs to be compiled once: the plus-
+argument ``+mutant=N`` chooses one, and no plus-argument, or 0, the design itself.
+"""
+
+import hashlib
+import re
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from amaranth.back import rtlil
+from amaranth.lib.wiring import Component
+
+from cubestack.hdl.tools import run_yosys
+
+__all__ = ["Mutant", "Netlist", "mutants", "netlist", "selectable"]
+
+_SIMPLIFY = """
+read_rtlil design.il
+hierarchy -top dut
+{keep}
+proc -norom
+flatten
+opt -full
+opt_clean -purge
+attrmap -remove init
+write_rtlil netlist.il
+"""
+
+_LIST = """
+read_rtlil netlist.il
+mutate -list {count} -seed {seed} -o mutants.txt
+"""
+
+_SELECTABLE = """
+read_rtlil netlist.il
+{mutations}
+delete -port dut/w:{control}
+write_verilog -noattr -norename mutants.v
+"""
+
+#: The wire that chooses a mutant; Yosys leads it to every module that has one.
+_CONTROL = "chosen_mutant"
+_CONTROL_BITS = 16
+
+#: More than any design here has.
+_ALL = 10**6
+
+_SOURCE = re.compile(r'^(\s*attribute \\src ")([^"]*)"$', re.MULTILINE)
+_OPTION = re.compile(r" -(\S+) (\S+)")
+
+
+@dataclass(frozen=True)
+class Netlist:
+    """A design as RTLIL; its top module is ``dut``. ``kept`` are submodules that are not dissolved.
+
+    Registers have no initial value: the part's have none.
+    """
+
+    text: str
+    kept: tuple[str, ...] = ()
+
+    @property
+    def digest(self) -> str:
+        """Of the text, in hexadecimal digits."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+class Mutant(NamedTuple):
+    """One change.
+
+    ``mode`` is "inv", "const0", "const1", "cnot0" or "cnot1"; the last two invert while bit
+    ``control_bit`` of the same port is 0 or 1. ``wire`` is the bit's name in the design, empty when
+    it has none; ``source`` are lines of the design's source that the cell comes from.
+    """
+
+    mode: str
+    module: str
+    cell: str
+    port: str
+    bit: int
+    control_bit: int | None = None
+    wire: str = ""
+    source: tuple[str, ...] = ()
+
+    def command(self) -> str:
+        """Yosys' command that makes it."""
+        text = (
+            f"mutate -mode {self.mode} -module {self.module} -cell {self.cell} "
+            f"-port {self.port} -portbit {self.bit}"
+        )
+        return text if self.control_bit is None else f"{text} -ctrlbit {self.control_bit}"
+
+    def __str__(self) -> str:
+        """One line for a reader."""
+        where = f"{self.module}/" if self.module != "dut" else ""
+        name = f" ({self.wire})" if self.wire else ""
+        under = "" if self.control_bit is None else f" under bit {self.control_bit}"
+        lines = ", ".join(self.source)
+        return f"{self.mode}{under} at {where}{self.cell}.{self.port}[{self.bit}]{name}: {lines}"
+
+
+def netlist(component: Component, kept: Sequence[str] = ()) -> Netlist:
+    """Simplify a design; submodules of the top named in ``kept`` stay modules of their own.
+
+    ToolMissingError without a Yosys.
+    """
+    text = str(rtlil.convert(component, name="dut", emit_src=True))
+    text = _SOURCE.sub(lambda found: f'{found[1]}{_basenames(found[2])}"', text)
+    keep = "".join(f"setattr -mod -set keep_hierarchy 1 dut.{name}\n" for name in kept)
+    with _folder() as name:
+        folder = Path(name)
+        (folder / "design.il").write_text(text, encoding="utf-8")
+        run_yosys(_SIMPLIFY.format(keep=keep), folder)
+        simplified = (folder / "netlist.il").read_text(encoding="utf-8")
+    return Netlist(re.sub(r"^# Generated.*\n", "", simplified), tuple(kept))
+
+
+def mutants(design: Netlist, count: int | None = None, seed: int = 1) -> list[Mutant]:
+    """``count`` mutants spread over the design's source, wires and cells; all of them with None.
+
+    The same seed gives the same ones.
+    """
+    with _folder() as name:
+        folder = Path(name)
+        (folder / "netlist.il").write_text(design.text, encoding="utf-8")
+        run_yosys(_LIST.format(count=_ALL if count is None else count, seed=seed), folder)
+        lines = (folder / "mutants.txt").read_text(encoding="utf-8").splitlines()
+    return [_parsed(line) for line in lines]
+
+
+def selectable(design: Netlist, chosen: Sequence[Mutant]) -> str:
+    """Verilog of the design and ``chosen`` mutants of it, which count from 1 on."""
+    if len(chosen) >= 1 << _CONTROL_BITS:
+        raise ValueError(f"at most {(1 << _CONTROL_BITS) - 1} mutants, not {len(chosen)}")
+    mutations = "\n".join(
+        f"{mutant.command()} -ctrl {_CONTROL} {_CONTROL_BITS} {number}"
+        for number, mutant in enumerate(chosen, 1)
+    )
+    with _folder() as name:
+        folder = Path(name)
+        (folder / "netlist.il").write_text(design.text, encoding="utf-8")
+        run_yosys(_SELECTABLE.format(mutations=mutations, control=_CONTROL), folder)
+        text = (folder / "mutants.v").read_text(encoding="utf-8")
+    bus = f"[{_CONTROL_BITS - 1}:0] {_CONTROL};\n"
+    argument = f'initial if (!$value$plusargs("mutant=%d", {_CONTROL})) {_CONTROL} = 0;\n'
+    # In the top it is no port any more.
+    own = re.compile(f"(?<!input {re.escape(bus)})^  wire {re.escape(bus)}", re.MULTILINE)
+    return own.sub(lambda _: f"  reg {bus}  {argument}", text)
+
+
+def _parsed(line: str) -> Mutant:
+    options: dict[str, list[str]] = {}
+    for name, value in _OPTION.findall(line):
+        options.setdefault(name, []).append(value)
+
+    def one(name: str) -> str:
+        return options.get(name, [""])[0]
+
+    wire = one("wire")
+    return Mutant(
+        one("mode"),
+        one("module"),
+        one("cell"),
+        one("port"),
+        int(one("portbit")),
+        int(one("ctrlbit")) if "ctrlbit" in options else None,
+        f"{wire}[{one('wirebit')}]" if wire else "",
+        tuple(options.get("src", [])),
+    )
+
+
+def _basenames(sources: str) -> str:
+    """The same places on every machine: files without their folders."""
+    return "|".join(source.rpartition("/")[2] for source in sources.split("|"))
+
+
+def _folder() -> "tempfile.TemporaryDirectory[str]":
+    return tempfile.TemporaryDirectory()

@@ -1,0 +1,191 @@
+"""Simulates mutants, proves what can not be told apart, and keeps the results in a file.
+
+A mutant is killed when a simulation fails, also by hanging; equivalent when a proof says so; else
+it survived. The file has one JSON object a line. What it has of killed and equivalent mutants of
+the same netlist counts; a survivor is tried again.
+"""
+
+import json
+import os
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from regression import build, simulate
+from suites import Stage, Suite
+
+from cubestack.hdl.designs import pins_of
+from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.mutants.equivalence import Equivalence
+from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
+
+__all__ = ["Result", "Score", "Scoring"]
+
+#: A simulation hangs after so many times its duration without a mutant, and at least so many s.
+PATIENCE, SHORTEST = 20, 120
+
+#: Mutants in one compiled file.
+CHUNK = 250
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of one mutant.
+
+    ``outcome`` is "killed", "equivalent" or "survived". ``by`` is the cocotb test that killed it,
+    or what else the simulation came to. ``steps`` are the least, as clocks' edges or other changes,
+    after which a pin shows a survivor; None when that is not known.
+    """
+
+    mutant: str
+    outcome: str
+    by: str = ""
+    seed: int = 0
+    seconds: float = 0.0
+    steps: int | None = None
+
+
+@dataclass(frozen=True)
+class Score:
+    """Counts of one suite."""
+
+    killed: int
+    equivalent: int
+    survived: int
+
+    @property
+    def share(self) -> float:
+        """Of the mutants that are not equivalent, the killed ones."""
+        counted = self.killed + self.survived
+        return self.killed / counted if counted else 1.0
+
+
+class Scoring:
+    """One suite's mutants: ``count`` of them, or all with None; the same seed gives the same."""
+
+    def __init__(
+        self, name: str, suite: Suite, folder: Path, *, count: int | None, seed: int
+    ) -> None:
+        self._suite = suite
+        self._folder = folder / name
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._file = self._folder / "results.jsonl"
+        self._design = suite.make()
+        self._netlist: Netlist = netlist(self._design, suite.kept)
+        self.mutants: list[Mutant] = mutants(self._netlist, count, seed)
+
+    def results(self) -> Iterator[Result]:
+        """One for each mutant, in their order; AssertionError when the design itself fails."""
+        done = self._done()
+        for start in range(0, len(self.mutants), CHUNK):
+            chunk = self.mutants[start : start + CHUNK]
+            bench: _Bench | None = None
+            for number, mutant in enumerate(chunk, 1):
+                found = done.get(str(mutant))
+                if found is None:
+                    bench = bench or self._bench(chunk)
+                    found = bench.simulated(number, mutant)
+                    if found.outcome == "survived":
+                        found = self._judged(mutant, found)
+                    self._keep(found)
+                yield found
+
+    def _bench(self, chunk: Sequence[Mutant]) -> "_Bench":
+        return _Bench(self._suite, selectable(self._netlist, chunk), self._folder)
+
+    def _judged(self, mutant: Mutant, result: Result) -> Result:
+        verdict = self._equivalence.compare(mutant)
+        outcome = "equivalent" if verdict.equivalent else "survived"
+        seconds = result.seconds + verdict.seconds
+        return Result(result.mutant, outcome, seconds=round(seconds, 1), steps=verdict.steps)
+
+    @cached_property
+    def _equivalence(self) -> Equivalence:
+        pins = pins_of(self._design, defaultdict(str))
+        return Equivalence(self._netlist, pins, self._suite.standby)
+
+    def _done(self) -> dict[str, Result]:
+        if not self._file.exists():
+            return {}
+        entries: list[dict[str, Any]] = [
+            json.loads(line) for line in self._file.read_text(encoding="utf-8").splitlines()
+        ]
+        results = [
+            Result(**{key: value for key, value in entry.items() if key != "netlist"})
+            for entry in entries
+            if entry["netlist"] == self._netlist.digest
+        ]
+        return {result.mutant: result for result in results if result.outcome != "survived"}
+
+    def _keep(self, result: Result) -> None:
+        entry = {"netlist": self._netlist.digest, **asdict(result)}
+        with self._file.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(entry) + "\n")
+
+
+class _Bench:
+    """Mutants in one Verilog file, compiled once for each top of the stages."""
+
+    def __init__(self, suite: Suite, verilog: str, folder: Path) -> None:
+        self._suite = suite
+        self._folder = folder
+        source = folder / "dut.v"
+        source.write_text(verilog, encoding="utf-8")
+        further = []
+        if suite.wrapper:
+            name, make = suite.wrapper
+            further.append(folder / f"{name}.v")
+            further[0].write_text(verilog_text(make(), name), encoding="utf-8")
+        self._runners = {
+            top: build(
+                source,
+                folder / f"build-{top}",
+                top=top,
+                further=further if top != "dut" else [],
+                strict=False,
+            )
+            for top in {stage.top for stage in suite.stages}
+        }
+        self._limits: dict[Stage, int] = {}
+
+    def simulated(self, number: int, mutant: Mutant) -> Result:
+        """Killed or survived; the design itself is simulated before a stage's first mutant."""
+        seconds = 0.0
+        for stage in self._suite.stages:
+            if stage not in self._limits:
+                outcome = self._simulate(stage, 0, 3600)
+                assert outcome.passed, f"without a mutant: {outcome.failed or outcome.problem}"
+                self._limits[stage] = max(SHORTEST, int(PATIENCE * outcome.seconds))
+            outcome = self._simulate(stage, number, self._limits[stage])
+            seconds += outcome.seconds
+            if not outcome.passed:
+                by = outcome.failed[0] if outcome.failed else outcome.problem
+                return Result(str(mutant), "killed", by, stage.seed, round(seconds, 1))
+        return Result(str(mutant), "survived", seconds=round(seconds, 1))
+
+    def _simulate(self, stage: Stage, number: int, limit_s: int) -> Any:
+        with _argument(f"+mutant={number}"):
+            return simulate(
+                self._runners[stage.top],
+                stage.modules,
+                self._folder / "run",
+                seed=stage.seed,
+                top=stage.top,
+                environment=self._suite.environment,
+                limit_s=limit_s,
+                failures=1,
+            )
+
+
+@contextmanager
+def _argument(text: str) -> Iterator[None]:
+    """One more argument of the simulator."""
+    os.environ["SIM_CMD_SUFFIX"] = text
+    try:
+        yield
+    finally:
+        del os.environ["SIM_CMD_SUFFIX"]

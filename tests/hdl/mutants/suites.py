@@ -1,0 +1,111 @@
+"""Which simulations a mutant of each top has to pass: tiers of the regression, small pictures."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
+from amaranth.lib.wiring import Component, In
+from published import DoubleAsPublished, SharedAsPublished
+from regression import TIERS, frame_environment
+
+from cubestack.hdl.matrix_counter import MatrixCounter
+
+__all__ = ["SUITES", "Stage", "Suite"]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One simulation of cocotb ``modules``, on the module ``top``."""
+
+    modules: tuple[str, ...]
+    seed: int
+    top: str = "dut"
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A design and its simulations.
+
+    Attributes:
+        make: the design, of a small picture.
+        stages: what a mutant has to pass, what finds most first.
+        environment: of the cocotb modules.
+        standby: levels of inputs that make the state.
+        kept: submodules whose signals the cocotb modules look at.
+        wrapper: a design around the module ``dut``, for stages with its name as top.
+    """
+
+    make: Callable[[], Component]
+    stages: tuple[Stage, ...]
+    environment: Mapping[str, str]
+    standby: Mapping[str, int]
+    kept: tuple[str, ...] = ()
+    wrapper: tuple[str, Callable[[], Component]] | None = None
+
+
+class CounterAlone(Component):
+    """A matrix counter that is reset without a clock, as in the boards."""
+
+    def __init__(self, columns: int, rows: int) -> None:
+        self._counter = MatrixCounter(columns, rows)
+        super().__init__({**self._counter.signature.members, "clk": In(1), "rst": In(1)})
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.submodules.counter = self._counter
+        m.domains.sync = ClockDomain(async_reset=True)
+        m.d.comb += [ClockSignal().eq(self.clk), ResetSignal().eq(self.rst)]
+        for name, member in self._counter.signature.members.items():
+            inside, outside = getattr(self._counter, name), getattr(self, name)
+            m.d.comb += inside.eq(outside) if member.flow is In else outside.eq(inside)
+        return m
+
+
+def _seeds(modules: tuple[str, ...], count: int, top: str = "dut") -> tuple[Stage, ...]:
+    return tuple(Stage(modules, seed, top) for seed in range(1, count + 1))
+
+
+def _suite(
+    name: str,
+    *stages: Stage,
+    standby: Mapping[str, int],
+    kept: tuple[str, ...] = (),
+    wrapper: tuple[str, Callable[[], Component]] | None = None,
+) -> Suite:
+    tier = TIERS[name]
+    environment = {**frame_environment(tier.columns, tier.rows), **tier.environment}
+    return Suite(tier.make, stages, environment, standby, kept, wrapper)
+
+
+def _next(name: str, wrapped: type[Component], standby: Mapping[str, int]) -> Suite:
+    """A board of the next version: its own benches, and the published board's of storing."""
+    tier = TIERS[name]
+    return _suite(
+        name,
+        *_seeds(tier.modules, 1),
+        *_seeds(("benches_store",), 1, "published"),
+        *_seeds(tier.modules, 3)[1:],
+        *_seeds(("benches_store",), 2, "published")[1:],
+        standby=standby,
+        wrapper=("published", lambda: wrapped(tier.columns, tier.rows)),
+    )
+
+
+#: By name: tops as in ``cubestack.hdl.designs``, and a block that is done in seconds.
+SUITES = {
+    "cubestar": _suite("cubestar", *_seeds(TIERS["cubestar"].modules, 3), standby={"ENABLE": 0}),
+    "cubestar-shared": _next("cubestar-shared", SharedAsPublished, {"ENABLE": 0}),
+    "cubestar-double": _next("cubestar-double", DoubleAsPublished, {"ENABLE": 0}),
+    "cubesense-pair": _suite(
+        "cubesense-pair",
+        *_seeds(TIERS["cubesense-pair"].modules, 2),
+        standby={"SUNEN": 1, "NADEN": 1},
+        kept=("sun", "nadir"),
+    ),
+    "matrix-counter": Suite(
+        lambda: CounterAlone(5, 3),
+        _seeds(("benches_matrix_counter",), 1),
+        frame_environment(5, 3),
+        {"rst": 1},
+    ),
+}
