@@ -37,6 +37,7 @@ QUIET_S = 0.2
 ANSWER_S = 0.5
 LONGEST_STREAM_S = 600
 READ_BYTES = 1 << 16
+MOST_AT_ONCE = 10_000
 
 #: Share of each kind of turn; one byte, one message, one disconnect or one fault is one event.
 TURNS = {
@@ -83,6 +84,8 @@ class Fuzzer:
     def __init__(self, session: Any, interface: Any, seed: int) -> None:
         self.board, self.interface = session.board, interface
         self.kernel = self.board.kernel
+        self._step, self._then_ps, self._still = self.kernel.step, 0, 0
+        vars(self.kernel)["step"] = self._watched_step
         self.rng = np.random.default_rng(seed)
         self.plugs = {"uart": self.board.serial}
         uarts = [self.board.uart]
@@ -117,6 +120,14 @@ class Fuzzer:
                 due = self.events + CHECK_EVERY
                 self.check()
         return self.board.faults.events, self.trace.hexdigest()
+
+    def _watched_step(self) -> None:
+        """Time goes on: a hang in virtual time would else be one in wall time."""
+        self._step()
+        now_ps = self.kernel.now
+        self._still = self._still + 1 if now_ps == self._then_ps else 0
+        self._then_ps = now_ps
+        assert self._still < MOST_AT_ONCE, f"{MOST_AT_ONCE} things happen at {now_ps} ps"
 
     def check(self) -> None:
         """Without faults, every good frame is answered the first time, on each way in."""
