@@ -1,18 +1,25 @@
-"""Bench of the board's top: camera and microcontroller on their own clocks, SRAM, scoreboard."""
+"""Bench of the board's top: camera and microcontroller on their own clocks, SRAM, scoreboard.
+
+Every top has a bench of the same form (:class:`Surroundings`): ``start`` it with a
+:class:`~timing.Timing`, ``shoot`` a picture to one of its ``PLACES``, ``fetch`` it, ``begin`` one
+and leave it at any moment with ``standby``, ``check`` the scoreboard.
+"""
 
 import random
 from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from operator import itemgetter
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import cocotb
+import cover_cubestar
 from cocotb.triggers import Event, ReadOnly, RisingEdge, Timer
 from geometry import GEOMETRY
 from instants import EVEN, ODD, now, wait
 from reference import Behaviour, Clock, Controls, Tick, behaviour
 from sram import SLOWEST_ACCESS, Sram
+from timing import ANY, Timing
 
 T = TypeVar("T")
 
@@ -79,21 +86,24 @@ def frame(content: bytes) -> list[Tick]:
 
 
 class Camera:
-    """Free-running source: random rate and duty cycle, stretched clocks, random set-up and hold.
+    """Free-running source: its rate, phase, duty cycle and stretched clocks are ``timing``'s.
+
+    Its pins change at random between hold and set-up time.
 
     With nothing to send it is between two lines. ``clocks`` is the record of what it did.
     """
 
-    def __init__(self, dut: Any) -> None:
+    def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         self._dut = dut
         self._queue: deque[Tick] = deque()
         self._shown = False  # the pins show a tick that was sent and not clocked yet
         self._pins = Tick(0, 0, 1)
         self._running = Event()
         self._running.set()
-        self.period = random.randrange(20_000, 200_000, 2)
-        self.stalls = random.choice([0.0, 0.02, 0.1])
-        self._duty = random.uniform(0.3, 0.7)
+        self.period = timing.pixel_period()
+        self.stalls = timing.stalls()
+        self._phase = timing.phase(self.period)
+        self._duty = timing.duty()
         self.clocks: list[Clock] = []
 
     @property
@@ -130,7 +140,7 @@ class Camera:
 
     async def run(self) -> None:
         self._show()
-        await self._pass(random.randrange(self.period))
+        await self._pass(self._phase)
         while True:
             self._dut.PIXCLK.value = 1
             self.clocks.append(Clock(now(), NEVER, self._pins))
@@ -166,20 +176,28 @@ class Camera:
             await wait(random.randrange(self.period), EVEN)
 
 
+def patience(camera: Camera) -> int:
+    """Time in ps in which a picture of ``GEOMETRY`` is over, however often its clock stalls."""
+    return 8 * (GEOMETRY.pixels + 20 * GEOMETRY.rows) * camera.period
+
+
 class Mcu:
     """Drives the control pins at random moments of its own; the record is in the two lists."""
 
-    def __init__(self, dut: Any) -> None:
+    def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         self._dut = dut
+        self._timing = timing
+        self._moved = 0  # when the SRAM's address may have changed last
         self._levels = {"ENABLE": 0, "RNW": 0, "BANK": 0}
         self.controls = [Controls(now(), 0, 0, 0)]
         self.data_clocks: list[int] = []
 
     async def set(self, after: int | None = None, **levels: int) -> None:
         """Drive pins together, ``after`` ps or after a random idle time."""
-        await wait(random.randrange(500_000) if after is None else after, ODD)
+        await wait(self._timing.idle() if after is None else after, ODD)
         for name, level in levels.items():
             getattr(self._dut, name).value = level
+        self._moved = now()
         self._levels.update(levels)
         self.controls.append(Controls(now(), *self._levels.values()))
 
@@ -208,10 +226,11 @@ class Mcu:
 
     async def clock(self) -> int:
         """One data clock, after the SRAM's access time; the byte it presents."""
-        await wait(SLOWEST_ACCESS + random.randrange(4_000, 100_000), ODD)
+        await wait(max(self._timing.data_half(), self._moved + SLOWEST_ACCESS + 2 - now()), ODD)
         self._dut.DCLK.value = 1
         self.data_clocks.append(now())
-        await wait(random.randrange(4_000, 100_000), ODD)
+        self._moved = now()
+        await wait(self._timing.data_half(), ODD)
         self._dut.DCLK.value = 0
         return int(self._dut.DATA.value)
 
@@ -222,24 +241,51 @@ class Mcu:
         await self.set(ENABLE=0)
 
 
-class Bench:
-    """The board's top with all that surrounds it. ``start`` it, use it, ``check`` it."""
+class Surroundings(Protocol):
+    """What the bench of every top can do. A place is one that a picture is stored at."""
 
-    def __init__(self, dut: Any) -> None:
+    PLACES: ClassVar[tuple[Any, ...]]
+
+    @classmethod
+    async def start(cls, dut: Any, timing: Timing = ANY) -> Self:
+        """In standby, with the camera's clock running."""
+
+    async def begin(self, place: Any, content: bytes) -> None:
+        """From standby: storing begins, and a picture is sent."""
+
+    async def acknowledged(self, place: Any) -> bool:
+        """Wait for ACK, for as long as the picture may take."""
+
+    async def standby(self) -> None:
+        """At any moment, from any state."""
+
+    async def fetch(self, place: Any) -> bytes:
+        """From standby to standby: the processor reads the picture there."""
+
+    async def check(self) -> object:
+        """In the end: everything is as the scoreboard says. Ends in standby."""
+
+
+class Bench:
+    """The published board with all that surrounds it. ``start`` it, use it, ``check`` it."""
+
+    PLACES: ClassVar[tuple[int, ...]] = (0, 1)  # banks
+
+    def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         self.dut = dut
         for name in ("ENABLE", "RNW", "BANK", "DCLK", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"):
             getattr(dut, name).value = 0
         dut.SRAM_D_I.value = 0
-        self.camera = Camera(dut)
-        self.mcu = Mcu(dut)
+        self.camera = Camera(dut, timing)
+        self.mcu = Mcu(dut, timing)
         self.sram = Sram(dut, GEOMETRY)
         self._before = bytes(self.sram.memory)
         self._seen: dict[str, list[tuple[int, int]]] = {"ACK": [(0, 0)], "DATA": [(0, 0)]}
 
     @classmethod
-    async def start(cls, dut: Any, *, camera: bool = True) -> "Bench":
+    async def start(cls, dut: Any, timing: Timing = ANY, *, camera: bool = True) -> "Bench":
         """In standby, with the camera's clock running or still."""
-        bench = cls(dut)
+        bench = cls(dut, timing)
         await Timer(1, unit="ns")
         assert outputs(dut) == STANDBY
         bench.sram.start()
@@ -263,6 +309,22 @@ class Bench:
         await self.mcu.store(bank)
         await self.camera.reach(len(self.camera.clocks) + 3)  # reset's two, and HSYNC seen low
 
+    async def begin(self, place: int, content: bytes) -> None:
+        await self.store(place)
+        self.camera.send(frame(content))
+
+    async def acknowledged(self, place: int) -> bool:
+        return await self.mcu.acknowledged(patience(self.camera))
+
+    async def standby(self) -> None:
+        await self.mcu.standby()
+
+    async def fetch(self, place: int) -> bytes:
+        await self.mcu.open(place)
+        content = await self.mcu.read(GEOMETRY.pixels)
+        await self.mcu.standby()
+        return content
+
     def stored(self, bank: int = 0) -> bytes:
         """The SRAM's picture, row by row."""
         rows, columns = range(GEOMETRY.rows), range(GEOMETRY.columns)
@@ -280,4 +342,7 @@ class Bench:
         assert self._seen["ACK"] == expected.ack
         assert self._seen["DATA"] == expected.data
         assert self.sram.memory == expected.memory
+        cover_cubestar.sample(
+            self.camera.clocks, self.camera.period, self.mcu.controls, self.mcu.data_clocks
+        )
         return expected

@@ -3,69 +3,18 @@
 import random
 from typing import Any
 
-import cocotb
-from bench import Camera, frame, picture, timed_test
-from cocotb.triggers import ReadOnly, Timer
-from ebi import Ebi, sram_at, stored
+from bench import picture, timed_test
+from bench_next import DoubleBench
 from geometry import GEOMETRY
-from instants import ODD, wait
 
 MEMORY = GEOMETRY.bank_size  # distance of the two memories on the bus
-SRAMS = (1, 2)
 
 
-class DoubleBench:
-    """Camera, processor and both SRAMs around the board."""
-
-    def __init__(self, dut: Any) -> None:
-        self.dut = dut
-        for name in ("ENABLE", "RNW", "INTO", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"):
-            getattr(dut, name).value = 0
-        self.camera = Camera(dut)
-        self.bus = Ebi(dut)
-        self.into: int | None = None  # memory that is stored in
-        self.srams = [sram_at(dut, f"SRAM{n}_", lambda n=n: self.into == n - 1) for n in SRAMS]
-
-    @classmethod
-    async def start(cls, dut: Any) -> "DoubleBench":
-        bench = cls(dut)
-        await Timer(1, unit="ns")
-        for sram in bench.srams:
-            sram.start()
-        bench.bus.start()
-        cocotb.start_soon(bench.camera.run())
-        await bench.set(RNW=1)
-        await bench.set(ENABLE=1)
-        return bench
-
-    async def set(self, **levels: int) -> None:
-        await wait(random.randrange(1, 200_000), ODD)
-        for name, level in levels.items():
-            getattr(self.dut, name).value = level
-
-    async def begin(self, into: int) -> bytes:
-        """Storing begins; the picture that comes."""
-        await self.set(INTO=into)
-        self.into = into
-        await self.set(RNW=0)
-        await self.set(INTO=random.getrandbits(1))
-        await self.camera.reach(len(self.camera.clocks) + 3)
-        content = picture()
-        self.camera.send(frame(content))
-        return content
-
-    async def finish(self, into: int, content: bytes) -> None:
-        """To ACK, and back to the bus."""
-        limit = 100_000
-        while not int(self.dut.ACK.value):
-            limit -= 1
-            assert limit, "no ACK"
-            await wait(random.randrange(100_000), ODD)
-        await self.set(RNW=1)
-        self.into = None
-        assert stored(self.srams[into]) == content
-        await wait(1_000, ODD)
-        assert not int(self.dut.ACK.value)
+async def begin(bench: DoubleBench, into: int) -> bytes:
+    """Storing begins; the picture that comes."""
+    content = picture()
+    await bench.begin(into, content)
+    return content
 
 
 async def works_on(bench: DoubleBench, memory: int, accesses: int) -> None:
@@ -102,7 +51,7 @@ async def bus_has_both_memories(dut: Any) -> None:
 async def one_is_filled_while_the_other_is_worked_on(dut: Any) -> None:
     bench = await DoubleBench.start(dut)
     for into in (0, 1, 0, 1, random.getrandbits(1)):
-        content = await bench.begin(into)
+        content = await begin(bench, into)
         await works_on(bench, 1 - into, 60)
         await bench.finish(into, content)
 
@@ -111,7 +60,7 @@ async def one_is_filled_while_the_other_is_worked_on(dut: Any) -> None:
 async def memory_that_is_filled_is_out_of_reach(dut: Any) -> None:
     bench = await DoubleBench.start(dut)
     for into in (0, 1):
-        content = await bench.begin(into)
+        content = await begin(bench, into)
         for _ in range(30):
             address = into * MEMORY + random.randrange(MEMORY)
             if random.getrandbits(1):
@@ -128,7 +77,7 @@ async def one_memory_serves_both_in_turn(dut: Any) -> None:
     good = random.getrandbits(1)
     failed = getattr(dut, f"SRAM{2 - good}_CE_N")
     for _ in range(3):
-        await bench.finish(good, await bench.begin(good))
+        await bench.finish(good, await begin(bench, good))
         await works_on(bench, good, 20)
         assert int(failed.value)
 
@@ -136,18 +85,23 @@ async def one_memory_serves_both_in_turn(dut: Any) -> None:
 @timed_test
 async def standby_turns_all_off(dut: Any) -> None:
     bench = await DoubleBench.start(dut)
-    await bench.begin(random.getrandbits(1))
+    await begin(bench, random.getrandbits(1))
     await bench.camera.reach(len(bench.camera.clocks) + random.randrange(20))
-    await bench.set(ENABLE=0)
-    bench.into = None
-    await Timer(1, unit="ns")
-    await ReadOnly()
-    for name in ("ACK", "AD_LOW_O", "AD_LOW_OE", "SRAM1_A", "SRAM2_A", "SRAM1_D_OE", "SRAM2_D_OE"):
-        assert int(getattr(dut, name).value) == 0
-    for number in SRAMS:
-        for name in ("CE_N", "OE_N", "WE_N"):
-            assert int(getattr(dut, f"SRAM{number}_{name}").value) == 1
-    await Timer(1, unit="ns")
-    await bench.set(RNW=1)
-    await bench.set(ENABLE=1)
-    await bench.finish(1, await bench.begin(1))
+    await bench.check()
+    await bench.open()
+    await bench.finish(1, await begin(bench, 1))
+
+
+@timed_test
+async def standby_answers_nothing(dut: Any) -> None:
+    bench = await DoubleBench.start(dut)
+    await bench.standby()
+    before = [bytes(sram.memory) for sram in bench.srams]
+    for _ in range(40):
+        address = random.randrange(2 * MEMORY)
+        if random.getrandbits(1):
+            await bench.bus.write(address, random.getrandbits(8))
+        else:
+            assert await bench.bus.read(address) is None
+    assert [sram.memory for sram in bench.srams] == before
+    await bench.check()

@@ -4,61 +4,14 @@ import random
 from typing import Any
 
 import cocotb
-from bench import Camera, Mcu, frame, picture, timed_test
+from bench import frame, picture, timed_test
+from bench_next import STANDBY, SharedBench
 from cocotb.triggers import Timer
-from ebi import Ebi, sram_at, stored
+from ebi import stored
 from geometry import GEOMETRY
 from instants import ODD, wait
 
 SIZE = 2 * GEOMETRY.bank_size
-STANDBY = {
-    **dict.fromkeys(("ACK", "AD_LOW_O", "AD_LOW_OE", "SRAM_D_O", "SRAM_D_OE"), 0),
-    **dict.fromkeys(("SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"), 1),
-}
-
-
-class SharedBench:
-    """Camera, processor and SRAM around the board."""
-
-    def __init__(self, dut: Any) -> None:
-        self.dut = dut
-        for name in ("ENABLE", "RNW", "BANK", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"):
-            getattr(dut, name).value = 0
-        self.camera = Camera(dut)
-        self.mcu = Mcu(dut)
-        self.bus = Ebi(dut)
-        self.sram = sram_at(dut, "SRAM_", lambda: not int(dut.RNW.value))
-
-    @classmethod
-    async def start(cls, dut: Any) -> "SharedBench":
-        bench = cls(dut)
-        await Timer(1, unit="ns")
-        bench.in_standby()
-        bench.sram.start()
-        bench.bus.start()
-        cocotb.start_soon(bench.camera.run())
-        return bench
-
-    def in_standby(self) -> None:
-        assert {name: int(getattr(self.dut, name).value) for name in STANDBY} == STANDBY
-        address = self.dut.SRAM_A.value
-        assert int(address[GEOMETRY.position_bits - 1 : 0]) == 0, "all but the bank"
-
-    async def shoot(self, bank: int) -> bytes:
-        """From standby to standby: a picture is stored."""
-        await self.mcu.store(bank)
-        await self.camera.reach(len(self.camera.clocks) + 3)
-        content = picture()
-        self.camera.send(frame(content))
-        assert await self.mcu.acknowledged()
-        await self.mcu.standby()
-        assert stored(self.sram, bank) == content
-        return content
-
-    async def open(self) -> None:
-        """From standby: the bus has the memory."""
-        await self.mcu.set(RNW=1, BANK=random.getrandbits(1))
-        await self.mcu.set(ENABLE=1)
 
 
 @timed_test
@@ -109,12 +62,11 @@ async def bus_is_cut_off_while_storing(dut: Any) -> None:
 
     for bank in (1, 0):
         other = stored(bench.sram, 1 - bank)
-        await bench.mcu.store(bank)
+        await bench.store(bank)
         meddling = cocotb.start_soon(meddle())
-        await bench.camera.reach(len(bench.camera.clocks) + 3)
         content = picture()
         bench.camera.send(frame(content))
-        assert await bench.mcu.acknowledged()
+        assert await bench.acknowledged(bank)
         meddling.cancel()
         for name in ("CS_N", "RE_N", "WE_N"):
             getattr(dut, name).value = 1
@@ -164,3 +116,17 @@ async def strobes_together_read(dut: Any) -> None:
             getattr(dut, name).value = 1
         await wait(1_000, ODD)
     assert bench.sram.memory == before
+
+
+@timed_test
+async def standby_answers_nothing(dut: Any) -> None:
+    bench = await SharedBench.start(dut)
+    before = bytes(bench.sram.memory)
+    for _ in range(40):
+        address = random.randrange(SIZE)
+        if random.getrandbits(1):
+            await bench.bus.write(address, random.getrandbits(8))
+        else:
+            assert await bench.bus.read(address) is None
+    assert bench.sram.memory == before
+    await bench.check()

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from amaranth.lib.wiring import Component
@@ -14,6 +15,7 @@ from cocotb_tools.runner import Runner
 
 sys.path.append(str(Path(__file__).parent))
 
+import cover
 import waves
 from regression import BASE_SEED, HERE, SIMULATOR, build, frame_environment, simulate
 
@@ -22,6 +24,43 @@ from cubestack.hdl.generate import verilog_text
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.
 INITIALISER = re.compile(r"^(\s*reg (?:\[\d+:0\] )?[^$;=]*?) = \d+'h\w+;$", re.MULTILINE)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "cocotb: simulates a design")
+    folder = os.environ.get("HDL_COVERAGE")
+    if folder and not hasattr(config, "workerinput"):
+        path = Path(folder).resolve()
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True)
+        os.environ["HDL_COVERAGE"] = str(path)
+
+
+def pytest_report_header() -> str:
+    return f"hdl: {SIMULATOR}, HDL_SEED={BASE_SEED}"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what simulates."""
+    for item in items:
+        if "icarus" in getattr(item, "fixturenames", ()):
+            item.add_marker("cocotb")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """With ``HDL_COVERAGE`` a regression that leaves out a declared point fails."""
+    folder = os.environ.get("HDL_COVERAGE")
+    here = not hasattr(session.config, "workerinput")
+    if folder and here and exitstatus == 0 and cover.missed(cover.merged(Path(folder))):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    if folder := os.environ.get("HDL_COVERAGE"):
+        terminalreporter.section("functional coverage")
+        for line in cover.table(cover.merged(Path(folder))):
+            terminalreporter.write_line(line)
 
 
 class Icarus:
@@ -75,7 +114,11 @@ class Icarus:
                 assert changed
             (folder / "dut.v").write_text(verilog, encoding="utf-8")
             self._built[name] = make(folder)
-        settings = {**frame_environment(columns, rows), **(environment or {})}
+        settings = {
+            **frame_environment(columns, rows),
+            "DESIGN": design.__name__,
+            **(environment or {}),
+        }
         run = partial(simulate, seed=seed, top=top, environment=settings)
         self._runs += 1
         place = self._folder / f"{self._runs}"
@@ -85,13 +128,12 @@ class Icarus:
         if outcome.failed:
             # The seed makes it the same run again.
             first = outcome.failed[0]
+            failed = [*outcome.failed[:20], *(["…"] if len(outcome.failed) > 20 else [])]
             path = waves.path_of(self._kept, node, first)
             traced = make(folder / "traced", traced=True)
             again = run(traced, modules, place / "traced", only=first, waveform=path)
-            kept = waves.describe(path, node, first, seed, again)
-            raise AssertionError(
-                f"cocotb tests failed: {list(outcome.failed)}\n{kept}\n{outcome.log[-6000:]}"
-            )
+            kept = waves.describe(path, node, seed, outcome, again)
+            raise AssertionError(f"cocotb tests failed: {failed}\n{kept}\n{outcome.log[-6000:]}")
         assert not outcome.problem, f"{outcome.problem}\n{outcome.log[-4000:]}"
 
 

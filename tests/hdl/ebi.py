@@ -6,10 +6,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import cocotb
+import cover_cubestar
 from cocotb.triggers import ReadOnly
+from cover import hit
 from geometry import GEOMETRY
 from instants import ODD, wait
 from sram import SLOWEST_ACCESS, UNKNOWN, Sram
+from timing import ANY, Timing
 
 #: Address bits that some memory uses: memory or bank, row, column.
 USED_BITS = GEOMETRY.position_bits + 1
@@ -18,10 +21,13 @@ USED_BITS = GEOMETRY.position_bits + 1
 class Ebi:
     """Bus master. Lines that it does not drive are unknown; bits of no use are random."""
 
-    def __init__(self, dut: Any, *selects: str) -> None:
+    def __init__(self, dut: Any, *selects: str, timing: Timing = ANY) -> None:
         self._dut = dut
+        self._timing = timing
         self._selects = selects or ("CS_N",)
         self.drives = True
+        #: Memory of an access to an address with a chip select, and what the board is at.
+        self.situation: Callable[[int, str], tuple[int, str]] | None = None
         for name in (*self._selects, "RE_N", "WE_N"):
             getattr(dut, name).value = 1
         for name in ("AD_HIGH", "AD_LOW_I", "ALE"):
@@ -52,12 +58,14 @@ class Ebi:
         self._dut.AD_HIGH.value = address & 0xFF
 
     async def write(self, address: int, value: int, select: str = "") -> None:
+        self._note("write", address, select)
         await self.address(address)
         self._dut.AD_LOW_I.value = value
         await self._strobe("WE_N", select)
 
     async def read(self, address: int, select: str = "") -> int | None:
         """The byte, or None when nobody drives the bus."""
+        self._note("read", address, select)
         await self.address(address)
         self._dut.AD_LOW_I.value = UNKNOWN
         self.drives = False
@@ -66,12 +74,17 @@ class Ebi:
         self._dut.AD_LOW_I.value = random.getrandbits(8)
         return byte
 
+    def _note(self, access: str, address: int, select: str) -> None:
+        if self.situation is not None and cover_cubestar.TOP is not None:
+            memory, board = self.situation(address, select)
+            hit("bus", top=cover_cubestar.TOP, access=access, memory=memory, board=board)
+
     async def _strobe(self, strobe: str, select: str) -> int | None:
         chip = getattr(self._dut, select or self._selects[0])
         chip.value = 0
         await self._pause()
         getattr(self._dut, strobe).value = 0
-        await wait(SLOWEST_ACCESS + random.randrange(1_000, 20_000), ODD)
+        await wait(SLOWEST_ACCESS + self._timing.pause(), ODD)
         driven = int(self._dut.AD_LOW_OE.value)
         byte = int(self._dut.AD_LOW_O.value) if driven else None
         getattr(self._dut, strobe).value = 1
@@ -81,7 +94,7 @@ class Ebi:
         return byte
 
     async def _pause(self) -> None:
-        await wait(random.randrange(1_000, 20_000), ODD)
+        await wait(self._timing.pause(), ODD)
 
 
 class _Clock:

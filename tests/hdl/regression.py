@@ -7,7 +7,7 @@ need not be what the top's source gives::
     outcome.passed, outcome.failed
 
 From the environment: ``HDL_SEED`` is added to every seed, ``HDL_SIMULATOR`` is ``icarus`` (default)
-or ``verilator``.
+or ``verilator``, ``HDL_TIER=full`` is what `make test-hdl` runs besides what `make test` does.
 """
 
 import json
@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -42,6 +41,7 @@ PATHS = (str(HERE), str(HERE / "cubesense"))
 
 SIMULATOR = os.environ.get("HDL_SIMULATOR", "icarus")
 BASE_SEED = int(os.environ.get("HDL_SEED", "0"))
+FULL = os.environ.get("HDL_TIER") == "full"
 
 #: Wall-clock seconds after which a simulation hangs; the slowest takes a tenth of it when idle.
 LIMIT_S = 600
@@ -74,17 +74,21 @@ class Tier:
     """What a top has to pass.
 
     Attributes:
-        make: the top, of a small picture.
+        design: the top's class, or what else makes it of the number of columns and rows.
         columns, rows: its size.
         modules: cocotb modules, those that find most first.
         environment: what they need besides the size.
     """
 
-    make: Callable[[], Component]
+    design: Callable[[int, int], Component]
     columns: int
     rows: int
     modules: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
+
+    def make(self) -> Component:
+        """The top, of a small picture."""
+        return self.design(self.columns, self.rows)
 
 
 #: The least picture that has all of CubeSense's cases.
@@ -106,18 +110,20 @@ def pair_environment(read_out: ReadOut, mcu_addressing: bool = False) -> dict[st
 def _pair(mcu_addressing: bool) -> Tier:
     modules = PAIR_MODULES + ("benches_pair_addressing",) * mcu_addressing
     environment = pair_environment(SMALLEST, mcu_addressing)
-    make = partial(CubeSensePair, SMALLEST, mcu_addressing)
-    return Tier(make, SMALLEST.columns, SMALLEST.rows, modules, environment)
+
+    def design(columns: int, rows: int) -> Component:
+        return CubeSensePair(SMALLEST, mcu_addressing)
+
+    design.__name__ = "addressable" if mcu_addressing else "CubeSensePair"
+    return Tier(design, SMALLEST.columns, SMALLEST.rows, modules, environment)
 
 
 #: By the tops' names in ``cubestack.hdl.designs``.
 TIERS = {
-    "cubestar": Tier(
-        partial(CubeStarTop, 5, 3), 5, 3, ("benches_read", "benches_modes", "benches_store")
-    ),
-    "cubestar-shared": Tier(partial(CubeStarShared, 5, 3), 5, 3, ("benches_shared",)),
-    "cubestar-double": Tier(partial(CubeStarDouble, 5, 3), 5, 3, ("benches_double",)),
-    "cubestar-boards": Tier(partial(CubeStarTwoBoards, 5, 3), 5, 3, ("benches_boards",)),
+    "cubestar": Tier(CubeStarTop, 5, 3, ("benches_read", "benches_modes", "benches_store")),
+    "cubestar-shared": Tier(CubeStarShared, 5, 3, ("benches_shared",)),
+    "cubestar-double": Tier(CubeStarDouble, 5, 3, ("benches_double",)),
+    "cubestar-boards": Tier(CubeStarTwoBoards, 5, 3, ("benches_boards",)),
     "cubesense-pair": _pair(mcu_addressing=False),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),
 }
@@ -146,7 +152,11 @@ def run_tier(
         tier.modules,
         folder / "run",
         seed=seed,
-        environment={**frame_environment(tier.columns, tier.rows), **tier.environment},
+        environment={
+            **frame_environment(tier.columns, tier.rows),
+            **tier.environment,
+            "HDL_COVERAGE": "",  # what a wrong design reaches counts for nothing
+        },
         limit_s=limit_s,
         failures=1,
     )
@@ -216,18 +226,20 @@ def simulate(
     plusargs = [f"+seed={seed}"]
     if waveform:
         plusargs.append(f"+dumpfile_path={waveform}")
-    with _surroundings(limit_s, waveform is not None), suppress(SystemExit, RuntimeError):
+    settings = {
+        **environment,
+        "PYTHONHASHSEED": "0",
+        "COCOTB_MAX_FAILURES": str(failures),
+        "NO_COLOR": "1",
+    }
+    if waveform and SIMULATOR == "icarus":
+        settings["SIM_CMD_SUFFIX"] = "-vcd"
+    with _surroundings(limit_s, settings), suppress(SystemExit, RuntimeError):
         runner.test(
             test_module=modules,
             hdl_toplevel=top,
             seed=seed,
             plusargs=plusargs,
-            extra_env={
-                **environment,
-                "PYTHONHASHSEED": "0",
-                "COCOTB_MAX_FAILURES": str(failures),
-                "NO_COLOR": "1",
-            },
             testcase=only or None,
             waves=waveform is not None,
             test_dir=folder,
@@ -238,14 +250,14 @@ def simulate(
 
 
 @contextmanager
-def _surroundings(limit_s: int, vcd: bool) -> Iterator[None]:
-    """The modules' folders, a limit that ends a simulation which hangs, the waveforms' format."""
+def _surroundings(limit_s: int, settings: Mapping[str, str]) -> Iterator[None]:
+    """The modules' folders, their settings, and a limit that ends a simulation which hangs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "path", [*PATHS, *(path for path in sys.path if path not in PATHS)])
         if shutil.which("timeout"):
             patch.setenv("SIM_CMD_PREFIX", f"timeout --kill-after=5 {limit_s}")
-        if vcd and SIMULATOR == "icarus":
-            patch.setenv("SIM_CMD_SUFFIX", "-vcd")
+        for name, value in settings.items():
+            patch.setenv(name, value)
         yield
 
 

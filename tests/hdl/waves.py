@@ -29,20 +29,24 @@ def forget(folder: Path, node: str) -> None:
 def path_of(folder: Path, node: str, case: str) -> Path:
     """Where the waveform of a test's cocotb test ``case`` goes; its folder is made."""
     folder.mkdir(parents=True, exist_ok=True)
-    return folder / f"{names(node)}.{case}.vcd"
+    plain = re.sub(r"[^\w.]+", "-", case)
+    return folder / f"{names(node)}.{plain}.vcd"
 
 
-def describe(path: Path, node: str, case: str, seed: int, outcome: Outcome) -> str:
-    """Write what the waveform shows beside it; a line for the reader."""
+def describe(path: Path, node: str, seed: int, failed: Outcome, again: Outcome) -> str:
+    """Write what the waveform shows beside it; a line for the reader.
+
+    ``failed`` is the run of all tests, ``again`` the first failed one alone.
+    """
     if not path.exists():
         return "no waveform was written"
     about = {
         "test": node,
-        "cocotb": case,
+        "cocotb": failed.failed[0],
         "seed": seed + BASE_SEED,
         "simulator": SIMULATOR,
-        "error": outcome.error,
+        "error": failed.error,
     }
     path.with_suffix(".json").write_text(json.dumps(about, indent=1), encoding="utf-8")
-    again = "" if case in outcome.failed else ", in which it passed alone"
-    return f"waveform{again}: {path}; look at it with: cubestack hdl wave {path.stem}"
+    alone = "" if again.failed else ", in which it passed alone"
+    return f"waveform{alone}: {path}; look at it with: cubestack hdl wave {path.stem}"

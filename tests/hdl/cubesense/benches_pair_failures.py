@@ -4,6 +4,7 @@ import random
 from typing import Any
 
 from bench import timed_test
+from cover import hit
 from geometry import GEOMETRY
 from pair import OTHER, PairBench
 from small import READ_OUT
@@ -37,6 +38,8 @@ async def measures(bench: PairBench, sensor: str, memory: str) -> None:
         for value, pixel in zip(data, pixels, strict=True):
             assert pixel is None or value == content[pixel[1] * COLUMNS + pixel[0]]
     await bench.mcu.standby()
+    parts = {"dead": bench.dead_camera, "failed": bench.failed_sram}
+    hit("failures", sensor=sensor, memory=memory, **parts)
 
 
 async def memory_failed(dut: Any, failed: str) -> None:

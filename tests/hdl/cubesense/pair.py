@@ -1,11 +1,13 @@
 """Bench of the pair of FPGAs: two cameras, two SRAMs, one microcontroller, and the scoreboard."""
 
 import random
+from itertools import product
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import cocotb
-from bench import Camera, flat, lines, vsync
+import cover_pair
+from bench import Camera, flat, lines, patience, vsync
 from cocotb.triggers import ReadOnly, Timer
 from geometry import GEOMETRY
 from instants import ODD, now, wait
@@ -13,6 +15,7 @@ from pair_reference import SIDES, Controls, Half, behaviour
 from reference import Tick
 from small import MCU_ADDRESSING, READ_OUT
 from sram import SLOWEST_ACCESS, UNKNOWN, Sram
+from timing import ANY, Timing
 
 PREFIXES = {"sun": "SUN", "nadir": "NAD"}
 OTHER = {"sun": "nadir", "nadir": "sun"}
@@ -71,8 +74,10 @@ class CubeSenseMcu:
 
     LINES = ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN")
 
-    def __init__(self, dut: Any) -> None:
+    def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         self._dut = dut
+        self._timing = timing
+        self._moved = 0  # when an SRAM's address may have changed last
         self._levels = dict.fromkeys(self.LINES, 0) | {"SUNEN": 1, "NADEN": 1}
         self.controls = [Controls(now(), *self._levels.values())]
         self.bytes: dict[int, int] = {}  # by the time of their clock
@@ -87,9 +92,10 @@ class CubeSenseMcu:
 
     async def set(self, after: int | None = None, **pins: int) -> None:
         """Drive pins together, ``after`` ps or after a random idle time."""
-        await wait(random.randrange(300_000) if after is None else after, ODD)
+        await wait(self._timing.idle() if after is None else after, ODD)
         for name, level in pins.items():
             getattr(self._dut, name).value = level
+        self._moved = now()
         self._levels.update(pins)
         self.controls.append(Controls(now(), *self._levels.values()))
 
@@ -163,12 +169,12 @@ class CubeSenseMcu:
 
     async def clock(self) -> int:
         """One data clock, after the SRAM's access time; the byte it presents."""
-        await wait(SLOWEST_ACCESS + random.randrange(4_000, 60_000), ODD)
+        await wait(max(self._timing.data_half(), self._moved + SLOWEST_ACCESS + 2 - now()), ODD)
         self._dut.CLK.value = 1
-        time = now()
+        time = self._moved = now()
         if self._data is not None:
             self.sent[time] = self._data
-        await wait(random.randrange(4_000, 60_000), ODD)
+        await wait(self._timing.data_half(), ODD)
         self._dut.CLK.value = 0
         self.bytes[time] = int(self._dut.DATA.value)
         return self.bytes[time]
@@ -185,9 +191,12 @@ def enables(side: str) -> tuple[int, int]:
 class PairBench:
     """The pair with all that surrounds it. ``start`` it, use it, ``check`` it."""
 
-    def __init__(self, dut: Any) -> None:
+    #: Camera and memory.
+    PLACES: ClassVar[tuple[tuple[str, str], ...]] = tuple(product(SIDES, SIDES))
+
+    def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         self.dut = dut
-        self.mcu = CubeSenseMcu(dut)
+        self.mcu = CubeSenseMcu(dut, timing)
         self.cameras: dict[str, Camera] = {}
         self.srams: dict[str, Sram] = {}
         for side, prefix in PREFIXES.items():
@@ -199,22 +208,26 @@ class PairBench:
                 HSYNC=getattr(dut, f"{prefix}_HREF"),
                 VSYNC=SimpleNamespace(),  # not wired
             )
-            self.cameras[side] = Camera(pins)
+            self.cameras[side] = Camera(pins, timing)
             names = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
             memory = {f"SRAM_{name}": getattr(dut, f"{prefix}_SRAM_{name}") for name in names}
             self.srams[side] = Sram(
                 SimpleNamespace(**memory, PIXCLK=StoringClock(dut, side)), GEOMETRY
             )
+        self.dead_camera = self.failed_sram = ""
         self._before = [bytes(self.srams[side].memory) for side in SIDES]
         self._ack: dict[str, list[tuple[int, int]]] = {side: [(0, 0)] for side in SIDES}
 
     @classmethod
-    async def start(cls, dut: Any, *, dead_camera: str = "", failed_sram: str = "") -> "PairBench":
+    async def start(
+        cls, dut: Any, timing: Timing = ANY, *, dead_camera: str = "", failed_sram: str = ""
+    ) -> "PairBench":
         """In standby, with both cameras' clocks running, but for a dead one, which stands still.
 
         A failed SRAM keeps nothing and offers unknown bytes.
         """
-        bench = cls(dut)
+        bench = cls(dut, timing)
+        bench.dead_camera, bench.failed_sram = dead_camera, failed_sram
         await Timer(1, unit="ns")
         assert levels(dut) == STANDBY
         for side in SIDES:
@@ -253,8 +266,8 @@ class PairBench:
             both = self.mcu.drives and int(self.dut.DATA_OE.value)
             assert not both, "the microcontroller and an FPGA drive the data bus"
 
-    async def shoot(self, camera: str, memory: str, content: bytes) -> None:
-        """From standby: one picture from a camera to a memory, to ACK, and to standby."""
+    async def begin(self, place: tuple[str, str], content: bytes) -> None:
+        camera, memory = place
         if camera == memory:
             await self.mcu.store(camera)
         else:
@@ -262,7 +275,28 @@ class PairBench:
         # Reset's two clocks, and one more.
         await self.cameras[camera].reach(len(self.cameras[camera].clocks) + 3)
         self.cameras[camera].send(frame(content))
-        assert await self.mcu.acknowledged(memory)
+
+    async def acknowledged(self, place: tuple[str, str]) -> bool:
+        camera, memory = place
+        limit = (
+            patience(self.cameras[camera]) + 8 * READ_OUT.frame_gap * self.cameras[camera].period
+        )
+        return await self.mcu.acknowledged(memory, limit)
+
+    async def standby(self) -> None:
+        await self.mcu.standby()
+
+    async def fetch(self, place: tuple[str, str]) -> bytes:
+        _, memory = place
+        await self.mcu.read_picture(memory)
+        content = await self.mcu.read(GEOMETRY.pixels)
+        await self.mcu.standby()
+        return content
+
+    async def shoot(self, camera: str, memory: str, content: bytes) -> None:
+        """From standby: one picture from a camera to a memory, to ACK, and to standby."""
+        await self.begin((camera, memory), content)
+        assert await self.acknowledged((camera, memory))
         await self.mcu.standby()
         assert self.stored(memory) == content
 
@@ -290,4 +324,10 @@ class PairBench:
             assert self.srams[side].memory == half.memory, side
             assert self._ack[side] == half.ack, side
         assert self.mcu.bytes == {time: data.get(time, 0) for time in self.mcu.bytes}
+        cover_pair.sample(
+            halves,
+            {side: self.cameras[side].clocks for side in SIDES},
+            self.mcu.controls,
+            list(self.mcu.bytes),
+        )
         return halves

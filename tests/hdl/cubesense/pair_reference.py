@@ -58,6 +58,7 @@ class Half:
     pulses: list[Pulse] = field(default_factory=list)
     ack: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     sun: tuple[int, int] | None = None  # first Sun pixel; None before the first Sun picture
+    suns_read: list[tuple[int, int]] = field(default_factory=list)  # of each window read
 
 
 def vsync(href: Sequence[int]) -> list[int]:
@@ -179,6 +180,7 @@ def scan(half: Half) -> Iterator[int]:
 def sun_window(half: Half) -> Iterator[int]:
     assert half.sun is not None, "a window is read before a Sun picture was stored"
     x, y = half.sun
+    half.suns_read.append(half.sun)
     yield from x.to_bytes(2, "little") + y.to_bytes(2, "little")
     left, top = READ_OUT.window_origin(x, y)
     while True:
