@@ -139,6 +139,11 @@ class CubeStarBoard:
         assert isinstance(program, CubeStarProgram)
         return program
 
+    @property
+    def flash(self) -> FlashStore:
+        """The processor's flash, as a debugger sees it."""
+        return self._hardware.flash
+
     @cached_property
     def faults(self) -> Faults:
         """Injects faults into this board."""

@@ -7,8 +7,11 @@ supply channel "memory" watches the memory with the picture. An FPGA whose bus i
 draws standing by; only accesses draw as much as reading.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+
+from amaranth.hdl import Fragment
 
 from cubestack.emulator.power_tables import CUBESTAR, Part, PowerTable
 from cubestack.emulator.rtl.wiring import (
@@ -20,7 +23,7 @@ from cubestack.emulator.rtl.wiring import (
 )
 from cubestack.firmware_model.interface.cubestar_layouts import Layout
 
-__all__ = ["BOARDS", "LayoutBoard"]
+__all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
 
 Pins = Mapping[str, int]
 States = dict[str, str]
@@ -33,7 +36,9 @@ class LayoutBoard:
     """One layout.
 
     Attributes:
-        wiring: of its FPGAs.
+        top: name of the design in each of its FPGAs.
+        fpgas: how many there are.
+        wiring: of them.
         controls: pins that command them, with their levels after power-up.
         power: what draws current.
         storing: how many memories a camera's picture may go to, by the control pins.
@@ -42,6 +47,8 @@ class LayoutBoard:
         external_ram: the processor has a memory of its own.
     """
 
+    top: str
+    fpgas: int
     wiring: Callable[[], Wiring]
     controls: Pins
     power: PowerTable
@@ -106,15 +113,36 @@ _ONE_FPGA = {"ENABLE": 0, "RNW": 0}
 #: Every layout.
 BOARDS = {
     Layout.COPIED: LayoutBoard(
-        cubestar_wiring, _ONE_FPGA, CUBESTAR, _stores, _copied_states, external_ram=True
+        "cubestar",
+        1,
+        cubestar_wiring,
+        _ONE_FPGA,
+        CUBESTAR,
+        _stores,
+        _copied_states,
+        external_ram=True,
     ),
     Layout.SHARED: LayoutBoard(
-        cubestar_shared_wiring, _ONE_FPGA, _powered(("fpga",), 1), _stores, _one_fpga_states
+        "cubestar-shared",
+        1,
+        cubestar_shared_wiring,
+        _ONE_FPGA,
+        _powered(("fpga",), 1),
+        _stores,
+        _one_fpga_states,
     ),
     Layout.TWO_MEMORIES: LayoutBoard(
-        cubestar_double_wiring, _ONE_FPGA, _powered(("fpga",), 2), _stores, _one_fpga_states
+        "cubestar-double",
+        1,
+        cubestar_double_wiring,
+        _ONE_FPGA,
+        _powered(("fpga",), 2),
+        _stores,
+        _one_fpga_states,
     ),
     Layout.TWO_BOARDS: LayoutBoard(
+        "cubestar-shared",
+        2,
         cubestar_two_boards_wiring,
         {f"{board}{name}": 0 for board in _TWO for name in _ONE_FPGA},
         _powered(("fpga1", "fpga2"), 2),
@@ -122,3 +150,38 @@ BOARDS = {
         _two_board_states,
     ),
 }
+
+
+@dataclass(frozen=True)
+class Fpga:
+    """What each FPGA of a layout takes of its part.
+
+    Attributes:
+        pins, tiles: taken.
+        part_pins, part_tiles: there are.
+    """
+
+    pins: int
+    tiles: int
+    part_pins: int
+    part_tiles: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether it can be built."""
+        return self.pins <= self.part_pins and self.tiles <= self.part_tiles
+
+
+def fpga_of(layout: Layout) -> Fpga:
+    """Pins of the design, and the tiles that ``hdl/area.json`` has for it."""
+    from cubestack.hdl.area import AGLN030_PINS, AGLN030_TILES
+    from cubestack.hdl.area_report import AREA_FILE
+    from cubestack.hdl.designs import TOPS, pins_of
+
+    name = BOARDS[layout].top
+    top = TOPS[name]
+    component = top.make()
+    Fragment.get(component, None)  # Amaranth complains of a design that was never made
+    pins = sum(pin.width for pin in pins_of(component, top.meanings))
+    areas = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]
+    return Fpga(pins, int(areas[name]["tiles"]), AGLN030_PINS, AGLN030_TILES)

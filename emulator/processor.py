@@ -107,7 +107,8 @@ class Processor:
             other_pins: pins that do not lead to the FPGA.
             on_pin: told about every output pin change, after it happened.
             on_activity: told when the processor falls asleep (False), starts or awakes (True).
-            on_access: told when the program begins (True) and ends to use the external bus.
+            on_access: told when the program begins to use the external bus (True), and when it
+                requests something else after that.
         """
         self._env = env
         self._meter = meter
@@ -119,6 +120,7 @@ class Processor:
         self._on_pin = on_pin
         self._on_activity = on_activity
         self._on_access = on_access
+        self._accesses = False
         self._clock = CycleClock(meter.table.clock_hz)
         self._wake = env.event()
         self.resets = 0
@@ -180,6 +182,9 @@ class Processor:
             yield self._env.timeout(self._clock.elapse(cycles))
 
     def _perform(self, request: Request) -> Steps:
+        if self._accesses != isinstance(request, BusAccess):
+            self._accesses = not self._accesses
+            self._on_access(self._accesses)
         match request:
             case Pay():
                 return None
@@ -278,7 +283,6 @@ class Processor:
         return None
 
     def _bus_access(self, request: BusAccess) -> Steps:
-        self._on_access(True)
         done, total = 0, len(request.addresses)
         while done < total:
             yield from self._pay()
@@ -299,5 +303,4 @@ class Processor:
             yield self._env.timeout(self.engine.now_ps - self._env.now)
             if not request.write and request.data[done - 1] > request.above:
                 break
-        self._on_access(False)
         return done

@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.external_bus import Transactions
 from cubestack.emulator.faults.injection import Injection, Report, active
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
@@ -114,6 +115,15 @@ class PinFaults:
         for act in self.around_reads:
             act()
         done = self._engine.strobe_read(out, period, until_ps)
+        for act in self.around_reads:
+            act()
+        return done
+
+    def access(self, transactions: Transactions, until_ps: int) -> int:
+        """Make transactions on the external bus."""
+        for act in self.around_reads:
+            act()
+        done = self._engine.access(transactions, until_ps)
         for act in self.around_reads:
             act()
         return done

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -10,6 +11,7 @@ from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubesense_bench import BENCH
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 
 if TYPE_CHECKING:
     from cubestack.emulator.faults.injector import Faults
@@ -88,12 +90,17 @@ def open_board(
     engine: Engine,
     baud: int | None,
     mcu_addressing: bool = False,
+    layout: Layout = Layout.COPIED,
 ) -> Opened:
     """Power up ``device`` (a name of ``DEVICES``); ``scene`` None is its default scene.
 
     ``baud`` is of the node protocol's line, None for the published one. ``mcu_addressing`` is an
-    option of CubeSense's FPGAs; ValueError for another device.
+    option of CubeSense's FPGAs, ``layout`` one of CubeStar; ValueError for another device.
     """
+    if layout is not Layout.COPIED:
+        if device != "cubestar":
+            raise ValueError(f"--layout is an option of cubestar, not of {device}")
+        return _cubestar(scene, seed, engine, baud, layout=layout)
     if mcu_addressing:
         if device != "cubesense":
             raise ValueError(f"--mcu-addressing is an option of cubesense, not of {device}")
@@ -122,13 +129,22 @@ def cubesense_scene(path: Path | None) -> EarthSunScene:
     return EarthSunScene.facing(sun_deg=angles["sun"], nadir_deg=angles["nadir"])
 
 
-def _cubestar(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+def _cubestar(
+    path: Path | None,
+    seed: int,
+    engine: Engine,
+    baud: int | None,
+    *,
+    layout: Layout = Layout.COPIED,
+) -> Opened:
     from cubestack.emulator.cubestar import CubeStarBoard
     from cubestack.emulator.onboard_catalogue import onboard_catalogue
 
     baud = baud or CUBESTAR.baud
     scene = cubestar_scene(path)
-    board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine, baud=baud)
+    board = CubeStarBoard(
+        scene, onboard_catalogue(), seed=seed, engine=engine, baud=baud, layout=layout
+    )
     return Opened("CubeStar", board, (SerialLine("node protocol", "", board.uart, baud),))
 
 
@@ -164,4 +180,8 @@ def _aramis(path: Path | None, seed: int, engine: Engine, baud: int | None) -> O
 
 
 #: Devices that can be emulated, by the names of the command line.
-DEVICES = {"cubestar": _cubestar, "cubesense": _cubesense, "aramis": _aramis}
+DEVICES: dict[str, Callable[[Path | None, int, Engine, int | None], Opened]] = {
+    "cubestar": _cubestar,
+    "cubesense": _cubesense,
+    "aramis": _aramis,
+}

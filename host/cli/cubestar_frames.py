@@ -67,7 +67,8 @@ def measure_frames(args: argparse.Namespace) -> Iterator[FrameResult]:
     rng = np.random.default_rng(args.seed)
     camera = None if args.camera is None else load_camera(args.camera).cropped(*args.crop)
     scene, truth = _first_scene(args, rng)
-    with open_session(scene, seed=args.seed, engine=args.engine) as session:
+    session_of = open_session(scene, seed=args.seed, engine=args.engine, layout=args.layout)
+    with session_of as session:
         inject_plan(session.board.faults, args.faults)
         if camera is not None:
             session.cubestar.configure(calibrate(camera).settings)

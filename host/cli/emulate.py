@@ -9,6 +9,7 @@ examples:
       then, in a second terminal:
       .venv/bin/python examples/plain_pyserial.py ./ttyCUBESTAR
   cubestack emulate cubestar --scene sky.toml --tcp 4000 --pace fast
+  cubestack emulate cubestar --tcp 4000 --layout two-boards
   cubestack emulate cubesense --pty ./ttyCUBESENSE --record session.jsonl
   cubestack emulate cubestar cubesense aramis --i2c 7
       then: cubestack run --attach -- i2cdetect -y 7
@@ -21,13 +22,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 from cubestack.firmware_model.interface.linux_i2c import socket_path
+from cubestack.firmware_model.interface.recording_setup import Option
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.boards import DEVICES, open_board
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import add_record_arguments, record
-from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
+from cubestack.host.cli.session import add_engine_arguments, add_layout_argument, tell_layout
 from cubestack.host.cli.setups import emulated_setup
 from cubestack.host.cli.terminal import say
 
@@ -96,12 +99,16 @@ def run(args: argparse.Namespace) -> int:
                     engine=args.engine,
                     baud=args.baud,
                     mcu_addressing=args.mcu_addressing,
+                    layout=args.layout,
                 )
             )
             stack.callback(devices[-1].board.close)
+        tell_layout(args.layout, say)
         if len(devices) == 1:
             inject_plan(devices[0].board.faults, args.faults, say)
-            options = {"mcu_addressing": True} if args.mcu_addressing else {}
+            options: dict[str, Option] = {"mcu_addressing": True} if args.mcu_addressing else {}
+            if args.layout is not Layout.COPIED:
+                options["layout"] = args.layout.value
             setup = emulated_setup(args.seed, args.scene, args.faults, options)
             record(args, devices[0], stack, setup)
         kernel, adapter = _joined(devices)

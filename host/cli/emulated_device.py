@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 from cubestack.host.cli.boards import cubesense_scene, cubestar_scene
 from cubestack.host.cubesense import CubeSense
 from cubestack.host.cubestar import CubeStar
@@ -262,14 +263,23 @@ def _seen(scene: Any, load: Callable[[Path | None], Any]) -> Any:
 
 
 def open_cubestar_device(
-    scene: str | Path | Any | None = None, *, seed: int = 0, engine: Engine = "auto"
+    scene: str | Path | Any | None = None,
+    *,
+    seed: int = 0,
+    engine: Engine = "auto",
+    layout: str = Layout.COPIED.value,
 ) -> EmulatedDevice[CubeStar]:
-    """Power up a CubeStar; without ``scene`` it looks at Orion."""
+    """Power up a CubeStar; without ``scene`` it looks at Orion.
+
+    ``layout`` is the name of a memory layout.
+    """
     from cubestack.emulator.cubestar import CubeStarBoard
     from cubestack.emulator.onboard_catalogue import onboard_catalogue
 
     seen = _seen(scene, cubestar_scene)
-    board = CubeStarBoard(seen, onboard_catalogue(), seed=seed, engine=engine)
+    board = CubeStarBoard(
+        seen, onboard_catalogue(), seed=seed, engine=engine, layout=Layout(layout)
+    )
     return EmulatedDevice(board, CubeStar, CUBESTAR, seed)
 
 

@@ -13,6 +13,7 @@ examples:
   cubestack measure cubestar --frames 200 --mag-limit 3.8 --json > frames.jsonl
   cubestack measure cubestar --mode assisted --hint-error 5   rough boresight
   cubestack measure cubestar --image sky.jpg --crop 0,256 --camera camera.json
+  cubestack measure cubestar --mag-limit 3.8 --layout 2       one SRAM for FPGA and processor
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import angle, corner, number, whole
 from cubestack.host.cli.fault_plan import add_faults_argument
-from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
-from cubestack.host.cli.terminal import collect, console
+from cubestack.host.cli.session import add_engine_arguments, add_layout_argument, tell_layout
+from cubestack.host.cli.terminal import collect, console, say
 
 if TYPE_CHECKING:
     from cubestack.host.cli.cubestar_frames import FrameResult
@@ -100,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
             "--mag-limit, --false-stars and --no-noise belong to the random sky; a scene file "
             "has the keys mag_limit, false_stars and noise"
         )
+    tell_layout(args.layout, say)
     started = time.monotonic()
     results = collect(measure_frames(args), args.frames, as_json=args.json)
     if not args.json:

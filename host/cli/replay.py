@@ -19,6 +19,7 @@ import json
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 from cubestack.firmware_model.interface.recording import Recording, load_recording
 from cubestack.firmware_model.interface.recording_setup import Setup
 from cubestack.host.cli.arguments import whole
@@ -80,6 +81,7 @@ def _open(recording: Recording, setup: Setup, engine: Engine) -> Opened:
     """The device, made as ``setup`` says."""
     options = dict(setup.options)
     mcu_addressing = options.pop("mcu_addressing", False)
+    layout = Layout(options.pop("layout", Layout.COPIED.value))
     if options:
         raise ValueError(f"{recording.name}: its setup has an unknown option {min(options)!r}")
     with nullcontext() if setup.scene is None else written(setup.scene) as scene:
@@ -90,4 +92,5 @@ def _open(recording: Recording, setup: Setup, engine: Engine) -> Opened:
             engine=engine,
             baud=recording.bauds.get("uart"),
             mcu_addressing=bool(mcu_addressing),
+            layout=layout,
         )

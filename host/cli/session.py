@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
 from cubestack.host.cubesense import CubeSense
 from cubestack.host.cubesense_bench import BenchClient
 from cubestack.host.cubestar import CubeStar
 from cubestack.host.node_client import NodeClient
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from cubestack.emulator.cubesense import CubeSenseBoard
     from cubestack.emulator.cubestar import CubeStarBoard
@@ -27,8 +28,10 @@ __all__ = [
     "Session",
     "add_engine_arguments",
     "add_layout_argument",
+    "layout_of",
     "open_cubesense",
     "open_session",
+    "tell_layout",
 ]
 
 Engine = Literal["auto", "compiled", "python"]
@@ -45,14 +48,38 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_layout_argument(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that says which of CubeStar's FPGA boards is there."""
+    """Declare the option that says which of CubeStar's memory layouts is there."""
     parser.add_argument(
         "--layout",
-        type=int,
-        choices=(1,),
-        default=1,
-        help="memory layout of the FPGA board; 1 is the published one",
+        type=layout_of,
+        default=Layout.COPIED,
+        metavar="|".join(layout.value for layout in Layout),
+        help="cubestar: memory layout; 1 (default) is the published one, 2 and two-boards its "
+        "recommended successors, 3 needs a larger FPGA (docs/layouts.md)",
     )
+
+
+def layout_of(text: str) -> Layout:
+    """Type of a layout."""
+    try:
+        return Layout(text)
+    except ValueError:
+        names = ", ".join(layout.value for layout in Layout)
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {names}") from None
+
+
+def tell_layout(layout: Layout, tell: Callable[[str], None]) -> None:
+    """Tell of a layout that can not be built from the published parts."""
+    if layout is Layout.COPIED:
+        return
+    from cubestack.emulator.cubestar_layouts import fpga_of
+
+    fpga = fpga_of(layout)
+    if not fpga.fits:
+        tell(
+            f"layout {layout.value} can not be built with an AGLN030: its FPGA takes {fpga.pins} "
+            f"pins of {fpga.part_pins}, {fpga.tiles} tiles of {fpga.part_tiles}"
+        )
 
 
 class Session:
@@ -70,12 +97,14 @@ class Session:
 
 
 @contextmanager
-def open_session(scene: Scene, *, seed: int = 0, engine: Engine = "auto") -> Iterator[Session]:
+def open_session(
+    scene: Scene, *, seed: int = 0, engine: Engine = "auto", layout: Layout = Layout.COPIED
+) -> Iterator[Session]:
     """Power up a CubeStar that looks at ``scene``."""
     from cubestack.emulator.cubestar import CubeStarBoard
     from cubestack.emulator.onboard_catalogue import onboard_catalogue
 
-    board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine)
+    board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine, layout=layout)
     try:
         yield Session(board)
     finally:

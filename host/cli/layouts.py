@@ -1,0 +1,225 @@
+"""Compare CubeStar's memory layouts: each runs its loop on the same sky, in
+virtual time, and is measured from outside.
+
+rate       attitudes a second
+age        from the mid-exposure of a picture to its attitude in flash, from when
+           on telemetry gives it; then at most, right before the next one
+power      mean of the whole stack at 3.3 V, with its two LEDs
+energy     for each attitude
+pins       of each FPGA, of the AGLN030's 77
+tiles      of each FPGA, as in hdl/area.json
+
+examples:
+  cubestack layouts
+  cubestack layouts --seconds 60 --json
+  cubestack measure cubestar --layout 2 --json     one shot, with its phases
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
+from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.boards import cubestar_scene
+from cubestack.host.cli.cubestar_frames import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG
+from cubestack.host.cli.session import add_engine_arguments, open_session
+from cubestack.host.cli.terminal import console, progress
+
+if TYPE_CHECKING:
+    from cubestack.emulator.cubestar import CubeStarBoard
+    from cubestack.emulator.sky.scene import Scene
+    from cubestack.host.cli.session import Engine
+
+__all__ = ["LayoutResult", "add_arguments", "measure_layout", "run"]
+
+SETTLING = 2
+"""Attitudes before the measurement."""
+
+PS_PER_MS, PS_PER_S = 10**9, 10**12
+MIDDLE_ROW = 255.5
+
+#: CubeStar thesis, sections 3.3, 5.3.6, 6.3 and 7.2.
+PUBLISHED = {
+    Layout.COPIED: "1 Hz, age 1.5 s, 396 mW; copy 404 ms",
+    Layout.SHARED: "1 Hz, age below 1 s; no copy",
+    Layout.TWO_MEMORIES: "2 Hz; no copy; too many pins",
+    Layout.TWO_BOARDS: "2 Hz; no copy",
+}
+
+
+@dataclass(frozen=True)
+class LayoutResult:
+    """What was measured of a layout; the attributes are those of the JSON output.
+
+    Attributes:
+        attitudes: counted; ``right`` of them near the truth.
+        age_ms: mean, when an attitude becomes available.
+        oldest_ms: mean, right before the next one does.
+        phase_ms: the program's own times of the last turn.
+        violations: broken rules of the memories and wires.
+    """
+
+    layout: str
+    fpgas: int
+    pins: int
+    tiles: int
+    fits: bool
+    attitudes: int
+    right: int
+    rate_hz: float
+    age_ms: float
+    oldest_ms: float
+    power_mw: float
+    energy_mj: float
+    phase_ms: dict[str, float]
+    violations: int
+    published: str
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="TOML scene; default: Orion, V < 3.8"
+    )
+    parser.add_argument(
+        "--seconds", type=whole(2, 3600), default=10, help="of virtual time each (default 10)"
+    )
+    parser.add_argument(
+        "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object a layout")
+    add_engine_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure all; returns 1 when one gave no attitude."""
+    scene = cubestar_scene(args.scene)
+    results = []
+    for layout in progress(list(Layout), len(Layout), "running", quiet=args.json):
+        result = measure_layout(
+            layout, scene, seconds=args.seconds, seed=args.seed, engine=args.engine
+        )
+        results.append(result)
+        if args.json:
+            print(json.dumps(asdict(result)), flush=True)
+    if not args.json:
+        _report(results)
+    return int(not all(result.attitudes for result in results))
+
+
+def measure_layout(
+    layout: Layout, scene: Scene, *, seconds: int, seed: int = 0, engine: Engine = "auto"
+) -> LayoutResult:
+    """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
+    from cubestack.emulator.cubestar_layouts import BOARDS, fpga_of
+
+    with open_session(scene, seed=seed, engine=engine, layout=layout) as session:
+        session.cubestar.client.command("Trigger")
+        found = list(_attitudes(session.board, seconds))
+        session.cubestar.client.command("StopLoop")
+        phases = session.cubestar.phase_times()
+        violations = sum(session.board.engine.violation_counts.values())
+        volts = session.board.power.table.volts
+    fpga = fpga_of(layout)
+    # Without an attitude there is nothing to divide by.
+    begun, measured = found[0], found[1:]
+    count = len(measured)
+    took_s = (found[-1].time_ps - begun.time_ps) / PS_PER_S if count else math.nan
+    age_ms = sum(one.age_ms for one in measured) / count if count else math.nan
+    spent_mj = (found[-1].charge_mas - begun.charge_mas) * volts if count else math.nan
+    return LayoutResult(
+        layout=layout.value,
+        fpgas=BOARDS[layout].fpgas,
+        pins=fpga.pins,
+        tiles=fpga.tiles,
+        fits=fpga.fits,
+        attitudes=count,
+        right=sum(one.right for one in measured),
+        rate_hz=round(count / took_s, 3),
+        age_ms=round(age_ms, 1),
+        oldest_ms=round(age_ms + 1000 * took_s / max(count, 1), 1),
+        power_mw=round(spent_mj / took_s, 1),
+        energy_mj=round(spent_mj / max(count, 1), 1),
+        phase_ms={name: round(value, 1) for name, value in phases.items()},
+        violations=violations,
+        published=PUBLISHED[layout],
+    )
+
+
+@dataclass(frozen=True)
+class _Found:
+    """An attitude at the instant at which it is available."""
+
+    time_ps: int
+    charge_mas: float
+    age_ms: float
+    right: bool
+
+
+def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
+    """What the loop finds after ``SETTLING`` attitudes: one, and those of ``seconds`` after it.
+
+    When the first one does not come, its place is told without it.
+    """
+    from cubestack.emulator.sky.attitude import attitude_error_deg
+    from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
+
+    kernel, seen, end_ps = board.kernel, 0, board.kernel.now + (SETTLING + 3) * PS_PER_S
+    begun = False
+    while not begun or kernel.now < end_ps:
+        if kernel.now >= end_ps:
+            yield _Found(kernel.now, 0.0, math.nan, right=False)
+            return
+        kernel.step()
+        writes = board.flash.writes.get(ATTITUDE_PAGE, 0)
+        if writes == seen:
+            continue
+        seen = writes
+        if seen <= SETTLING:
+            continue
+        page, stored, truth = board.flash.read(ATTITUDE_PAGE), board.stored[-1], board.truth()
+        assert page is not None
+        assert stored is not None
+        assert truth is not None
+        across, about = attitude_error_deg(Attitude.unpack(page).quaternion, truth)
+        if not begun:
+            begun, end_ps = True, kernel.now + seconds * PS_PER_S + PS_PER_MS
+        yield _Found(
+            kernel.now,
+            board.power.charge_mas(),
+            (kernel.now - stored.mid_exposure_ps(MIDDLE_ROW)) / PS_PER_MS,
+            right=across < RIGHT_CROSS_DEG and abs(about) < RIGHT_ROLL_DEG,
+        )
+
+
+def _report(results: list[LayoutResult]) -> None:
+    from rich.table import Table
+
+    table = Table(title="CubeStar's memory layouts in their loops")
+    for column in ("layout", "Hz", "age ms", "mW", "mJ", "copy ms", "pins", "tiles"):
+        table.add_column(column, justify="right")
+    for result in results:
+        each = f"{result.fpgas} x " if result.fpgas > 1 else ""
+        table.add_row(
+            result.layout,
+            f"{result.rate_hz:.2f}",
+            f"{result.age_ms:.0f} to {result.oldest_ms:.0f}",
+            f"{result.power_mw:.0f}",
+            f"{result.energy_mj:.0f}",
+            f"{result.phase_ms['transfer']:.0f}",
+            f"{each}{result.pins}{'' if result.fits else ' (!)'}",
+            f"{each}{result.tiles}",
+        )
+    console.print(table)
+    for result in results:
+        console.print(f"published for {result.layout}: {result.published}", highlight=False)
+    for result in results:
+        if not result.fits:
+            console.print(f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins")
