@@ -109,7 +109,9 @@ class CubeSenseI2cRegisters(Component):
 
         # SCL runs for a byte at least before it is looked at, so it is two periods old at most.
         acknowledged = Signal()
-        m.submodules.ack_crossing = FFSynchronizer(self.ack, acknowledged, o_domain=self._domain)
+        m.submodules.ack_crossing = FFSynchronizer(
+            self.ack, acknowledged, o_domain=self._domain, reset_less=False
+        )
         storing = self.store | self.store_other
         sun = self.sun & (~storing).replicate(len(self.sun))
         values = {

@@ -88,14 +88,14 @@ class I2cTarget(Component):
         last_bit = count == 7
         acknowledging = count == 8
         own = Signal()
-        group = Signal()
+        to_group = Signal()
         accepted = Signal()
         undisturbed = ~start & ~stop
         m.d.comb += [
             self.byte.eq(Cat(bit, shift)),
             own.eq(self.byte[1:] == self._address),
-            group.eq((self.byte[1:] == self._group_address) & ~self.byte[0]),
-            accepted.eq((addressing & (own | group)) | numbering | (writing & self.writable)),
+            to_group.eq((self.byte[1:] == self._group_address) & ~self.byte[0]),
+            accepted.eq((addressing & (own | to_group)) | numbering | (writing & self.writable)),
             self.write.eq(writing & last_bit & undisturbed),
             # The address' acknowledge is the target's own, so it reads 0 as the master's does.
             self.read.eq(reading & acknowledging & ~bit & undisturbed),
@@ -114,7 +114,7 @@ class I2cTarget(Component):
                 reading.eq(reading | (addressing & accepted & bit)),
             ]
             with m.If(addressing):
-                bus += self.group.eq(group)
+                bus += self.group.eq(to_group)
             with m.If(numbering):
                 bus += self.number.eq(self.byte)
         with m.Elif(acknowledging):

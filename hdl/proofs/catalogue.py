@@ -4,12 +4,12 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from cubestack.hdl.proofs import cubesense, cubestar, cubestar_next
+from cubestack.hdl.proofs import cubesense, cubesense_i2c, cubestar, cubestar_next
 from cubestack.hdl.proofs.prover import Outcome, prove
 
 __all__ = ["PROOFS", "Verdict", "verdict_json", "verdict_text", "verdicts"]
 
-PROOFS = cubestar.PROOFS | cubestar_next.PROOFS | cubesense.PROOFS
+PROOFS = cubestar.PROOFS | cubestar_next.PROOFS | cubesense.PROOFS | cubesense_i2c.PROOFS
 
 
 class Verdict(NamedTuple):
