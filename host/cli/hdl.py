@@ -1,5 +1,5 @@
 """Look at the FPGA designs: how much of the part they take, Verilog of them for
-other tools, and proofs of what they promise.
+other tools, proofs of what they promise, waveforms of tests that failed.
 
 examples:
   cubestack hdl area
@@ -7,6 +7,7 @@ examples:
   cubestack hdl verilog cubestar --out cubestar.v
   cubestack hdl verilog cubesense-sun | yosys -f verilog -p 'synth_ice40' -
   cubestack hdl prove sun-scan
+  cubestack hdl wave whole_frame
 """
 
 import argparse
@@ -46,6 +47,14 @@ examples:
   cubestack hdl prove sun-scan pair-drivers
   cubestack hdl prove --json"""
 
+WAVE = """The waveform of a gateware test that failed (`make test-hdl` and `make test` keep it):
+in gtkwave or surfer when there is a screen and one is installed, else as text, the pins' last
+changes before the failure.
+
+examples:
+  cubestack hdl wave whole_frame    part of a test's name; a wrong one lists all
+  cubestack hdl wave whole_frame --text --internal --last 50"""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommands and their options."""
@@ -68,6 +77,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     prove.add_argument("names", metavar="NAME", nargs="*", help="proofs; default: all")
     prove.add_argument("--json", action="store_true", help="as JSON, when all are done")
     prove.set_defaults(act=_prove)
+    wave = _subcommand(actions, "wave", "waveform of a test that failed", WAVE)
+    wave.add_argument("test", metavar="TEST", help="part of its name, or a VCD file")
+    wave.add_argument(
+        "--folder", type=Path, default=Path("out/hdl/waves"), help="default: %(default)s"
+    )
+    wave.add_argument("--text", action="store_true", help="text even if there is a viewer")
+    wave.add_argument("--last", type=_count, default=20, metavar="N", help="changes in the text")
+    wave.add_argument("--internal", action="store_true", help="not only pins in the text")
+    wave.set_defaults(act=_wave)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -133,3 +151,17 @@ def _prove(args: argparse.Namespace) -> int:
     if args.json:
         print(verdict_json(done))
     return 0 if all(verdict.good for verdict in done) else 1
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 on, not {text!r}")
+    return int(text)
+
+
+def _wave(args: argparse.Namespace) -> int:
+    from cubestack.host.cli.waveform import find, show
+
+    for line in show(find(args.folder, args.test), args.last, args.internal, args.text):
+        print(line)
+    return 0

@@ -1,0 +1,145 @@
+"""Waveforms of gateware tests that failed: finding one, showing it in a viewer or as text.
+
+The tests keep a VCD file and a JSON file about it; the end of the file is where the test failed.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from vcd.reader import TokenKind, VCDParseError, tokenize
+
+__all__ = ["Trace", "find", "read", "show"]
+
+#: Programs that show a waveform, the first one installed is taken.
+VIEWERS = ("gtkwave", "surfer")
+
+#: Seconds in a VCD file's units of time.
+_PS = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3, "ps": 1}
+
+
+class Trace(NamedTuple):
+    """The end of a waveform.
+
+    Attributes:
+        signals: all names.
+        levels: of each in the end.
+        moments: time in ps and changes, of the last times at which something changed.
+    """
+
+    signals: list[str]
+    levels: dict[str, str]
+    moments: list[tuple[int, dict[str, str]]]
+
+
+def find(folder: Path, name: str) -> Path:
+    """The waveform of a test: a file, or the one in ``folder`` whose name or test has ``name``.
+
+    FileNotFoundError when there is none, ValueError when there are several.
+    """
+    if name.endswith(".vcd"):
+        if not Path(name).is_file():
+            raise FileNotFoundError(f"there is no waveform {name}")
+        return Path(name)
+    kept = sorted(folder.glob("*.vcd"))
+    found = [path for path in kept if name in path.name or name in _about(path).get("test", "")]
+    if not found:
+        there = ", ".join(path.stem for path in kept) or "none: no test failed there"
+        raise FileNotFoundError(f"{folder} has no waveform of {name!r}; there are {there}")
+    if len(found) > 1:
+        exact = [path for path in found if path.stem == name]
+        if len(exact) != 1:
+            raise ValueError(f"{name!r} fits {', '.join(path.stem for path in found)}; say which")
+        return exact[0]
+    return found[0]
+
+
+def show(path: Path, count: int, internal: bool, text: bool) -> Iterator[str]:
+    """Open ``path`` in a viewer if there is a screen and one is installed; else lines of text."""
+    about = _about(path)
+    if about:
+        yield (
+            f"{about['cocotb']} of {about['test']}, seed {about['seed']}, on {about['simulator']}"
+        )
+        yield f"failed: {about['error'].strip() or 'without a word'}"
+    viewer = next(filter(None, map(shutil.which, VIEWERS)), None)
+    screen = "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
+    if viewer and screen and not text:
+        yield f"{path}: opened in {Path(viewer).name}"
+        subprocess.run([viewer, str(path)], check=True)
+        return
+    trace = read(path, count, internal)
+    yield f"{path}; {' and '.join(VIEWERS)} open it"
+    yield from _lines(trace)
+
+
+def read(path: Path, count: int = 20, internal: bool = False) -> Trace:
+    """The last ``count`` moments of a VCD file; signals inside of the design if ``internal``.
+
+    Else pins only, which have the names in capitals. ValueError when it is none.
+    """
+    names: dict[str, list[str]] = {}
+    scopes: list[str] = []
+    levels: dict[str, str] = {}
+    moments: deque[tuple[int, dict[str, str]]] = deque(maxlen=count)
+    changes: dict[str, str] = {}
+    unit, time = 1, 0
+    try:
+        with path.open("rb") as stream:
+            for token in tokenize(stream):
+                if token.kind is TokenKind.SCOPE:
+                    scopes.append(token.scope.ident)
+                elif token.kind is TokenKind.UPSCOPE:
+                    scopes.pop()
+                elif token.kind is TokenKind.TIMESCALE:
+                    unit = token.timescale.magnitude.value * _PS.get(token.timescale.unit.value, 1)
+                elif token.kind is TokenKind.VAR:
+                    name = ".".join([*scopes[1:], token.var.reference])
+                    pin = len(scopes) == 1 and name == name.upper() and "$" not in name
+                    if (internal or pin) and token.var.type_.value != "parameter":
+                        names.setdefault(token.var.id_code, []).append(name)
+                elif token.kind is TokenKind.CHANGE_TIME:
+                    time, changes = token.time_change * unit, {}
+                elif token.kind in (TokenKind.CHANGE_SCALAR, TokenKind.CHANGE_VECTOR):
+                    change = (
+                        token.scalar_change
+                        if token.kind is TokenKind.CHANGE_SCALAR
+                        else token.vector_change
+                    )
+                    if not changes and change.id_code in names:
+                        moments.append((time, changes))
+                    for name in names.get(change.id_code, ()):
+                        levels[name] = changes[name] = _level(change.value)
+    except (VCDParseError, UnicodeDecodeError, IndexError) as error:
+        raise ValueError(f"{path} is no VCD file: {error}") from None
+    signals = [name for group in names.values() for name in group]
+    return Trace(signals, levels, list(moments))
+
+
+def _level(value: int | str) -> str:
+    """Hexadecimal, or binary with unknown bits."""
+    return f"{value:x}" if isinstance(value, int) else value
+
+
+def _lines(trace: Trace) -> Iterator[str]:
+    yield f"last {len(trace.moments)} times at which a pin changed, in ns:"
+    for time, changes in trace.moments:
+        yield f"{time / 1000:14.3f}  {'  '.join(f'{n}={v}' for n, v in sorted(changes.items()))}"
+    yield "levels in the end (hexadecimal):"
+    width = max(map(len, trace.signals), default=0)
+    for name in sorted(trace.signals):
+        yield f"  {name:<{width}}  {trace.levels.get(name, 'x')}"
+
+
+def _about(path: Path) -> dict[str, str]:
+    """What the test wrote about it; nothing for a file from elsewhere."""
+    try:
+        about = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return {str(key): str(value) for key, value in about.items()}
