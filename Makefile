@@ -7,12 +7,17 @@ PHOTOGRAPHS ?= ../shared/data/sky
 # What `make mutants` tries, for instance MUTANTS="cubestar --all"; --help says what there is.
 MUTANTS ?=
 
-.PHONY: help venv run test mutants lint bench clean
+# Of the gateware's tests: further random numbers, and the simulator, icarus or verilator.
+SEED ?= 0
+SIMULATOR ?= icarus
+
+.PHONY: help venv run test test-hdl mutants lint bench clean
 
 help:
 	@echo "make run    set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test   set up, then run all tests"
 	@echo "make mutants  score the HDL test benches by wrong gates that they notice; takes an hour"
+	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
 	@echo "make lint   ruff and mypy"
 	@echo "make bench  measure the cost of the hot paths"
 	@echo "make clean  remove .venv, out and caches"
@@ -35,6 +40,10 @@ test: .venv/ready-dev
 
 mutants: .venv/ready-dev
 	@$(BIN)/python tests/hdl/mutants $(MUTANTS)
+
+test-hdl: .venv/ready-dev
+	@HDL_TIER=full HDL_SEED=$(SEED) HDL_SIMULATOR=$(SIMULATOR) HDL_COVERAGE=out/hdl/coverage \
+		$(BIN)/pytest tests/hdl -m cocotb -n auto --junitxml=out/hdl/junit.xml
 
 lint: .venv/ready-dev
 	@$(BIN)/ruff check .
