@@ -30,6 +30,11 @@ __all__ = ["CameraFaults", "MemoryFaults", "RegisterFaults", "SupplyFaults"]
 
 Steps = Generator[simpy.Event, Any, None]
 
+MOST_UPSETS_PER_S = 10_000.0
+"""Upsets of a memory that come one by one; what is more comes in ``BATCH_S``."""
+
+BATCH_S = 1e-3
+
 
 class CameraFaults:
     """A camera's faults: those of its output, and its death."""
@@ -110,7 +115,7 @@ class MemoryFaults:
         self._engine = engine
         self._report = report
         self._injections: list[Injection] = []
-        self._stuck: list[Injection] = []
+        self._stuck: dict[Injection, tuple[int, int]] = {}
         self._read_by_strobes = pins is not None
         if pins is not None:
             pins.around_reads.append(self._hold)
@@ -126,10 +131,10 @@ class MemoryFaults:
         fault = injection.fault
         match fault:
             case MemoryFlip():
-                address = injection.drawn(fault.address, self._memory.size, 1)
-                self._flip(injection, 8 * address + injection.drawn(fault.bit, 8, 2))
+                address, bit = self._place(injection, fault)
+                self._flip(injection, 8 * address + bit)
             case MemoryStuck():
-                self._stuck.append(injection)
+                self._stuck[injection] = self._place(injection, fault)
                 self._hold()
             case MemoryUpsets():
                 self._injections.append(injection)
@@ -137,9 +142,14 @@ class MemoryFaults:
 
     def end(self, injection: Injection) -> None:
         """Act no longer."""
-        for injections in (self._injections, self._stuck):
-            if injection in injections:
-                injections.remove(injection)
+        self._stuck.pop(injection, None)
+        if injection in self._injections:
+            self._injections.remove(injection)
+
+    def _place(self, injection: Injection, fault: MemoryFlip | MemoryStuck) -> tuple[int, int]:
+        """Byte and bit."""
+        address = injection.drawn(fault.address, self._memory.size, 1)
+        return address, injection.drawn(fault.bit, 8, 2)
 
     def _advance(self) -> None:
         if self._engine is not None:
@@ -150,21 +160,27 @@ class MemoryFaults:
         self._report(self._env.now, injection, f"byte {place // 8:#x}, bit {place % 8}")
 
     def _upsets(self, injection: Injection, fault: MemoryUpsets) -> Steps:
-        bits = 8 * self._memory.size
+        bits, generator = 8 * self._memory.size, injection.generator
+        per_s = fault.rate * bits
+        one_by_one = per_s <= MOST_UPSETS_PER_S
         while True:
-            wait_s = float(injection.generator.exponential(1 / (fault.rate * bits)))
+            wait_s = float(generator.exponential(1 / per_s)) if one_by_one else BATCH_S
             yield self._env.timeout(max(1, round(wait_s * PS_PER_S)))
             if injection not in self._injections:
                 return
             self._advance()
-            self._flip(injection, int(injection.generator.integers(bits)))
+            if one_by_one:
+                self._flip(injection, int(generator.integers(bits)))
+            else:
+                places = generator.integers(bits, size=generator.poisson(per_s * BATCH_S))
+                masks = np.left_shift(1, places % 8).astype(np.uint8)
+                np.bitwise_xor.at(self._memory, places // 8, masks)
+                self._report(self._env.now, injection, f"{len(places)} bits")
 
     def _hold(self) -> None:
-        for injection in self._stuck:
+        for injection, (address, bit) in self._stuck.items():
             fault = injection.fault
             assert isinstance(fault, MemoryStuck)
-            address = injection.drawn(fault.address, self._memory.size, 1)
-            bit = injection.drawn(fault.bit, 8, 2)
             if self._memory[address] >> bit & 1 != fault.level:
                 flip_bit(self._memory, 8 * address + bit)
                 self._report(

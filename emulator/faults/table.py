@@ -274,7 +274,7 @@ class RegisterUpsets(Fault):
 
     kind: ClassVar[str] = "register-upsets"
     site: ClassVar[Site] = Site.FPGA
-    rate: float = number(1e-2, "mean rate of each bit", "/s", 1e-15, 1e6)
+    rate: float = number(1e-2, "mean rate of each bit", "/s", 1e-15, 1e3)
 
 
 @dataclass(frozen=True)

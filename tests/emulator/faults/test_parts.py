@@ -1,0 +1,64 @@
+"""Upsets of a memory: how many, where, and when, for rates at which they come one by one or not."""
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.faults.injection import Injection
+from cubestack.emulator.faults.parts import BATCH_S, MOST_UPSETS_PER_S, MemoryFaults
+from cubestack.emulator.faults.table import MemoryUpsets
+from cubestack.emulator.virtual_time import PS_PER_S, Kernel
+
+BITS = 1 << 20
+
+
+class Part:
+    """A memory with faults, and their log."""
+
+    def __init__(self, rate: float, seed: int = 1) -> None:
+        self.kernel = Kernel()
+        self.memory = np.zeros(BITS // 8, np.uint8)
+        self.log: list[tuple[int, str]] = []
+        faults = MemoryFaults(
+            self.kernel,
+            self.memory,
+            None,
+            None,
+            lambda time, _injection, text: self.log.append((time, text)),
+        )
+        self.injection = Injection(0, MemoryUpsets(rate=rate), "SRAM", 0, None, seed)
+        faults.begin(self.injection)
+        self.faults = faults
+
+    def run(self, seconds: float) -> int:
+        """How many bits are turned over after so long."""
+        self.kernel.advance_to(self.kernel.now + round(seconds * PS_PER_S))
+        return int(np.unpackbits(self.memory).sum())
+
+
+@pytest.mark.parametrize("per_s", [100.0, 0.9 * MOST_UPSETS_PER_S, 10 * MOST_UPSETS_PER_S])
+def test_upsets_come_at_their_rate_all_over(per_s: float) -> None:
+    part = Part(per_s / BITS)
+    found = part.run(2.0)
+    odd = BITS / 2 * -np.expm1(-2 * 2 * per_s / BITS)  # turned over once, or three times, ...
+    assert abs(found - odd) < 5 * np.sqrt(odd)
+    half = int(np.unpackbits(part.memory[: BITS // 16]).sum())
+    assert abs(half - found / 2) < 5 * np.sqrt(found) / 2
+    planes = [int((part.memory >> bit & 1).sum()) for bit in range(8)]
+    assert max(planes) - min(planes) < 10 * np.sqrt(found / 8)
+
+
+def test_even_the_highest_rate_takes_a_bounded_number_of_steps() -> None:
+    part = Part(1.0)
+    assert part.run(0.1) == pytest.approx(BITS / 2 * -np.expm1(-0.2), rel=0.02)
+    assert len(part.log) == round(0.1 / BATCH_S) - 1
+    assert sum(int(text.split()[0]) for _, text in part.log) == pytest.approx(0.1 * BITS, rel=0.02)
+
+
+@pytest.mark.parametrize("per_s", [100.0, 10 * MOST_UPSETS_PER_S])
+def test_they_end_and_repeat_with_the_seed(per_s: float) -> None:
+    parts = [Part(per_s / BITS, seed) for seed in (1, 1, 2)]
+    counts = [part.run(0.5) for part in parts]
+    assert parts[0].log == parts[1].log != parts[2].log
+    np.testing.assert_array_equal(parts[0].memory, parts[1].memory)
+    parts[0].faults.end(parts[0].injection)
+    assert parts[0].run(1.0) == counts[0]

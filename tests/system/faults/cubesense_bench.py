@@ -1,0 +1,69 @@
+"""What the tests of a CubeSense's pictures share."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.interface.cubesense_codes import (
+    FRAME_BYTES,
+    Camera,
+    DetectResult,
+    ImageLocation,
+    ImageSize,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
+from cubestack.host.cubesense import Measurement
+
+from .bench import NADIR_DEG, SUN_DEG, Bench
+
+TRUTH_DEG = {Camera.SUN: SUN_DEG, Camera.NADIR: NADIR_DEG}
+TARGETS = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
+
+
+def measure(bench: Bench, camera: Camera = Camera.NADIR) -> Measurement:
+    """What the host gets."""
+    found: Measurement = bench.device.capture_and_detect(camera)
+    return found
+
+
+def measure_with(bench: Bench, kind: str, **options: Any) -> Measurement:
+    """A nadir measurement with a fault of that half, which is cleared then."""
+    options.setdefault("target", "nadir")
+    found: Measurement = bench.during(kind, lambda: measure(bench), **options)
+    return found
+
+
+def check_right(found: Measurement, *, within_deg: float = 0.1) -> None:
+    """The direction is the truth's."""
+    assert found.detect is DetectResult.SUCCESS
+    truth = TRUTH_DEG[found.camera]
+    assert (found.alpha_deg, found.beta_deg) == pytest.approx(truth, abs=within_deg)
+
+
+def check_next(bench: Bench, camera: Camera = Camera.NADIR) -> None:
+    """The next measurement is sound."""
+    check_right(measure(bench, camera))
+
+
+def picture(bench: Bench, camera: Camera = Camera.NADIR) -> np.ndarray:
+    """What the memory of a camera's half holds, (480, 640); an address is row : column."""
+    rows = bench.board.engine.memories[TARGETS[camera]].reshape(-1, 1024)
+    held: np.ndarray = rows[: FULL_SIZE.rows, : FULL_SIZE.columns]
+    return held.copy()
+
+
+def host_pixel(bench: Bench, x: int, y: int, sram: Sram = Sram.SRAM2) -> int:
+    """A pixel as the host gets it."""
+    size = ImageSize.SIDE_1024
+    column, row = x + (size.side - FULL_SIZE.columns) // 2, y + (size.side - FULL_SIZE.rows) // 2
+    frame, at = divmod(row * size.side + column, FRAME_BYTES)
+    client = bench.client
+    client.command("StartImageDownload", Sram=sram, Location=ImageLocation.TOP, Size=size)
+    client.command("NextImageFrame", Frame=frame)
+    for _ in range(50):
+        client.pause(0.04)
+        if client.telemetry("ImageFrameInfo")["FrameNumber"] == frame:
+            return int(bytes(bench.telemetry("ImageFrame")["Frame"])[at])
+    pytest.fail(f"frame {frame} is never ready")

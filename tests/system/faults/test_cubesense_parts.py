@@ -1,0 +1,207 @@
+"""CubeSense: faults of memories, FPGA registers and supplies, and of the bench line."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.sky.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense_codes import (
+    Camera,
+    CaptureResult,
+    DetectResult,
+    ResetTarget,
+    Sram,
+)
+from cubestack.host.cubesense_bench import BenchClient
+from cubestack.host.errors import NoAnswerError
+
+from .bench import NADIR_DEG, Bench
+from .cubesense_bench import check_next, check_right, host_pixel, measure, measure_with, picture
+
+X, Y = 320, 300
+ADDRESS = 1024 * Y + X
+STORING_S, SEARCHING_S = 0.03, 0.1
+"""From the request on."""
+
+REQUEST_PS = 3 * 10**9
+"""More than a request takes until the FPGA waits for a frame's gap, and the gap."""
+
+UNTOUCHED = 1
+"""A value that no pixel of the scene has."""
+
+MONITOR_MA = 200.0
+"""The current monitors' full scale."""
+
+CUT = (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
+
+
+@pytest.fixture
+def quiet(sense: Bench) -> Bench:
+    """A sensor without noise, so that all pictures of the nadir camera are the same."""
+    sense.board.scene = EarthSunScene.facing(nadir_deg=NADIR_DEG, noise=False, hot_pixels=0)
+    check_right(measure(sense))
+    return sense
+
+
+@pytest.mark.fault("memory-flip")
+def test_a_flipped_bit_is_one_bit(quiet: Bench) -> None:
+    before = host_pixel(quiet, X, Y)
+    quiet.inject("memory-flip", target="nadir", address=ADDRESS, bit=5)
+    assert host_pixel(quiet, X, Y) == before ^ 0x20
+    assert host_pixel(quiet, X, Y) == before ^ 0x20
+    assert host_pixel(quiet, X + 1, Y) == picture(quiet)[Y, X + 1]
+    check_next(quiet)
+    assert host_pixel(quiet, X, Y) == before
+
+
+@pytest.mark.fault("memory-upsets")
+def test_upsets_come_at_their_rate_and_the_fit_bears_them(quiet: Bench) -> None:
+    clean = picture(quiet)
+    quiet.inject("memory-upsets", target="nadir", rate=1e-2)
+    began_s = quiet.now_s
+    check_right(measure(quiet))
+    expected = 1e-2 * 8 * clean.size * (quiet.now_s - began_s)
+    flipped = int(np.unpackbits(picture(quiet) ^ clean).sum())
+    assert 0.5 * expected < flipped < expected
+    quiet.faults.clear()
+    check_next(quiet)
+
+
+@pytest.mark.fault("memory-stuck")
+def test_a_stuck_bit_is_the_same_in_every_picture(quiet: Bench) -> None:
+    before = host_pixel(quiet, X, Y)
+    level = 1 - (before >> 5 & 1)
+    quiet.inject("memory-stuck", target="nadir", address=ADDRESS, bit=5, level=level)
+    for _ in range(2):
+        check_next(quiet)
+        assert host_pixel(quiet, X, Y) == before ^ 0x20
+    quiet.faults.clear()
+    check_next(quiet)
+    assert host_pixel(quiet, X, Y) == before
+
+
+@pytest.mark.fault("register-flip")
+def test_a_row_counter_that_flips_puts_the_rest_elsewhere(quiet: Bench) -> None:
+    clean = picture(quiet)
+    quiet.board.engine.memories["nadir"][:] = UNTOUCHED
+    register = "nadir.pix_writer.counter.row"
+    frame = quiet.board.cameras[Camera.NADIR].frame_from(quiet.board.kernel.now + REQUEST_PS)
+    at_s = (frame.readout_ps + 35.5 * frame.line_ps) / 1e12
+    quiet.faults.inject("register-flip", register=register, bit=7, at_s=at_s)
+    found = measure(quiet)
+    assert found.capture is CaptureResult.STORED_OWN_SRAM
+    skipped = np.flatnonzero((picture(quiet) == UNTOUCHED).all(axis=1))
+    assert len(skipped) == 127  # and two halves of lines
+    row = int(skipped[0]) - 1
+    assert row == 35
+    np.testing.assert_array_equal(picture(quiet)[:row], clean[:row])
+    np.testing.assert_array_equal(picture(quiet)[row + 129 :], clean[row + 1 : -128])
+    assert host_pixel(quiet, X, row + 60) == UNTOUCHED
+    check_next(quiet)
+
+
+@pytest.mark.fault("register-flip")
+def test_registers_of_an_idle_fpga_do_not_flip(quiet: Bench) -> None:
+    clean = picture(quiet)
+    for number in range(20):
+        quiet.inject("register-flip", after_s=0.001 + number * 1e-5)
+    quiet.client.pause(0.01)
+    assert len(quiet.said()) == 20
+    np.testing.assert_array_equal(picture(quiet), clean)
+    check_next(quiet)
+    np.testing.assert_array_equal(picture(quiet), clean)
+
+
+@pytest.mark.fault("register-upsets")
+def test_register_upsets_cost_a_measurement(quiet: Bench) -> None:
+    found = measure_with(quiet, "register-upsets", target="fpga", rate=10)
+    assert found.detect is DetectResult.BAD_FIT
+    assert quiet.board.engine.violation_log.counts
+    assert len(quiet.said()) > 100
+    check_next(quiet)
+
+
+# --- latch-up -------------------------------------------------------------------------------------
+
+
+@pytest.mark.fault("latch-up")
+def test_a_latched_memory_is_cut_until_a_telecommand(sense: Bench) -> None:
+    check_right(measure(sense))
+    sense.inject("latch-up", target="SRAM2")
+    assert sense.board.power.current_ma("SRAM2") > 300
+    sense.client.pause(0.006)
+    assert sense.board.power.current_ma("SRAM2") == 0
+    power = sense.device.power()
+    assert power.over_current == (False, True)
+    assert power.current_sram_ma[1] == 0
+    found = measure(sense)
+    assert (found.capture, found.detect) == CUT
+    other = sense.device.capture_and_detect(Camera.NADIR, Sram.SRAM1)
+    assert other.capture is CaptureResult.STORED_OTHER_SRAM
+    check_right(other)
+    sense.device.clear_over_current()
+    check_next(sense)
+    assert sense.device.power().over_current == (False, False)
+
+
+@pytest.mark.parametrize("after_s", [STORING_S, SEARCHING_S])
+@pytest.mark.fault("latch-up")
+def test_a_latch_up_in_a_measurement_ends_it(sense: Bench, after_s: float) -> None:
+    check_right(measure(sense))
+    sense.inject("latch-up", target="SRAM2", after_s=after_s)
+    found = measure(sense)
+    assert (found.capture, found.detect) == CUT
+    assert sense.device.power().over_current == (False, True)
+    sense.device.clear_over_current()
+    check_next(sense)
+
+
+@pytest.mark.fault("latch-up")
+def test_a_lasting_latch_up_is_cut_again_each_time(sense: Bench) -> None:
+    check_right(measure(sense))
+    sense.inject("latch-up", target="SRAM2", lasting=True)
+    for _ in range(2):
+        sense.client.pause(0.006)
+        assert sense.device.power().over_current == (False, True)
+        sense.device.clear_over_current()
+        sense.client.pause(0.3)
+    assert sense.device.power().over_current == (False, True)
+    check_right(sense.device.capture_and_detect(Camera.NADIR, Sram.SRAM1))
+
+
+@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.fault("latch-up")
+def test_a_latched_camera_draws_on_until_the_cameras_are_reset(
+    sense: Bench, camera: Camera
+) -> None:
+    check_right(measure(sense, camera))
+    usual_ma = sense.device.power().current_5v_ma
+    sense.inject("latch-up", target=("sun_camera", "nadir_camera")[camera])
+    sense.client.pause(0.1)
+    found = sense.device.power()
+    assert found.over_current == (False, False)
+    assert found.current_5v_ma == MONITOR_MA > usual_ma + 100
+    check_next(sense, camera)
+    sense.device.reset(ResetTarget.CAMERAS)
+    sense.client.pause(0.3)
+    assert sense.device.power().current_5v_ma == pytest.approx(usual_ma, abs=1)
+    check_next(sense, camera)
+
+
+# --- the bench line -------------------------------------------------------------------------------
+
+
+@pytest.mark.fault
+@pytest.mark.parametrize("kind", ["uart-drop", "uart-corrupt", "uart-delay"])
+def test_the_bench_line_has_faults_of_its_own(sense: Bench, kind: str) -> None:
+    bench = BenchClient(sense.board.bench_serial(), timeout_s=0.5)
+    options: dict[str, Any] = {"delay_ms": 1000} if kind == "uart-delay" else {}
+    sense.inject(kind, target="bench", direction="to-device", **options)
+    with pytest.raises(NoAnswerError):
+        bench.take(Camera.SUN)
+    assert sense.device.serial_number()
+    assert sense.flags() == set()
+    sense.faults.clear()
+    sense.client.pause(2.0)
+    bench.take(Camera.SUN)
