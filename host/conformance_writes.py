@@ -3,52 +3,33 @@
 A setting that can be read back is put back to what it was.
 """
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 from cubestack.firmware_model.interface.bench_letters import BenchProtocol, Letter
-from cubestack.firmware_model.interface.field import Field, InterfaceError, Value
+from cubestack.firmware_model.interface.field import Field, Value
 from cubestack.firmware_model.interface.message import TELEMETRY_BIT, Message
 from cubestack.firmware_model.interface.register_pointer import PointerRegister
 from cubestack.host.conformance import FailedError, SkippedError, Suite
-from cubestack.host.errors import CommandRefusedError, NoAnswerError, NodeError
+from cubestack.host.conformance_actions import perform
+from cubestack.host.conformance_tasks import TASKS
+from cubestack.host.conformance_values import (
+    keys_of,
+    limits_of,
+    read_back,
+    values_to_try,
+    violations,
+)
+from cubestack.host.errors import CommandRefusedError
 from cubestack.host.transport import Transport
 
-__all__ = ["check_writes", "read_back", "values_to_try"]
+__all__ = ["check_writes"]
 
-PROCESSING_TIMEOUT_S = 15.0
-RESTART_TIMEOUT_S = 10.0
-RESTART_POLL_S = 0.25
 BENCH_TIMEOUT_S = 3.0
 BENCH_READ_BYTES = 4096
 
-#: Telecommands whose success is not this suite's to see, with the reason.
-LEFT_OUT = {
-    "StreamDownImage": "streams a whole picture",
-    "UploadBlock": "needs an upload under way",
-    "TestWDG": "ends in a watchdog reset on purpose",
-    "WriteCameraRegister": "writes any register of the camera",
-}
-
-#: Telecommands with fields of the same names as telemetry that shows something else: what was
-#: measured, a clock, or part of what is set.
-NOT_SHOWN = {
-    "setTrackingMode",
-    "GetAttitudeNearPoint",
-    "SetBodyRotation",
-    "SetSystemTime",
-    "StartLoop",
-    "SetIdentification",
-    "SetField",
-}
-
 #: Settings of which some values need an option of the hardware; without it they are refused.
 OPTIONAL = {"SetNadirSearch", "NADIR_SEARCH"}
-
-#: Fields that say which of several settings a telecommand is for; telemetry shows them all, each
-#: with its number behind the name.
-KEYS = ("Area",)
 
 #: What ends a mode that a telecommand starts.
 ENDED_BY = {"Trigger": "StopLoop", "StartLoop": "StopLoop"}
@@ -77,7 +58,7 @@ def check_writes(suite: Suite) -> None:
 def _check_telecommand(suite: Suite, message: Message) -> None:
     name = f"telecommand {message.name}"
     suite.writing(f"{name}: wrong lengths", partial(_check_lengths, suite, message))
-    for field, data in _violations(message):
+    for field, data in violations(message):
         suite.writing(
             f"{name}: {field.name} out of range", partial(_check_range, suite, message, field, data)
         )
@@ -114,20 +95,21 @@ def _check_range(
 
 
 def _check_effect(suite: Suite, message: Message, seen: list[str]) -> None:
-    if message.name in LEFT_OUT:
-        raise SkippedError(LEFT_OUT[message.name])
+    if message.name in TASKS:
+        TASKS[message.name](suite, message, seen)
+        return
     before = _shown(suite, message)
     if before is None:
         _perform_any(suite, message)
         seen.append("processed")
         if message.name in ENDED_BY:
-            _perform(suite, suite.target.interface.telecommand(ENDED_BY[message.name]), {})
+            perform(suite, suite.target.interface.telecommand(ENDED_BY[message.name]), {})
         return
     refused = 0
     for tried in [*values_to_try(message), before]:
-        values = tried | _keys(message)
+        values = tried | keys_of(message)
         try:
-            _perform(suite, message, values)
+            perform(suite, message, values)
         except CommandRefusedError:
             if message.name not in OPTIONAL or values == before:
                 raise
@@ -142,7 +124,7 @@ def _perform_any(suite: Suite, message: Message) -> None:
     refusal: CommandRefusedError | None = None
     for values in values_to_try(message):
         try:
-            _perform(suite, message, values)
+            perform(suite, message, values)
             return
         except CommandRefusedError as error:
             refusal = refusal or error
@@ -150,127 +132,15 @@ def _perform_any(suite: Suite, message: Message) -> None:
         raise refusal
 
 
-def read_back(suite: Suite, message: Message) -> dict[str, tuple[Message, Field]]:
-    """Where each of a telecommand's fields but keys is shown in telemetry; empty unless all are.
-
-    By name: the field's own, with the telecommand's number or the key behind it, or the
-    telecommand's.
-    """
-    if message.name in NOT_SHOWN:
-        return {}
-    keys = _keys(message)
-    number = re.sub(r".*?(\d*)$", r"\1", message.name)
-    found = {}
-    for field in message.fields:
-        if field.name in keys:
-            continue
-        behind = "".join(str(key) for key in keys.values()) or number
-        names = [field.name + behind]
-        if len(message.fields) == 1:
-            names.append(message.name)
-        ending = number if keys else ""
-        place = _place(suite, field, [name.lower() for name in names], ending)
-        if place is None:
-            return {}
-        found[field.name] = place
-    return found
-
-
-def _keys(message: Message) -> dict[str, Value]:
-    """Key fields, at the values that are tried."""
-    return {name: value for name, value in message.reset_values().items() if name in KEYS}
-
-
-def _place(
-    suite: Suite, field: Field, names: list[str], ending: str
-) -> tuple[Message, Field] | None:
-    for telemetry in suite.target.interface.telemetries:
-        if telemetry.supported and not telemetry.steps and telemetry.name.endswith(ending):
-            for shown in telemetry.fields:
-                same = (shown.type, shown.scale, shown.unit) == (
-                    field.type,
-                    field.scale,
-                    field.unit,
-                )
-                if same and shown.name.lower() in names:
-                    return telemetry, shown
-    return None
-
-
-def values_to_try(message: Message) -> Iterator[dict[str, Value]]:
-    """Allowed values of all fields: reset, smallest, largest, in between, single ones."""
-    reset = message.reset_values()
-    candidates = [reset]
-    for share in (0.0, 1.0, 0.5):
-        values: dict[str, Value] = {}
-        for field in message.fields:
-            low, high = _limits(field)
-            value = low + share * (high - low)
-            integer = field.type != "f32" and field.scale == 1
-            values[field.name] = int(value) if integer else value
-        candidates.append(values)
-    floats = [field.name for field in message.fields if field.type == "f32"]
-    candidates += [reset | {name: 1.0} for name in floats]  # unit vectors among them
-    seen = []
-    for values in candidates:
-        try:
-            carried = message.unpack(message.pack(**values))
-        except InterfaceError:
-            continue
-        if not message.violations(carried) and carried not in seen:
-            seen.append(carried)
-            yield carried
-
-
-def _limits(field: Field) -> tuple[float, float]:
-    if field.choices is not None:
-        values = [int(choice) for choice in field.choices]
-        return min(values), max(values)
-    if field.type.startswith("bytes"):
-        return 0, 0
-    low, high = (0.0, 1.0) if field.type == "f32" else _raw_limits(field)
-    return (
-        low if field.minimum is None else field.minimum,
-        high if field.maximum is None else field.maximum,
-    )
-
-
-def _raw_limits(field: Field) -> tuple[float, float]:
-    low, high = field.raw_range
-    return low / field.scale, high / field.scale
-
-
-def _violations(message: Message) -> Iterator[tuple[Field, bytes]]:
-    reset = message.reset_values()
-    for field in message.fields:
-        if field.type.startswith("bytes"):
-            continue
-        tries: list[float] = []
-        if field.type == "f32":
-            tries.append(float("nan"))
-        else:
-            tries += _raw_limits(field)
-        low, high = _limits(field)
-        tries += [low - 1 / field.scale, high + 1 / field.scale]
-        for value in reversed(tries):
-            try:
-                data = message.pack(**(reset | {field.name: value}))
-            except (InterfaceError, ValueError, OverflowError):
-                continue
-            if field in [wrong for wrong, _ in message.violations(message.unpack(data))]:
-                yield field, data
-                break
-
-
 def _shown(suite: Suite, message: Message) -> dict[str, Value] | None:
     """What telemetry shows of a telecommand's fields; None when not all are there."""
-    places = read_back(suite, message)
+    places = read_back(suite.target.interface, message)
     if not places:
         return None
     frames = {telemetry.name for telemetry, _ in places.values()}
     read = {name: suite.target.node.telemetry(name) for name in sorted(frames)}
     values = {name: read[place.name][field.name] for name, (place, field) in places.items()}
-    return message.unpack(message.pack(**values, **_keys(message)))
+    return message.unpack(message.pack(**values, **keys_of(message)))
 
 
 def _expect_shown(suite: Suite, message: Message, wanted: Mapping[str, Value]) -> None:
@@ -306,33 +176,13 @@ def _expect_flag(suite: Suite, flag: str, seen: list[str]) -> None:
                 return
 
 
-def _perform(suite: Suite, message: Message, values: Mapping[str, Value]) -> None:
-    """Send it, and wait until it is processed; after a restart, until the node answers again."""
-    node = suite.target.node
-    node.command(message.name, **values)
-    try:
-        node.wait_processed(PROCESSING_TIMEOUT_S)
-    except NoAnswerError:
-        _wait_restarted(suite, message)
-
-
-def _wait_restarted(suite: Suite, message: Message) -> None:
-    for _ in range(int(RESTART_TIMEOUT_S / RESTART_POLL_S)):
-        try:
-            suite.target.node.telemetry(suite.target.interface.telemetries[0].name)
-            return
-        except NodeError:
-            suite.target.node.pause(RESTART_POLL_S)
-    raise FailedError(f"no answer for {RESTART_TIMEOUT_S:g} s after {message.name}")
-
-
 def _check_register(suite: Suite, register: PointerRegister, seen: list[str]) -> None:
     client = suite.target.registers
     if client is None:
         raise SkippedError("no I2C bus within reach")
     before = client.read(register.name)
     label = register.field.label
-    low, high = _limits(register.field)
+    low, high = limits_of(register.field)
     for value in (int(low), int(high), before):
         client.write(register.name, value)
         found = client.read(register.name)

@@ -170,13 +170,17 @@ class FakeCubeSense(FakeNode):
 
 
 class UartLink:
-    """Transport to a node; ``mangle`` changes what the host receives, ``chunk`` its pieces."""
+    """Transport to a node; ``mangle`` changes what the host receives, ``chunk`` its pieces.
+
+    ``later`` is what comes behind the next answer.
+    """
 
     def __init__(self, node: FakeNode) -> None:
         self.node = node
         self.mangle: Callable[[bytes], bytes] = lambda data: data
         self.chunk = 4096
         self.pending = bytearray()
+        self.later = bytearray()
         self.silences: list[float] = []
         self._decoder = FrameDecoder(256)
 
@@ -185,7 +189,8 @@ class UartLink:
             if self._decoder.feed(byte) is FrameEvent.FRAME:
                 answer = self.node.answer(self._decoder.payload)
                 if answer is not None:
-                    self.pending += self.mangle(encode_frame(answer))
+                    self.pending += self.mangle(encode_frame(answer)) + self.later
+                    self.later.clear()
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         size = min(max_bytes, self.chunk)

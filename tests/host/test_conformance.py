@@ -5,10 +5,15 @@ import pytest
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.interface.cubestar import ResetCause
+from cubestack.firmware_model.interface.frames import encode_frame
 from cubestack.host.conformance import Check, Outcome, Suite, compare
-from cubestack.host.conformance_writes import read_back, values_to_try
+from cubestack.host.conformance_tasks import PICTURE_BYTES
+from cubestack.host.conformance_values import read_back, values_to_try
 from cubestack.host.node_client import NodeClient
 from cubestack.host.targets import Target
+
+BLOCKS = 4
 
 
 def suite(node, link, **options) -> Suite:
@@ -19,8 +24,12 @@ def suite(node, link, **options) -> Suite:
 
 @pytest.fixture
 def good(node, uart, monkeypatch):
-    """A CubeStar in memory that shows its settings, and the error flags of refusals."""
-    places = {m.name: read_back(suite(node, uart), m) for m in CUBESTAR.telecommands}
+    """A CubeStar in memory that shows its settings, and the error flags of refusals.
+
+    Its pictures are small.
+    """
+    monkeypatch.setitem(PICTURE_BYTES, "CubeStar", 128 * BLOCKS)
+    places = {m.name: read_back(CUBESTAR, m) for m in CUBESTAR.telecommands}
     for message in CUBESTAR.telemetries:  # after power-up, settings show their reset values
         node.values[message.name] = {}
     for name, shown in places.items():
@@ -35,8 +44,29 @@ def good(node, uart, monkeypatch):
 
     def remember(name, values):
         execute(name, values)
+        perform(name, values)
         for field, (telemetry, place) in places[name].items():
             node.values[telemetry.name][place.name] = values[field]
+
+    camera = {}
+
+    def perform(name, values):
+        identification, shown = node.values["ExtendedIdentification"], node.values["CameraRegister"]
+        if name == "StreamDownImage":
+            blocks = node.memory.reshape(-1, 128)[:BLOCKS]
+            uart.later += b"".join(encode_frame(block.tobytes()) for block in blocks)
+        elif name == "UploadBlock":
+            node.values["UploadStatus"]["NextBlock"] = values["BlockNumber"] + 1
+        elif name == "TestWDG":
+            identification["WDGResetCount"] = identification.get("WDGResetCount", 0) + 1
+            identification["ResetCause"] = ResetCause.WATCHDOG
+        elif name == "ClearWDGResetCounter":
+            identification["WDGResetCount"] = 0
+        elif name == "SelectCameraRegister":
+            shown["Address"], shown["Valid"] = values["Address"], 1
+        elif name == "WriteCameraRegister":
+            camera[values["Address"]] = values["Value"]
+        shown["Value"] = camera.get(shown.get("Address"), 0)
 
     def flag(payload):
         reply = answer(payload)
@@ -59,6 +89,7 @@ def failures(run: Suite) -> dict[str, str]:
 def test_good_node_passes(good, uart):
     run = suite(good, uart, allow_write=True)
     assert failures(run) == {}
+    assert {check.outcome for check in run.checks} == {Outcome.PASSED}
     names = [check.name for check in run.checks]
     assert len(set(names)) == len(names)
     for message in CUBESTAR.messages:
@@ -79,7 +110,7 @@ def test_settings_are_put_back(good, uart):
     before = {name: dict(values) for name, values in good.values.items()}
     suite(good, uart, allow_write=True).run()
     after = {name: dict(values) for name, values in good.values.items()}
-    for changing in ("ErrorFlags", "UploadStatus"):
+    for changing in ("ErrorFlags", "UploadStatus", "ExtendedIdentification", "CameraRegister"):
         after[changing] = before[changing]
     assert {k: v for k, v in after.items() if v} == {k: v for k, v in before.items() if v}
 
@@ -112,6 +143,55 @@ def test_setting_that_does_not_stick_is_found(good, uart, monkeypatch):
     found = failures(suite(good, uart, allow_write=True))
     assert list(found) == ["telecommand Exposure"]
     assert "is read back" in found["telecommand Exposure"]
+
+
+def without(name):
+    """A node on which a telecommand has no effect."""
+
+    def spoil(node, _uart):
+        execute = node.execute
+        node.execute = lambda n, values: None if n == name else execute(n, values)
+
+    return spoil
+
+
+def with_another_block(node, uart):
+    execute = node.execute
+
+    def do(name, values):
+        execute(name, values)
+        if name == "StreamDownImage":
+            uart.later[10] ^= 1
+
+    node.execute = do
+
+
+def with_a_short_block(node, uart):
+    execute = node.execute
+
+    def do(name, values):
+        execute(name, values)
+        if name == "StreamDownImage":
+            uart.later[:] = encode_frame(bytes(127)) + uart.later
+
+    node.execute = do
+
+
+@pytest.mark.parametrize(
+    ("spoil", "check", "detail"),
+    [
+        (without("StreamDownImage"), "StreamDownImage", "ended after 0 of 4 frames"),
+        (with_another_block, "StreamDownImage", "block 0 of the stream is another one"),
+        (with_a_short_block, "StreamDownImage", "block 0 has 127 bytes, declared 128"),
+        (without("UploadBlock"), "UploadBlock", "after one block {'NextBlock': 4, "),
+        (without("TestWDG"), "TestWDG", "WDGResetCount was 0, is 0"),
+        (without("WriteCameraRegister"), "WriteCameraRegister", "0x1 was written to 0x8527"),
+        (without("SelectCameraRegister"), "WriteCameraRegister", "of the camera is not read"),
+    ],
+)
+def test_task_that_is_not_done_is_found(good, uart, spoil, check, detail):
+    spoil(good, uart)
+    assert detail in failures(suite(good, uart, allow_write=True))[f"telecommand {check}"]
 
 
 def test_missing_flag_is_found(good, uart, monkeypatch):
@@ -164,18 +244,17 @@ def test_values_to_try_are_allowed_and_differ(interface):
         assert all(tried.count(values) == 1 for values in tried)
 
 
-def test_masks_are_read_back_by_camera_and_area(sense, sense_uart):
-    run = suite(sense, sense_uart)
+def test_masks_are_read_back_by_camera_and_area():
     for number in (1, 2):
-        places = read_back(run, CUBESENSE.telecommand(f"Mask{number}"))
+        places = read_back(CUBESENSE, CUBESENSE.telecommand(f"Mask{number}"))
         shown = {name: (frame.name, place.name) for name, (frame, place) in places.items()}
         assert shown == {
             name: (f"Masks{number}", f"{name}1") for name in ("XMin", "XMax", "YMin", "YMax")
         }
 
 
-def test_measurements_are_no_settings(node, uart):
-    assert read_back(suite(node, uart), CUBESTAR.telecommand("setTrackingMode")) == {}
+def test_measurements_are_no_settings():
+    assert read_back(CUBESTAR, CUBESTAR.telecommand("setTrackingMode")) == {}
 
 
 def runs(*checks: Check) -> Suite:
