@@ -48,6 +48,7 @@ class I2cMcu:
         self._dut = dut
         self._models = models
         self.set_speed(speed)
+        self.free_ps = 0  # how long the bus was free between transfers
         self.falls: list[int] = []  # of SCL, in ps
         self.commands: list[tuple[int, int]] = []  # time in ps, COMMAND from then on
 
@@ -95,7 +96,9 @@ class I2cMcu:
     async def start(self, address: int, read: int = 0) -> bool:
         """START, or a repeated one, and the address byte; whether it was acknowledged."""
         if not self.master.bus_active:
+            before = now()
             await wait(random.randrange(2 * self.bit_ps), ODD)
+            self.free_ps += now() - before
         await self.master.send_start()
         refused = await self.master.send_byte(address << 1 | read)
         accepted = [model.start(address << 1 | read) for model in self._models.values()]

@@ -1,5 +1,6 @@
 """The pair on its I2C bus, against an independent master, on Icarus Verilog."""
 
+import os
 from typing import Any
 
 import pytest
@@ -12,9 +13,15 @@ SMALL = {
     ),
     "benches_i2c_store": ReadOut(16, 8, 7, scan_step=4, first_row=0, first_column=2, window=5),
     "benches_i2c_full_size": FULL_SIZE,
+    "benches_i2c_times": FULL_SIZE,
 }
 
 
 @pytest.mark.parametrize("module", SMALL)
 def test_pair(simulate: Any, module: str) -> None:
     simulate(SMALL[module], module, seed=1)
+
+
+@pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes minutes: set I2C_WHOLE")
+def test_whole_read_outs(simulate: Any) -> None:
+    simulate(FULL_SIZE, "benches_i2c_whole", seed=1)
