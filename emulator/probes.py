@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from cubestack.emulator.trace import Probe
+from cubestack.firmware_model.interface.aramis_codes import MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.cubesense_codes import Camera, CaptureResult, DetectResult
 from cubestack.firmware_model.interface.cubestar_codes import TaskStatus
 
@@ -20,6 +21,11 @@ def firmware_probes(board: Any) -> dict[str, Probe]:
     state = getattr(board.program, "_state", None)
     if hasattr(state, "task_status"):
         probes["task"] = lambda: TaskStatus(board.program._state.task_status).name
+    if hasattr(state, "sensor"):
+        probes["task"] = lambda: SensorState(board.program._state.sensor).name
+        probes["measurement"] = lambda: (
+            MeasurementOutcome(board.program._state.measurement.outcome).name
+        )
     results = getattr(getattr(board.program, "node", None), "_state", None)
     if hasattr(results, "results"):
         for camera in Camera:
