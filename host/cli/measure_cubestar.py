@@ -101,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
             "--mag-limit, --false-stars and --no-noise belong to the random sky; a scene file "
             "has the keys mag_limit, false_stars and noise"
         )
-    tell_layout(args.layout, say)
+    if not args.json:
+        tell_layout(args.layout, say)
     started = time.monotonic()
     results = collect(measure_frames(args), args.frames, as_json=args.json)
     if not args.json:

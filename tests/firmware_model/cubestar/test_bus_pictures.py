@@ -1,0 +1,248 @@
+"""Pictures behind the FPGA: what the program does over its bus, on memories that are arrays."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.algorithms.detection import DetectionConfig, detect_stars
+from cubestack.firmware_model.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
+from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
+from cubestack.firmware_model.cubestar.pictures import ITERATION_US, Pictures
+from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.cubestar.supply import SupplyMonitor
+from cubestack.firmware_model.external_bus import EBI
+from cubestack.firmware_model.hardware import BusAccess, FlashStore, Routine, SetPin
+from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
+
+from .sky import Sky
+
+ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]
+SIZE = 2 * IMAGE_BYTES
+
+
+class Board:
+    """Memories by chip select, as arrays, and the pins; it says which accesses find an answer."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.retention = bytearray(RETENTION_BYTES)
+        self.flash = FlashStore()
+        self.external_ram = np.zeros(0, np.uint8)
+        self.memories = {select: np.zeros(SIZE, np.uint8) for select in (0, 1)}
+        self.pins: dict[str, int] = {}
+        self.log: list[tuple[str, int]] = []
+        self.meter = Meter(CORTEX_M3)
+        self.state = State(self)  # type: ignore[arg-type]  # what it does not use is missing
+        self.supply = SupplyMonitor(self, self.state)  # type: ignore[arg-type]
+        self.pictures: Pictures = pictures_of(
+            layout,
+            self,  # type: ignore[arg-type]
+            self.state,
+            self.meter,
+            self.supply,
+        )
+        self.accesses = 0
+        self.stuck: int | None = None
+        self.run(self.pictures.start())
+
+    def run(self, routine: Routine[Any]) -> Any:
+        """Perform what it requests; its result."""
+        answer = None
+        while True:
+            try:
+                request = routine.send(answer)
+            except StopIteration as done:
+                return done.value
+            answer = None
+            if isinstance(request, SetPin):
+                self.pins[request.pin] = request.level
+                self.log.append((request.pin, request.level))
+            else:
+                assert isinstance(request, BusAccess)
+                answer = self._access(request)
+
+    def bus_read(self, select: int, address: int, count: int) -> bytes:
+        assert self._open(select, address)
+        return self.memories[select][address : address + count].tobytes()
+
+    def _access(self, request: BusAccess) -> int:
+        assert request.cycles == 2 + EBI.cycles
+        for address in request.addresses[:1]:
+            assert self._open(request.select, int(address))
+        memory = self.memories[request.select]
+        if request.write:
+            memory[request.addresses] = request.data
+            if self.stuck is not None:
+                memory[self.stuck] |= 1
+            count = len(request.addresses)
+        else:
+            values = memory[request.addresses]
+            above = np.flatnonzero(values > request.above)
+            count = int(above[0]) + 1 if len(above) else len(values)
+            request.data[:count] = values[:count]
+        self.accesses += count
+        return count
+
+    def _open(self, select: int, address: int) -> bool:
+        """Whether the pins give that memory to the bus."""
+        if self.layout is Layout.TWO_BOARDS:
+            board = f"BOARD{select + 1}_"
+            return bool(self.pins[f"{board}ENABLE"] and self.pins[f"{board}RNW"])
+        reached = self.pins["RNW"]
+        if self.layout is Layout.TWO_MEMORIES and not reached:
+            reached = self.pins["INTO"] != address // IMAGE_BYTES
+        return bool(self.pins["ENABLE"] and reached)
+
+    def stored(self, picture: NDArray[np.uint8]) -> None:
+        """The FPGA stores a picture where the pins say."""
+        self.run(self.pictures.begin())
+        select, place = 0, self.pins.get("BANK", 0)
+        if self.layout is Layout.TWO_MEMORIES:
+            place = self.pins["INTO"]
+        if self.layout is Layout.TWO_BOARDS:
+            (select,) = (n for n in (0, 1) if not self.pins[f"BOARD{n + 1}_RNW"])
+            assert self.pictures.acknowledge == f"BOARD{select + 1}_ACK"
+            place = self.pins[f"BOARD{select + 1}_BANK"]
+        self.memories[select][place * IMAGE_BYTES :][:IMAGE_BYTES] = picture.reshape(-1)
+        self.run(self.pictures.end(True))
+
+
+@pytest.fixture(params=ON_BUS, ids=lambda layout: layout.value)
+def board(request: pytest.FixtureRequest) -> Board:
+    return Board(request.param)
+
+
+def read_all(board: Board) -> NDArray[np.uint8]:
+    return np.frombuffer(board.run(board.pictures.read(0, IMAGE_BYTES)), np.uint8)
+
+
+def test_the_newest_picture_is_read_wherever_it_was_stored(board: Board) -> None:
+    rng = np.random.default_rng(5)
+    for bank in (0, 0, 1, 1, 0):
+        board.state.settings.put("SelectImageBank", {"Bank": bank})
+        picture = rng.integers(0, 256, IMAGE_BYTES, dtype=np.uint8)
+        board.stored(picture)
+        assert np.array_equal(read_all(board), picture)
+        assert board.pictures.read_now(1234, 128) == picture[1234:][:128].tobytes()
+
+
+def test_a_picture_that_was_not_stored_leaves_the_last_one(board: Board) -> None:
+    """Where there is a second memory; a shared one holds half of a picture then."""
+    picture = np.arange(IMAGE_BYTES).astype(np.uint8)
+    board.stored(picture)
+    board.run(board.pictures.begin())
+    board.run(board.pictures.end(False))
+    assert np.array_equal(read_all(board), picture)
+
+
+def test_while_the_next_picture_is_stored_the_last_one_is_there_or_none(board: Board) -> None:
+    picture = np.arange(IMAGE_BYTES).astype(np.uint8)
+    board.stored(picture)
+    board.run(board.pictures.begin())
+    if board.pictures.while_storing:
+        assert np.array_equal(read_all(board), picture)
+        assert board.pictures.read_now(7, 9) == picture[7:16].tobytes()
+    else:
+        assert board.layout is Layout.SHARED
+        assert board.pictures.read_now(7, 9) is None
+
+
+def test_without_supply_there_is_no_way_to_the_picture(board: Board) -> None:
+    board.state.retained.imager_off = 1
+    assert board.pictures.read_now(0, 1) is None
+
+
+def test_the_search_is_that_in_an_array_and_leaves_the_picture(board: Board, sky: Sky) -> None:
+    """The same stars for the same charge; the accesses are booked, as their time has passed."""
+    board.stored(sky.picture)
+    own = Meter(CORTEX_M3)
+    expected = detect_stars(sky.picture, DetectionConfig(), own)
+    board.meter.take()
+    before, accesses = dict(board.meter.counts), board.accesses
+    found = board.run(board.pictures.search(DetectionConfig()))
+    assert np.array_equal(found.centroids, expected.centroids)
+    assert np.array_equal(found.intensities, expected.intensities)
+    assert (found.dark_value, found.end) == (expected.dark_value, expected.end)
+    spent = {k: v - before.get(k, 0) for k, v in board.meter.counts.items()}
+    assert {k: v for k, v in spent.items() if v} == {k: v for k, v in own.counts.items() if v}
+    assert board.accesses - accesses == own.counts["ebi_read"] + own.counts["ebi_write"]
+    assert board.meter.phases == own.phases
+    on_the_bus = (2 + EBI.cycles) * (own.counts["ebi_read"] + own.counts["ebi_write"])
+    assert board.meter.take() == own.take() - on_the_bus
+    assert np.array_equal(read_all(board), sky.picture.reshape(-1))
+
+
+def test_pixels_are_zero_on_the_bus_during_the_search(board: Board, sky: Sky) -> None:
+    board.stored(sky.picture)
+    routine, lowest = board.pictures.search(DetectionConfig()), []
+    answer = None
+    while True:
+        try:
+            request = routine.send(answer)
+        except StopIteration:
+            break
+        assert isinstance(request, BusAccess)
+        answer = board._access(request)
+        if request.write and len(request.data) == 1:
+            lowest.append(int(request.data[0]))
+    assert lowest
+    assert not any(lowest)
+
+
+def test_memory_test_finds_one_bit_in_any_memory(board: Board) -> None:
+    assert board.run(board.pictures.test_memory()) is True
+    for stuck in (0, 777_777, SIZE - 1):
+        board.stuck = stuck
+        assert board.run(board.pictures.test_memory()) is False
+
+
+def test_every_place_is_tested(board: Board) -> None:
+    board.run(board.pictures.test_memory())
+    boards = 2 if board.layout is Layout.TWO_BOARDS else 1
+    assert board.accesses == 4 * boards * SIZE
+
+
+@pytest.mark.parametrize(
+    ("layout", "log"),
+    [
+        (Layout.SHARED, "ENABLE0 BANK0 RNW0 ENABLE1 ENABLE0 RNW1 ENABLE1"),
+        (Layout.TWO_MEMORIES, "INTO1 RNW0 RNW1"),
+        (
+            Layout.TWO_BOARDS,
+            "BOARD2_ENABLE0 BOARD2_BANK0 BOARD2_RNW0 BOARD2_ENABLE1 "
+            "BOARD2_ENABLE0 BOARD2_RNW1 BOARD2_ENABLE1",
+        ),
+    ],
+)
+def test_control_pins_change_in_the_gateware_s_order(layout: Layout, log: str) -> None:
+    """RNW never changes under ENABLE where that would hand over the address in a write pulse."""
+    board = Board(layout)
+    board.log.clear()
+    board.stored(np.zeros(IMAGE_BYTES, np.uint8))
+    assert " ".join(f"{pin}{level}" for pin, level in board.log) == log
+
+
+def test_rate_is_twice_as_high_with_two_memories() -> None:
+    rates = {layout: ITERATION_US / Board(layout).pictures.iteration_us for layout in ON_BUS}
+    assert rates == {Layout.SHARED: 1, Layout.TWO_MEMORIES: 2, Layout.TWO_BOARDS: 2}
+
+
+def test_the_cost_table_has_the_bus_s_cycles() -> None:
+    for operation in ("ebi_read", "ebi_write"):
+        assert CORTEX_M3.operations[operation].cycles == 2 + EBI.cycles
+
+
+def test_book_counts_without_a_debt() -> None:
+    meter: Meter = Meter(CORTEX_M3)
+    debts: Callable[[], int] = meter.take
+    meter.charge(loop=3)
+    with meter.phase("search"):
+        meter.book(ebi_read=10)
+    assert meter.counts["ebi_read"] == 10
+    assert meter.phases == {"search": 80}
+    assert (debts(), debts()) == (15, 0)

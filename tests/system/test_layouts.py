@@ -1,0 +1,307 @@
+"""CubeStar's further memory layouts, whole: the host sees what it sees of the published one."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.cubestar_layouts import fpga_of
+from cubestack.emulator.sky.attitude import quaternion_from_pointing
+from cubestack.emulator.sky.scene import SkyScene
+from cubestack.firmware_model.interface.cubestar_codes import (
+    ImageBlockSize,
+    MemoryTest,
+    TaskStatus,
+    TestPattern,
+)
+from cubestack.firmware_model.interface.cubestar_layouts import Layout
+from cubestack.host.cli.layouts import measure_layout
+from cubestack.host.cli.main import main
+from cubestack.host.cli.session import Session, tell_layout
+
+ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]
+ORION = SkyScene(quaternion_from_pointing(84.0, -1.0, 0.0), mag_limit=3.8)
+FULL = ImageBlockSize.BYTES_128.length
+
+Open = Callable[..., AbstractContextManager[Session]]
+
+
+def blocks(node: Session, numbers: range) -> bytes:
+    """Blocks of the picture, read in interrupts."""
+    client, found = node.cubestar.client, b""
+    for number in numbers:
+        client.command("ImageBlockSet", BlockNumber=number, BlockSize=ImageBlockSize.BYTES_128)
+        client.wait_processed(1.0)
+        found += client.telemetry("ImageBlock")["Block"]
+    return found
+
+
+def flags(node: Session) -> set[str]:
+    return {name for name, up in node.cubestar.client.telemetry("ErrorFlags").items() if up}
+
+
+def seen(node: Session) -> dict[str, Any]:
+    """All that a host gets of one capture, but for times and currents."""
+    status = node.cubestar.capture_and_process()
+    client = node.cubestar.client
+    found = {
+        name: client.telemetry(name)
+        for name in ("DetectionSummary", "MatchSummary", "DetectionThresholdValues")
+    }
+    attitude = node.cubestar.attitude()
+    return {
+        **found,
+        "status": status,
+        "quaternion": attitude.quaternion.tolist(),
+        "matched": attitude.matched,
+        "stars": node.cubestar.stars(),
+        "flags": flags(node),
+    }
+
+
+@pytest.fixture(params=ON_BUS, ids=lambda layout: layout.value)
+def layout(request: pytest.FixtureRequest) -> Layout:
+    found: Layout = request.param
+    return found
+
+
+@pytest.fixture
+def node(session: Open, layout: Layout) -> Iterator[Session]:
+    with session(ORION, layout=layout) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def published() -> dict[str, Any]:
+    from cubestack.host.cli.session import open_session
+
+    with open_session(ORION) as opened:
+        found = seen(opened)
+        picture: np.ndarray = opened.board.program._capture.image.copy()
+        star = int(picture.argmax()) // FULL
+        assert blocks(opened, range(star, star + 1)) == block_of(picture, star)
+    return found | {"picture": picture, "star": star}
+
+
+def block_of(picture: np.ndarray, number: int) -> bytes:
+    return picture.tobytes()[number * FULL :][:FULL]
+
+
+def newest(node: Session, layout: Layout) -> np.ndarray:
+    """The picture of the first capture, where the layout has it."""
+    name = "SRAM" if layout is Layout.SHARED else "SRAM2"
+    return node.board.engine.memories[name][: 512 * 1024]
+
+
+def test_the_same_scene_gives_the_same_bytes_and_attitude(
+    node: Session, layout: Layout, published: dict[str, Any]
+) -> None:
+    """Detected over the bus, zeroed and written back there, and downloaded in two ways."""
+    found = seen(node)
+    assert found == {name: published[name] for name in found}
+    assert found["status"] is TaskStatus.CALCULATED
+    picture, star = published["picture"], published["star"]
+    assert np.array_equal(newest(node, layout), picture.reshape(-1))
+    for number in (0, star - 8, star, star + 8, 4095):  # a row has eight
+        assert blocks(node, range(number, number + 1)) == block_of(picture, number)
+    streamed = zip(range(40), node.cubestar.client.stream("StreamDownImage", 4096), strict=False)
+    assert all(block == block_of(picture, number) for number, block in streamed)
+    assert not node.board.engine.violation_counts
+
+
+def test_nothing_is_copied(node: Session) -> None:
+    node.cubestar.capture()
+    phases = node.cubestar.phase_times()
+    assert phases["transfer"] == 0
+    assert phases["capture"] == pytest.approx(384, abs=1)
+
+
+def test_uploaded_and_drawn_pictures_are_in_memory(node: Session) -> None:
+    rng = np.random.default_rng(4)
+    picture = np.zeros((512, 1024), np.uint8)
+    picture[100:102] = rng.integers(0, 256, (2, 1024))
+    node.cubestar.upload_image(picture)
+    assert blocks(node, range(800, 816)) == picture[100:102].tobytes()
+    node.cubestar.client.command("CaptureTestPatern", TestPaternType=TestPattern.DIAGONAL_RAMP)
+    node.cubestar.client.wait_processed(5.0)
+    expected = (np.add.outer(np.arange(512), np.arange(1024)) % 256).astype(np.uint8)
+    assert blocks(node, range(4090, 4096)) == expected.tobytes()[-6 * FULL :]
+
+
+@pytest.mark.parametrize("layout", [Layout.SHARED, Layout.TWO_BOARDS])
+def test_memory_test_passes_and_takes_the_bus_s_time(node: Session, layout: Layout) -> None:
+    began_ps = node.board.kernel.now
+    node.cubestar.client.command("TestSRAM")
+    node.cubestar.client.wait_processed(10.0)
+    took_s = (node.board.kernel.now - began_ps) / 1e12
+    result = node.cubestar.client.telemetry("SRAMTestResults")["TestResult"]
+    assert result == MemoryTest.PASSED
+    boards = 2 if layout is Layout.TWO_BOARDS else 1
+    assert took_s == pytest.approx(boards * 4 * (1 << 20) * (8 + 5) / 48e6, abs=0.05)
+    assert not node.board.engine.violation_counts
+
+
+@pytest.mark.parametrize("layout", [Layout.SHARED])
+def test_a_bit_that_does_not_hold_is_found(node: Session) -> None:
+    node.board.faults.inject("memory-stuck", address=4711, bit=3, level=0)
+    node.cubestar.client.command("TestSRAM")
+    node.cubestar.client.wait_processed(10.0)
+    result = node.cubestar.client.telemetry("SRAMTestResults")["TestResult"]
+    assert result == MemoryTest.FAILED
+
+
+def test_while_a_picture_is_stored_the_last_one_is_there_or_a_flag_is_up(
+    node: Session, layout: Layout, published: dict[str, Any]
+) -> None:
+    node.cubestar.capture()
+    star, client = published["star"], node.cubestar.client
+    client.command("ImageBlockSet", BlockNumber=star, BlockSize=ImageBlockSize.BYTES_128)
+    client.wait_processed(1.0)
+    client.command("CaptureImage")
+    client.pause(0.2)
+    block = client.telemetry("ImageBlock")["Block"]
+    if layout is Layout.SHARED:
+        assert not any(block)
+        assert flags(node) == {"StatusError"}
+    else:
+        assert block == block_of(published["picture"], star)
+        assert not flags(node)
+    client.wait_processed(1.0)
+    again = np.frombuffer(blocks(node, range(star, star + 1)), np.uint8)
+    assert np.abs(again.astype(int) - np.frombuffer(block, np.uint8)).max() > 0  # other noise
+    assert again.max() > 100
+    assert not node.board.engine.violation_counts
+
+
+def test_a_lost_acknowledge_fails_the_capture_and_the_next_one_is_good(node: Session) -> None:
+    for acknowledge in node.board.engine.wiring.acknowledges:
+        node.board.faults.inject("ack-lost", target=acknowledge)
+    assert node.cubestar.capture_and_process() is TaskStatus.CAPTURE_FAILED
+    assert "ImageCaptureError" in flags(node)
+    node.board.faults.clear()
+    node.cubestar.client.command("ClearErrorFlags")
+    assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
+
+
+def test_a_latch_up_of_the_memory_loses_the_picture_only(
+    node: Session, layout: Layout, published: dict[str, Any]
+) -> None:
+    star = published["star"]
+    node.cubestar.capture()
+    assert blocks(node, range(star, star + 1)) == block_of(published["picture"], star)
+    node.board.power.latch_up("memory")
+    node.cubestar.client.pause(0.5)
+    assert flags(node) == {"OverCurrent"}
+    assert node.board.power.is_on("memory")
+    assert blocks(node, range(star, star + 1)) != block_of(published["picture"], star)
+    assert node.cubestar.process_image() is TaskStatus.DETECTION_FAILED
+    assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
+
+
+def test_a_switched_off_board_has_no_picture_to_give(
+    node: Session, published: dict[str, Any]
+) -> None:
+    star = published["star"]
+    node.cubestar.capture()
+    node.cubestar.client.command("TogglePowerSW")
+    node.cubestar.client.wait_processed(1.0)
+    assert blocks(node, range(star, star + 1)) == bytes(FULL)
+    assert "StatusError" in flags(node)
+
+
+def test_banks_are_kept_apart_where_there_are_any(
+    node: Session, layout: Layout, published: dict[str, Any]
+) -> None:
+    star = published["star"]
+    before = newest(node, layout).copy()
+    node.cubestar.client.command("SelectImageBank", Bank=1)
+    node.cubestar.capture()
+    found = blocks(node, range(star, star + 1))
+    assert max(found) > 100
+    if layout is not Layout.TWO_MEMORIES:
+        assert np.array_equal(newest(node, layout), before)
+        whole = node.board.engine.memories["SRAM" if layout is Layout.SHARED else "SRAM2"]
+        assert block_of(whole[1 << 19 :], star) == found
+    assert node.cubestar.client.telemetry("LoopStatus")["Bank"] == 1
+
+
+@pytest.mark.parametrize("layout", list(Layout), ids=lambda layout: layout.value)
+def test_the_loop_keeps_its_rate_and_age(layout: Layout) -> None:
+    """Twice the rate with two memories; no layout without a copy is older than 500 ms."""
+    result = measure_layout(layout, ORION, seconds=2)
+    fast = layout in (Layout.TWO_MEMORIES, Layout.TWO_BOARDS)
+    assert result.rate_hz == pytest.approx(2 if fast else 1, rel=1e-3)
+    assert result.attitudes == result.right == (4 if fast else 2)
+    if layout is Layout.COPIED:
+        assert result.age_ms > 900
+    else:
+        assert result.age_ms < 500
+        assert result.phase_ms["transfer"] == 0
+    assert result.violations == 0
+    assert result.power_mw == pytest.approx(result.energy_mj * result.rate_hz, rel=1e-3)
+
+
+def test_two_memories_are_filled_in_turn(session: Open) -> None:
+    """And the one that is not stored in is worked on, beside the pixels."""
+    with session(ORION, layout=Layout.TWO_MEMORIES) as node:
+        into = []
+        set_pin = node.board.engine.set_pin
+
+        def watched(name: str, level: int) -> None:
+            if name == "INTO":
+                into.append(level)
+            set_pin(name, level)
+
+        node.board.engine.set_pin = watched  # type: ignore[method-assign]
+        node.cubestar.client.command("Trigger")
+        node.cubestar.client.pause(2.2)
+        assert len(into) >= 4
+        assert all(later != earlier for earlier, later in pairwise(into))
+
+
+def test_only_option_3_needs_too_many_pins() -> None:
+    fpgas = {layout: fpga_of(layout) for layout in Layout}
+    assert [layout for layout, fpga in fpgas.items() if not fpga.fits] == [Layout.TWO_MEMORIES]
+    assert [fpga.pins for fpga in fpgas.values()] == [55, 66, 95, 66]
+
+
+def test_the_commands_say_what_can_not_be_built(
+    capsys: pytest.CaptureFixture[str], emulate: Callable[..., Any]
+) -> None:
+    told: list[str] = []
+    for layout in Layout:
+        tell_layout(layout, told.append)
+    (line,) = told
+    assert "layout 3 can not be built with an AGLN030: its FPGA takes 95 pins of 77" in line
+    capsys.readouterr()
+    arguments = ["measure", "cubestar", "--layout", "3", "--mag-limit", "3.8"]
+    assert main([*arguments, "--json"]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    assert json.loads(output.out)["phase_ms"]["transfer"] == 0
+    with emulate("--layout", "two-boards", "--tcp", "0") as served:
+        assert served.port
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("measure", "cubestar", "--layout", "4"), "'4' is none of 1, 2, 3, two-boards"),
+        (("emulate", "cubesense", "--tcp", "0", "--layout", "2"), "option of cubestar, not of"),
+    ],
+)
+def test_other_layouts_are_refused_in_one_line(
+    arguments: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code = main(list(arguments))
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    error = capsys.readouterr().err
+    assert code == 2
+    assert text in error
+    assert error.count("\n") == 1
