@@ -24,6 +24,8 @@ from cubestack.firmware_model.interface.cubesense_fpga_registers import (
     WHO,
     CommandBits,
     Register,
+    command_byte,
+    command_of,
 )
 from cubestack.hdl.cubesense_dataflow import Side
 from cubestack.hdl.cubesense_pointer import MemoryPointer
@@ -105,7 +107,7 @@ class CubeSenseI2cRegisters(Component):
         }
         for action, output in outputs.items():
             rows = [row for row in I2C_COMMANDS if getattr(row.actions, self._side) is action]
-            m.d.comb += output.eq(Cat(_fits(command, row) for row in rows).any())
+            m.d.comb += output.eq(Cat(self._fits(command, row) for row in rows).any())
 
         # SCL runs for a byte at least before it is looked at, so it is two periods old at most.
         acknowledged = Signal()
@@ -133,20 +135,25 @@ class CubeSenseI2cRegisters(Component):
         m.d.comb += target.value.eq(reduce(or_, selected))
         return m
 
+    def _fits(self, command: Signal, row: Command) -> Value:
+        """Whether the command's bits are at the levels of a row.
+
+        The other enable is no input where it makes no difference, so that it can not disturb a
+        picture that is being stored.
+        """
+        levels = {
+            CommandBits.SHIFT: row.shift,
+            CommandBits.RNW: row.rnw,
+            CommandBits.SUNEN: row.sunen,
+            CommandBits.NADEN: row.naden,
+        }
+        other = CommandBits.NADEN if self._side == "sun" else CommandBits.SUNEN
+        flipped = command_of(command_byte(row.actions) ^ other)
+        if getattr(flipped, self._side) is getattr(row.actions, self._side):
+            del levels[other]
+        return Cat(command[bit.bit_length() - 1] == level for bit, level in levels.items()).all()
+
 
 def _is(number: Signal, register: Register) -> Value:
     """Whether it is that register's; a comparison with 0 is no Verilog that linters like."""
     return number == register if register else ~number.any()
-
-
-def _fits(command: Signal, row: Command) -> Value:
-    """Whether the command's bits are at the levels of a row."""
-    levels = {
-        CommandBits.SHIFT: row.shift,
-        CommandBits.RNW: row.rnw,
-        CommandBits.SUNEN: row.sunen,
-        CommandBits.NADEN: row.naden,
-    }
-    return Cat(
-        command[bit.bit_length() - 1] == level for bit, level in levels.items() if level is not None
-    ).all()

@@ -126,6 +126,13 @@ def _one_phase(d: SimpleNamespace, prefix: str = "") -> list[Value]:
 # Both FPGAs have the same command, so the link has one driver.
 
 
+_PAIR_WIRES = {
+    **_target_wires("sun"),
+    **_target_wires("nadir"),
+    **{f"{side}_LINK_D_OE": f"{side}.LINK_D_OE" for side in ("sun", "nadir")},
+}
+
+
 def _one_driver(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.RESET_N)
     sun, nadir = (
@@ -156,6 +163,14 @@ def _one_driver(m: Module, d: SimpleNamespace) -> None:
     for bit in range(8):
         received = writing & (sun.count > bit)
         m.d.comb += Assert(~received | (sun.shift[bit] == nadir.shift[bit]))
+    # Each value of the command, listed or not, turns on the drivers that it should.
+    for byte in range(16):
+        here = sun.command == byte
+        for side, prefix in (("sun", "SUN"), ("nadir", "NAD")):
+            action = getattr(command_of(byte), side)
+            sends = getattr(d, f"{side}_LINK_D_OE") == (action is Action.SEND_PICTURE)
+            reads = getattr(d, f"{prefix}_SRAM_OE_N") == (action is not Action.READ)
+            m.d.comb += Assert(~here | (sends & reads))
     for prefix in ("SUN", "NAD"):
         drives, chip = getattr(d, f"{prefix}_SRAM_D_OE"), getattr(d, f"{prefix}_SRAM_OE_N")
         m.d.comb += Assert(~drives | chip)
@@ -211,9 +226,10 @@ def _proofs(side: Side) -> dict[str, Proof]:
 #: By name.
 PROOFS = {
     "pair-drivers-i2c": Proof(
-        "Both FPGAs have the same command, and no wire of theirs has two drivers",
+        "Both FPGAs have the same command, which turns on the drivers that it should, and no wire "
+        "has two",
         _pair,
-        _target_wires("sun") | _target_wires("nadir"),
+        _PAIR_WIRES,
         _one_driver,
         Fault("nadir.registers.target.group", 1),
     ),
