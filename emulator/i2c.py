@@ -7,6 +7,7 @@ transfers queue for the wire.
 """
 
 import errno
+from collections import deque
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -130,7 +131,8 @@ class I2cBus:
         self._env = env
         self._targets: dict[int, I2cTarget] = {}
         self._general = _GeneralCall()
-        self._wire = simpy.Resource(env)
+        self._taken = False
+        self._turns: deque[simpy.Event] = deque()
         self.disturbance: I2cDisturbance | None = None
         self.bit_ps = PS_PER_S // hz
 
@@ -165,30 +167,56 @@ class I2cBus:
 
         Read data lands in the messages. Raises I2cNackError, after the stop condition.
         """
-        with self._wire.request() as granted:
-            yield granted
-            addressed: I2cTarget | None = None
-            failure: I2cNackError | None = None
-            if self.disturbance is not None:
-                yield from self.disturbance.before_start()
-            try:
-                for message in messages:
-                    yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
-                    if self.disturbance is not None:
-                        yield from self.disturbance.after_address(message.address)
-                    target = self._find(message)
-                    if addressed is not None and addressed is not target:
-                        addressed.i2c_stop()
-                    addressed = target
-                    target.i2c_start(message.reading)
-                    yield from self._bytes(target, message)
-            except I2cNackError as error:
-                failure = error
-            yield self._env.timeout(self.bit_ps)
-            if addressed is not None:
-                addressed.i2c_stop()
-            if failure is not None:
-                raise failure
+        if self._taken:
+            yield from self._take_turn()
+        self._taken = True
+        try:
+            yield from self._transfer(messages)
+        finally:
+            self._hand_on()
+
+    def _take_turn(self) -> Generator[simpy.Event, Any, None]:
+        turn = self._env.event()
+        self._turns.append(turn)
+        try:
+            yield turn
+        except BaseException:  # who waits no longer holds up nobody
+            if turn.triggered:
+                self._hand_on()
+            else:
+                self._turns.remove(turn)
+            raise
+
+    def _hand_on(self) -> None:
+        """Give the wire to the next one, for whom it stays taken, or free it."""
+        if self._turns:
+            self._turns.popleft().succeed()
+        else:
+            self._taken = False
+
+    def _transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
+        addressed: I2cTarget | None = None
+        failure: I2cNackError | None = None
+        if self.disturbance is not None:
+            yield from self.disturbance.before_start()
+        try:
+            for message in messages:
+                yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
+                if self.disturbance is not None:
+                    yield from self.disturbance.after_address(message.address)
+                target = self._find(message)
+                if addressed is not None and addressed is not target:
+                    addressed.i2c_stop()
+                addressed = target
+                target.i2c_start(message.reading)
+                yield from self._bytes(target, message)
+        except I2cNackError as error:
+            failure = error
+        yield self._env.timeout(self.bit_ps)
+        if addressed is not None:
+            addressed.i2c_stop()
+        if failure is not None:
+            raise failure
 
     def _find(self, message: I2cMessage) -> I2cTarget:
         address = message.address

@@ -3,8 +3,8 @@
 import errno
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from cubestack.emulator.i2c_host.notify import Notification, read_memory, write_memory
 from cubestack.firmware_model.interface.linux_i2c import (
@@ -15,6 +15,7 @@ from cubestack.firmware_model.interface.linux_i2c import (
     MessageFlag,
     RdwrMessage,
     SmbusCall,
+    SmbusSize,
     pack_ioctl,
     pack_rdwr,
     pack_read,
@@ -34,8 +35,7 @@ _SMBUS = struct.Struct("=BB2xIQ")
 _PART = struct.Struct("=QQ")
 
 
-@dataclass(frozen=True)
-class Marshalled:
+class Marshalled(NamedTuple):
     """A call for the emulated bus.
 
     Attributes:
@@ -129,9 +129,15 @@ def _rdwr(call: Notification, argument: int) -> Marshalled:
 def _smbus(call: Notification, argument: int) -> Marshalled:
     found = _SMBUS.unpack(read_memory(call.pid, argument, _SMBUS.size))
     direction, command, size, place = found
-    data = read_memory(call.pid, place, smbus_data_bytes(size)) if place else None
+    data = read_memory(call.pid, place, _given_bytes(direction, size)) if place else None
     body = pack_smbus(SmbusCall(direction, command, size, data))
     return Marshalled(Call.SMBUS, body, partial(_put, call.pid, place))
+
+
+def _given_bytes(direction: int, size: int) -> int:
+    """How much of its data an SMBus transaction looks at before it starts, as i2c-dev does."""
+    plain_read = direction == 1 and size <= SmbusSize.BLOCK_DATA and size != SmbusSize.PROCESS_CALL
+    return 0 if plain_read else smbus_data_bytes(size)
 
 
 def _put(pid: int, place: int, result: int, data: bytes) -> int:

@@ -3,13 +3,14 @@
 linux/seccomp.h; needs Linux 5.9 for descriptors that are put into the process.
 """
 
+import contextlib
 import ctypes
 import errno
 import fcntl
 import os
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 __all__ = ["Listener", "Notification", "read_memory", "read_text", "write_memory"]
 
@@ -17,12 +18,14 @@ _RECEIVE = 0xC050_2100
 _SEND = 0xC018_2101
 _VALID = 0x4008_2102
 _ADD_DESCRIPTOR = 0x4018_2103
+_SET_FLAGS = 0x4008_2104
 
 _NOTIFICATION = struct.Struct("=QIIiIQ6Q")
 _RESPONSE = struct.Struct("=QqiI")
 _ADDITION = struct.Struct("=QIIII")
 _ID = struct.Struct("=Q")
 
+_WAKE_HERE = struct.pack("=Q", 1)
 _CONTINUE = 1
 _AT_NUMBER = 1
 _AND_SEND = 2
@@ -31,8 +34,7 @@ PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 CHUNK_BYTES = 256  # most paths are shorter
 
 
-@dataclass(frozen=True)
-class Notification:
+class Notification(NamedTuple):
     """A call that waits.
 
     Attributes:
@@ -59,6 +61,9 @@ class Listener:
         """Take over ``fd``."""
         self.fd = fd
         self._one_step = True
+        with contextlib.suppress(OSError):  # before Linux 6.6
+            # Caller and supervisor wait for each other: one processor is quickest for both.
+            fcntl.ioctl(fd, _SET_FLAGS, _WAKE_HERE)
 
     def receive(self) -> Notification | None:
         """The next call; waits for one. None when its process was killed meanwhile."""

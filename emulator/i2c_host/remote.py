@@ -5,6 +5,7 @@ import select
 import socket
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from cubestack.emulator.ports.serial_port import PortError
@@ -28,14 +29,22 @@ class RemoteBus:
     def __init__(self, path: Path) -> None:
         """Use the socket at ``path``; raises PortError when nobody serves it."""
         self.name = str(path)
-        self._files: list[_RemoteFile] = []
+        self._files: dict[int, _RemoteFile] = {}
+        self._poller = select.epoll()
         self._connect().close()
 
     def open(self) -> "_RemoteFile":
         """Open a device file; raises PortError."""
-        file = _RemoteFile(self._connect())
-        self._files.append(file)
+        link = self._connect()
+        fileno = link.fileno()
+        self._poller.register(fileno, select.EPOLLIN)
+        file = _RemoteFile(link, partial(self._poller.modify, fileno), partial(self._drop, fileno))
+        self._files[fileno] = file
         return file
+
+    def _drop(self, fileno: int) -> None:
+        self._poller.unregister(fileno)
+        del self._files[fileno]
 
     def _connect(self) -> socket.socket:
         link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -52,13 +61,13 @@ class RemoteBus:
 
     def watched(self) -> list[tuple[int, int]]:
         """See Endpoint."""
-        return [file.watched() for file in self._files]
+        return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint."""
-        self._files = [file for file in self._files if not file.gone]
-        for file in self._files:
-            file.exchange()
+        for fileno, _ in self._poller.poll(0):
+            if fileno in self._files:
+                self._files[fileno].exchange()
 
     def release_ps(self, count: int) -> int | None:
         """See Endpoint."""
@@ -66,18 +75,25 @@ class RemoteBus:
 
     def close(self) -> None:
         """See Endpoint."""
-        for file in self._files:
+        for file in list(self._files.values()):
             file.close()
+        self._poller.close()
 
 
 class _RemoteFile:
     """One connection: the other side keeps the file's state."""
 
-    def __init__(self, link: socket.socket) -> None:
+    def __init__(
+        self, link: socket.socket, watch: Callable[[int], None], drop: Callable[[], None]
+    ) -> None:
+        """Use ``link``, watched for input; ``watch`` gets other events, ``drop`` ends it."""
         self._link = link
+        self._watch = watch
+        self._drop = drop
         self._due: deque[Done] = deque()
         self._received = bytearray()
         self._unsent = bytearray()
+        self._blocked = False
         self.gone = False
 
     def perform(self, call: Call, body: bytes, done: Done) -> None:
@@ -92,28 +108,29 @@ class _RemoteFile:
 
     def close(self) -> None:
         """See OpenFile."""
+        if self.gone:
+            return
         self.gone = True
+        self._drop()
         self._link.close()
         while self._due:
             self._due.popleft()(reply(-errno.EIO))
 
-    def watched(self) -> tuple[int, int]:
-        return self._link.fileno(), select.POLLIN | (select.POLLOUT if self._unsent else 0)
-
     def exchange(self) -> None:
         self._send()
-        while not self.gone:
-            try:
-                data = self._link.recv(CHUNK_BYTES)
-            except BlockingIOError:
-                return
-            except OSError:
-                data = b""
-            self._received += data
-            while (answer := self._take_answer()) is not None and self._due:
-                self._due.popleft()(answer)
-            if not data:
-                self.close()
+        if self.gone:
+            return
+        try:
+            data = self._link.recv(CHUNK_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        self._received += data
+        while self._due and (answer := self._take_answer()) is not None:
+            self._due.popleft()(answer)
+        if not data:
+            self.close()
 
     def _take_answer(self) -> bytes | None:
         if len(self._received) < LENGTH.size:
@@ -134,3 +151,7 @@ class _RemoteFile:
             pass
         except OSError:
             self.close()
+        blocked = bool(self._unsent)
+        if blocked != self._blocked and not self.gone:
+            self._blocked = blocked
+            self._watch(select.EPOLLIN | (select.EPOLLOUT if blocked else 0))

@@ -1,7 +1,6 @@
 """A program with an emulated bus: where the bus comes from, by which route, until it ends."""
 
 import signal
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Literal
 from cubestack.emulator.i2c_host.adapter import I2cAdapter
 from cubestack.emulator.i2c_host.device_file import DeviceFile
 from cubestack.emulator.i2c_host.device_node import DeviceNode
-from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely, wait_until
+from cubestack.emulator.i2c_host.pacing import Watch, sharpen_timers, wait_precisely
 from cubestack.emulator.i2c_host.program import (
     Program,
     Route,
@@ -23,22 +22,14 @@ from cubestack.emulator.i2c_host.remote import RemoteBus
 from cubestack.emulator.i2c_host.server import I2cServer
 from cubestack.emulator.i2c_host.shim import shim_library
 from cubestack.emulator.i2c_host.supervisor import Files, Supervisor
+from cubestack.emulator.i2c_host.turns import TURNAROUND_NS, Turns
 from cubestack.emulator.ports.endpoint import Endpoint
-from cubestack.emulator.ports.pump import SLICE_S, Pump
-from cubestack.emulator.virtual_time import PS_PER_MS, Kernel
+from cubestack.emulator.ports.pump import Pump
+from cubestack.emulator.virtual_time import Kernel
 
 __all__ = ["HostBus", "attached_bus", "emulated_bus", "run_program"]
 
-AHEAD_PS = 2 * PS_PER_MS
-"""How far virtual time may be ahead of wall time during a transfer, when it is paced."""
-
-TURNAROUND_NS = 200_000
-"""A call that comes so soon after the last answer starts where that transfer ended: what it takes
-to get from one process to the other is not counted."""
-
 IDLE_NS = 100_000_000
-PS_PER_NS = 1000
-NS_PER_S = 10**9
 
 FORWARDED = (signal.SIGTERM, signal.SIGHUP)
 
@@ -49,7 +40,7 @@ class HostBus:
 
     Attributes:
         kernel: what to drive.
-        busy: whether it has work.
+        busy: whether its devices have work of their own.
         adapter: its master; None when that is in another process.
         port: to serve with the pump.
         files: opens a device file of it.
@@ -70,7 +61,7 @@ def emulated_bus(
     """The bus of an emulation in this process, served at ``path`` as well; raises PortError."""
     return HostBus(
         kernel,
-        lambda: adapter.busy or busy(),
+        busy,
         adapter,
         server := I2cServer(path, adapter),
         lambda: DeviceFile(adapter),
@@ -102,7 +93,7 @@ def run_program(
         RouteError: the kernel refuses the route.
         CompilerError: the library of the preload route can not be built.
     """
-    running: list[_Ports] = []
+    running: list[_Run] = []
     early: list[int] = []
 
     def end(number: int, _frame: object) -> None:
@@ -114,128 +105,111 @@ def run_program(
     handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
     try:
         program, supervisor, reason = _start(command, number, bus, route)
-        ports = _Ports(bus, program, supervisor, fast=pace == "fast")
-        running.append(ports)
+        running.append(run := _Run(program, supervisor))
         for each in early:
-            ports.signalled(each)
+            run.signalled(each)
         say(f"/dev/i2c-{number} by way of {reason}")
         sharpen_timers()
         if bus.adapter is None:
-            ports.serve()
+            _serve([bus.port, *run.ports], run)
         else:
-            pump = Pump(
-                bus.kernel,
-                [ports],
-                bus.busy,
-                pace=pace,
-                report=say,
-                clock_ns=ports.clock_ns,
-                wait=wait_precisely,
-            )
-            ports.on_end = pump.stop
-            pump.run()
+            _emulate(bus, bus.adapter, run, pace=pace, say=say)
     finally:
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
-        for ports in running:
-            ports.close()
+        for run in running:
+            run.close()
     return program.exit_code
 
 
-class _Ports:
-    """All ports as one, which does transfers in one go where the pump would look at each byte.
+def _emulate(
+    bus: HostBus,
+    adapter: I2cAdapter,
+    run: "_Run",
+    *,
+    pace: Literal["real", "fast"],
+    say: Callable[[str], None],
+) -> None:
+    turns = Turns(
+        "program and bus",
+        bus.kernel,
+        adapter,
+        [bus.port, *run.ports],
+        bus.busy,
+        fast=pace == "fast",
+    )
+    pump = Pump(
+        bus.kernel,
+        [turns, run],
+        lambda: adapter.busy or bus.busy(),
+        pace=pace,
+        report=say,
+        clock_ns=turns.clock_ns,
+        wait=wait_precisely,
+    )
+    run.on_end = pump.stop
+    pump.run()
 
-    Paced, virtual time runs ahead of wall time for that, and the program is told when wall time
-    gets there.
+
+def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
+    """Serve without a pump: the bus is in another process."""
+    watch = Watch(ports)
+    while not run.ended:
+        ready = watch.wait(TURNAROUND_NS, awake=True) or watch.wait(IDLE_NS)
+        for port in ready or ports:
+            port.exchange(0)
+    watch.close()
+
+
+class _Run:
+    """A program under way; as a port of the pump it notices the end.
 
     Attributes:
+        name: of the program.
+        ports: what has to be served for it.
         on_end: called when there is nobody left to serve.
     """
 
-    name = "program and bus"
     congested = False
 
-    def __init__(
-        self, bus: HostBus, program: Program, supervisor: Supervisor | None, *, fast: bool
-    ) -> None:
+    def __init__(self, program: Program, supervisor: Supervisor | None) -> None:
+        self.name = program.name
+        self.ports: list[Endpoint] = [supervisor, program] if supervisor else [program]
         self.on_end: Callable[[], None] = lambda: None
-        self._bus = bus
         self._program = program
         self._supervisor = supervisor
-        self._fast = fast
-        self._ended = False
-        others: list[Endpoint] = [supervisor] if supervisor else []
-        self._ports: list[Endpoint] = [bus.port, program, *others]
-        self._origin_ns = time.monotonic_ns() - bus.kernel.now // PS_PER_NS
-        if bus.adapter is not None:
-            bus.adapter.holding = not fast
+        self._dropped = False
 
-    def clock_ns(self) -> int:
-        """Wall time, on the scale of virtual time when that is paced."""
-        return time.monotonic_ns() - self._origin_ns
-
-    def exchange(self, now_ps: int) -> None:
-        for port in self._ports:
-            port.exchange(now_ps)
-        adapter = self._bus.adapter
-        if adapter is not None:
-            told = adapter.told
-            self._transfer(adapter)
-            if adapter.told > told:
-                self._await_next(adapter)
-        if self._program.ended and (self._supervisor is None or self._supervisor.ended):
-            self._end()
-
-    def serve(self) -> None:
-        """Serve without a pump: the bus is in another process."""
-        while not self._ended:
-            wait_until(self.watched(), IDLE_NS)
-            self.exchange(0)
+    @property
+    def ended(self) -> bool:
+        """Whether nobody is left who could call."""
+        served = self._supervisor is not None and not self._supervisor.ended
+        return self._dropped or (self._program.ended and not served)
 
     def signalled(self, number: int) -> None:
         """Pass a signal on, but for Ctrl-C: that comes to the program as well, and it decides."""
         if self._program.ended:
-            self._end()  # only what the program left behind was still served
+            self._dropped = True  # only what the program left behind was still served
         elif number != signal.SIGINT:
             self._program.send(number)
 
-    def _end(self) -> None:
-        self._ended = True
-        self.on_end()
-
-    def _transfer(self, adapter: I2cAdapter) -> None:
-        kernel = self._bus.kernel
-        end_ns = time.monotonic_ns() + int(SLICE_S * NS_PER_S)
-        limit_ps = None if self._fast else self.clock_ns() * PS_PER_NS + AHEAD_PS
-        while adapter.busy and time.monotonic_ns() < end_ns:
-            if limit_ps is not None and (kernel.horizon() or 0) > limit_ps:
-                break
-            kernel.step()
-        while kernel.horizon() == kernel.now:  # what is left of them
-            kernel.step()
-        if adapter.holding:
-            adapter.release(self.clock_ns() * PS_PER_NS)
-
-    def _await_next(self, adapter: I2cAdapter) -> None:
-        """Virtual time stands still for a moment: most programs call again at once."""
-        end_ns = time.monotonic_ns() + TURNAROUND_NS
-        while not adapter.busy and (left_ns := end_ns - time.monotonic_ns()) > 0:
-            wait_until(self.watched(), left_ns)
-            for port in self._ports:
-                port.exchange(self._bus.kernel.now)
-        self._transfer(adapter)
-
     def watched(self) -> list[tuple[int, int]]:
-        return [item for port in self._ports for item in port.watched()]
+        """See Endpoint; ``ports`` are watched by themselves."""
+        return []
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+        if self.ended:
+            self.on_end()
 
     def release_ps(self, count: int) -> int | None:
-        return None if self._bus.adapter is None else self._bus.adapter.release_ps()
+        """See Endpoint."""
+        return None
 
     def close(self) -> None:
         """Release program and supervisor; the bus is the caller's."""
-        self._program.close()
-        if self._supervisor is not None:
-            self._supervisor.close()
+        for port in self.ports:
+            port.close()
 
 
 def _start(

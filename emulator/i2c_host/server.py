@@ -12,11 +12,12 @@ import os
 import select
 import socket
 import stat
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from cubestack.emulator.i2c_host.adapter import I2cAdapter
 from cubestack.emulator.i2c_host.device_file import DeviceFile
-from cubestack.emulator.i2c_host.pacing import poll_all
 from cubestack.emulator.ports.serial_port import PortError
 from cubestack.firmware_model.interface.linux_i2c import (
     LENGTH,
@@ -32,6 +33,7 @@ MAX_CLIENTS = 64
 """Connections at one time; a program takes one, and one for each device file it has open."""
 
 CHUNK_BYTES = 1 << 16
+HUNG_UP = select.EPOLLHUP | select.EPOLLERR
 
 
 class I2cServer:
@@ -63,6 +65,8 @@ class I2cServer:
             raise PortError(f"can not make {path}: {_reason(error)}") from error
         self._socket.listen(MAX_CLIENTS)
         self._socket.setblocking(False)
+        self._poller = select.epoll()
+        self._poller.register(self._socket, select.EPOLLIN)
 
     @property
     def clients(self) -> int:
@@ -71,28 +75,37 @@ class I2cServer:
 
     def watched(self) -> list[tuple[int, int]]:
         """See Endpoint."""
-        own = [(self._socket.fileno(), select.POLLIN)] if len(self._clients) < MAX_CLIENTS else []
-        return own + [(fileno, client.events) for fileno, client in self._clients.items()]
+        return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint; answers go out at the end of their transfer, whenever that is."""
-        for fileno, events in poll_all(self.watched()):
+        for fileno, events in self._poller.poll(0):
             client = self._clients.get(fileno)
             if client is None:
                 self._accept()
                 continue
-            client.exchange(hung_up=bool(events & (select.POLLHUP | select.POLLERR)))
+            client.exchange(hung_up=bool(events & HUNG_UP))
             if client.gone:
-                client.close()
-                del self._clients[fileno]
+                self._drop(fileno)
 
     def _accept(self) -> None:
         try:
             connection, _ = self._socket.accept()
         except OSError:  # gone again
             return
-        client = _Client(connection, self._adapter, self._files)
-        self._clients[connection.fileno()] = client
+        fileno = connection.fileno()
+        self._poller.register(fileno, select.EPOLLIN)
+        self._clients[fileno] = _Client(
+            connection, self._adapter, self._files, partial(self._poller.modify, fileno)
+        )
+        if len(self._clients) == MAX_CLIENTS:
+            self._poller.unregister(self._socket)
+
+    def _drop(self, fileno: int) -> None:
+        if len(self._clients) == MAX_CLIENTS:
+            self._poller.register(self._socket, select.EPOLLIN)
+        self._poller.unregister(fileno)
+        self._clients.pop(fileno).close()
 
     def release_ps(self, count: int) -> int | None:
         """See Endpoint; nothing waits here for its time."""
@@ -103,6 +116,7 @@ class I2cServer:
         for client in self._clients.values():
             client.close()
         self._clients.clear()
+        self._poller.close()
         self._socket.close()
         with contextlib.suppress(FileNotFoundError):
             os.unlink(self.name)
@@ -112,31 +126,36 @@ class _Client:
     """One connection, with the file that it stands for."""
 
     def __init__(
-        self, connection: socket.socket, adapter: I2cAdapter, files: dict[int, DeviceFile]
+        self,
+        connection: socket.socket,
+        adapter: I2cAdapter,
+        files: dict[int, DeviceFile],
+        watch: Callable[[int], None],
     ) -> None:
+        """Serve ``connection``, which is watched for input; ``watch`` gets other events."""
         self._socket = connection
         self._socket.setblocking(False)
         self._files = files
         self._file = DeviceFile(adapter)
+        self._watch = watch
+        self._watched: int = select.EPOLLIN
         self._key = 0
         self._received = bytearray()
         self._unsent = bytearray()
         self._waiting = False
         self.gone = False
 
-    @property
-    def events(self) -> int:
-        """While an answer is due only its end, a hang-up, is of interest."""
-        if self._unsent:
-            return select.POLLOUT
-        return 0 if self._waiting else select.POLLIN
-
     def exchange(self, *, hung_up: bool) -> None:
-        """Send what was left, then take the next call."""
+        """Send what was left, then take the next call.
+
+        While an answer is due or unsent nothing is taken; input that comes nevertheless is not
+        watched for from then on.
+        """
         if self._unsent:
             self._send(b"")
         if self._waiting or self._unsent:
             self.gone = self.gone or hung_up
+            self._watch_for(select.EPOLLOUT if self._unsent else 0)
             return
         received = False
         while not (self._waiting or self._unsent or self.gone):
@@ -145,6 +164,13 @@ class _Client:
             if received or not self._receive():
                 break
             received = True  # once: a client that asks as fast as it is answered is not alone
+        if not self._waiting:
+            self._watch_for(select.EPOLLOUT if self._unsent else select.EPOLLIN)
+
+    def _watch_for(self, events: int) -> None:
+        if events != self._watched and not self.gone:
+            self._watched = events
+            self._watch(events)
 
     def _receive(self) -> bool:
         """Read what is there; returns whether anything came."""
@@ -191,6 +217,9 @@ class _Client:
         self._waiting = False
         if not self.gone:
             self._send(LENGTH.pack(len(data)) + data)
+            # There is room to write, so with a further call here it is looked at again at once.
+            more = self._unsent or self._received
+            self._watch_for(select.EPOLLOUT if more else select.EPOLLIN)
 
     def _send(self, data: bytes) -> None:
         self._unsent += data

@@ -85,8 +85,8 @@ class Supervisor:
         self._files = files
         self._opened: dict[int, tuple[OpenFile, socket.socket]] = {}
         self._transfers = 0
-        self._poller = select.poll()
-        self._poller.register(listener.fd, select.POLLIN)
+        self._poller = select.epoll()
+        self._poller.register(listener.fd, select.EPOLLIN)
         named = self._by_path() | self._by_descriptor()
         self._handlers = {
             number: named[name] for name, number in abi.calls.items() if name in named
@@ -94,10 +94,7 @@ class Supervisor:
 
     def watched(self) -> list[tuple[int, int]]:
         """See Endpoint."""
-        if self.ended:
-            return []
-        ends = [(end.fileno(), 0) for _, end in self._opened.values()]
-        return [(self._listener.fd, select.POLLIN), *ends]
+        return [] if self.ended else [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
         """See Endpoint; answers go out at the end of their transfer, whenever that is."""
@@ -105,7 +102,7 @@ class Supervisor:
             for fd, events in ready:
                 if fd != self._listener.fd:
                     self._forget(fd)
-                elif not events & select.POLLIN:
+                elif not events & select.EPOLLIN:
                     self.ended = True
                 elif (call := self._listener.receive()) is not None:
                     self._handle(call)
@@ -121,6 +118,7 @@ class Supervisor:
         for file, end in self._opened.values():
             end.close()
             file.close()
+        self._poller.close()
         os.close(self._listener.fd)
 
     def _forget(self, fd: int) -> None:
@@ -212,7 +210,7 @@ class Supervisor:
             mine.shutdown(socket.SHUT_RD)
             theirs.setblocking(False)
             self._opened[os.fstat(theirs.fileno()).st_ino] = file, mine
-            self._poller.register(mine, 0)
+            self._poller.register(mine, 0)  # only for its hang-up
             self._listener.answer_with_descriptor(
                 call, theirs.fileno(), number, close_on_exec=close_on_exec
             )

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from cubestack.emulator.i2c_host.elf import is_static
 from cubestack.emulator.i2c_host.shim import find_c_compiler
 
+TIMEOUT_S = 120
+
 
 @pytest.mark.parametrize("static", [True, False])
 def test_compiled_programs(tmp_path, static):
@@ -20,7 +22,8 @@ def test_compiled_programs(tmp_path, static):
     source, program = tmp_path / "program.c", tmp_path / "program"
     source.write_text("int main(void) { return 0; }\n")
     options = ["-static"] if static else []
-    if subprocess.run([*compiler, *options, "-o", program, source], capture_output=True).returncode:
+    command = [*compiler, *options, "-o", program, source]
+    if subprocess.run(command, capture_output=True, timeout=TIMEOUT_S).returncode:
         pytest.skip("no static C library here")
     assert is_static(program) is static
 

@@ -77,6 +77,16 @@ def test_clients_take_turns_by_whole_transfers(served, registers):
     assert all(t[0] == t[1] == t[2] and t[3] == -1 for t in transfers)
 
 
+def test_calls_that_come_together(served):
+    """All but the first are read before their turn."""
+    client = served.connect()
+    served.ask(client, Call.IOCTL, SLAVE)
+    data = request(0, Call.READ, pack_read(1))
+    client.socket.sendall((LENGTH.pack(len(data)) + data) * 3)
+    served.serve()
+    assert [client.receive() for _ in range(3)] == [(1, b"\0"), (1, b"\1"), (1, b"\2")]
+
+
 def test_largest_transfer(served):
     client = served.connect()
     messages = [RdwrMessage(0x1A, 1, 8192)] * 42
@@ -123,7 +133,7 @@ class Babbler:
 
 def test_a_client_that_never_pauses_is_left_for_the_next(adapter):
     babbler = Babbler()
-    client = _Client(babbler, adapter, {})
+    client = _Client(babbler, adapter, {}, lambda _events: None)
     client.exchange(hung_up=False)
     client.exchange(hung_up=False)
     assert babbler.looks == 2
