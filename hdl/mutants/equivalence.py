@@ -62,9 +62,8 @@ _NARROW_BITS = 4
 #: Counterexamples looked for at once.
 _GROUPS = 12
 
-#: Steps of a counterexample at most; a clock takes two. Seconds for it at most.
-STEPS = 120
-LIMIT = 60
+#: Steps of a counterexample, at most and before more is guessed; a clock takes two.
+STEPS, SOON = 40, 16
 
 _UNRESET = ("$dff", "$dffe")
 _MODEL = re.compile(r"^ +(\d+) \\(guess\d+) .* ([01]+) *$", re.MULTILINE)
@@ -129,11 +128,12 @@ class Equivalence:
         start = time.monotonic()
         common = [self._same(name, n) for name, width in self._wires.items() for n in range(width)]
         equal = self._pins in self._kept(mutant, [self._pins, *common], [])
-        if not equal:
+        steps = None if equal else self._counterexample(mutant, SOON)
+        if not equal and steps is None:
             if self._invariants is None:
                 self._invariants = self._kept(None, self._guesses(), [])
             equal = self._pins in self._kept(mutant, [self._pins, *common], self._invariants)
-        steps = None if equal else self._counterexample(mutant)
+            steps = None if equal else self._counterexample(mutant, STEPS)
         return Verdict(equal, steps, time.monotonic() - start)
 
     def _same(self, wire: str, bit: int) -> str:
@@ -209,10 +209,10 @@ class Equivalence:
                 wrong |= {offset + n for n, bit in enumerate(bits[::-1]) if bit == "0"}
         return wrong
 
-    def _counterexample(self, mutant: Mutant) -> int | None:
-        """Steps from standby to a difference at the pins."""
+    def _counterexample(self, mutant: Mutant, most: int) -> int | None:
+        """Steps from standby to a difference at the pins; None when there is none in ``most``."""
         call = (
-            f"sat -tempinduct-baseonly -maxsteps {STEPS} -timeout {LIMIT} "
+            f"sat -tempinduct-baseonly -maxsteps {most} "
             "-set-at 1 standby 1 -set-at 1 retained 1 -prove all 1 -show all"
         )
         report = self._run(mutant, [[self._pins]], [], [call])

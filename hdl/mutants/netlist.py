@@ -68,8 +68,8 @@ class Netlist:
 
     @property
     def digest(self) -> str:
-        """Of the text, in hexadecimal digits."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
+        """Of the text without places in the source, in hexadecimal digits."""
+        return hashlib.sha256(_SOURCE.sub("", self.text).encode()).hexdigest()
 
 
 class Mutant(NamedTuple):

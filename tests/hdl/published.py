@@ -1,18 +1,22 @@
 """The next version's boards behind the published board's pins, so that its benches run on them.
 
-The bus rests, so nothing is read. Around a module ``dut``: the board.
+The bus rests, so nothing is read.
 """
 
-from amaranth.hdl import Cat, Fragment, Instance, Module, Mux, Signal
+from amaranth.hdl import Cat, Const, Fragment, Instance, Module, Mux, Signal
 from amaranth.lib.wiring import Component, In, SignatureMembers
 
 from cubestack.hdl.cubestar_double_top import CubeStarDouble
 from cubestack.hdl.cubestar_shared_top import CubeStarShared
 from cubestack.hdl.cubestar_top import CubeStarTop
 
-__all__ = ["DoubleAsPublished", "SharedAsPublished"]
+__all__ = ["AsPublished", "DoubleAsPublished", "SharedAsPublished"]
 
-_BUS_RESTS = {"AD_HIGH": 0, "AD_LOW_I": 0, "ALE": 0, "CS_N": 1, "RE_N": 1, "WE_N": 1}
+_BUS_RESTS = {
+    **dict.fromkeys(("AD_HIGH", "AD_LOW_I"), Const(0, 8)),
+    "ALE": Const(0),
+    **dict.fromkeys(("CS_N", "RE_N", "WE_N"), Const(1)),
+}
 
 
 def _ports(board: Component) -> SignatureMembers:
@@ -20,7 +24,15 @@ def _ports(board: Component) -> SignatureMembers:
     return board.signature.members
 
 
-class SharedAsPublished(CubeStarTop):
+class AsPublished(CubeStarTop):
+    """Around a board that is a module named ``board``."""
+
+    def __init__(self, columns: int, rows: int, board: str = "board") -> None:
+        super().__init__(columns, rows)
+        self._board = board
+
+
+class SharedAsPublished(AsPublished):
     """One SRAM: all other pins are the same ones."""
 
     def elaborate(self, platform: object) -> Module:
@@ -28,7 +40,7 @@ class SharedAsPublished(CubeStarTop):
         levels = {name: getattr(self, name) for name in self.signature.members} | _BUS_RESTS
         members = _ports(CubeStarShared(self.columns, self.rows))
         m.submodules.board = Instance(
-            "dut",
+            self._board,
             **{
                 f"{'i' if member.flow is In else 'o'}_{name}": levels[name]
                 for name, member in members.items()
@@ -38,7 +50,7 @@ class SharedAsPublished(CubeStarTop):
         return m
 
 
-class DoubleAsPublished(CubeStarTop):
+class DoubleAsPublished(AsPublished):
     """Two SRAMs: a memory is a bank. RNW falls when storing begins, which latches INTO."""
 
     def elaborate(self, platform: object) -> Module:
@@ -71,7 +83,7 @@ class DoubleAsPublished(CubeStarTop):
             self.SRAM_WE_N.eq(first["WE_N"] & second["WE_N"]),
         ]
         m.submodules.board = Instance(
-            "dut",
+            self._board,
             **{
                 f"{'i' if member.flow is In else 'o'}_{name}": ports[name]
                 for name, member in members.items()

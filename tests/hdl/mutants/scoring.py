@@ -85,13 +85,13 @@ class Scoring:
             chunk = self.mutants[start : start + CHUNK]
             bench: _Bench | None = None
             for number, mutant in enumerate(chunk, 1):
-                found = done.get(str(mutant))
+                found = done.get(mutant.command())
                 if found is None:
                     bench = bench or self._bench(chunk)
                     found = bench.simulated(number, mutant)
                     if found.outcome == "survived":
                         found = self._judged(mutant, found)
-                    self._keep(found)
+                    self._keep(mutant, found)
                 yield found
 
     def _bench(self, chunk: Sequence[Mutant]) -> "_Bench":
@@ -114,15 +114,18 @@ class Scoring:
         entries: list[dict[str, Any]] = [
             json.loads(line) for line in self._file.read_text(encoding="utf-8").splitlines()
         ]
-        results = [
-            Result(**{key: value for key, value in entry.items() if key != "netlist"})
+        return {
+            entry["command"]: Result(**entry["result"])
             for entry in entries
-            if entry["netlist"] == self._netlist.digest
-        ]
-        return {result.mutant: result for result in results if result.outcome != "survived"}
+            if entry["netlist"] == self._netlist.digest and entry["result"]["outcome"] != "survived"
+        }
 
-    def _keep(self, result: Result) -> None:
-        entry = {"netlist": self._netlist.digest, **asdict(result)}
+    def _keep(self, mutant: Mutant, result: Result) -> None:
+        entry = {
+            "netlist": self._netlist.digest,
+            "command": mutant.command(),
+            "result": asdict(result),
+        }
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
 

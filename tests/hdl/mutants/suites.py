@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
-from published import DoubleAsPublished, SharedAsPublished
+from published import AsPublished, DoubleAsPublished, SharedAsPublished
 from regression import TIERS, frame_environment
 
 from cubestack.hdl.matrix_counter import MatrixCounter
@@ -73,32 +73,53 @@ def _suite(
     wrapper: tuple[str, Callable[[], Component]] | None = None,
 ) -> Suite:
     tier = TIERS[name]
-    environment = {**frame_environment(tier.columns, tier.rows), **tier.environment}
+    environment = {
+        **frame_environment(tier.columns, tier.rows),
+        **tier.environment,
+        "BENCH": BENCHES[name],
+        "HDL_COVERAGE": "",  # what a wrong design reaches counts for nothing
+    }
     return Suite(tier.make, stages, environment, standby, kept, wrapper)
 
 
-def _next(name: str, wrapped: type[Component], standby: Mapping[str, int]) -> Suite:
+def _next(name: str, wrapped: type[AsPublished], standby: Mapping[str, int]) -> Suite:
     """A board of the next version: its own benches, and the published board's of storing."""
     tier = TIERS[name]
+    published = ("benches_store", "benches_borders")
     return _suite(
         name,
         *_seeds(tier.modules, 1),
-        *_seeds(("benches_store",), 1, "published"),
-        *_seeds(tier.modules, 3)[1:],
-        *_seeds(("benches_store",), 2, "published")[1:],
+        *_seeds(published, 1, "published"),
+        *_seeds((*tier.modules, "benches_any_top"), 3)[1:],
+        *_seeds(published, 2, "published")[1:],
         standby=standby,
-        wrapper=("published", lambda: wrapped(tier.columns, tier.rows)),
+        wrapper=("published", lambda: wrapped(tier.columns, tier.rows, "dut")),
     )
 
 
+#: The tops' benches, for what is the same for all of them.
+BENCHES = {
+    "cubestar": "bench:Bench",
+    "cubestar-shared": "bench_next:SharedBench",
+    "cubestar-double": "bench_next:DoubleBench",
+    "cubesense-pair": "pair:PairBench",
+}
+
 #: By name: tops as in ``cubestack.hdl.designs``, and a block that is done in seconds.
 SUITES = {
-    "cubestar": _suite("cubestar", *_seeds(TIERS["cubestar"].modules, 3), standby={"ENABLE": 0}),
+    "cubestar": _suite(
+        "cubestar",
+        *_seeds(TIERS["cubestar"].modules, 1),
+        *_seeds((*TIERS["cubestar"].modules, "benches_borders", "benches_any_top"), 3)[1:],
+        standby={"ENABLE": 0},
+    ),
     "cubestar-shared": _next("cubestar-shared", SharedAsPublished, {"ENABLE": 0}),
     "cubestar-double": _next("cubestar-double", DoubleAsPublished, {"ENABLE": 0}),
     "cubesense-pair": _suite(
         "cubesense-pair",
-        *_seeds(TIERS["cubesense-pair"].modules, 2),
+        *_seeds(TIERS["cubesense-pair"].modules, 1),
+        *_seeds(("benches_pair_borders",), 1),
+        *_seeds((*TIERS["cubesense-pair"].modules, "benches_any_top"), 2)[1:],
         standby={"SUNEN": 1, "NADEN": 1},
         kept=("sun", "nadir"),
     ),
