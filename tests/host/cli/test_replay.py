@@ -9,6 +9,7 @@ import pytest
 from cubestack.emulator.rtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.host.cli import replay
 from cubestack.host.cli.boards import open_board
 from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.main import main
@@ -100,6 +101,22 @@ def test_a_session_says_how_it_was_made(session, capsys, tmp_path):
     assert "no difference" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("device", "commands"),
+    [
+        ("cubestar", "write CaptureAndProcess; read Quaternion; write 21 16 9; dump"),
+        ("aramis", "write Activate; write GetAttitude; time 2; dump; fault memory-flip; dump"),
+    ],
+)
+def test_a_session_of_each_device_replays(tmp_path, capsys, device, commands):
+    made = str(tmp_path / "session.rec")
+    assert main(["shell", f"emulated:{device}", "--record", made, "-c", commands]) == 0
+    assert main(["replay", made]) == 0
+    output = capsys.readouterr()
+    assert "no difference" in output.out
+    assert output.err == ""
+
+
 def test_what_is_not_as_it_was_is_told(session, capsys, tmp_path):
     made, scenes, _ = session
     (tmp_path / "plan.toml").write_text("seed = 1\n")
@@ -118,15 +135,13 @@ def test_what_is_not_as_it_was_is_told(session, capsys, tmp_path):
     assert capsys.readouterr().err == ""
 
 
-def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys):
+def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys, monkeypatch):
     plan = tmp_path / "plan.toml"
     plan.write_text('seed = 9\n[[fault]]\nkind = "uart-drop"\nrate = 0.2\n')
     made = tmp_path / "a.rec"
     args = argparse.Namespace(record=made, trace=None)
     with ExitStack() as stack:
-        opened = open_board(
-            "cubesense", None, seed=3, engine="auto", baud=9600, mcu_addressing=True
-        )
+        opened = open_board("cubesense", None, seed=3, engine="auto", baud=9600)
         stack.callback(opened.board.close)
         inject_plan(opened.board.faults, plan)
         setup = emulated_setup(3, None, plan, {"mcu_addressing": True})
@@ -136,7 +151,15 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys):
             line.write(b"\x1f\x7f\x80\x1f\xff")
             line.read(100, 0.1)
     plan.unlink()
+    options = []
+
+    def with_usual_fpgas(*arguments, mcu_addressing, **others):  # the others take long to compile
+        options.append(mcu_addressing)
+        return open_board(*arguments, **others)
+
+    monkeypatch.setattr(replay, "open_board", with_usual_fpgas)
     assert main(["replay", str(made)]) == 0
+    assert options == [True]
     assert "no difference" in capsys.readouterr().out
     changed = made.read_text().replace("seed = 9", "seed = 8")
     made.write_text(changed)
