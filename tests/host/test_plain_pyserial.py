@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+TIMEOUT_S = 60
 EXAMPLE = Path(__file__).parents[2] / "examples" / "plain_pyserial.py"
 
 
@@ -17,19 +18,24 @@ def run_against(uart: Any) -> "subprocess.CompletedProcess[str]":
 
     def serve(server: socket.socket) -> None:
         connection = server.accept()[0]
+        connection.settimeout(TIMEOUT_S)
         with connection:
             while data := connection.recv(1000):
                 uart.write(data)
                 connection.sendall(uart.read(1000, 0.0))
 
     with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(TIMEOUT_S)  # a program that never calls must not keep the thread
         thread = threading.Thread(target=serve, args=(server,))
         thread.start()
         target = f"socket://127.0.0.1:{server.getsockname()[1]}"
         result = subprocess.run(
-            [sys.executable, str(EXAMPLE), target], capture_output=True, text=True, timeout=60
+            [sys.executable, str(EXAMPLE), target],
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
         )
-        thread.join()
+        thread.join(TIMEOUT_S)
     return result
 
 

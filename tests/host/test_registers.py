@@ -17,6 +17,7 @@ from cubestack.host.registers import FORMATS, render
 DOCUMENTS = Path(__file__).parents[2] / "docs"
 DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+TIMEOUT_S = 120
 
 PROGRAM = """
 #include <stdio.h>
@@ -69,8 +70,10 @@ def compile_and_run(folder: Path, interface: Interface, program: str, data: byte
     (folder / "main.c").write_text(program)
     flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]
     command = [str(COMPILER), *flags, "main.c", "-o", "main"]
-    subprocess.run(command, cwd=folder, check=True)
-    run = subprocess.run([folder / "main"], input=data, stdout=subprocess.PIPE, check=True)
+    subprocess.run(command, cwd=folder, check=True, timeout=TIMEOUT_S)
+    run = subprocess.run(
+        [folder / "main"], input=data, stdout=subprocess.PIPE, check=True, timeout=TIMEOUT_S
+    )
     return run.stdout.decode().splitlines()
 
 

@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -100,7 +101,10 @@ class Served:
             env=os.environ | {"COLUMNS": "200"},  # its message on one line
         )
         assert self.process.stderr is not None
+        watch = threading.Timer(START_TIMEOUT_S, self.process.kill)
+        watch.start()
         line = self.process.stderr.readline()
+        watch.cancel()
         if " serves on " not in line:
             self.end()
         assert " serves on " in line, line

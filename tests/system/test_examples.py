@@ -15,6 +15,7 @@ from cubestack.host.cli.emulated_device import open_cubestar_device
 
 HERE = Path(__file__).parents[2] / "examples"
 PLUGIN = "cubestack.host.cli.pytest_plugin"
+TIMEOUT_S = 120
 
 
 @pytest.fixture
@@ -32,7 +33,8 @@ def flight_driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("no C compiler")
     program = tmp_path_factory.mktemp("flight") / "flight_driver"
     flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1"]
-    subprocess.run([compiler, *flags, "-o", program, HERE / "flight_driver.c"], check=True)
+    command = [compiler, *flags, "-o", program, HERE / "flight_driver.c"]
+    subprocess.run(command, check=True, timeout=TIMEOUT_S)
     return program
 
 
@@ -69,7 +71,9 @@ def test_flight_driver_with_a_dead_camera(device: Any, flight_driver: Path) -> N
 
 
 def test_flight_driver_without_a_port(flight_driver: Path) -> None:
-    done = subprocess.run([flight_driver, "/nowhere"], capture_output=True, text=True)
+    done = subprocess.run(
+        [flight_driver, "/nowhere"], capture_output=True, text=True, timeout=TIMEOUT_S
+    )
     assert (done.returncode, done.stderr) == (1, "flight_driver: No such file or directory\n")
 
 
@@ -103,7 +107,7 @@ def test_suite_of_a_driver(tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=TIMEOUT_S,
     )
     assert done.returncode == 0, done.stdout
     assert "5 passed" in done.stdout

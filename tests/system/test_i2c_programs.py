@@ -64,7 +64,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     thread.start()
     yield path
     pump.stop()
-    thread.join()
+    thread.join(TIMEOUT_S)
     server.close()
     board.close()
 
@@ -249,7 +249,8 @@ def test_a_c_program(run: Run, route: str, tmp_path: Path, link: str) -> None:
     compiler = find_c_compiler()
     assert compiler is not None
     options = [link] if link == "-static" else []
-    built = subprocess.run([*compiler, *options, "-o", program, CLIENT], capture_output=True)
+    command = [*compiler, *options, "-o", program, CLIENT]
+    built = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S)
     if built.returncode and link == "-static":
         pytest.skip("no static C library here")
     assert built.returncode == 0, built.stderr
@@ -351,7 +352,10 @@ def test_a_signal_to_the_command_goes_to_the_program(route: str, served: Path) -
         stdout=subprocess.PIPE,
     ) as process:
         assert process.stdout is not None
+        watch = threading.Timer(TIMEOUT_S, process.kill)
+        watch.start()
         assert process.stdout.readline() == b"ready\n"
+        watch.cancel()
         process.terminate()
         assert process.wait(TIMEOUT_S) == 33
 

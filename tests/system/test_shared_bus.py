@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from cubestack.host.targets import INTERFACES, open_target
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
+START_TIMEOUT_S = 120
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
 BUS = 16 + os.getpid() % 200
 ADDRESSES = [interface.i2c_address for interface in INTERFACES.values()]
@@ -42,10 +44,13 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         )
         assert process.stdout is not None
         lines = []
+        watch = threading.Timer(START_TIMEOUT_S, process.kill)
+        watch.start()
         for line in process.stdout:
             lines.append(line)
             if socket_path(BUS).exists():
                 break
+        watch.cancel()
         try:
             assert socket_path(BUS).exists(), "".join(lines)
             yield

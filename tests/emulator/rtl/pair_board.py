@@ -27,6 +27,7 @@ SIZES = (
 )
 
 STROBE_PERIOD = 100_000
+TIMEOUT_S = 300
 SETTLED = 50_000
 """From an enable to the first data clock: the SRAM's access time, and more."""
 
@@ -172,7 +173,7 @@ class IcarusPair:
         command = ["iverilog", "-g2005", "-s", "pair_bench", "-o", "bench.vvp"]
         command += [f"-Ppair_bench.{name}={value}" for name, value in parameters.items()]
         command += [str(Path(__file__).with_name("pair_bench.v")), "top.v"]
-        subprocess.run(command, cwd=folder, check=True)
+        subprocess.run(command, cwd=folder, check=True, timeout=TIMEOUT_S)
 
     def run(
         self, cameras: dict[str, ListCamera], commands: Sequence[Command]
@@ -192,7 +193,13 @@ class IcarusPair:
         (folder / "commands.txt").write_text(
             "".join(f"{time} {COMMANDS.index(name)} {value}\n" for time, name, value in commands)
         )
-        subprocess.run(["vvp", "-n", "bench.vvp"], cwd=folder, check=True, capture_output=True)
+        subprocess.run(
+            ["vvp", "-n", "bench.vvp"],
+            cwd=folder,
+            check=True,
+            capture_output=True,
+            timeout=TIMEOUT_S,
+        )
         sun, nadir, data = (
             read_hex(folder / name) for name in ("sun_memory.hex", "nadir_memory.hex", "data.hex")
         )

@@ -14,6 +14,8 @@ from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
 from cubestack.hdl.cubestar_top import CubeStarTop
 
+TIMEOUT_S = 300
+
 needs_compiler = pytest.mark.skipif(build.find_compiler() is None, reason="no C++ compiler")
 
 
@@ -99,7 +101,7 @@ def test_two_processes_may_build_at_once(cache):
         subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
         for _ in range(2)
     ]
-    assert [process.communicate()[0] for process in started] == ["1\n", "1\n"]
+    assert [process.communicate(timeout=TIMEOUT_S)[0] for process in started] == ["1\n", "1\n"]
     assert not [path for path in cache.iterdir() if path.is_dir()]
 
 

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 STROBE_PERIOD = 1_000_000
+TIMEOUT_S = 300
 COMMANDS = ("ENABLE", "RNW", "BANK", "strobe")
 Command = tuple[int, str, int]
 
@@ -52,14 +53,18 @@ class IcarusBoard:
         command = ["iverilog", "-g2005", "-s", "bench", "-o", "bench.vvp"]
         command += [f"-Pbench.{name}={value}" for name, value in parameters.items()]
         command += [str(Path(__file__).with_name("bench.v")), "top.v"]
-        subprocess.run(command, cwd=folder, check=True)
+        subprocess.run(command, cwd=folder, check=True, timeout=TIMEOUT_S)
 
     def run(self, commands: Sequence[Command]) -> Outcome:
         (self._folder / "commands.txt").write_text(
             "".join(f"{time} {COMMANDS.index(name)} {value}\n" for time, name, value in commands)
         )
         subprocess.run(
-            ["vvp", "-n", "bench.vvp"], cwd=self._folder, check=True, capture_output=True
+            ["vvp", "-n", "bench.vvp"],
+            cwd=self._folder,
+            check=True,
+            capture_output=True,
+            timeout=TIMEOUT_S,
         )
         return Outcome(
             read_hex(self._folder / "sram.hex"),

@@ -13,6 +13,7 @@ from cubestack.emulator.sram import RULES, Sram, SramPins, SramTiming, Violation
 
 SIZE = 16
 COMPILER = build.find_compiler()
+TIMEOUT_S = 300
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,7 @@ def library(tmp_path_factory) -> ctypes.CDLL:
     include = f"-I{Path(build.__file__).parent}"
     source = Path(__file__).with_name("sram_harness.cpp")
     command = [*COMPILER.command, *build.FLAGS, include, str(source), "-o", str(target)]
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, timeout=TIMEOUT_S)
     library = ctypes.CDLL(str(target))
     long, flag = ctypes.c_int64, ctypes.c_bool
     library.sram_new.restype = ctypes.c_void_p
