@@ -4,12 +4,13 @@ CubeStar thesis, options 1 to 3 of section 3.3, and section 7.2.
 """
 
 from enum import Enum
+from typing import Never
 
 __all__ = ["Layout"]
 
 
 class Layout(Enum):
-    """A layout; its value is its name on the command line."""
+    """A layout; its value is its name on the command line. ValueError for another name."""
 
     COPIED = "1"
     """Option 1, the published one: an SRAM for the FPGA, one for the processor."""
@@ -22,3 +23,8 @@ class Layout(Enum):
 
     TWO_BOARDS = "two-boards"
     """Section 7.2: two boards of option 2 on one bus, in turn."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> Never:
+        names = ", ".join(layout.value for layout in cls)
+        raise ValueError(f"{value!r} is none of the layouts {names}")

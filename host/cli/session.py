@@ -63,9 +63,8 @@ def layout_of(text: str) -> Layout:
     """Type of a layout."""
     try:
         return Layout(text)
-    except ValueError:
-        names = ", ".join(layout.value for layout in Layout)
-        raise argparse.ArgumentTypeError(f"{text!r} is none of {names}") from None
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def tell_layout(layout: Layout, tell: Callable[[str], None]) -> None:

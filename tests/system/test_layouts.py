@@ -1,17 +1,21 @@
 """CubeStar's further memory layouts, whole: the host sees what it sees of the published one."""
 
+import io
 import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from cubestack.emulator.cubestar_layouts import fpga_of
+from cubestack.emulator.probes import firmware_probes
 from cubestack.emulator.sky.attitude import quaternion_from_pointing
 from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.trace import VcdTrace
 from cubestack.firmware_model.interface.cubestar_codes import (
     ImageBlockSize,
     MemoryTest,
@@ -290,7 +294,7 @@ def test_the_commands_say_what_can_not_be_built(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("measure", "cubestar", "--layout", "4"), "'4' is none of 1, 2, 3, two-boards"),
+        (("measure", "cubestar", "--layout", "4"), "'4' is none of the layouts 1, 2, 3, two-boards"),
         (("emulate", "cubesense", "--tcp", "0", "--layout", "2"), "option of cubestar, not of"),
     ],
 )
@@ -305,3 +309,38 @@ def test_other_layouts_are_refused_in_one_line(
     assert code == 2
     assert text in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(("layout", "code"), [("two-boards", 0), ("9", 2)])
+def test_a_recording_says_which_layout_it_is_of(
+    layout: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.rec"
+    setup = {"version": "0.1.0", "seed": 0, "options": {"layout": layout}}
+    header = {"recording": 1, "device": "cubestar", "lines": {"uart": 57600}, "setup": setup}
+    path.write_text(json.dumps(header) + "\n", encoding="utf-8")
+    assert main(["replay", str(path)]) == code
+    if code:
+        assert "'9' is none of the layouts 1, 2, 3, two-boards" in capsys.readouterr().err
+
+
+def test_a_trace_shows_the_bus(node: Session) -> None:
+    stream = io.StringIO()
+    board = node.board
+    trace = VcdTrace(
+        stream,
+        "cubestar",
+        board.kernel,
+        {"uart": board.uart},
+        board.engine,
+        firmware_probes(board),
+    )
+    node.cubestar.capture()
+    blocks(node, range(3))
+    trace.close()
+    lines = stream.getvalue().splitlines()
+    symbols = {line.split()[4]: line.split()[3] for line in lines if line.startswith("$var")}
+    for pin in ("ALE", "RE_N", "AD_HIGH"):
+        assert pin in symbols
+    changes = [line for line in lines if line.endswith(f" {symbols['AD_HIGH']}")]
+    assert len(changes) > 1
