@@ -294,7 +294,7 @@ def test_the_commands_say_what_can_not_be_built(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("measure", "cubestar", "--layout", "4"), "'4' is none of the layouts 1, 2, 3, two-boards"),
+        (("measure", "cubestar", "--layout", "4"), "'4' is none of the layouts 1, 2, 3"),
         (("emulate", "cubesense", "--tcp", "0", "--layout", "2"), "option of cubestar, not of"),
     ],
 )
