@@ -65,7 +65,8 @@ _GROUPS = 12
 #: Steps of a counterexample, at most and before more is guessed; a clock takes two.
 STEPS, SOON = 40, 16
 
-_UNRESET = ("$dff", "$dffe")
+#: Registers that a level resets; Yosys takes other resets for a part of the next state.
+_RESET = ("$adff", "$adffe")
 _MODEL = re.compile(r"^ +(\d+) \\(guess\d+) .* ([01]+) *$", re.MULTILINE)
 
 
@@ -104,7 +105,7 @@ class Equivalence:
         self._standby = " & ".join(f"\\{n} == {level}" for n, level in standby.items())
         self._pins = " & ".join(self._pin_is_same(pin) for pin in pins if pin.level_out)
         registers: dict[int, bool] = {
-            bit: cell["type"] in _UNRESET
+            bit: cell["type"] not in _RESET
             for cell in module["cells"].values()
             if "dff" in cell["type"]
             for bit in cell["connections"]["Q"]
