@@ -13,6 +13,7 @@ from cubestack.emulator.ports.pump import Pump
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.rtl.build import find_compiler
 from cubestack.firmware_model.interface.linux_i2c import socket_path
+from cubestack.firmware_model.interface.recording import load_recording
 from cubestack.host.cli.boards import open_board
 from cubestack.host.cli.main import main
 
@@ -66,6 +67,7 @@ def shell_on(tmp_path, monkeypatch, capsys):
         if kind.startswith("recorded"):
             made = tmp_path / "session.rec"
             run("i2c" if "i2c" in kind else "tcp", commands, "--record", str(made))
+            assert load_recording(made).setup.target.startswith(("i2c:", "tcp://"))
             code = main(["shell", f"recorded:{made}", "-c", commands])
         elif kind == "emulated":
             code = main(["shell", "emulated:cubesense", "-c", commands, *options])
