@@ -7,7 +7,7 @@ and leave it at any moment with ``standby``, ``check`` the scoreboard.
 
 import random
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from operator import itemgetter
 from typing import Any, ClassVar, Protocol, Self, TypeVar
@@ -17,7 +17,7 @@ import cover_cubestar
 from cocotb.triggers import Event, ReadOnly, RisingEdge, Timer
 from geometry import GEOMETRY
 from instants import EVEN, ODD, now, wait
-from reference import Behaviour, Clock, Controls, Tick, behaviour
+from reference import Behaviour, Clock, Controls, Pulse, Tick, behaviour
 from sram import SLOWEST_ACCESS, Sram
 from timing import ANY, Timing
 
@@ -241,6 +241,32 @@ class Mcu:
         await self.set(ENABLE=0)
 
 
+async def watch(signal: Any, seen: list[tuple[int, int]]) -> None:
+    """Note the time and level whenever a signal has settled at another one."""
+    while True:
+        await signal.value_change
+        await ReadOnly()
+        if int(signal.value) != seen[-1][1]:
+            seen.append((now(), int(signal.value)))
+
+
+def check_stores(
+    camera: Camera, mcu: Mcu, ack: Sequence[tuple[int, int]], pulses: Iterable[Pulse]
+) -> None:
+    """ACK and the write pulses of a board's stores, to the ps, wherever in memory they went.
+
+    Of all its ``pulses`` those count that the camera's clock began: at even ps.
+    """
+    expected = behaviour(GEOMETRY, bytes(2 * GEOMETRY.bank_size), camera.clocks, mcu.controls, ())
+    assert list(ack) == expected.ack
+    own = [pulse for pulse in pulses if pulse.start % 2 == EVEN]
+    assert _positions(own) == _positions(expected.pulses)
+
+
+def _positions(pulses: Iterable[Pulse]) -> list[Pulse]:
+    return [pulse._replace(address=pulse.address % GEOMETRY.bank_size) for pulse in pulses]
+
+
 class Surroundings(Protocol):
     """What the bench of every top can do. A place is one that a picture is stored at."""
 
@@ -290,23 +316,22 @@ class Bench:
         assert outputs(dut) == STANDBY
         bench.sram.start()
         for name in bench._seen:
-            cocotb.start_soon(bench._watch(name))
+            cocotb.start_soon(watch(getattr(dut, name), bench._seen[name]))
         if camera:
             cocotb.start_soon(bench.camera.run())
         return bench
 
-    async def _watch(self, name: str) -> None:
-        seen = self._seen[name]
-        signal = getattr(self.dut, name)
-        while True:
-            await signal.value_change
-            await ReadOnly()
-            if int(signal.value) != seen[-1][1]:
-                seen.append((now(), int(signal.value)))
+    def control(self, place: int) -> Mcu:
+        """Who drives the pins that lead to a place."""
+        return self.mcu
+
+    async def command(self, place: int) -> None:
+        """From standby to storing, without waiting for the camera."""
+        await self.mcu.store(place)
 
     async def store(self, bank: int = 0) -> None:
         """From standby to storing, in time for a frame that is sent from now on."""
-        await self.mcu.store(bank)
+        await self.command(bank)
         await self.camera.reach(len(self.camera.clocks) + 3)  # reset's two, and HSYNC seen low
 
     async def begin(self, place: int, content: bytes) -> None:

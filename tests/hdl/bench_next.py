@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import cocotb
 import cover_cubestar
-from bench import Camera, Mcu, frame, patience, picture
+from bench import Camera, Mcu, check_stores, frame, patience, picture, watch
 from cocotb.triggers import ReadOnly, Timer
 from ebi import Ebi, sram_at, stored
 from geometry import GEOMETRY
@@ -38,6 +38,7 @@ class SharedBench:
         self.camera = Camera(dut, timing)
         self.mcu = Mcu(dut, timing)
         self.bus = Ebi(dut, timing=timing)
+        self._ack = [(0, 0)]
         self.sram = sram_at(dut, "SRAM_", lambda: not int(dut.RNW.value))
         self.bus.situation = self._situation
 
@@ -53,6 +54,7 @@ class SharedBench:
         bench.in_standby()
         bench.sram.start()
         bench.bus.start()
+        cocotb.start_soon(watch(dut.ACK, bench._ack))
         cocotb.start_soon(bench.camera.run())
         return bench
 
@@ -61,9 +63,15 @@ class SharedBench:
         address = self.dut.SRAM_A.value
         assert int(address[GEOMETRY.position_bits - 1 : 0]) == 0, "all but the bank"
 
+    def control(self, place: int) -> Mcu:
+        return self.mcu
+
+    async def command(self, place: int) -> None:
+        await self.mcu.store(place)
+
     async def store(self, bank: int) -> None:
         """From standby to storing, in time for a frame that is sent from now on."""
-        await self.mcu.store(bank)
+        await self.command(bank)
         await self.camera.reach(len(self.camera.clocks) + 3)
 
     async def begin(self, place: int, content: bytes) -> None:
@@ -101,6 +109,7 @@ class SharedBench:
         await Timer(1, unit="ns")
         self.in_standby()
         assert self.sram.edges == len(self.sram.pulses), "a write pulse that was none"
+        check_stores(self.camera, self.mcu, self._ack, self.sram.pulses)
         cover_cubestar.sample(self.camera.clocks, self.camera.period, self.mcu.controls)
 
 
@@ -117,6 +126,7 @@ class DoubleBench:
         pins = {name: getattr(dut, name) for name in ("ENABLE", "RNW", "ACK")}
         self.mcu = Mcu(SimpleNamespace(**pins, BANK=dut.INTO), timing)
         self.bus = Ebi(dut, timing=timing)
+        self._ack = [(0, 0)]
         self.into: int | None = None  # memory that is stored in
         self.srams = [
             sram_at(dut, f"SRAM{n + 1}_", lambda n=n: self.into == n) for n in self.PLACES
@@ -133,6 +143,7 @@ class DoubleBench:
         """The bus has both memories, and the camera's clock runs."""
         bench = cls(dut, timing)
         await Timer(1, unit="ns")
+        cocotb.start_soon(watch(dut.ACK, bench._ack))
         for sram in bench.srams:
             sram.start()
         bench.bus.start()
@@ -145,13 +156,20 @@ class DoubleBench:
         await self.mcu.set(RNW=1)
         await self.mcu.set(ENABLE=1)
 
-    async def store(self, into: int) -> None:
-        """From where the bus has both to storing, in time for a frame that is sent from now on."""
+    def control(self, place: int) -> Mcu:
+        return self.mcu
+
+    async def command(self, place: int) -> None:
+        """From standby, or from where the bus has both."""
         if not self.mcu.controls[-1].enable:
             await self.open()
-        await self.mcu.set(BANK=into)
-        self.into = into
+        await self.mcu.set(BANK=place)
+        self.into = place
         await self.mcu.set(RNW=0)
+
+    async def store(self, into: int) -> None:
+        """To storing, in time for a frame that is sent from now on."""
+        await self.command(into)
         await self.mcu.set(BANK=random.getrandbits(1))
         await self.camera.reach(len(self.camera.clocks) + 3)
 
@@ -190,6 +208,8 @@ class DoubleBench:
         high = [f"SRAM{n}_{name}" for n in (1, 2) for name in ("CE_N", "OE_N", "WE_N")]
         assert {name: int(getattr(self.dut, name).value) for name in high} == dict.fromkeys(high, 1)
         assert all(sram.edges == len(sram.pulses) for sram in self.srams)
+        pulses = sorted(pulse for sram in self.srams for pulse in sram.pulses)
+        check_stores(self.camera, self.mcu, self._ack, pulses)
         cover_cubestar.sample(self.camera.clocks, self.camera.period, self.mcu.controls)
         await Timer(1, unit="ns")
 
@@ -206,6 +226,7 @@ class BoardsBench:
         self.camera = Camera(dut, timing)
         self.bus = Ebi(dut, "BOARD1_CS_N", "BOARD2_CS_N", timing=timing)
         self.mcus, self.srams = [], []
+        self._acks: list[list[tuple[int, int]]] = [[(0, 0)] for _ in self.PLACES]
         for n in self.PLACES:
             board = f"BOARD{n + 1}_"
             pins = {name: getattr(dut, board + name) for name in ("ENABLE", "RNW", "BANK")}
@@ -233,6 +254,8 @@ class BoardsBench:
         bench.bus.start()
         cocotb.start_soon(bench.camera.run())
         cocotb.start_soon(bench._watch_contention())
+        for board, ack in zip((dut.BOARD1_ACK, dut.BOARD2_ACK), bench._acks, strict=True):
+            cocotb.start_soon(watch(board, ack))
         return bench
 
     async def _watch_contention(self) -> None:
@@ -241,9 +264,15 @@ class BoardsBench:
             await ReadOnly()
             assert not int(self.dut.CONTENTION.value), "both boards drive the bus"
 
-    async def store(self, board: int, bank: int = 0) -> None:
+    def control(self, place: int) -> Mcu:
+        return self.mcus[place]
+
+    async def command(self, place: int) -> None:
+        await self.mcus[place].store(0)
+
+    async def store(self, board: int) -> None:
         """From standby to storing, in time for a frame that is sent from now on."""
-        await self.mcus[board].store(bank)
+        await self.command(board)
         await self.camera.reach(len(self.camera.clocks) + 3)
 
     async def begin(self, place: int, content: bytes) -> None:
@@ -274,5 +303,6 @@ class BoardsBench:
         await Timer(1, unit="ns")
         assert not int(self.dut.AD_LOW_OE.value)
         assert all(sram.edges == len(sram.pulses) for sram in self.srams)
-        for mcu in self.mcus:
+        for mcu, sram, ack in zip(self.mcus, self.srams, self._acks, strict=True):
+            check_stores(self.camera, mcu, ack, sram.pulses)
             cover_cubestar.sample(self.camera.clocks, self.camera.period, mcu.controls)

@@ -31,6 +31,7 @@ async def one_stores_while_the_other_is_worked_on(dut: Any) -> None:
         await bench.mcus[storing].standby()
         assert stored(bench.srams[storing]) == new
         content = new
+    await bench.check()
 
 
 @timed_test
@@ -49,6 +50,7 @@ async def address_of_one_board_is_not_taken_by_the_other(dut: Any) -> None:
         else:
             assert await bench.bus.read(address, select) == expected[board][address]
     assert [sram.memory for sram in bench.srams] == expected
+    await bench.check()
 
 
 @timed_test
@@ -73,4 +75,18 @@ async def board_that_has_no_bus_answers_nothing(dut: Any) -> None:
                 assert stored(bench.srams[board]) == content
             assert bench.srams[board].memory[GEOMETRY.bank_size :] == before
             await bench.standby()
+    await bench.check()
+
+
+@timed_test
+async def strobes_together_read(dut: Any) -> None:
+    bench = await BoardsBench.start(dut)
+    before = [bytes(sram.memory) for sram in bench.srams]
+    for board in bench.PLACES:
+        await bench.open(board)
+        address = random.randrange(2 * GEOMETRY.bank_size)
+        byte = await bench.bus.read_and_write(address, f"BOARD{board + 1}_CS_N")
+        assert byte == before[board][address]
+    assert [sram.memory for sram in bench.srams] == before
+    assert not any(sram.edges for sram in bench.srams)
     await bench.check()

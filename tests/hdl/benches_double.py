@@ -45,6 +45,7 @@ async def bus_has_both_memories(dut: Any) -> None:
             assert byte == expected[memory][position]
     assert [sram.memory for sram in bench.srams] == expected
     assert all(sram.edges == len(sram.pulses) for sram in bench.srams)
+    await bench.check()
 
 
 @timed_test
@@ -54,6 +55,7 @@ async def one_is_filled_while_the_other_is_worked_on(dut: Any) -> None:
         content = await begin(bench, into)
         await works_on(bench, 1 - into, 60)
         await bench.finish(into, content)
+    await bench.check()
 
 
 @timed_test
@@ -68,6 +70,7 @@ async def memory_that_is_filled_is_out_of_reach(dut: Any) -> None:
             else:
                 assert await bench.bus.read(address) is None
         await bench.finish(into, content)
+    await bench.check()
 
 
 @timed_test
@@ -80,6 +83,7 @@ async def one_memory_serves_both_in_turn(dut: Any) -> None:
         await bench.finish(good, await begin(bench, good))
         await works_on(bench, good, 20)
         assert int(failed.value)
+    await bench.check()
 
 
 @timed_test
@@ -90,6 +94,7 @@ async def standby_turns_all_off(dut: Any) -> None:
     await bench.check()
     await bench.open()
     await bench.finish(1, await begin(bench, 1))
+    await bench.check()
 
 
 @timed_test
@@ -104,4 +109,17 @@ async def standby_answers_nothing(dut: Any) -> None:
         else:
             assert await bench.bus.read(address) is None
     assert [sram.memory for sram in bench.srams] == before
+    await bench.check()
+
+
+@timed_test
+async def strobes_together_read(dut: Any) -> None:
+    bench = await DoubleBench.start(dut)
+    before = [bytes(sram.memory) for sram in bench.srams]
+    for _ in range(4):
+        memory, position = random.getrandbits(1), random.randrange(MEMORY)
+        byte = await bench.bus.read_and_write(memory * MEMORY + position)
+        assert byte == before[memory][position]
+    assert [sram.memory for sram in bench.srams] == before
+    assert not any(sram.edges for sram in bench.srams)
     await bench.check()

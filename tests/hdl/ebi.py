@@ -74,6 +74,22 @@ class Ebi:
         self._dut.AD_LOW_I.value = random.getrandbits(8)
         return byte
 
+    async def read_and_write(self, address: int, select: str = "") -> int:
+        """Both strobes in one access, which a processor never makes; the byte that comes."""
+        await self.address(address)
+        self.drives = False
+        chip = select or self._selects[0]
+        levels = [getattr(self._dut, name) for name in (chip, "RE_N", "WE_N")]
+        for pin in levels:
+            pin.value = 0
+        await wait(SLOWEST_ACCESS + self._timing.pause(), ODD)
+        byte = int(self._dut.AD_LOW_O.value)
+        for pin in levels:
+            pin.value = 1
+        await self._pause()
+        self.drives = True
+        return byte
+
     def _note(self, access: str, address: int, select: str) -> None:
         if self.situation is not None and cover_cubestar.TOP is not None:
             memory, board = self.situation(address, select)

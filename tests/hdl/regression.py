@@ -118,12 +118,15 @@ def _pair(mcu_addressing: bool) -> Tier:
     return Tier(design, SMALLEST.columns, SMALLEST.rows, modules, environment)
 
 
-#: By the tops' names in ``cubestack.hdl.designs``.
+#: By the tops' names in ``cubestack.hdl.designs``; some have a further one.
 TIERS = {
     "cubestar": Tier(CubeStarTop, 5, 3, ("benches_read", "benches_modes", "benches_store")),
     "cubestar-shared": Tier(CubeStarShared, 5, 3, ("benches_shared",)),
     "cubestar-double": Tier(CubeStarDouble, 5, 3, ("benches_double",)),
     "cubestar-boards": Tier(CubeStarTwoBoards, 5, 3, ("benches_boards",)),
+    # Addresses of more than 8 bits, so that there is an address latch.
+    "cubestar-shared-latch": Tier(CubeStarShared, 9, 9, ("benches_shared",)),
+    "cubestar-double-latch": Tier(CubeStarDouble, 9, 9, ("benches_double",)),
     "cubesense-pair": _pair(mcu_addressing=False),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),
 }

@@ -20,3 +20,12 @@ def test_any_top(icarus: Any, top: str, module: str) -> None:
     tier = TIERS[top]
     environment = {**tier.environment, "BENCH": BENCHES[top]}
     icarus.run(tier.design, tier.columns, tier.rows, module, seed=1, environment=environment)
+
+
+@pytest.mark.parametrize("top", [top for top in BENCHES if top.startswith("cubestar")])
+def test_is_left_in_every_state(icarus: Any, top: str) -> None:
+    tier = TIERS[top]
+    environment = {"BENCH": BENCHES[top]}
+    icarus.run(
+        tier.design, tier.columns, tier.rows, "benches_states", seed=1, environment=environment
+    )
