@@ -77,8 +77,9 @@ def check_watchdog(suite: Suite, message: Message, seen: list[str]) -> None:
     perform(suite, message, {})
     after = node.telemetry("ExtendedIdentification")
     cause = suite.target.interface.telemetry("ExtendedIdentification").field("ResetCause")
-    if int(after["WDGResetCount"]) != before + 1:
-        raise FailedError(f"WDGResetCount was {before}, is {after['WDGResetCount']}")
+    count = int(after["WDGResetCount"])
+    if count != before + 1:
+        raise FailedError(f"WDGResetCount was {before}, is {count}")
     if cause.label(after["ResetCause"]) != "WATCHDOG":
         raise FailedError(f"ResetCause is {cause.label(after['ResetCause'])}, declared WATCHDOG")
     if not before:
