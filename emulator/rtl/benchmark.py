@@ -2,17 +2,14 @@
 
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.build import library_for
 from cubestack.emulator.rtl.engine import RtlEngine, make_engine
+from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring, cubesense_wiring, cubestar_wiring
 from cubestack.emulator.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
@@ -44,44 +41,6 @@ PAIR_STORES = {
 }
 _CONTROLS = ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN")
 _SCAN_PERIOD = Fraction(PS_PER_S, 1_000_000)
-
-
-@dataclass(frozen=True)
-class _Segment:
-    """Blanking, or all lines of a picture."""
-
-    start_ps: int
-    clocks: int
-    rows: int
-    pixels: Callable[[], NDArray[np.uint8]] | None
-    vsync: int = 1
-
-
-@dataclass(frozen=True)
-class _Camera:
-    """The same frame for ever: blanking, then the picture."""
-
-    image: NDArray[np.uint8]
-    period: Fraction
-    line_clocks: int
-    blank_clocks: int = 0
-
-    @property
-    def active_columns(self) -> int:
-        return len(self.image[0])
-
-    @property
-    def clocks(self) -> int:
-        return self.blank_clocks + len(self.image) * self.line_clocks
-
-    def segment_at(self, time_ps: int) -> _Segment:
-        # The last frame that begins at this time or before, its start rounded down.
-        first = (ceil((time_ps + 1) / (self.clocks * self.period)) - 1) * self.clocks
-        picture_ps = int((first + self.blank_clocks) * self.period)
-        if time_ps < picture_ps:
-            return _Segment(int(first * self.period), self.blank_clocks, 0, None)
-        lines = len(self.image)
-        return _Segment(picture_ps, lines * self.line_clocks, lines, lambda: self.image)
 
 
 def rtl_clocks_per_s() -> float:
@@ -156,7 +115,7 @@ def _store(*, skipping: bool) -> tuple[float, RtlEngine]:
     engine = make_engine(top, "compiled", skipping=skipping)
     rng = np.random.default_rng(0)
     image = rng.integers(0, 256, (top.rows, top.columns), dtype=np.uint8)
-    engine.attach(_Camera(image, PERIOD, LINE_CLOCKS))
+    engine.attach(RepeatedFrame(image, PERIOD, LINE_CLOCKS))
     engine.set_pin("ENABLE", 1)
     frame_ps = int(top.rows * LINE_CLOCKS * PERIOD)
     start = time.perf_counter()
@@ -172,7 +131,7 @@ def _pair() -> RtlEngine:
     for camera in ("sun", "nadir"):
         image = rng.integers(0, 256, (FULL_SIZE.rows, FULL_SIZE.columns), dtype=np.uint8)
         period = Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
-        engine.attach(_Camera(image, period, CLOCKS_PER_LINE, blank), camera)
+        engine.attach(RepeatedFrame(image, period, CLOCKS_PER_LINE, blank), camera)
     return engine
 
 

@@ -1,4 +1,4 @@
-"""Builds the compiled engine's library once, and keeps it in the user's cache folder.
+"""Builds libraries of driver and design once, and keeps them in the user's cache folder.
 
 The key covers everything that the result depends on: the design and its wiring, the driver, the
 CXXRTL runtime, the compiler and its flags. A library's file name carries the hash of its own bytes,
@@ -15,8 +15,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -32,6 +33,8 @@ __all__ = [
     "CompilerError",
     "NoCompilerError",
     "cache_folder",
+    "cached_library",
+    "compile_driver",
     "find_compiler",
     "library_for",
 ]
@@ -81,13 +84,23 @@ def cache_folder() -> Path:
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
     """Shared library of the driver with ``wiring``, from the cache or built now.
 
-    ``folder`` replaces :func:`cache_folder`.
+    ``folder`` replaces :func:`cache_folder`; errors as :func:`cached_library`.
+    """
+    design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
+    return cached_library(design, partial(_compile, wiring), folder)
+
+
+def cached_library(
+    design: str, build: Callable[[Compiler, Path, Path], Path], folder: Path | None = None
+) -> Path:
+    """Shared library of the driver with what ``design`` says, from the cache or built now.
+
+    ``build`` gets the compiler, a scratch folder and where its log goes, and returns the library.
 
     Raises:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
-    design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
     compiler = find_compiler()
     if compiler is None:
         raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
@@ -101,7 +114,7 @@ def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
             candidate.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            built = _compile(wiring, compiler, Path(scratch), folder / f"{key}.log")
+            built = build(compiler, Path(scratch), folder / f"{key}.log")
             library = folder / _library_name(key, built.read_bytes())
             built.replace(library)
     except OSError as error:
@@ -109,6 +122,33 @@ def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
             f"can not use the cache folder {folder} ({error.strerror}); "
             "XDG_CACHE_HOME names another one"
         ) from error
+    return library
+
+
+def compile_driver(
+    compiler: Compiler, scratch: Path, log: Path, options: Iterable[str] = ()
+) -> Path:
+    """Library of driver.cpp with the design.cpp and pins.h of the scratch folder.
+
+    CompilerError when the compiler fails; the message names the log.
+    """
+    library = scratch / "library.so"
+    command = [
+        *compiler.command,
+        *FLAGS,
+        f"-I{scratch}",
+        f"-I{cxxrtl_headers()}",
+        str(_source("driver.cpp")),
+        *options,
+        "-o",
+        str(library),
+    ]
+    with log.open("w") as output:
+        output.write(shlex.join(command) + "\n")
+        output.flush()
+        done = subprocess.run(command, stdout=output, stderr=subprocess.STDOUT)
+    if done.returncode != 0 or not library.exists():
+        raise CompilerError(f"{shlex.join(compiler.command)} failed; its log is {log}")
     return library
 
 
@@ -145,20 +185,4 @@ def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Pa
     for number, variant in enumerate(variants):
         (scratch / f"variant_{number}.cpp").write_text(variant)
     (scratch / "pins.h").write_text(pins_header(wiring, design, variants))
-    library = scratch / "library.so"
-    command = [
-        *compiler.command,
-        *FLAGS,
-        f"-I{scratch}",
-        f"-I{cxxrtl_headers()}",
-        str(_source("driver.cpp")),
-        "-o",
-        str(library),
-    ]
-    with log.open("w") as output:
-        output.write(shlex.join(command) + "\n")
-        output.flush()
-        done = subprocess.run(command, stdout=output, stderr=subprocess.STDOUT)
-    if done.returncode != 0 or not library.exists():
-        raise CompilerError(f"{shlex.join(compiler.command)} failed; its log is {log}")
-    return library
+    return compile_driver(compiler, scratch, log)

@@ -117,16 +117,23 @@ class CompiledEngine(SteppingEngine):
     """
 
     def __init__(
-        self, wiring: Wiring, sram_timing: SramTiming | None = None, *, skipping: bool = True
+        self,
+        wiring: Wiring,
+        sram_timing: SramTiming | None = None,
+        *,
+        skipping: bool = True,
+        library: Path | None = None,
     ) -> None:
         """Load the library of ``wiring``, building it first where the cache has none.
+
+        ``library`` is another one with the same driver in it.
 
         Raises:
             CompilerError: there is no C++ compiler, or it failed.
         """
         super().__init__(wiring, skipping=skipping)
         self._driver: int | None = None
-        self._library = load_library(library_for(wiring))
+        self._library = load_library(library or library_for(wiring))
         addresses = [memory.ctypes.data for memory in self.memories.values()]
         self._driver = self._library.driver_new(
             (_POINTER * len(addresses))(*addresses),

@@ -112,11 +112,11 @@ def _hold(design: str) -> str:
         if output is None or not without or not _FIXED_CLOCK.search(body):
             continue
         wire = re.compile(rf"(?:  attribute .*\n)*  wire ((?:width \d+ )?){re.escape(output[1])}\n")
-        number += 1
-        design = design.replace(cell[0], "")
-        design = wire.sub(
-            lambda found, n=number, name=output[1]: f"  wire {found[1]}input {n} {name}\n", design
-        )
+        found = wire.search(design)
+        if found is not None:
+            number += 1
+            port = f"  wire {found[1]}input {number} {output[1]}\n"
+            design = design.replace(found[0], port).replace(cell[0], "")
     return design
 
 

