@@ -1,10 +1,15 @@
 """Reading the stored bytes with the microcontroller's clock, and choosing the bank."""
 
 import random
+from itertools import product
 from typing import Any
 
+import cocotb
 from bench import Bench, frame, picture, timed_test
+from cocotb.triggers import FallingEdge, RisingEdge
+from cover_cubestar import STOPPED
 from geometry import GEOMETRY
+from instants import ODD, wait
 
 
 def wrapped(content: bytes, count: int) -> bytes:
@@ -106,4 +111,75 @@ async def byte_stands_until_the_next_clock(dut: Any) -> None:
         assert await bench.mcu.clock() == expected
         await bench.mcu.set(after=random.randrange(200_000))
         assert int(dut.DATA.value) == expected
+    await bench.check()
+
+
+@timed_test
+async def left_after_any_count_by_any_pin(dut: Any) -> None:
+    """The next reading starts at the first pixel all the same."""
+    bench = await Bench.start(dut)
+    pixels, columns = GEOMETRY.pixels, GEOMETRY.columns
+    further = random.randrange(columns, pixels)
+    counts = (0, random.randrange(1, columns), further, pixels, pixels + random.randrange(1, 9))
+    for count, end in product(counts, ({"ENABLE": 0}, {"RNW": 0}, {"ENABLE": 0, "RNW": 0})):
+        bank = random.getrandbits(1)
+        await bench.mcu.open(bank)
+        assert await bench.mcu.read(count) == wrapped(bench.stored(bank), count)
+        await bench.mcu.set(**end)
+        await bench.mcu.set(ENABLE=0)
+    await bench.check()
+
+
+@timed_test
+async def every_command_without_a_clock(dut: Any) -> None:
+    """The camera's never ran, or stopped long ago at either level."""
+    bench = await Bench.start(dut, camera=False)
+    await every_command(bench)
+    cocotb.start_soon(bench.camera.run())
+    await bench.camera.reach(3)
+    for edge in (RisingEdge, FallingEdge):
+        await stop(bench, edge)
+        await every_command(bench)
+        bench.camera.go()
+        await bench.camera.reach(len(bench.camera.clocks) + 3)
+    await bench.check()
+
+
+async def stop(bench: Bench, edge: Any) -> None:
+    """The camera's clock stops after an edge, for longer than any stall."""
+    await edge(bench.dut.PIXCLK)
+    await bench.mcu.set(after=1)
+    bench.camera.stop()
+    await wait(2 * STOPPED * bench.camera.period, ODD)
+
+
+async def every_command(bench: Bench) -> None:
+    """In either bank; from standby to standby."""
+    for bank in (0, 1):
+        await bench.mcu.set(BANK=bank, RNW=0)
+        await bench.mcu.set(ENABLE=1)
+        assert not await bench.mcu.acknowledged(10**6)
+        await bench.mcu.standby()
+        await bench.mcu.open(bank)
+        assert await bench.mcu.read(3) == bench.stored(bank)[:3]
+        await bench.mcu.standby()
+
+
+@timed_test
+async def clock_stops_while_storing(dut: Any) -> None:
+    """At either level, in a picture that is given up and in one that goes on to ACK."""
+    bench = await Bench.start(dut)
+    for edge, goes_on in product((RisingEdge, FallingEdge), (True, False)):
+        content = picture()
+        await bench.store()
+        start = await bench.camera.begin(frame(content))
+        await bench.camera.reach(start + random.randrange(4, GEOMETRY.pixels))
+        await stop(bench, edge)
+        if goes_on:
+            bench.camera.go()
+            assert await bench.acknowledged(0)
+            assert bench.stored() == content
+        await bench.mcu.standby()
+        bench.camera.go()
+        await bench.camera.sent()
     await bench.check()

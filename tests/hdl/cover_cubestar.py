@@ -64,7 +64,7 @@ def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -
     ends = [clock.rise for clock in own[1:]] + [window.end]
     for clock, end in zip(own, ends, strict=True):
         if end - clock.rise > STOPPED * period:
-            level = "low" if clock.fall < end else "high"
+            level = "high" if min(clock.fall, end) - clock.rise > STOPPED * period else "low"
             hit("cubestar border", case=f"clock stops {level}", acknowledged=acknowledged)
 
 

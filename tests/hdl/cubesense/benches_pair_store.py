@@ -3,7 +3,7 @@
 import random
 from typing import Any
 
-from bench import flat, lines, picture, timed_test
+from bench import flat, line, lines, picture, timed_test
 from geometry import GEOMETRY
 from pair import OTHER, PREFIXES, PairBench, frame
 from pair_reference import NOT_FOUND, SIDES
@@ -119,7 +119,7 @@ async def lines_too_long_and_too_short(dut: Any) -> None:
         rows = [random.randbytes(random.choice(sizes)) for _ in range(ROWS - 1)]
         rows.append(random.randbytes(COLUMNS))
         source.send(frame(b"")[:-1])
-        source.send(flat(flat(lines(row)[:1]) for row in rows))
+        source.send(flat(line(row) for row in rows))
         source.send([*flat(lines(picture())), *frame(b"")])
         await source.sent()
         await bench.mcu.standby()
@@ -157,7 +157,7 @@ async def any_waveform(dut: Any) -> None:
         for source in bench.cameras.values():
             for _ in range(3 * ROWS):
                 row = random.randbytes(random.choice([COLUMNS] * 8 + [1, COLUMNS + 1]))
-                source.send(flat(lines(row)))
+                source.send(line(row))
                 if random.random() < 1 / ROWS:
                     source.send(frame(b"")[: random.choice([GAP - 2, GAP, GAP + 9])])
         camera, memory = any_path()

@@ -4,11 +4,11 @@ import random
 from typing import Any
 
 import pytest
+from regression import FULL, SMALLEST
 
 from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense_pair import CubeSensePair
 
-SMALLEST = ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1)
 MODULES = ["benches_pair_store", "benches_pair_read", "benches_pair_modes", "benches_pair_failures"]
 
 
@@ -50,6 +50,16 @@ def test_addressing_changes_nothing_else(
 ) -> None:
     monkeypatch.setenv("MCU_ADDRESSING", "1")
     simulate(addressable, SMALLEST, *MODULES, seed=1, initialised=initialised)
+
+
+@pytest.mark.skipif(not FULL, reason="`make test-hdl` runs it")
+@pytest.mark.parametrize("addressing", [False, True], ids=["published", "addressing"])
+def test_every_state_and_border(
+    simulate: Any, addressing: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MCU_ADDRESSING", str(int(addressing)))
+    design = addressable if addressing else CubeSensePair
+    simulate(design, SMALLEST, "benches_pair_states", seed=1)
 
 
 def test_full_size(simulate: Any) -> None:
