@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.shutter import RollingShutter
+from cubestack.emulator.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense_codes import (
     FRAME_BYTES,
     Camera,
@@ -45,6 +47,25 @@ def check_right(found: Measurement, *, within_deg: float = 0.1) -> None:
 def check_next(bench: Bench, camera: Camera = Camera.NADIR) -> None:
     """The next measurement is sound."""
     check_right(measure(bench, camera))
+
+
+WAIT_S, REQUEST_S = 0.015, 0.003
+"""From a request made after ``await_frame`` to its frame; and what it takes at least: the bytes
+on the line, and the gap before a frame that the FPGA has to see."""
+
+
+def await_frame(bench: Bench, camera: Camera = Camera.NADIR) -> RollingShutter:
+    """Wait until a request would wait for ``WAIT_S``; the frame that it would store."""
+    sensor, kernel = bench.board.cameras[camera], bench.board.kernel
+    frame: RollingShutter = sensor.frame_from(kernel.now + round(WAIT_S * PS_PER_S))
+    bench.client.pause((frame.readout_ps - kernel.now) / PS_PER_S - WAIT_S)
+    assert frame.readout_ps - kernel.now > REQUEST_S * PS_PER_S
+    return frame
+
+
+def line_s(frame: RollingShutter, line: float) -> float:
+    """Virtual time at which a frame's line is read out."""
+    return float(frame.readout_ps + line * frame.line_ps) / PS_PER_S
 
 
 def picture(bench: Bench, camera: Camera = Camera.NADIR) -> np.ndarray:

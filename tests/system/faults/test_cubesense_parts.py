@@ -17,15 +17,21 @@ from cubestack.host.cubesense_bench import BenchClient
 from cubestack.host.errors import NoAnswerError
 
 from .bench import NADIR_DEG, Bench
-from .cubesense_bench import check_next, check_right, host_pixel, measure, measure_with, picture
+from .cubesense_bench import (
+    await_frame,
+    check_next,
+    check_right,
+    host_pixel,
+    line_s,
+    measure,
+    measure_with,
+    picture,
+)
 
 X, Y = 320, 300
 ADDRESS = 1024 * Y + X
-STORING_S, SEARCHING_S = 0.03, 0.1
+SEARCHING_S = 0.1
 """From the request on."""
-
-REQUEST_PS = 3 * 10**9
-"""More than a request takes until the FPGA waits for a frame's gap, and the gap."""
 
 UNTOUCHED = 1
 """A value that no pixel of the scene has."""
@@ -86,8 +92,7 @@ def test_a_row_counter_that_flips_puts_the_rest_elsewhere(quiet: Bench) -> None:
     clean = picture(quiet)
     quiet.board.engine.memories["nadir"][:] = UNTOUCHED
     register = "nadir.pix_writer.counter.row"
-    frame = quiet.board.cameras[Camera.NADIR].frame_from(quiet.board.kernel.now + REQUEST_PS)
-    at_s = (frame.readout_ps + 35.5 * frame.line_ps) / 1e12
+    at_s = line_s(await_frame(quiet), 35.5)
     quiet.faults.inject("register-flip", register=register, bit=7, at_s=at_s)
     found = measure(quiet)
     assert found.capture is CaptureResult.STORED_OWN_SRAM
@@ -145,11 +150,12 @@ def test_a_latched_memory_is_cut_until_a_telecommand(sense: Bench) -> None:
     assert sense.device.power().over_current == (False, False)
 
 
-@pytest.mark.parametrize("after_s", [STORING_S, SEARCHING_S])
+@pytest.mark.parametrize("storing", [True, False])
 @pytest.mark.fault("latch-up")
-def test_a_latch_up_in_a_measurement_ends_it(sense: Bench, after_s: float) -> None:
+def test_a_latch_up_in_a_measurement_ends_it(sense: Bench, storing: bool) -> None:
     check_right(measure(sense))
-    sense.inject("latch-up", target="SRAM2", after_s=after_s)
+    at_s = line_s(await_frame(sense), 240) if storing else sense.now_s + SEARCHING_S
+    sense.faults.inject("latch-up", target="SRAM2", at_s=at_s)
     found = measure(sense)
     assert (found.capture, found.detect) == CUT
     assert sense.device.power().over_current == (False, True)

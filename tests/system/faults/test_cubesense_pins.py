@@ -9,12 +9,20 @@ from cubestack.emulator.sky.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense_codes import Camera, CaptureResult, DetectResult
 
 from .bench import SUN_DEG, Bench
-from .cubesense_bench import check_next, check_right, measure, measure_with, picture
+from .cubesense_bench import (
+    await_frame,
+    check_next,
+    check_right,
+    line_s,
+    measure,
+    measure_with,
+    picture,
+)
 
 ACK = {Camera.SUN: "SUNACK", Camera.NADIR: "NADACK"}
 ENABLES = {Camera.SUN: "SUNEN", Camera.NADIR: "NADEN"}
-WAITING_S, STORING_S = 0.005, 0.03
-"""From the request on: the FPGA waits for the frame, or stores it."""
+BEFORE_S = 0.007
+"""From a glitch to the frame: the FPGA has yet to see the gap before it."""
 
 SEARCHING_S = {Camera.SUN: 0.0005, Camera.NADIR: 0.05}
 """From the command on: the middle of the edge data."""
@@ -96,7 +104,8 @@ def test_with_an_acknowledge_that_is_always_there_no_sun_is_found(ready: Bench) 
 @pytest.mark.parametrize("pin", ["NADEN", "RNW", "EDGE", "SHIFT"])
 @pytest.mark.fault("control-glitch")
 def test_a_glitch_while_storing_costs_the_frame(ready: Bench, pin: str) -> None:
-    ready.inject("control-glitch", target=pin, after_s=STORING_S)
+    at_s = line_s(await_frame(ready), 240)
+    ready.faults.inject("control-glitch", target=pin, at_s=at_s)
     found = measure(ready)
     assert (found.capture, found.detect) == FAILED  # the next frame would be too late
     assert ready.said() == ["goes to 1"]
@@ -106,14 +115,16 @@ def test_a_glitch_while_storing_costs_the_frame(ready: Bench, pin: str) -> None:
 @pytest.mark.parametrize("pin", ["NADEN", "RNW", "EDGE", "SHIFT"])
 @pytest.mark.fault("control-glitch")
 def test_a_glitch_before_the_frame_costs_nothing(ready: Bench, pin: str) -> None:
-    ready.inject("control-glitch", target=pin, after_s=WAITING_S)
+    at_s = line_s(await_frame(ready), 0) - BEFORE_S
+    ready.faults.inject("control-glitch", target=pin, at_s=at_s)
     check_right(measure(ready))
     assert capture_ms(ready, Camera.NADIR) < 70
 
 
 @pytest.mark.fault("control-glitch")
 def test_a_glitch_of_the_other_half_s_enable_costs_nothing(ready: Bench) -> None:
-    ready.inject("control-glitch", target="SUNEN", after_s=STORING_S)
+    at_s = line_s(await_frame(ready), 240)
+    ready.faults.inject("control-glitch", target="SUNEN", at_s=at_s)
     check_right(measure(ready))
 
 
