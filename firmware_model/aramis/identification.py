@@ -24,6 +24,7 @@ from cubestack.firmware_model.aramis.database import Database
 from cubestack.firmware_model.aramis.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching import Match, MatchEnd, match_triple
+from cubestack.firmware_model.aramis.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.solution import (
     NONE,
     Outcome,
@@ -144,9 +145,12 @@ class _Search:
                     found = self._confirm(quaternion, hypotheses)
                     if found is not None:
                         quaternion, stars, identities, expected = found
+                        straight = self._at_middle_row(quaternion, stars, identities)
+                        if straight is None:
+                            return unsolved(Outcome.NONE, Reason.SMEAR, self.measured)
                         return self._solution(
                             Reason.CONFIRMED,
-                            quaternion,
+                            straight,
                             stars,
                             identities,
                             candidates=len(match.candidates),
@@ -208,15 +212,18 @@ class _Search:
     def _attitude(
         self, measured: NDArray[np.intp], identities: NDArray[np.intp]
     ) -> NDArray[np.float32] | None:
+        weights = np.ones(len(measured), dtype=np.float32)
+        return self._quest(self.vectors[measured], self.database.vectors[identities], weights)
+
+    def _quest(
+        self,
+        vectors: NDArray[np.float32],
+        catalogue: NDArray[np.float32],
+        weights: NDArray[np.float32],
+    ) -> NDArray[np.float32] | None:
         with self.meter.phase("attitude"):
             try:
-                return quest(
-                    self.vectors[measured],
-                    self.database.vectors[identities],
-                    np.ones(len(measured), dtype=np.float32),
-                    self.meter,
-                    eigenvalue=largest_eigenvalue,
-                )
+                return quest(vectors, catalogue, weights, self.meter, eigenvalue=largest_eigenvalue)
             except AttitudeError:
                 return None
 
@@ -252,6 +259,29 @@ class _Search:
                 return None
             quaternion = refined
         return quaternion, found.measured, found.stars, found.expected
+
+    def _at_middle_row(
+        self, quaternion: NDArray[np.float32], measured: NDArray[np.intp], stars: NDArray[np.intp]
+    ) -> NDArray[np.float32] | None:
+        """The attitude at one instant, when stars moved; None when it can't be told well enough."""
+        still = self.measured.smear_px <= self.profile.smear_px or self.measured.skew_px <= 0
+        if still or len(measured) < FEWEST:
+            return quaternion
+        catalogue = self.database.vectors[stars]
+        heights = self.measured.centroids[measured, 1] / np.float32(self.field.rows)
+        with self.meter.phase("attitude"):
+            predicted = catalogue @ dcm(quaternion, self.meter).T
+            self.meter.charge(f32_mul=9 * len(stars), f32_add=6 * len(stars), loop=len(stars))
+            straight, weights, sigma_rad = at_middle_row(
+                self.vectors[measured],
+                predicted,
+                heights - np.float32(0.5),
+                self.measured.skew_px * self.field.scale[1],
+                self.meter,
+            )
+        if sigma_rad > self.profile.motion_sigma_rad:
+            return None
+        return self._quest(straight, catalogue, weights)
 
     def _solution(
         self,

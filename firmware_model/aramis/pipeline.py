@@ -14,7 +14,7 @@ from cubestack.firmware_model.aramis.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.identification import identify
 from cubestack.firmware_model.aramis.regions import find_regions, locate_stars
-from cubestack.firmware_model.aramis.smear import DRAWN_OUT_PX, smear_px, streak_px
+from cubestack.firmware_model.aramis.smear import is_drawn_out, smear_px
 from cubestack.firmware_model.aramis.solution import (
     Outcome,
     Profile,
@@ -26,7 +26,7 @@ from cubestack.firmware_model.aramis.solution import (
 from cubestack.firmware_model.aramis.spikes import HALF, SpikeRemoval, remove_spikes
 from cubestack.firmware_model.costs import Meter
 
-__all__ = ["PUBLISHED", "VERIFIED", "Configuration", "Detection", "detect", "solve"]
+__all__ = ["PUBLISHED", "VERIFIED", "Configuration", "Detection", "detect", "explain", "solve"]
 
 
 @dataclass(frozen=True)
@@ -123,10 +123,6 @@ def detect(
         )
         inside = np.flatnonzero(field.inside(stars.centroids, meter))[: settings.max_stars]
         smear = smear_px(picture, regions, background.mean(meter), meter)
-        if len(inside) < 3:
-            smear = max(smear, streak_px(picture, field, 1, meter))
-        elif smear > DRAWN_OUT_PX:
-            smear = max(smear, streak_px(picture, field, 2, meter))
     return StarList(stars.centroids[inside], stars.brightness[inside], smear)
 
 
@@ -155,4 +151,21 @@ def solve(
     if stars is None:
         nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
         return unsolved(Outcome.NONE, Reason.TOO_MANY_PIXELS, nothing)
-    return identify(stars, configuration.field, configuration.profile, database, meter, hint)
+    solution = identify(stars, configuration.field, configuration.profile, database, meter, hint)
+    return explain(solution, picture, configuration, meter)
+
+
+def explain(
+    solution: Solution, picture: NDArray[np.uint8], configuration: Configuration, meter: Meter
+) -> Solution:
+    """The solution; with verification, the reason why there is none may be streaks in the picture.
+
+    Phase `verification`.
+    """
+    if not configuration.profile.verify or solution.outcome is not Outcome.NONE:
+        return solution
+    if solution.reason is Reason.SMEAR:
+        return solution
+    with meter.phase("verification"):
+        drawn_out = is_drawn_out(picture, configuration.field, meter)
+    return replace(solution, reason=Reason.SMEAR) if drawn_out else solution

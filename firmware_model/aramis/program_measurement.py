@@ -19,7 +19,13 @@ from cubestack.firmware_model.aramis.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.identification import identify
-from cubestack.firmware_model.aramis.pipeline import VERIFIED, Configuration, Detection, detect
+from cubestack.firmware_model.aramis.pipeline import (
+    VERIFIED,
+    Configuration,
+    Detection,
+    detect,
+    explain,
+)
 from cubestack.firmware_model.aramis.program_camera import Camera
 from cubestack.firmware_model.aramis.program_settings import Settings
 from cubestack.firmware_model.aramis.program_state import Measurement, State
@@ -203,7 +209,8 @@ class Measuring:
             return unsolved(Outcome.NONE, Finding.TOO_MANY_PIXELS, nothing)
         exposure = int(self._state.settings.get("SetExposure", "Rows"))
         stars = replace(stars, skew_px=stars.smear_px * settings.field.rows / exposure)
-        return identify(stars, settings.field, settings.profile, database, self._meter, hint)
+        found = identify(stars, settings.field, settings.profile, database, self._meter, hint)
+        return explain(found, picture, settings, self._meter)
 
     @contextmanager
     def _phases(self, result: Measurement) -> Iterator[None]:

@@ -68,6 +68,8 @@ class Profile:
         smear_px: with verification, where stars are drawn out farther, that is why there is no
             attitude.
         skew_px: with verification, stars that also moved farther from row to row are refused.
+        motion_sigma_rad: with verification, stars that moved are also refused when they leave more
+            doubt than that about the turn about the boresight.
     """
 
     sigma_rad: float = 0.26 * 0.3759 / 582
@@ -83,6 +85,7 @@ class Profile:
     hint_tolerance_deg: float = 6.0
     smear_px: float = 4.0
     skew_px: float = 4.0
+    motion_sigma_rad: float = 7e-4
 
     def __post_init__(self) -> None:
         """Refuse settings with which nothing can be found."""
@@ -99,6 +102,7 @@ class Profile:
             "hint_tolerance_deg": (0, 180),
             "smear_px": (1, 1000),
             "skew_px": (0, 1000),
+            "motion_sigma_rad": (0, 0.1),
         }
         for name, (low, high) in bounds.items():
             value = getattr(self, name)

@@ -1,16 +1,17 @@
 """Streaks of known length, drawn by sweeping a spot."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.background import Background
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.identification import identify
-from cubestack.firmware_model.aramis.pipeline import VERIFIED, detect
+from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, explain
 from cubestack.firmware_model.aramis.regions import find_regions
-from cubestack.firmware_model.aramis.smear import smear_px, streak_px
-from cubestack.firmware_model.aramis.solution import Outcome, Reason, StarList
+from cubestack.firmware_model.aramis.smear import is_drawn_out, smear_px
+from cubestack.firmware_model.aramis.solution import Outcome, Reason, StarList, unsolved
 from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
 from cubestack.firmware_model.costs import Meter
 
@@ -24,11 +25,11 @@ def meter() -> Meter:
 
 
 def swept(
-    length: float, angle_deg: float, light: float, noise: float = 1.5, count: int = 12
+    length: float, angle_deg: float, light: float, count: int = 12, background: Any = 0
 ) -> NDArray[np.uint8]:
-    """Spots of standard deviation 1.5 px that move by `length`, with `light` grey levels each."""
+    """Spots of standard deviation 1.5 px that move by `length`, of `light` grey levels each."""
     rng = np.random.default_rng(3)
-    image = rng.normal(6, noise, (FIELD.rows, FIELD.columns))
+    image = rng.normal(6, 1.5, (FIELD.rows, FIELD.columns)) + background
     steps = max(1, round(2 * length))
     along = (np.arange(steps) + 0.5) / steps - 0.5
     y, x = np.mgrid[-80:81, -80:81].astype(float)
@@ -52,17 +53,36 @@ def test_length_of_bright_streaks(length: float, angle_deg: float) -> None:
     assert smear_px(image, regions, 6, meter()) == pytest.approx(length, abs=1.5)
 
 
-def test_faint_streaks_are_found_among_blocks() -> None:
-    """A star that is bright enough at rest has no bright pixel left; its streak is found."""
-    image = swept(95, 40, light=1000)
-    stars = detect(image, Background(), FIELD, VERIFIED.detection, meter())
-    assert stars is not None
-    assert len(stars) < 3
-    assert stars.smear_px == pytest.approx(95, rel=0.2)
-    assert streak_px(image, FIELD, 2, meter()) == pytest.approx(95, rel=0.2)
-    assert streak_px(swept(0, 0, light=1000), FIELD, 1, meter()) == 0
-    assert streak_px(swept(0, 0, light=0), FIELD, 1, meter()) == 0
+@pytest.mark.parametrize("angle_deg", [0, 40, 90, 160])
+def test_faint_streaks_show_together(angle_deg: float) -> None:
+    """A star that is bright enough at rest has no bright pixel left."""
+    image = swept(95, angle_deg, light=800)
+    assert np.count_nonzero(image > 12) < 50
+    assert is_drawn_out(image, FIELD, meter())
+
+
+def test_stars_at_rest_are_not_drawn_out() -> None:
+    """Nor are noise alone, bright stars in rows and columns, a slope, or a glow."""
+    y, x = np.mgrid[: FIELD.rows, : FIELD.columns]
+    glow = 30 * np.exp(-((x - 400) ** 2 + (y - 200) ** 2) / (2 * 300.0**2))
+    for light, background in ((0, 0), (8000, 0), (0, 0.05 * x), (800, 0.05 * x), (800, glow)):
+        assert not is_drawn_out(swept(0, 0, light, background=background), FIELD, meter())
+
+
+def test_a_picture_without_noise_is_not_drawn_out() -> None:
+    for level in (0, 7, 255):
+        image = np.full((FIELD.rows, FIELD.columns), level, dtype=np.uint8)
+        assert not is_drawn_out(image, FIELD, meter())
     assert smear_px(image, find_regions(image > 255, meter()), 0, meter()) == 0  # type: ignore[arg-type]
+
+
+def test_streaks_explain_why_there_is_no_attitude() -> None:
+    nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
+    failed = unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, nothing)
+    streaks, rest = swept(95, 40, light=800), swept(0, 0, light=800)
+    assert explain(failed, streaks, VERIFIED, meter()).reason is Reason.SMEAR
+    assert explain(failed, rest, VERIFIED, meter()).reason is Reason.TOO_FEW_STARS
+    assert explain(failed, streaks, PUBLISHED, meter()).reason is Reason.TOO_FEW_STARS
 
 
 def test_smear_is_the_reason_when_there_is_no_attitude() -> None:
