@@ -87,7 +87,7 @@ def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool
         field: the camera; blocks near the edge of its field do not count.
         meter: charged.
     """
-    inside = _blocks(field.mask).all(axis=(1, 3))
+    inside: NDArray[np.bool_] = np.all(_blocks(field.mask), axis=(1, 3))
     around = _box(inside.astype(np.float32))
     inside &= around > (2 * SURROUNDINGS + 1) ** 2 - 0.5
     count = int(inside.sum())
@@ -129,8 +129,8 @@ def _clipped(values: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[
     """Values (rows, columns) less the median, in sigmas of those inside, clipped."""
     low, middle, high = np.percentile(values[inside], (25, 50, 75))
     sigma = max(high - low, _LEAST) / QUARTILES_APART
-    clipped = np.clip((values - middle) / sigma, -CLIPPED_SIGMAS, CLIPPED_SIGMAS)
-    return clipped.astype(np.float32)
+    clipped: NDArray[np.float32] = ((values - middle) / sigma).astype(np.float32)
+    return np.clip(clipped, -CLIPPED_SIGMAS, CLIPPED_SIGMAS)
 
 
 def _box(values: NDArray[np.float32]) -> NDArray[np.float32]:
