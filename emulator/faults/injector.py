@@ -14,7 +14,13 @@ from cubestack.emulator.faults.parts import (
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.plan import Plan
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.faults.table import make_fault
+from cubestack.emulator.faults.table import (
+    FAULTS,
+    MemoryStuck,
+    RegisterFlip,
+    RegisterUpsets,
+    make_fault,
+)
 from cubestack.emulator.faults.wire import BusFaults, LineFaults
 from cubestack.emulator.virtual_time import PS_PER_S
 
@@ -63,6 +69,20 @@ class Faults:
     def targets(self, site: Site) -> tuple[str, ...]:
         """Names of what faults of that site can hit here, the usual one first."""
         return self._sites.targets(site)
+
+    def kinds(self) -> dict[str, tuple[str, ...]]:
+        """Kinds that can be injected here, with their targets, the usual one first."""
+        engine = self._sites.engine
+        refused: set[type[Fault]] = set()
+        if engine is None:
+            refused.add(MemoryStuck)
+        elif not engine.registers:
+            refused |= {RegisterFlip, RegisterUpsets}
+        return {
+            kind: self.targets(fault.site)
+            for kind, fault in FAULTS.items()
+            if fault not in refused and self.targets(fault.site)
+        }
 
     def inject(
         self,

@@ -12,7 +12,6 @@ import pytest
 from cubestack.emulator.faults.table import FAULTS
 
 from .bench import BENCHES
-from .test_ways import REFUSED, kinds_of
 
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parents[2] / "docs" / "faults.md"
@@ -27,12 +26,14 @@ Pair = tuple[str, str]
 
 
 @pytest.fixture(scope="module")
-def supported() -> set[Pair]:
-    """(kind, device) of all that can be injected."""
-    pairs = set()
+def supported() -> dict[Pair, bool]:
+    """(kind, device) of all that has a target, and whether it can be injected."""
+    pairs = {}
     for device, power_up in BENCHES.items():
         with power_up() as bench:
-            pairs |= {(kind, device) for kind in kinds_of(bench.faults, device)}
+            for kind, fault in FAULTS.items():
+                if bench.faults.targets(fault.site):
+                    pairs[kind, device] = kind in bench.faults.kinds()
     return pairs
 
 
@@ -75,7 +76,7 @@ def _parameter(marks: list[pytest.Mark], wanted: str) -> set[str]:
     raise AssertionError(f"no parameter {wanted!r}")
 
 
-def test_a_test_shows_every_kind_on_every_device_that_has_it(supported: set[Pair]) -> None:
+def test_a_test_shows_every_kind_on_every_device_that_has_it(supported: dict[Pair, bool]) -> None:
     found = {
         pair
         for module in modules()
@@ -83,11 +84,11 @@ def test_a_test_shows_every_kind_on_every_device_that_has_it(supported: set[Pair
         if inspect.isfunction(function) and function.__name__.startswith("test_")
         for pair in shown(function, module)
     }
-    assert found == supported
+    assert found == {pair for pair, injected in supported.items() if injected}
 
 
 def test_the_document_says_what_happens_to_every_kind_on_every_device(
-    supported: set[Pair],
+    supported: dict[Pair, bool],
 ) -> None:
     part = DOCUMENT.read_text(encoding="utf-8").split("## What the firmware does about it\n")[1]
     lines = [line for line in part.split("\n## ")[0].splitlines() if line.startswith("|")]
@@ -96,7 +97,5 @@ def test_the_document_says_what_happens_to_every_kind_on_every_device(
     assert [row[0] for row in rows] == [f"`{kind}`" for kind in FAULTS]
     for kind, row in zip(FAULTS, rows, strict=True):
         for device, cell in zip(BENCHES, row[1:], strict=True):
-            if (kind, device) in REFUSED:
-                assert cell == REFUSES
-            else:
-                assert bool(cell) is ((kind, device) in supported), (kind, device)
+            assert bool(cell) is ((kind, device) in supported), (kind, device)
+            assert (cell == REFUSES) is (supported.get((kind, device)) is False), (kind, device)

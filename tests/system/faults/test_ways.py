@@ -9,24 +9,14 @@ import pytest
 from cubestack.emulator.faults.declaration import Fault, FaultError, Parameter
 from cubestack.emulator.faults.plan import parse_plan
 from cubestack.emulator.faults.table import FAULTS
+from cubestack.emulator.sky.scene import SkyScene
 from cubestack.firmware_model.interface.cubesense_codes import Camera
 from cubestack.host.cli.main import main
+from cubestack.host.cli.session import open_session
 from cubestack.host.cli.targets import open_emulated
 from cubestack.host.shell import Shell
 
 from .bench import BENCHES, Bench
-
-REFUSED = {("memory-stuck", "aramis")}
-"""Kinds that a device has targets for, and no way to carry out."""
-
-
-def kinds_of(faults: Any, device: str) -> dict[str, tuple[str, ...]]:
-    """Kinds that a device supports, with their targets."""
-    return {
-        kind: faults.targets(fault.site)
-        for kind, fault in FAULTS.items()
-        if faults.targets(fault.site) and (kind, device) not in REFUSED
-    }
 
 
 def given(fault: type[Fault], registers: dict[str, int]) -> dict[str, Any]:
@@ -55,38 +45,38 @@ def in_words(value: Any) -> str:
 
 
 @pytest.fixture(params=BENCHES)
-def shell(request: pytest.FixtureRequest) -> Iterator[tuple[str, Shell]]:
+def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
     target = open_emulated(f"emulated:{request.param}", request.param, None, seed=1)
-    yield request.param, Shell(target)
+    yield Shell(target)
     target.close()
 
 
-def test_the_shell_completes_and_takes_every_kind(shell: tuple[str, Shell]) -> None:
-    device, prompt = shell
-    board: Any = prompt.target.controls._board  # type: ignore[union-attr]
-    kinds = kinds_of(board.faults, device)
-    completed = prompt.complete("fault ")
+def test_the_shell_completes_and_takes_every_kind(shell: Shell) -> None:
+    board: Any = shell.target.controls._board  # type: ignore[union-attr]
+    kinds = board.faults.kinds()
+    completed = shell.complete("fault ")
     assert set(kinds) | {"clear"} <= set(completed)
-    assert not (set(FAULTS) - set(kinds) - {kind for kind, _ in REFUSED}) & set(completed)
+    absent = {kind for kind, fault in FAULTS.items() if not board.faults.targets(fault.site)}
+    assert not absent & set(completed)
     for kind, targets in kinds.items():
-        assert kind in prompt.complete(f"fault {kind[:-1]}")
-        assert prompt.complete(f"fault {kind} ")[: len(targets)] == list(targets)
+        assert kind in shell.complete(f"fault {kind[:-1]}")
+        assert shell.complete(f"fault {kind} ")[: len(targets)] == list(targets)
         words = [f"{n}={in_words(v)}" for n, v in given(FAULTS[kind], registers_of(board)).items()]
         for target in targets:
             for line in (f"fault {kind} {target}", f"fault {kind} {target} {' '.join(words)}"):
-                assert prompt.execute(line) is not None
+                assert shell.execute(line) is not None
         again = "" if FAULTS[kind].momentary else " for_s=0.001"
-        assert prompt.execute(f"fault {kind} at_s=0.01{again}") is not None
+        assert shell.execute(f"fault {kind} at_s=0.01{again}") is not None
     lasting = {kind for kind in kinds if not FAULTS[kind].momentary}
     assert {injection.fault.kind for injection in board.faults._running} >= lasting
-    assert prompt.execute("fault clear") is not None
+    assert shell.execute("fault clear") is not None
     assert board.faults._running == []
 
 
 @pytest.mark.parametrize("device", BENCHES)
 def test_the_command_line_takes_every_kind(device: str, capsys: pytest.CaptureFixture[str]) -> None:
     with BENCHES[device]() as bench:
-        kinds = kinds_of(bench.faults, device)
+        kinds = bench.faults.kinds()
     commands = [f"fault {kind} {targets[-1]}; fault clear" for kind, targets in kinds.items()]
     assert main(["shell", f"emulated:{device}", "-c", "; ".join(commands)]) == 0
     said = capsys.readouterr().out.splitlines()
@@ -97,7 +87,7 @@ def test_the_command_line_takes_every_kind(device: str, capsys: pytest.CaptureFi
 
 
 def test_a_plan_takes_every_kind(bench: Bench) -> None:
-    kinds = kinds_of(bench.faults, bench.name)
+    kinds = bench.faults.kinds()
     entries = []
     for kind, targets in kinds.items():
         for target in targets:
@@ -142,7 +132,7 @@ RATES = {
 def all_kinds(bench: Bench) -> tuple[str, float]:
     """A plan of every kind: those of the wires all the time, the others one after the other."""
     entries, at_s = [], 0.2
-    for kind, targets in kinds_of(bench.faults, bench.name).items():
+    for kind, targets in bench.faults.kinds().items():
         target = next((name for name in NADIR_HALF if name in targets), targets[0])
         lines = [f'kind = "{kind}"', f'target = "{target}"']
         if kind in RATES:
@@ -189,8 +179,7 @@ def played(
                     trace.append((bench.now_s, repr(act())))
                 except OSError as error:
                     trace.append((bench.now_s, str(error)))
-        kinds = set(kinds_of(bench.faults, device))
-        return trace, [str(event) for event in bench.faults.log], kinds
+        return trace, [str(event) for event in bench.faults.log], set(bench.faults.kinds())
 
 
 @pytest.mark.parametrize("device", BENCHES)
@@ -226,8 +215,16 @@ def test_refusals_name_what_would_be_right(star: Bench) -> None:
     assert star.faults.events == 0
 
 
+def test_the_simulator_s_registers_can_not_be_hit() -> None:
+    with open_session(SkyScene.pointing(84, -1), engine="python") as session:
+        kinds = session.board.faults.kinds()
+        assert set(FAULTS) - set(kinds) == {"register-flip", "register-upsets"}
+        with pytest.raises(ValueError, match="only the compiled engine"):
+            session.board.faults.inject("register-upsets")
+
+
 def test_what_a_device_does_not_have_can_not_be_hit(tracker: Bench) -> None:
-    missing = set(FAULTS) - set(kinds_of(tracker.faults, "aramis"))
+    missing = set(FAULTS) - set(tracker.faults.kinds())
     assert len(missing) > 10
     for kind in missing:
         with pytest.raises(FaultError, match=rf"^{kind}: "):
