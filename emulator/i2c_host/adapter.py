@@ -171,14 +171,13 @@ class _Driven:
 
     def drive(self, kernel: Kernel, goes_on: Callable[[], bool]) -> None:
         """See I2cAdapter."""
-        event = self._event
-        left = EVENTS
+        event, left = self._event, 0
         if event is None:
-            event = self._go_on(None)
-        elif event.callbacks is not None:
+            event, left = self._go_on(None), EVENTS
+        else:
             event.callbacks.remove(self._happened)
         while event is not None:
-            while event.callbacks is not None:
+            while not event.processed:
                 if not left:
                     if not goes_on():
                         self._wait_for(event)
@@ -197,7 +196,7 @@ class _Driven:
 
     def _wait_for(self, event: simpy.Event | None) -> None:
         """Let the kernel go on, whoever runs it, when ``event`` has happened."""
-        while event is not None and event.callbacks is None:
+        while event is not None and event.processed:
             event = self._go_on(event)
         self._event = event
         if event is not None:

@@ -4,9 +4,13 @@ import errno
 
 import pytest
 
-from cubestack.emulator.i2c import I2cMessage, I2cNackError
+from cubestack.emulator.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.i2c_host.adapter import I2cAdapter
 from cubestack.emulator.i2c_host.device_file import DeviceFile
+from cubestack.emulator.virtual_time import Kernel
 from cubestack.firmware_model.interface.linux_i2c import Call, Ioctl, pack_ioctl, reply
+
+from .conftest import Registers
 
 BIT_PS = 2_500_000
 
@@ -76,3 +80,64 @@ def test_a_lost_bus_is_tried_again(kernel, bus, adapter, retries, timeout, tries
     adapter.submit([I2cMessage(0x1A)], told.append)
     kernel.run()
     assert (len(tried), told) == (tries, [result])
+
+
+class Patience:
+    """Says no after so many questions."""
+
+    def __init__(self, questions: int) -> None:
+        self.left = questions
+
+    def __call__(self) -> bool:
+        self.left -= 1
+        return self.left >= 0
+
+
+def outcome(kernel, adapter, registers, run):
+    """Three transfers: their ends, and what came to the target."""
+    told: list[tuple[int, int]] = []
+    for messages in (
+        [I2cMessage(0x1A, bytearray(40)), I2cMessage(0x1A, read=30)],
+        [I2cMessage(0x30)],
+        [I2cMessage(0x1A, bytearray([0xF0, 1, 2])), I2cMessage(0x1A, read=1)],
+    ):
+        adapter.submit(messages, lambda result: told.append((result, kernel.now)))
+    run()
+    assert not adapter.busy
+    return told, registers.log
+
+
+@pytest.mark.parametrize(("patience", "steps"), [(0, 1), (0, 5), (1, 0), (1, 1), (3, 7), (100, 0)])
+def test_driven_transfers_are_the_same(patience, steps):
+    """Also when the kernel is run by others between two drives."""
+
+    def make():
+        kernel, registers = Kernel(), Registers()
+        bus = I2cBus(kernel)
+        bus.attach(0x1A, registers)
+        return kernel, I2cAdapter(kernel, bus), registers
+
+    kernel, adapter, registers = make()
+    expected = outcome(kernel, adapter, registers, kernel.run)
+    kernel, adapter, registers = make()
+    adapter.driven = True
+
+    def run():
+        while adapter.busy:
+            adapter.drive(kernel, Patience(patience))
+            for _ in range(steps):
+                if kernel.horizon() is not None:
+                    kernel.step()
+
+    assert outcome(kernel, adapter, registers, run) == expected
+
+
+def test_a_drive_without_a_transfer(kernel, adapter):
+    adapter.driven = True
+    assert not adapter.beginning
+    adapter.drive(kernel, lambda: True)
+    adapter.submit([I2cMessage(0x1A)], lambda _result: None)
+    assert adapter.beginning
+    adapter.drive(kernel, lambda: True)
+    assert not adapter.beginning
+    assert not adapter.busy
