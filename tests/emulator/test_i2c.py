@@ -143,6 +143,23 @@ def test_concurrent_transfers_wait_for_each_other():
     assert kernel.now == 2 * (1 + 9 + 9 + 1) * BIT_PS[100_000]
 
 
+@pytest.mark.parametrize("granted", [False, True])
+def test_who_gives_up_waiting_holds_up_nobody(granted):
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    first = bus.transfer([I2cMessage(0x1A, bytearray([1]))])
+    kernel.process(first)
+    kernel.step()
+    impatient = bus.transfer([I2cMessage(0x1A, bytearray([2]))])
+    turn = next(impatient)
+    kernel.process(bus.transfer([I2cMessage(0x1A, bytearray([3]))]))
+    while granted and not turn.triggered:
+        kernel.step()
+    impatient.close()
+    kernel.run()
+    assert target.calls == ["write", 1, "stop", "write", 3, "stop"]
+
+
 @pytest.mark.parametrize("address", [-1, 0x00, 0x07, 0x78, 0x3FF])
 def test_reserved_addresses_are_refused(address):
     _, bus = make()
