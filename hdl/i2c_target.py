@@ -30,7 +30,7 @@ class I2cTarget(Component):
         group: the transfer came through the group's address.
         byte: received byte, while ``write`` is high.
         write: at the next falling SCL the register ``number`` takes ``byte``.
-        writable: whether it does; else the byte is refused, and the target waits for a START.
+        writable: whether it does; else the byte is refused, and those after it are too.
         read: at the next falling SCL ``value`` is taken, to be sent.
         value: of the register ``number``.
     """
@@ -110,7 +110,8 @@ class I2cTarget(Component):
                 self.sda_low.eq(accepted),
                 addressing.eq(0),
                 numbering.eq(addressing & accepted & ~bit),
-                writing.eq(numbering | (writing & accepted)),
+                # A refused byte leaves the number, so the bytes after it are refused as well.
+                writing.eq(numbering | writing),
                 reading.eq(reading | (addressing & accepted & bit)),
             ]
             with m.If(addressing):

@@ -12,14 +12,16 @@ SMALL = {
         11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1
     ),
     "benches_i2c_store": ReadOut(16, 8, 7, scan_step=4, first_row=0, first_column=2, window=5),
-    "benches_i2c_full_size": FULL_SIZE,
-    "benches_i2c_times": FULL_SIZE,
 }
 
 
 @pytest.mark.parametrize("module", SMALL)
 def test_pair(simulate: Any, module: str) -> None:
     simulate(SMALL[module], module, seed=1)
+
+
+def test_full_size(simulate: Any) -> None:
+    simulate(FULL_SIZE, "benches_i2c_full_size", "benches_i2c_times", seed=1)
 
 
 @pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes minutes: set I2C_WHOLE")
