@@ -40,7 +40,7 @@ async def under_pressure(dut: Any, pressure: str) -> None:
     for place in BENCH.PLACES:
         await works(bench, place)
     await bench.check()
-    hit("pressure", top=BENCH.__name__, pressure=pressure)
+    hit("pressure", bench=BENCH.__name__, pressure=pressure)
 
 
 @slow_test

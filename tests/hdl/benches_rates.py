@@ -6,7 +6,8 @@ from typing import Any
 import cocotb
 from benches_any_top import BENCH, slow_test, works
 from cover import hit
-from timing import DATA_HALVES, PHASES, PIXEL_MHZ, fixed
+from cover_points import PHASES, PIXEL_MHZ
+from timing import DATA_HALVES, fixed
 
 
 @slow_test
@@ -15,4 +16,4 @@ async def at_fixed_rates(dut: Any, pixel_mhz: float, data: str, phase: int) -> N
     bench = await BENCH.start(dut, fixed(pixel_mhz, DATA_HALVES[data], phase / PHASES))
     await works(bench, random.choice(BENCH.PLACES))
     await bench.check()
-    hit("rates", top=BENCH.__name__, pixel_mhz=pixel_mhz, data=data, phase=phase)
+    hit("rates", bench=BENCH.__name__, pixel_mhz=pixel_mhz, data=data, phase=phase)

@@ -54,6 +54,15 @@ SEND_STATES = ("line, clock high", "line, clock low", "pause, clock high", "paus
 TAKE_STATES = ("no byte", "one byte", "two bytes", "address", "more bytes")
 READ_FROM_STATES = ("no clock", "addressed byte", "next bytes")
 
+#: Pixel clocks in MHz: the range, the sensors' own, and between.
+PIXEL_MHZ = (1.0, 2.0, 5.0, 10.0, 13.5, 20.0)
+
+#: Steps of the pixel clock's phase against the processor's.
+PHASES = 8
+
+#: The benches that ``benches_any_top`` and ``benches_rates`` run on.
+BENCHES = ("Bench", "SharedBench", "DoubleBench", "BoardsBench", "PairBench")
+
 #: CubeStar's tops by the names of their designs.
 CUBESTAR = {
     "CubeStarTop": "published",
@@ -251,16 +260,16 @@ GROUPS = {
     "rates": Group(
         "a picture stored and read back at fixed rates and phase of both clocks",
         {
-            "top": ("Bench", "SharedBench", "DoubleBench", "BoardsBench", "PairBench"),
-            "pixel_mhz": (1.0, 2.0, 5.0, 10.0, 13.5, 20.0),
+            "bench": BENCHES,
+            "pixel_mhz": PIXEL_MHZ,
             "data": ("37 cycles", "2 instructions", "1 MHz", "limit"),
-            "phase": range(8),
+            "phase": range(PHASES),
         },
     ),
     "pressure": Group(
         "pictures stored and read back with idle times and stalls of one kind",
         {
-            "top": ("Bench", "SharedBench", "DoubleBench", "BoardsBench", "PairBench"),
+            "bench": BENCHES,
             "pressure": (
                 "steady",
                 "stalling camera",

