@@ -216,17 +216,22 @@ class CubeStarBoard:
         # A latch-up comes from outside, so the FPGA may have run ahead; see emulator/processor.py.
         now_ps = max(self.kernel.now, self.engine.now_ps)
         self.engine.run(now_ps)
-        behind = "imager" if self._layout.external_ram else "memory"
-        if channel == "memory" and not on:
-            self._scramble(self._hardware.external_ram)
         if channel == "imager":
             self.camera.power(on, now_ps)
-        if channel == behind:
-            for name, memory in self.engine.memories.items():
-                if not self._layout.external_ram:
-                    self.engine.power_memory(name, on)
-                if not on:
-                    self._scramble(memory)
+        memories = self.engine.memories
+        if not self._layout.external_ram:
+            # Without supply an FPGA leads nowhere, as a memory without supply does.
+            reached = all(self.power.is_on(name) for name in ("imager", "memory"))
+            for name in memories:
+                self.engine.power_memory(name, reached)
+        lost = list(memories.values())
+        if self._layout.external_ram:
+            lost = [self._hardware.external_ram] if channel == "memory" else lost
+        elif channel == "imager":
+            lost = []
+        if not on:
+            for memory in lost:
+                self._scramble(memory)
 
 
 class _Efm32gg:

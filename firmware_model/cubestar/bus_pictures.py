@@ -79,12 +79,14 @@ class _BusPictures(ABC):
         return False
 
     def search(self, config: DetectionConfig) -> Routine[Detection]:
-        """Find stars."""
+        """Find stars; a picture whose supply was cut meanwhile is lost, as pixels may stay zero."""
         search, answer = search_stars(ROWS, COLUMNS, config, self._meter), None
         while True:
             try:
                 access = search.send(answer)
             except StopIteration as done:
+                if self._supply.cut:
+                    self._state.retained.image_present = 0
                 detection: Detection = done.value
                 return detection
             if isinstance(access, Look):

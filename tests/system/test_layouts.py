@@ -206,6 +206,30 @@ def test_a_latch_up_of_the_memory_loses_the_picture_only(
     assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
 
 
+def test_a_latch_up_of_the_boards_in_a_search_costs_the_picture(
+    node: Session, layout: Layout
+) -> None:
+    """Nothing is found from there on, and what was found stays zero."""
+    node.cubestar.capture()
+    picture = newest(node, layout).copy()
+    client, power = node.cubestar.client, node.board.power
+    client.command("DetectStars")
+    client.pause(0.005)
+    power.latch_up("imager")
+    client.wait_processed(5.0)
+    client.pause(0.3)
+    assert "OverCurrent" in flags(node)
+    assert power.is_on("imager")
+    assert client.telemetry("DetectionSummary")["NumStarsDetected"] < 20
+    left = newest(node, layout)
+    changed = left != picture
+    assert 0 < np.count_nonzero(changed) < 20 * 60
+    assert not left[changed].any()
+    assert node.cubestar.process_image() is TaskStatus.DETECTION_FAILED
+    assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
+    assert not node.board.engine.violation_counts
+
+
 def test_a_switched_off_board_has_no_picture_to_give(
     node: Session, published: dict[str, Any]
 ) -> None:
