@@ -75,17 +75,22 @@ class Ebi:
         return byte
 
     async def read_and_write(self, address: int, select: str = "") -> int:
-        """Both strobes in one access, which a processor never makes; the byte that comes."""
+        """Both strobes in one access, which a processor never makes; the byte that comes.
+
+        RE_N falls first and rises last: of pins that move together the order is the simulator's.
+        """
         await self.address(address)
         self.drives = False
         chip = select or self._selects[0]
-        levels = [getattr(self._dut, name) for name in (chip, "RE_N", "WE_N")]
-        for pin in levels:
+        pins = [getattr(self._dut, name) for name in ("RE_N", "WE_N", chip)]
+        for pin in pins:
             pin.value = 0
+            await wait(1_000, ODD)
         await wait(SLOWEST_ACCESS + self._timing.pause(), ODD)
         byte = int(self._dut.AD_LOW_O.value)
-        for pin in levels:
+        for pin in reversed(pins):
             pin.value = 1
+            await wait(1_000, ODD)
         await self._pause()
         self.drives = True
         return byte
