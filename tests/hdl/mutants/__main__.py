@@ -41,6 +41,9 @@ def arguments() -> argparse.Namespace:
     number.add_argument("--all", action="store_true", help="every mutant that there is")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the choice; default 1")
     parser.add_argument("--out", type=Path, default=FOLDER, metavar="FOLDER", help="of results")
+    parser.add_argument(
+        "--no-proofs", action="store_true", help="simulate only: what is equivalent survives"
+    )
     parser.add_argument("--json", action="store_true", help="as JSON")
     args = parser.parse_args()
     for name in args.names:
@@ -53,7 +56,9 @@ def arguments() -> argparse.Namespace:
 
 def score(name: str, args: argparse.Namespace) -> list[Result]:
     count = None if args.all else args.count
-    scoring = Scoring(name, SUITES[name], args.out, count=count, seed=args.seed)
+    scoring = Scoring(
+        name, SUITES[name], args.out, count=count, seed=args.seed, proofs=not args.no_proofs
+    )
     results = []
     columns = [SpinnerColumn(), *Progress.get_default_columns()]
     with Progress(*columns, console=errors, disable=not errors.is_terminal, transient=True) as bar:

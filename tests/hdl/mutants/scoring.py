@@ -65,12 +65,23 @@ class Score:
 
 
 class Scoring:
-    """One suite's mutants: ``count`` of them, or all with None; the same seed gives the same."""
+    """One suite's mutants: ``count`` of them, or all with None; the same seed gives the same.
+
+    Without ``proofs`` what is equivalent survives.
+    """
 
     def __init__(
-        self, name: str, suite: Suite, folder: Path, *, count: int | None, seed: int
+        self,
+        name: str,
+        suite: Suite,
+        folder: Path,
+        *,
+        count: int | None,
+        seed: int,
+        proofs: bool,
     ) -> None:
         self._suite = suite
+        self._proofs = proofs
         self._folder = folder / name
         self._folder.mkdir(parents=True, exist_ok=True)
         self._file = self._folder / "results.jsonl"
@@ -89,7 +100,7 @@ class Scoring:
                 if found is None:
                     bench = bench or self._bench(chunk)
                     found = bench.simulated(number, mutant)
-                    if found.outcome == "survived":
+                    if self._proofs and found.outcome == "survived":
                         found = self._judged(mutant, found)
                     self._keep(mutant, found)
                 yield found
