@@ -35,7 +35,7 @@ EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
 QUIET_S = 0.2
 ANSWER_S = 0.5
-LONGEST_STREAM_S = 600
+LONGEST_STREAM_S = 3000  # some whole pictures of AraMiS, one after the other
 READ_BYTES = 1 << 16
 MOST_AT_ONCE = 10_000
 
