@@ -52,7 +52,8 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     """With ``HDL_COVERAGE`` a regression that leaves out a declared point fails."""
     folder = os.environ.get("HDL_COVERAGE")
     here = not hasattr(session.config, "workerinput")
-    if folder and here and exitstatus == 0 and cover.missed(cover.merged(Path(folder))):
+    judged = folder and here and exitstatus == 0 and SIMULATOR == "icarus"
+    if judged and cover.missed(cover.merged(Path(folder))):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 

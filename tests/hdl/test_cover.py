@@ -57,6 +57,12 @@ def test_every_row_of_the_table_is_declared() -> None:
             assert (side, str(action), state) in taken
 
 
+def test_document_has_the_same_groups() -> None:
+    text = (HERE.parents[1] / "docs" / "gateware-tests.md").read_text(encoding="utf-8")
+    for name, group in GROUPS.items():
+        assert f"| {name} | {len(group.points())} | {group.meaning} |" in text
+
+
 def test_regression_that_misses_a_point_fails(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
     done = subprocess.run(

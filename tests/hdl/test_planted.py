@@ -53,6 +53,14 @@ def test_every_kind_is_planted_in_both_sensors() -> None:
         assert {"cubestar", "cubesense-pair"} <= tops, kind
 
 
+def test_document_has_every_bug() -> None:
+    document = Path(__file__).parents[2] / "docs" / "gateware-tests.md"
+    text = document.read_text(encoding="utf-8")
+    for kind in KINDS:
+        titles = dict.fromkeys(bug.title for bug in BUGS if bug.kind == kind)
+        assert f"| {kind} | {'; '.join(titles)} |" in text
+
+
 def test_nothing_is_left_behind() -> None:
     before = verilog_text(TIERS[STAR].make(), "dut")
     wrong_verilog(BUGS[0], STAR)
