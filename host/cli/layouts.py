@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.sky.scene import Scene
     from cubestack.host.cli.session import Engine
 
-__all__ = ["LayoutResult", "add_arguments", "measure_layout", "run"]
+__all__ = ["LayoutResult", "add_arguments", "measure_layout", "report", "run"]
 
 SETTLING = 2
 """Attitudes before the measurement."""
@@ -58,8 +58,11 @@ PUBLISHED = {
 class LayoutResult:
     """What was measured of a layout; the attributes are those of the JSON output.
 
+    Without attitudes there is no rate, age and energy: None.
+
     Attributes:
-        attitudes: counted; ``right`` of them near the truth.
+        attitudes: counted.
+        right: those near the truth; None where the scene has none.
         age_ms: mean, when an attitude becomes available.
         oldest_ms: mean, right before the next one does.
         phase_ms: the program's own times of the last turn.
@@ -72,12 +75,12 @@ class LayoutResult:
     tiles: int
     fits: bool
     attitudes: int
-    right: int
-    rate_hz: float
-    age_ms: float
-    oldest_ms: float
-    power_mw: float
-    energy_mj: float
+    right: int | None
+    rate_hz: float | None
+    age_ms: float | None
+    oldest_ms: float | None
+    power_mw: float | None
+    energy_mj: float | None
     phase_ms: dict[str, float]
     violations: int
     published: str
@@ -110,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print(json.dumps(asdict(result)), flush=True)
     if not args.json:
-        _report(results)
+        report(results)
     return int(not all(result.attitudes for result in results))
 
 
@@ -141,16 +144,20 @@ def measure_layout(
         tiles=fpga.tiles,
         fits=fpga.fits,
         attitudes=count,
-        right=sum(one.right for one in measured),
-        rate_hz=round(count / took_s, 3),
-        age_ms=round(age_ms, 1),
-        oldest_ms=round(age_ms + 1000 * took_s / max(count, 1), 1),
-        power_mw=round(spent_mj / took_s, 1),
-        energy_mj=round(spent_mj / max(count, 1), 1),
+        right=None if begun.right is None else sum(bool(one.right) for one in measured),
+        rate_hz=_known(count / took_s, 3),
+        age_ms=_known(age_ms),
+        oldest_ms=_known(age_ms + 1000 * took_s / max(count, 1)),
+        power_mw=_known(spent_mj / took_s),
+        energy_mj=_known(spent_mj / max(count, 1)),
         phase_ms={name: round(value, 1) for name, value in phases.items()},
         violations=violations,
         published=PUBLISHED[layout],
     )
+
+
+def _known(value: float, digits: int = 1) -> float | None:
+    return None if math.isnan(value) else round(value, digits)
 
 
 @dataclass(frozen=True)
@@ -160,7 +167,7 @@ class _Found:
     time_ps: int
     charge_mas: float
     age_ms: float
-    right: bool
+    right: bool | None
 
 
 def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
@@ -175,7 +182,7 @@ def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
     begun = False
     while not begun or kernel.now < end_ps:
         if kernel.now >= end_ps:
-            yield _Found(kernel.now, 0.0, math.nan, right=False)
+            yield _Found(kernel.now, 0.0, math.nan, right=None)
             return
         kernel.step()
         writes = board.flash.writes.get(ATTITUDE_PAGE, 0)
@@ -187,19 +194,22 @@ def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
         page, stored, truth = board.flash.read(ATTITUDE_PAGE), board.stored[-1], board.truth()
         assert page is not None
         assert stored is not None
-        assert truth is not None
-        across, about = attitude_error_deg(Attitude.unpack(page).quaternion, truth)
+        right = None
+        if truth is not None:
+            across, about = attitude_error_deg(Attitude.unpack(page).quaternion, truth)
+            right = across < RIGHT_CROSS_DEG and abs(about) < RIGHT_ROLL_DEG
         if not begun:
             begun, end_ps = True, kernel.now + seconds * PS_PER_S + PS_PER_MS
         yield _Found(
             kernel.now,
             board.power.charge_mas(),
             (kernel.now - stored.mid_exposure_ps(MIDDLE_ROW)) / PS_PER_MS,
-            right=across < RIGHT_CROSS_DEG and abs(about) < RIGHT_ROLL_DEG,
+            right=right,
         )
 
 
-def _report(results: list[LayoutResult]) -> None:
+def report(results: list[LayoutResult]) -> None:
+    """Show ``results`` as a table."""
     from rich.table import Table
 
     table = Table(title="CubeStar's memory layouts in their loops")
@@ -209,10 +219,10 @@ def _report(results: list[LayoutResult]) -> None:
         each = f"{result.fpgas} x " if result.fpgas > 1 else ""
         table.add_row(
             result.layout,
-            f"{result.rate_hz:.2f}",
-            f"{result.age_ms:.0f} to {result.oldest_ms:.0f}",
-            f"{result.power_mw:.0f}",
-            f"{result.energy_mj:.0f}",
+            _shown(result.rate_hz, 2),
+            f"{_shown(result.age_ms)} to {_shown(result.oldest_ms)}",
+            _shown(result.power_mw),
+            _shown(result.energy_mj),
             f"{result.phase_ms['transfer']:.0f}",
             f"{each}{result.pins}{'' if result.fits else ' (!)'}",
             f"{each}{result.tiles}",
@@ -223,3 +233,7 @@ def _report(results: list[LayoutResult]) -> None:
     for result in results:
         if not result.fits:
             console.print(f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins")
+
+
+def _shown(value: float | None, digits: int = 0) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

@@ -23,7 +23,7 @@ from cubestack.firmware_model.interface.cubestar_codes import (
     TestPattern,
 )
 from cubestack.firmware_model.interface.cubestar_layouts import Layout
-from cubestack.host.cli.layouts import measure_layout
+from cubestack.host.cli import layouts
 from cubestack.host.cli.main import main
 from cubestack.host.cli.session import Session, tell_layout
 
@@ -256,20 +256,29 @@ def test_banks_are_kept_apart_where_there_are_any(
     assert node.cubestar.client.telemetry("LoopStatus")["Bank"] == 1
 
 
-@pytest.mark.parametrize("layout", list(Layout), ids=lambda layout: layout.value)
-def test_the_loop_keeps_its_rate_and_age(layout: Layout) -> None:
+def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -> None:
     """Twice the rate with two memories; no layout without a copy is older than 500 ms."""
-    result = measure_layout(layout, ORION, seconds=2)
-    fast = layout in (Layout.TWO_MEMORIES, Layout.TWO_BOARDS)
-    assert result.rate_hz == pytest.approx(2 if fast else 1, rel=1e-3)
-    assert result.attitudes == result.right == (4 if fast else 2)
-    if layout is Layout.COPIED:
-        assert result.age_ms > 900
-    else:
-        assert result.age_ms < 500
-        assert result.phase_ms["transfer"] == 0
-    assert result.violations == 0
-    assert result.power_mw == pytest.approx(result.energy_mj * result.rate_hz, rel=1e-3)
+    capsys.readouterr()
+    assert main(["layouts", "--seconds", "2", "--json"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    results = [layouts.LayoutResult(**json.loads(line)) for line in lines]
+    assert [result.layout for result in results] == [layout.value for layout in Layout]
+    for result in results:
+        fast = result.layout in ("3", "two-boards")
+        assert result.rate_hz == pytest.approx(2 if fast else 1, rel=1e-3)
+        assert result.attitudes == result.right == (4 if fast else 2)
+        copied = result.layout == "1"
+        assert result.age_ms is not None
+        assert result.age_ms > 900 if copied else result.age_ms < 500
+        assert (result.phase_ms["transfer"] > 0) == copied
+        assert result.violations == 0
+        assert result.energy_mj is not None
+        assert result.rate_hz is not None
+        assert result.power_mw == pytest.approx(result.energy_mj * result.rate_hz, rel=1e-3)
+    layouts.report(results)
+    shown = capsys.readouterr().out
+    assert all(result.published in shown for result in results)
+    assert shown.count("can not be built") == 1
 
 
 def test_two_memories_are_filled_in_turn(session: Open) -> None:
