@@ -1,0 +1,117 @@
+"""Programs on an emulated bus, by both routes."""
+
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from cubestack.emulator.i2c_host.adapter import I2cAdapter
+from cubestack.emulator.i2c_host.pacing import wait_precisely
+from cubestack.emulator.i2c_host.server import I2cServer
+from cubestack.emulator.i2c_host.shim import find_c_compiler
+from cubestack.emulator.ports.pump import Pump
+from cubestack.host.cli.boards import open_board
+
+COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
+ENVIRONMENT = os.environ | {"PATH": f"{os.environ['PATH']}:/usr/sbin:/sbin"}
+TIMEOUT_S = 120
+ROUTES = ("seccomp", "preload")
+
+LATCH = 0x50
+"""Where the served bus has a device that listens to the general call, beside the sensor."""
+
+needs_tools = pytest.mark.skipif(
+    shutil.which("i2ctransfer", path=ENVIRONMENT["PATH"]) is None, reason="no i2c-tools here"
+)
+needs_c = pytest.mark.skipif(find_c_compiler() is None, reason="no C compiler here")
+
+
+class Outcome(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Outcome]
+
+
+class Latch:
+    """Keeps the last byte that was written."""
+
+    def __init__(self) -> None:
+        self._byte = 0
+
+    def i2c_start(self, read: bool) -> None: ...
+
+    def i2c_write(self, byte: int) -> bool:
+        self._byte = byte
+        return True
+
+    def i2c_read(self) -> int:
+        return self._byte
+
+    def i2c_stop(self) -> None: ...
+
+
+@pytest.fixture(scope="session")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The socket of an emulation that runs in this process."""
+    path = tmp_path_factory.mktemp("private", numbered=True) / "bus"
+    opened = open_board("cubestar", None, seed=0, engine="auto", baud=None)
+    board = opened.board
+    board.i2c_bus.attach(LATCH, Latch(), general_call=True)
+    adapter = I2cAdapter(board.kernel, board.i2c_bus)
+    server = I2cServer(path, adapter)
+    pump = Pump(
+        board.kernel,
+        [server],
+        lambda: board.busy() or adapter.busy,
+        pace="fast",
+        wait=wait_precisely,
+    )
+    thread = threading.Thread(target=pump.run)
+    thread.start()
+    yield path
+    pump.stop()
+    thread.join(TIMEOUT_S)
+    server.close()
+    board.close()
+
+
+@pytest.fixture(scope="session", params=ROUTES)
+def route(request: pytest.FixtureRequest, served: Path) -> str:
+    """A route that works here."""
+    name = str(request.param)
+    found = start("--route", name, "--attach", served, "--", "true")
+    if found.code:
+        pytest.skip(f"no {name} route here: {found.err.strip()}")
+    assert found.err == f"/dev/i2c-7 by way of {name}, as asked\n"
+    return name
+
+
+@pytest.fixture
+def run(route: str, served: Path) -> Run:
+    """Runs a program with the route, on the served bus or with options of its own."""
+
+    def call(*program: object, options: tuple[object, ...] = ("--attach", served)) -> Outcome:
+        return start("--quiet", "--route", route, *options, "--", *program)
+
+    return call
+
+
+def start(*arguments: object, given: str | None = None) -> Outcome:
+    done = subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        capture_output=True,
+        input=given,
+        text=True,
+        env=ENVIRONMENT,
+        timeout=TIMEOUT_S,
+    )
+    return Outcome(done.returncode, done.stdout, done.stderr)

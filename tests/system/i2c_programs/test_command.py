@@ -1,0 +1,94 @@
+"""The command around the program: options of the bus, streams, signals and the end."""
+
+import errno
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from cubestack.host.cli.main import main
+
+from .conftest import COMMAND, TIMEOUT_S, Run, start
+
+
+def test_faults_of_the_bus_reach_the_program(run: Run, tmp_path: Path) -> None:
+    plan = tmp_path / "faults.toml"
+    plan.write_text('seed = 1\n[[fault]]\nkind = "i2c-stretch"\nstretch_us = 2e6\n')
+    script = "import smbus2\ntry: smbus2.SMBus(7).read_byte(26)\nexcept OSError as e: print(e)"
+    outcome = run(sys.executable, "-c", script, options=("--pace", "fast", "--faults", plan))
+    assert outcome.out == f"[Errno {errno.ETIMEDOUT}] Connection timed out\n"
+
+
+def test_exit_codes_and_streams(route: str, served: Path) -> None:
+    script = "read line; echo out $line; echo err >&2; exit 7"
+    options = ("--quiet", "--route", route, "--attach", served)
+    outcome = start(*options, "--", "sh", "-c", script, given="in\n")
+    assert outcome == (7, "out in\n", "err\n")
+
+
+def test_a_program_that_a_signal_ends(run: Run) -> None:
+    assert run("sh", "-c", "kill -TERM $$").code == 128 + 15
+
+
+def test_a_program_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--", "no-such-program"]) == 2
+    assert "no-such-program: no such program" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["cubestarr=0x2a", "0x1a", "0x1a=", "cubestar=x", "0x1a=0x2a=3"])
+def test_a_move_that_makes_no_sense(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        main(["run", "--i2c-addr", text, "--", "true"])
+    assert raised.value.code == 2
+    assert "is not NAME=0xNN, as in cubestar=0x2a" in capsys.readouterr().err
+
+
+def test_attached_to_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--attach", str(tmp_path / "bus"), "--", "true"]) == 1
+    assert "no emulation serves" in capsys.readouterr().err
+
+
+def test_preload_takes_over_where_seccomp_is_refused(route: str, served: Path) -> None:
+    """A process under a listener gets no second one, as in a container that refuses it."""
+    if route != "seccomp":
+        pytest.skip("needs a filter around it")
+    inner = [*COMMAND, "--bus", "8", "--attach", str(served), "--", "cat", "/proc/bus/i2c"]
+    outcome = start("--quiet", "--route", "seccomp", "--attach", served, "--", *inner)
+    assert outcome.code == 0
+    assert outcome.out.startswith("i2c-7")  # cat does not use fopen, so the outer one answers
+    assert "by way of preload, as seccomp is not there: the kernel refuses" in outcome.err
+
+
+def test_processes_left_behind_are_served(run: Run, route: str, tmp_path: Path) -> None:
+    """Under a filter they would fail without their supervisor."""
+    result = tmp_path / "result"
+    script = (
+        "import os, smbus2\n"
+        "read, write = os.pipe()\n"
+        "if not os.fork():\n"
+        "    os.close(write); os.read(read, 1)\n"  # until the parent has ended
+        f"    open({str(result)!r}, 'w').write(str(smbus2.SMBus(7).read_byte_data(26, 131)))\n"
+        "os._exit(5)\n"
+    )
+    assert run(sys.executable, "-c", script).code == 5
+    if route == "seccomp":
+        assert result.read_text() == "1"
+
+
+def test_a_signal_to_the_command_goes_to_the_program(route: str, served: Path) -> None:
+    script = "trap 'exit 33' TERM; echo ready; read line"
+    options = ("--quiet", "--route", route, "--attach", str(served))
+    with subprocess.Popen(
+        [*COMMAND, *options, "--", "sh", "-c", script],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        watch = threading.Timer(TIMEOUT_S, process.kill)
+        watch.start()
+        assert process.stdout.readline() == b"ready\n"
+        watch.cancel()
+        process.terminate()
+        assert process.wait(TIMEOUT_S) == 33

@@ -1,0 +1,65 @@
+"""Paced programs: a transfer takes its time on the wire.
+
+With real-time priority, as others use the machine as well; skipped where that is not allowed.
+"""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from cubestack.emulator.i2c_host.turns import MAX_DEBT_NS
+
+from .conftest import COMMAND, ENVIRONMENT, TIMEOUT_S
+
+PRIORITY = "import os, sys; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(5))"
+FIRST = (sys.executable, "-c", f"{PRIORITY}; os.execv(sys.argv[1], sys.argv[1:])")
+"""Runs a command with real-time priority."""
+
+CLIENT = """
+import sys, time
+from smbus2 import SMBus, i2c_msg
+marks = []
+with SMBus(7) as bus:
+    for _ in range(16):
+        {}
+        marks.append(time.perf_counter())
+print(*(after - before for before, after in zip(marks, marks[1:])))
+"""
+BYTE_READS = 20
+BYTES = f"for _ in range({BYTE_READS}): bus.read_byte_data(0x1A, 0x83)"
+BYTES_BITS = BYTE_READS * (2 * (1 + 9 + 9) + 1)
+LONG = "bus.i2c_rdwr(i2c_msg.read(0x1A, 600))"
+LONG_BITS = 1 + 9 + 9 * 600 + 1
+
+
+@pytest.mark.parametrize("hz", [100_000, 400_000])
+@pytest.mark.parametrize(
+    ("calls", "bits"), [(BYTES, BYTES_BITS), (LONG, LONG_BITS)], ids=["bytes", "long"]
+)
+def test_transfers_take_the_time_of_the_wire(route: str, hz: int, calls: str, bits: int) -> None:
+    """All together take no less, but for what was late before them; and some take no more.
+
+    Not all: even so, others slow this processor down.
+    """
+    try:
+        before = os.sched_getscheduler(0), os.sched_getparam(0)
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(5))
+        os.sched_setscheduler(0, *before)
+    except PermissionError:
+        pytest.skip("no real-time priority here")
+    options = ("--quiet", "--route", route, "--hz", str(hz))
+    client = (sys.executable, "-c", CLIENT.format(calls))
+    out = subprocess.run(
+        [*FIRST, *COMMAND, *options, "--", *client],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT,
+        timeout=TIMEOUT_S,
+        check=True,
+    ).stdout
+    times = sorted(map(float, out.split()))
+    wire_s = bits / hz
+    assert sum(times) > len(times) * wire_s - MAX_DEBT_NS / 1e9
+    assert times[1] < 1.05 * wire_s
