@@ -21,6 +21,8 @@ Verilog and Amaranth's simulator, on every top (docs/engines.md).
 
 import argparse
 import json
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -42,6 +44,18 @@ LOOP_ITERATIONS = 10
 CAPTURES = 5
 HIGHEST_GAIN = 15.0
 PS_PER_S = 10**12
+I2C_HZ = 400_000
+I2C_CLIENT = """
+import time, smbus2
+bus = smbus2.SMBus(7)
+marks = [time.perf_counter()]
+for _ in range(20):
+    for _ in range(100):
+        bus.read_byte_data(0x1A, 0x83)
+    marks.append(time.perf_counter())
+times = sorted(after - before for before, after in zip(marks, marks[1:]))
+print(100 / times[len(times) // 2])
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
     figures["pair_scan_ms"] = round(pair_scan_ms(), 1)
     figures["pair_build_s"] = round(cold_build_s(cubesense_wiring()), 1)
     figures |= _aramis()
+    figures |= _i2c()
     if args.json:
         print(json.dumps(figures))
         return 0
@@ -173,6 +188,23 @@ def _aramis() -> dict[str, float]:
         "aramis_frame_ms": round(1000 * min(frames), 1),
         "aramis_solve_ms": round(1000 * min(solves), 1),
     }
+
+
+def _i2c() -> dict[str, float]:
+    """Rates of a program in a process of its own: the median of stretches of 100 reads."""
+    figures: dict[str, float] = {}
+    command = (sys.executable, "-m", "cubestack.host.cli.main", "run", "--quiet")
+    for route in ("seccomp", "preload"):
+        for pace in ("fast", "real"):
+            options = ("--route", route, "--pace", pace, "--hz", str(I2C_HZ))
+            done = subprocess.run(
+                [*command, *options, "--", sys.executable, "-c", I2C_CLIENT],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            if done.returncode == 0:
+                figures[f"i2c_{route}_{pace}"] = round(float(done.stdout))
+    return figures
 
 
 def _sensors_ratio(sensors: "CubeSenseSession") -> float:
