@@ -7,6 +7,7 @@ argument ``+mutant=N`` chooses one, and no plus-argument, or 0, the design itsel
 """
 
 import hashlib
+import random
 import re
 import tempfile
 from collections.abc import Sequence
@@ -122,11 +123,18 @@ def netlist(component: Component, kept: Sequence[str] = ()) -> Netlist:
     return Netlist(re.sub(r"^# Generated.*\n", "", simplified), tuple(kept))
 
 
-def mutants(design: Netlist, count: int | None = None, seed: int = 1) -> list[Mutant]:
+def mutants(
+    design: Netlist, count: int | None = None, seed: int = 1, source: str = ""
+) -> list[Mutant]:
     """``count`` mutants spread over the design's source, wires and cells; all of them with None.
 
-    The same seed gives the same ones.
+    The same seed gives the same ones. With ``source``, the name of a file of the design, only
+    mutants of what comes from there, and not more than there are.
     """
+    if source:
+        every = [m for m in mutants(design) if any(s.startswith(f"{source}:") for s in m.source)]
+        chosen = len(every) if count is None else min(count, len(every))
+        return random.Random(seed).sample(every, chosen)
     with _folder() as name:
         folder = Path(name)
         (folder / "netlist.il").write_text(design.text, encoding="utf-8")

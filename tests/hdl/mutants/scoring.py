@@ -87,7 +87,7 @@ class Scoring:
         self._file = self._folder / "results.jsonl"
         self._design = suite.make()
         self._netlist: Netlist = netlist(self._design, suite.kept)
-        self.mutants: list[Mutant] = mutants(self._netlist, count, seed)
+        self.mutants: list[Mutant] = mutants(self._netlist, count, seed, suite.source)
 
     def results(self) -> Iterator[Result]:
         """One for each mutant, in their order; AssertionError when the design itself fails."""

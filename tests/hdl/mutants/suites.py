@@ -8,6 +8,7 @@ from amaranth.lib.wiring import Component, In
 from published import AsPublished, DoubleAsPublished, SharedAsPublished
 from regression import TIERS, frame_environment
 
+from cubestack.hdl.cubestar_shared_top import CubeStarShared
 from cubestack.hdl.matrix_counter import MatrixCounter
 
 __all__ = ["SUITES", "Stage", "Suite"]
@@ -33,6 +34,7 @@ class Suite:
         standby: levels of inputs that make the state.
         kept: submodules whose signals the cocotb modules look at.
         wrapper: a design around the module ``dut``, for stages with its name as top.
+        source: file of the design's source that the mutants are of, if not of all.
     """
 
     make: Callable[[], Component]
@@ -41,6 +43,7 @@ class Suite:
     standby: Mapping[str, int]
     kept: tuple[str, ...] = ()
     wrapper: tuple[str, Callable[[], Component]] | None = None
+    source: str = ""
 
 
 class CounterAlone(Component):
@@ -105,7 +108,7 @@ BENCHES = {
     "cubesense-pair": "pair:PairBench",
 }
 
-#: By name: tops as in ``cubestack.hdl.designs``, and a block that is done in seconds.
+#: By name: tops as in ``cubestack.hdl.designs``, one's bus, and a block that is done in seconds.
 SUITES = {
     "cubestar": _suite(
         "cubestar",
@@ -122,6 +125,14 @@ SUITES = {
         *_seeds((*TIERS["cubesense-pair"].modules, "benches_any_top"), 2)[1:],
         standby={"SUNEN": 1, "NADEN": 1},
         kept=("sun", "nadir"),
+    ),
+    # A picture so large that its address needs the latch.
+    "cubestar-shared-bus": Suite(
+        lambda: CubeStarShared(5, 33),
+        _seeds(("benches_shared",), 2),
+        {**frame_environment(5, 33), "HDL_COVERAGE": ""},
+        {"ENABLE": 0},
+        source="bus_port.py",
     ),
     "matrix-counter": Suite(
         lambda: CounterAlone(5, 3),
