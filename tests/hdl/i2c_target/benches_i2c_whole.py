@@ -1,34 +1,53 @@
-"""How long the scan and a whole picture take on the bus; minutes of simulation."""
+"""The nadir scan and a whole picture over the bus; see i2c_full_frame.v, which has the master."""
 
+from fractions import Fraction
 from typing import Any
 
 import cocotb
 import i2c_times
-from benches_i2c_times import read_at, takes
-from geometry import GEOMETRY
-from i2c_bench import I2cBench, read
+from cocotb.triggers import RisingEdge, Timer
+from instants import now
 from small import READ_OUT
 
+from cubestack.firmware_model.interface.cubesense_fpga import Action, Actions
+from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+    ADDRESSES,
+    GROUP_ADDRESS,
+    command_byte,
+)
 
-@cocotb.test(timeout_time=10, timeout_unit="sec")
-async def nadir_scan(dut: Any) -> None:
-    bench = await I2cBench.start(dut, cameras=(), speed=400_000)
-    await bench.mcu.command(read("nadir"))
-    data = b""
-    with takes(bench, i2c_times.scan(), "scan"):
-        for y in READ_OUT.scan_rows:
-            data += await read_at(bench, "nadir", 0, y, READ_OUT.columns, False)
-        for x in READ_OUT.scan_columns:
-            data += await read_at(bench, "nadir", x, 0, READ_OUT.rows, True)
-    memory = bench.srams["nadir"].memory
-    pixels = [pixel for pixel in READ_OUT.scan() if pixel is not None]
-    assert data == bytes(memory[GEOMETRY.address(x, y)] for x, y in pixels)
+PERIOD_PS = 10**6
 
 
-@cocotb.test(timeout_time=100, timeout_unit="sec")
-async def whole_picture(dut: Any) -> None:
-    bench = await I2cBench.start(dut, cameras=(), speed=1_000_000)
-    await bench.mcu.command(read("sun"))
-    with takes(bench, i2c_times.PICTURE, "picture"):
-        data = await read_at(bench, "sun", 0, 0, READ_OUT.pixels, False)
-    assert data == bench.stored("sun")
+async def request(dut: Any, kind: str, **values: int) -> Fraction:
+    """One transfer; how many SCL periods it took."""
+    for name, value in values.items():
+        getattr(dut, name).value = value
+    await Timer(1, unit="us")
+    before = now()
+    getattr(dut, kind).value = 1
+    await RisingEdge(dut.done)
+    taken = now() - before
+    getattr(dut, kind).value = 0
+    await Timer(1, unit="us")
+    assert int(dut.refused.value) == int(dut.wrong.value) == 0
+    return Fraction(taken, PERIOD_PS)
+
+
+@cocotb.test()
+async def scan_and_picture(dut: Any) -> None:
+    await Timer(1, unit="us")
+    dut.RESET_N.value = 1
+    dut.quarter.value = PERIOD_PS // 4
+    dut.group.value, dut.target.value = GROUP_ADDRESS, ADDRESSES["nadir"]
+    read = command_byte(Actions(Action.STANDBY, Action.READ))
+    assert await request(dut, "command", value=read) == i2c_times.COMMAND
+    scan = Fraction(0)
+    for y in READ_OUT.scan_rows:
+        scan += await request(dut, "read", x=0, y=y, down=0, count=READ_OUT.columns)
+    for x in READ_OUT.scan_columns:
+        scan += await request(dut, "read", x=x, y=0, down=1, count=READ_OUT.rows)
+    assert scan == i2c_times.scan()
+    picture = await request(dut, "read", x=0, y=0, down=0, count=READ_OUT.pixels)
+    assert picture == i2c_times.PICTURE
+    print(f"scan {float(scan)} periods, picture {float(picture)} periods, at {PERIOD_PS} ps")

@@ -24,6 +24,6 @@ def test_full_size(simulate: Any) -> None:
     simulate(FULL_SIZE, "benches_i2c_full_size", "benches_i2c_times", seed=1)
 
 
-@pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes minutes: set I2C_WHOLE")
+@pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes a minute: set I2C_WHOLE")
 def test_whole_read_outs(simulate: Any) -> None:
-    simulate(FULL_SIZE, "benches_i2c_whole", seed=1)
+    simulate(FULL_SIZE, "benches_i2c_whole", seed=1, harness="i2c_full_frame")
