@@ -197,7 +197,7 @@ def _acknowledges(m: Module, d: SimpleNamespace) -> None:
 def _proofs(side: Side) -> dict[str, Proof]:
     """What is proved of one of the two FPGAs."""
     return {
-        f"{side}-i2c-idle": Proof(
+        f"{side}-idle-i2c": Proof(
             "With RESET_N low every register but the Sun's coordinates is reset; in standby every "
             "pin but SDA is",
             partial(_fpga, side),
@@ -205,7 +205,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             partial(_idle, side),
             Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
         ),
-        f"{side}-i2c-sda": Proof(
+        f"{side}-sda-i2c": Proof(
             "SDA is pulled low in transfers to this FPGA only, to acknowledge or to send a 0, and "
             "never moved while SCL is high",
             partial(_fpga, side),
@@ -213,7 +213,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             partial(_pulls_sda, side),
             Fault("registers.target.reading", 1),
         ),
-        f"{side}-i2c-ack": Proof(
+        f"{side}-ack-i2c": Proof(
             "ACK is high exactly from when all rows of a frame are stored",
             partial(_fpga, side),
             _WRITERS,
