@@ -36,8 +36,9 @@ MAX_DEBT_NS = 1_000_000
 SPIN_NS = 200_000
 """An answer that is due so soon is waited for without sleep; the pump wakes that early for it."""
 
-WORTH_NS = 20_000
-"""Answers that are later than this are worth the processor time that it takes to be quicker."""
+SPARE_NS = 30_000
+"""Answers that are ready no longer than this before they are due are worth the processor time
+that it takes to be quicker."""
 
 VISIT_NS = 5_000_000
 """Wall time between two looks of the pump at its other ports."""
@@ -84,7 +85,7 @@ class Turns:
         self._origin_ns = 0
         self._begun = False
         self._watch = Watch(ports)
-        self._came_ns = self._answered_ns = self._told_ns = self._late_ns = 0
+        self._came_ns = self._answered_ns = self._told_ns = self._late_ns = self._spare_ns = 0
         self._quickest_ns = TURNAROUND_NS
         adapter.driven = True
         adapter.holding = not fast
@@ -186,6 +187,7 @@ class Turns:
         left_ns = due_ns - (clock() - origin_ns)
         if left_ns > SPIN_NS:
             return False
+        self._spare_ns = left_ns
         self._watch.nap(left_ns)
         while (now_ns := clock() - origin_ns) < due_ns:
             pass
@@ -201,7 +203,7 @@ class Turns:
         left_ns = self._answered_ns + TURNAROUND_NS - self._now_ns()
         if left_ns <= 0:
             return False
-        awake = self._fast or self._late_ns > WORTH_NS
+        awake = self._fast or self._spare_ns < SPARE_NS
         ready = self._watch.wait(left_ns, awake=awake)
         if ready:
             self._serve(ready, came=True)
