@@ -182,13 +182,16 @@ def _proofs(side: Side) -> dict[str, Proof]:
             _address_stays_inside,
             Fault("reader.window.clamped_x", 7),
         ),
-        f"{side}-ack": Proof(
-            "ACK is high exactly from when all rows of a frame are stored",
-            fpga(side),
-            _WRITERS,
-            _acknowledges,
-            Fault("pix_writer.counter.last_row", 1),
-        ),
+        **{
+            f"{side}-ack{'-addressing' * mcu_addressing}": Proof(
+                "ACK is high exactly from when all rows of a frame are stored",
+                fpga(side, mcu_addressing),
+                _WRITERS,
+                _acknowledges,
+                Fault("pix_writer.counter.last_row", 1),
+            )
+            for mcu_addressing in (False, True)
+        },
         **{
             f"{side}-idle{'-addressing' * mcu_addressing}": Proof(
                 "With EN high every register but the Sun's coordinates is reset, and they rest",
@@ -200,6 +203,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             for mcu_addressing in (False, True)
         },
         **edge_proofs(side),
+        **edge_proofs(side, mcu_addressing=True),
         f"{side}-taken-address": Proof(
             "What is read first is at the address that the microcontroller gave",
             fpga(side, mcu_addressing=True),

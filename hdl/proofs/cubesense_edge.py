@@ -174,26 +174,28 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-def edge_proofs(side: Side) -> dict[str, Proof]:
+def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:
     """What is proved of one of the two FPGAs."""
+    make = fpga(side, mcu_addressing)
+    option = "-addressing" * mcu_addressing
     return {
-        f"{side}-scan": Proof(
+        f"{side}-scan{option}": Proof(
             "The nadir scan visits exactly the declared addresses in order",
-            fpga(side),
+            make,
             _SCAN,
             _scans,
             Fault("reader.scan.line_ends", 0),
         ),
-        f"{side}-window": Proof(
+        f"{side}-window{option}": Proof(
             "The Sun window lies inside of the picture, around the first Sun pixel",
-            fpga(side),
+            make,
             _WINDOW,
             _windows,
             Fault("reader.window.clamped_y", 3),
         ),
-        f"{side}-first-pixel": Proof(
+        f"{side}-first-pixel{option}": Proof(
             "The first Sun pixel is the first of three bright ones side by side",
-            fpga(side),
+            make,
             _searching(side),
             partial(_first_sun_pixel, side),
             Fault("search.bright", 1),

@@ -2,8 +2,9 @@
 
 from types import SimpleNamespace
 
-from amaranth.hdl import Assert, Module, Mux, Signal
+from amaranth.hdl import Assert, Module, Mux, Signal, Value
 from amaranth.lib.wiring import Component
+from amaranth.utils import ceil_log2
 
 from cubestack.hdl.cubestar_top import CubeStarTop
 from cubestack.hdl.proofs.claims import (
@@ -15,13 +16,36 @@ from cubestack.hdl.proofs.claims import (
 )
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-__all__ = ["PROOFS"]
+__all__ = ["PROOFS", "gapped", "inside"]
+
+
+def gapped(small: bool) -> SimpleNamespace:
+    """A size that is no power of two, so that the address could leave it; wide as the shipped."""
+    columns, rows = (3, 3) if small else (1000, 500)
+    return SimpleNamespace(columns=columns, rows=rows)
+
+
+def inside(address: Value, size: SimpleNamespace) -> Value:
+    """Whether row : column is within the picture."""
+    bits = ceil_log2(size.columns)
+    return (address[:bits] < size.columns) & (address[bits:] < size.rows)
+
+
+def _gapped_top(small: bool) -> tuple[Component, SimpleNamespace]:
+    size = gapped(small)
+    return CubeStarTop(size.columns, size.rows), size
 
 
 def _top(small: bool) -> tuple[Component, SimpleNamespace]:
     """The shipped size, or one so small that a counterexample takes a few clocks."""
     columns, rows = (3, 3) if small else (1024, 512)
     return CubeStarTop(columns, rows), SimpleNamespace(columns=columns, rows=rows)
+
+
+def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
+    starts_in(m, ~d.ENABLE)
+    for position in (d.written, d.read, d.SRAM_A[:-1]):
+        m.d.comb += Assert(inside(position, d.size))
 
 
 def _idle(m: Module, d: SimpleNamespace) -> None:
@@ -76,6 +100,13 @@ PROOFS = {
         writer_wires("writer", "pix"),
         _acknowledges,
         Fault("writer.counter.last_row", 1),
+    ),
+    "cubestar-address": Proof(
+        "The SRAM address never leaves the picture, at 1000 x 500 pixels, where it could",
+        _gapped_top,
+        {"written": "writer.address", "read": "reader.address"},
+        _address_stays_inside,
+        Fault("writer.counter.last_column", 0),
     ),
     "cubestar-drivers": Proof(
         "FPGA and SRAM never both drive the SRAM's data bus",

@@ -14,6 +14,7 @@ from cubestack.hdl.proofs.claims import (
     starts_in,
     writer_wires,
 )
+from cubestack.hdl.proofs.cubestar import gapped, inside
 from cubestack.hdl.proofs.prover import Fault, Proof
 
 __all__ = ["PROOFS"]
@@ -39,10 +40,54 @@ def _boards(small: bool) -> tuple[Component, SimpleNamespace]:
     return CubeStarTwoBoards(size.columns, size.rows), size
 
 
+def _gapped_shared(small: bool) -> tuple[Component, SimpleNamespace]:
+    size = gapped(small)
+    return CubeStarShared(size.columns, size.rows), size
+
+
+def _gapped_double(small: bool) -> tuple[Component, SimpleNamespace]:
+    size = gapped(small)
+    return CubeStarDouble(size.columns, size.rows), size
+
+
+def _shared_address(m: Module, d: SimpleNamespace) -> None:
+    """The processor may address anything."""
+    starts_in(m, ~d.ENABLE)
+    m.d.comb += [
+        Assert(inside(d.written, d.size)),
+        Assert((d.ENABLE & d.RNW) | inside(d.SRAM_A[:-1], d.size)),
+    ]
+
+
+def _double_address(m: Module, d: SimpleNamespace) -> None:
+    """The processor may address anything in the other memory."""
+    starts_in(m, ~d.ENABLE)
+    storing = d.ENABLE & ~d.RNW
+    m.d.comb += [
+        Assert(inside(d.written, d.size)),
+        Assert(~(storing & ~d.into) | inside(d.SRAM1_A, d.size)),
+        Assert(~(storing & d.into) | inside(d.SRAM2_A, d.size)),
+    ]
+
+
 def _acknowledges(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.ENABLE)
     size = d.size.columns, d.size.rows
     m.d.comb += Assert(acknowledges_all_rows(m, d, "writer", d.PIXCLK, *size) == d.ACK)
+
+
+def _boards_acknowledge(m: Module, d: SimpleNamespace) -> None:
+    starts_in(m, ~d.BOARD1_ENABLE & ~d.BOARD2_ENABLE)
+    size = d.size.columns, d.size.rows
+    for board, ack in (("board1", d.BOARD1_ACK), ("board2", d.BOARD2_ACK)):
+        m.d.comb += Assert(acknowledges_all_rows(m, d, board, d.PIXCLK, *size) == ack)
+
+
+def _boards_idle(m: Module, d: SimpleNamespace) -> None:
+    """Each board by itself, whatever the other one does."""
+    for board, standby in (("board1", ~d.BOARD1_ENABLE), ("board2", ~d.BOARD2_ENABLE)):
+        own = [register for register in d.registers if register.name.startswith(f"{board}.")]
+        idle_is_reset(m, SimpleNamespace(registers=own), standby, {f"{board}.bank"})
 
 
 def _standby(m: Module, d: SimpleNamespace, srams: tuple[str, ...]) -> Value:
@@ -133,6 +178,13 @@ PROOFS = {
     "cubestar-shared-ack": Proof(
         _ACK, _shared, writer_wires("writer", "pix"), _acknowledges, _LAST_ROW
     ),
+    "cubestar-shared-address": Proof(
+        "Storing never leaves the picture, at 1000 x 500 pixels, where it could",
+        _gapped_shared,
+        {"written": "writer.address"},
+        _shared_address,
+        Fault("writer.counter.last_column", 0),
+    ),
     "cubestar-shared-drivers": Proof(
         "FPGA, SRAM and processor never drive the same data lines",
         _shared,
@@ -149,6 +201,13 @@ PROOFS = {
     ),
     "cubestar-double-ack": Proof(
         _ACK, _double, writer_wires("writer", "pix"), _acknowledges, _LAST_ROW
+    ),
+    "cubestar-double-address": Proof(
+        "Storing never leaves the picture, at 1000 x 500 pixels, where it could",
+        _gapped_double,
+        {"written": "writer.address", "into": "into"},
+        _double_address,
+        Fault("writer.counter.last_column", 0),
     ),
     "cubestar-double-apart": Proof(
         "The memory that is stored in is the camera's alone, the other one the bus's",
@@ -176,6 +235,21 @@ PROOFS = {
         {},
         _double_idle,
         Fault("bus.on", 1),
+    ),
+    "cubestar-boards-ack": Proof(
+        _ACK,
+        _boards,
+        writer_wires("board1", "pix", "board1.writer")
+        | writer_wires("board2", "pix", "board2.writer"),
+        _boards_acknowledge,
+        Fault("board2.writer.counter.last_row", 1),
+    ),
+    "cubestar-boards-idle": Proof(
+        "With its ENABLE low every register of a board but the bank is reset, and the bank rests",
+        _boards,
+        {},
+        _boards_idle,
+        Fault("board2.writer.pix_rst", 0),
     ),
     "cubestar-boards-drivers": Proof(
         "Two boards drive the bus together only when both are selected",
