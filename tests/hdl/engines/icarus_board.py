@@ -1,0 +1,137 @@
+"""Icarus Verilog as an engine: the same events on a top's Verilog, and what its pins settle on.
+
+The memories are those of :mod:`cubestack.emulator.sram` once more, in Verilog: they look at the
+settled pins a picosecond after each event, and what they then offer has another one to settle.
+"""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.rtl.engine import PinEvent
+from cubestack.emulator.rtl.wiring import MEMORY_PINS, MemoryPins, Wiring
+
+LIMIT_S = 120
+
+_BENCH = """\
+`timescale 1ps / 1ps
+module bench;
+{declarations}
+  top dut ({ports});
+
+{memories}
+  integer events, outputs, code, n;
+  reg [63:0] at, level;
+  initial begin
+{initial}
+    for (n = 0; n < 1 << {depth}; n = n + 1) begin
+{cleared}
+    end
+    #1;
+{follow}
+    events = $fopen("events.txt", "r");
+    outputs = $fopen("outputs.txt", "w");
+    while ($fscanf(events, "%d %d %d", at, code, level) == 3) begin
+      #(at - $time);
+      case (code)
+{cases}
+      endcase
+      #1;
+{follow}
+      #1;
+      $fwrite(outputs, "{format}\\n", {watched});
+    end
+{dumps}
+    $finish;
+  end
+endmodule
+"""
+
+_MEMORY = """\
+  reg [7:0] bytes_{n}[0:(1 << {width}) - 1];
+  reg [{width}-1:0] a_{n} = 0;
+  reg [7:0] data_{n} = 0;
+  reg writes_{n} = 0;
+  task follow_{n};
+    begin
+      // A pulse ends, or its address leaves: what was there is written.
+      if (writes_{n} && (a_{n} != {A} || {CE_N} || {WE_N})) bytes_{n}[a_{n}] = data_{n};
+      a_{n} = {A};
+      data_{n} = {D_OE} ? {D_O} : 8'h00;
+      writes_{n} = !{CE_N} && !{WE_N};
+      {D_I} = !{CE_N} && !{OE_N} && {WE_N} ? bytes_{n}[a_{n}] : data_{n};
+    end
+  endtask
+"""
+
+
+class Played(NamedTuple):
+    """Settled levels of the output pins after each event, shape (events, pins); the memories."""
+
+    outputs: NDArray[np.int64]
+    memories: dict[str, bytes]
+
+
+class IcarusBoard:
+    """A top's Verilog between its memories, compiled once."""
+
+    def __init__(self, folder: Path, wiring: Wiring, verilog: str) -> None:
+        self._folder = folder
+        self._wiring = wiring
+        (folder / "top.v").write_text(verilog)
+        (folder / "bench.v").write_text(_bench(wiring))
+        command = ["iverilog", "-g2005", "-s", "bench", "-o", "bench.vvp", "bench.v", "top.v"]
+        subprocess.run(command, cwd=folder, check=True, timeout=LIMIT_S)
+
+    def play(self, events: Sequence[PinEvent]) -> Played:
+        """Drive the pins."""
+        names = [*self._wiring.initial]
+        lines = [f"{time_ps} {names.index(pin)} {level}\n" for time_ps, pin, level in events]
+        (self._folder / "events.txt").write_text("".join(lines))
+        program = str(shutil.which("vvp"))
+        command = [program, "-n", "bench.vvp"]
+        subprocess.run(command, cwd=self._folder, check=True, capture_output=True, timeout=LIMIT_S)
+        text = (self._folder / "outputs.txt").read_text()
+        rows = [[int(level, 16) for level in line.split()] for line in text.splitlines()]
+        memories = {
+            memory.name: _read_hex(self._folder / f"memory_{n}.hex")
+            for n, memory in enumerate(self._wiring.memories)
+        }
+        return Played(np.array(rows, np.int64), memories)
+
+
+def _bench(wiring: Wiring) -> str:
+    pins = wiring.widths
+    kinds = {name: "reg" if name in wiring.initial else "wire" for name in pins}
+    memories = [_memory(n, memory, wiring) for n, memory in enumerate(wiring.memories)]
+    numbers = range(len(memories))
+    depth = wiring.widths[wiring.memories[0]["A"]]
+    return _BENCH.format(
+        declarations="".join(f"  {kinds[name]} [{w - 1}:0] {name};\n" for name, w in pins.items()),
+        ports=", ".join(f".{name}({name})" for name in pins),
+        memories="\n".join(memories),
+        initial="\n".join(f"    {name} = {level};" for name, level in wiring.initial.items()),
+        depth=depth,
+        cleared="\n".join(f"      bytes_{n}[n] = 0;" for n in numbers),
+        follow="\n".join(f"    follow_{n};" for n in numbers),
+        cases="\n".join(f"        {n}: {name} = level;" for n, name in enumerate(wiring.initial)),
+        format=" ".join("%h" for _ in wiring.output_pins),
+        watched=", ".join(wiring.output_pins),
+        dumps="\n".join(f'    $writememh("memory_{n}.hex", bytes_{n});' for n in numbers),
+    )
+
+
+def _memory(number: int, memory: MemoryPins, wiring: Wiring) -> str:
+    pins = {pin: memory[pin] for pin in MEMORY_PINS}
+    return _MEMORY.format(n=number, width=wiring.widths[memory["A"]], **pins)
+
+
+def _read_hex(path: Path) -> bytes:
+    lines = (re.sub(r"//.*", "", line) for line in path.read_text().splitlines())
+    return bytes.fromhex("".join(lines))
