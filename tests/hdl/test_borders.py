@@ -1,4 +1,4 @@
-"""Border cases of storing on every way that a picture can take, on Icarus Verilog."""
+"""Border cases on every way that a picture can take, and on the bus, on Icarus Verilog."""
 
 from typing import Any
 
@@ -33,6 +33,22 @@ def test_published_board(icarus: Any) -> None:
 def test_next_version_stores_like_it(icarus: Any, wrapper: type[AsPublished]) -> None:
     modules = ("benches_store", "benches_borders")
     icarus.run(wrapper, COLUMNS, ROWS, *modules, seed=1, text=with_board)
+
+
+@pytest.mark.parametrize(
+    ("name", "bench"), [("cubestar-shared", "SharedBench"), ("cubestar-double", "DoubleBench")]
+)
+def test_strobes_for_another_chip(icarus: Any, name: str, bench: str) -> None:
+    tier = TIERS[name]
+    environment = {**tier.environment, "BENCH": f"bench_next:{bench}"}
+    icarus.run(
+        tier.design,
+        tier.columns,
+        tier.rows,
+        "benches_unselected",
+        seed=1,
+        environment=environment,
+    )
 
 
 def test_pair(icarus: Any) -> None:

@@ -93,7 +93,7 @@ def _next(name: str, wrapped: type[AsPublished], standby: Mapping[str, int]) -> 
         name,
         *_seeds(tier.modules, 1),
         *_seeds(published, 1, "published"),
-        *_seeds(("benches_any_top",), 1),
+        *_seeds(("benches_unselected", "benches_any_top"), 1),
         *_seeds(tier.modules, 3)[1:],
         *_seeds(published, 2, "published")[1:],
         standby=standby,
@@ -131,8 +131,12 @@ SUITES = {
     # A picture so large that its address needs the latch.
     "cubestar-shared-bus": Suite(
         lambda: CubeStarShared(5, 33),
-        _seeds(("benches_shared",), 2),
-        {**frame_environment(5, 33), "HDL_COVERAGE": ""},
+        _seeds(("benches_shared", "benches_unselected"), 2),
+        {
+            **frame_environment(5, 33),
+            "BENCH": "bench_next:SharedBench",
+            "HDL_COVERAGE": "",
+        },
         {"ENABLE": 0},
         source="bus_port.py",
     ),
