@@ -1,5 +1,6 @@
 """A program with an emulated bus: where the bus comes from, by which route, until it ends."""
 
+import gc
 import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -148,7 +149,12 @@ def _emulate(
         wait=wait_precisely,
     )
     run.on_end = pump.stop
-    pump.run()
+    gc.freeze()  # the catalogue need not be looked through for garbage between two transfers
+    try:
+        pump.run()
+    finally:
+        gc.unfreeze()
+        turns.close()
 
 
 def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
