@@ -135,7 +135,7 @@ class Icarus:
             first = outcome.failed[0]
             failed = [*outcome.failed[:20], *(["…"] if len(outcome.failed) > 20 else [])]
             path = waves.path_of(self._kept, node, first)
-            traced = make(folder / "traced", traced=True)
+            traced = make(self._folder / f"{name}-traced", traced=True)
             again = run(traced, modules, place / "traced", only=first, waveform=path)
             kept = waves.describe(path, node, seed, outcome, again)
             raise AssertionError(f"cocotb tests failed: {failed}\n{kept}\n{outcome.log[-6000:]}")

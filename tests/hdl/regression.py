@@ -53,8 +53,11 @@ ARGUMENTS = {
     "verilator": ["-Wno-fatal", "-Wno-lint", "-CFLAGS", "-std=c++20"],
 }
 
-#: Wall-clock seconds after which a simulation hangs; the slowest takes a tenth of it when idle.
-LIMIT_S = 600
+#: Wall-clock seconds after which a simulation hangs; a busy machine may be slow.
+LIMIT_S = 3600
+
+#: The same of a tier, which takes seconds.
+TIER_LIMIT_S = 600
 
 # A warning in a simulation's log. Icarus has no instances to iterate over, of which GPI warns.
 WARNING = re.compile(r"WARNING +(?! |gpi +vpi_iterate returned NULL)|[Ww]arning:")
@@ -143,7 +146,7 @@ TIERS = {
 
 
 def run_tier(
-    top: str, verilog: Path, folder: Path, *, seed: int = 1, limit_s: int = LIMIT_S
+    top: str, verilog: Path, folder: Path, *, seed: int = 1, limit_s: int = TIER_LIMIT_S
 ) -> Outcome:
     """Run the tier of ``top`` on the file ``verilog``, whose top module is ``dut``.
 
@@ -271,6 +274,9 @@ def simulate(
             results_xml=str(results.resolve()),
             log_file=log,
         )
+    dump = folder / "dump.vcd"  # where Verilator writes it
+    if waveform and dump.exists():
+        shutil.move(dump, waveform)
     return _outcome(results, log, modules, failures, time.monotonic() - start)
 
 
