@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from cubestack.firmware_model.interface.field import Field
 from cubestack.firmware_model.interface.message import Kind
-from cubestack.host.shell_controls import ON_OFF
+from cubestack.host.shell_controls import LOG, ON_OFF
 from cubestack.host.shell_names import Names
 from cubestack.host.targets import Target
 
@@ -38,7 +38,10 @@ def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
     if command == "bench" and not arguments and target.interface.bench is not None:
         return [letter.letter for letter in target.interface.bench.letters]
     if command == "fault" and controls is not None:
-        return _next_words(controls.faults, arguments)
+        parameters = controls.fault_parameters.get(arguments[0], ()) if arguments else ()
+        given = {word.partition("=")[0] for word in arguments[1:]}
+        words = _next_words((*controls.faults, LOG), arguments)
+        return words + [f"{name}=" for name in parameters if name not in given]
     if command == "power" and controls is not None:
         phrases = [f"{channel} {state}" for channel in controls.channels for state in ON_OFF]
         return _next_words(phrases, arguments)

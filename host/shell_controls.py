@@ -5,12 +5,14 @@ from pathlib import Path
 from cubestack.host.shell_result import Command, Result, ShellError, check_count, to_number
 from cubestack.host.targets import Controls, Target
 
-__all__ = ["ON_OFF", "ControlCommands"]
+__all__ = ["LOG", "ON_OFF", "ControlCommands"]
 
 ON_OFF = ("on", "off")
 
 SCENE = "scene FILE"
 FAULT = "fault [KIND [TARGET] [PARAMETER=VALUE ...] [for_s=SECONDS]]"
+LOG = "log"
+"""What follows ``fault`` to see what faults have done."""
 POWER = "power [CHANNEL on|off]"
 TIME = "time [SECONDS]"
 
@@ -26,7 +28,12 @@ class ControlCommands:
         """What they are called."""
         return [
             Command(SCENE, "show another scene", self._scene, True),
-            Command(FAULT, "let something break; fault clear ends it", self._fault, True),
+            Command(
+                FAULT,
+                "let something break; fault clear, fault log",
+                self._fault,
+                True,
+            ),
             Command(POWER, "supply currents, load switches", self._power, True),
             Command(TIME, "virtual time; let it pass", self._time, True),
         ]
@@ -40,6 +47,9 @@ class ControlCommands:
         controls = self._controls
         if not words:
             return Result([("", fault) for fault in controls.faults], {"faults": controls.faults})
+        if words == [LOG]:
+            log = controls.fault_log()
+            return Result([("", line) for line in log], {"log": log})
         controls.fault(words)
         return Result([("", f"fault: {' '.join(words)}")], {"fault": " ".join(words)})
 

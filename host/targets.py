@@ -13,7 +13,7 @@ recorded:FILE               a recording, which answers like the device did
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -49,11 +49,17 @@ class Controls(Protocol):
     faults: tuple[str, ...]
     """What ``fault`` takes, as a user types it."""
 
+    fault_parameters: Mapping[str, tuple[str, ...]]
+    """What may follow each kind of fault and its target, as NAME=VALUE."""
+
     channels: tuple[str, ...]
     """Load switches."""
 
     def fault(self, words: list[str]) -> None:
         """Let something break; ValueError for what is not in ``faults``."""
+
+    def fault_log(self) -> list[str]:
+        """A line for each thing that faults have done, with its virtual time."""
 
     def scene(self, path: Path) -> None:
         """Show another scene; ValueError for a file that is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,14 +36,15 @@ class BoardControls:
         self.channels = tuple(board.power.table.channels)
         from cubestack.emulator.faults.table import FAULTS
 
+        kinds = board.faults.kinds()
         self.faults = (
-            *(
-                f"{kind} {target}"
-                for kind, fault in FAULTS.items()
-                for target in board.faults.targets(fault.site)
-            ),
+            *(f"{kind} {target}" for kind, targets in kinds.items() for target in targets),
             CLEAR,
         )
+        self.fault_parameters: Mapping[str, tuple[str, ...]] = {
+            kind: (*FAULTS[kind].parameters(), *TIMES[: 1 if FAULTS[kind].momentary else 2])
+            for kind in kinds
+        }
 
     def act(self, control: Control) -> None:
         """Do what a recording has; ValueError for what can not be done."""
@@ -66,6 +67,10 @@ class BoardControls:
         else:
             self._inject(words)
         self.on_act(("fault", *words), "")
+
+    def fault_log(self) -> list[str]:
+        """See Controls."""
+        return [str(event) for event in self._board.faults.log]
 
     def _inject(self, words: list[str]) -> None:
         kind, *rest = words

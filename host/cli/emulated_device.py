@@ -240,8 +240,8 @@ class _Watch:
             words: Sequence[Any] = program.args  # type: ignore[assignment]
             self._outcome = subprocess.CompletedProcess(words, program.returncode, output, errors)
         except subprocess.TimeoutExpired as error:
-            program.kill()
-            program.communicate()
+            with program:  # closes the pipes unread, as a child of it may hold them for ever
+                program.kill()
             self._outcome = error
         finally:
             self._pump.stop()

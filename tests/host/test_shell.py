@@ -1,6 +1,7 @@
 """The shell on nodes in memory: every name completes, every line gives rows and data."""
 
 import contextlib
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -58,6 +59,7 @@ class BenchLine:
 
 class Controls:
     faults = ("latch-up SRAM1", "latch-up SRAM2", "camera sun")
+    fault_parameters: ClassVar = {"latch-up": ("extra_ma", "at_s"), "camera": ("for_s",)}
     channels = ("SRAM1", "SRAM2")
 
     def __init__(self) -> None:
@@ -65,6 +67,9 @@ class Controls:
 
     def fault(self, words: list[str]) -> None:
         self.calls.append(words)
+
+    def fault_log(self) -> list[str]:
+        return [f"0.1 s {' '.join(call)}" for call in self.calls]
 
     def scene(self, path) -> None:
         self.calls.append(path)
@@ -188,6 +193,7 @@ def test_image(node, shell, tmp_path):
 def test_controls(sense_shell):
     controls = sense_shell.target.controls
     sense_shell.execute("fault latch-up SRAM1")
+    assert sense_shell.execute("fault log").rows == [("", "0.1 s latch-up SRAM1")]
     sense_shell.execute("power SRAM2 off")
     assert sense_shell.execute("power").rows == [("total", "71.9 mA")]
     assert sense_shell.execute("time 0.5").rows == [("time", "1.500000 s")]
@@ -280,8 +286,9 @@ def test_every_name_completes(interface):
               "power", "time", "help"]),
         ("wa", ["watch"]),
         ("bench ", ["a", "q", "s", "w"]),
-        ("fault ", ["latch-up", "camera"]),
-        ("fault latch-up ", ["SRAM1", "SRAM2"]),
+        ("fault ", ["latch-up", "camera", "log"]),
+        ("fault latch-up ", ["SRAM1", "SRAM2", "extra_ma=", "at_s="]),
+        ("fault latch-up SRAM1 extra_ma=5 ", ["at_s="]),
         ("power ", ["SRAM1", "SRAM2"]),
         ("power SRAM1 ", ["on", "off"]),
         ("write CaptureAndDetect Camera=", ["Camera=SUN", "Camera=NADIR"]),
