@@ -5,7 +5,7 @@ microcontroller for both, its buses to the satellite, and its switches and curre
 """
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
@@ -50,6 +50,12 @@ HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
 
 STORING = (Action.STORE, Action.STORE_OTHER)
 CLOCKED = (*STORING, Action.SEND_PICTURE)
+
+
+@lru_cache(maxsize=2)
+def _design(mcu_addressing: bool) -> CubeSensePair:
+    """Both FPGAs; kept, as the engine knows its library by the design's text, which takes time."""
+    return CubeSensePair(mcu_addressing=mcu_addressing)
 
 
 class _UartLink(Protocol):
@@ -102,7 +108,7 @@ class CubeSenseBoard:
         self.kernel = Kernel()
         self._seed = seed
         self._rng = np.random.default_rng(seed)
-        self.engine = make_engine(CubeSensePair(mcu_addressing=mcu_addressing), kind=engine)
+        self.engine = make_engine(_design(mcu_addressing), kind=engine)
         self.cameras = {camera: Ov7620(scene, camera) for camera in Camera}
         self._failed: set[Camera] = set()
         self.power = PowerModel(self.kernel, CUBESENSE)
