@@ -23,17 +23,15 @@ class JoinedKernel(Kernel):
     @property
     def now(self) -> int:
         """See Kernel."""
-        return max(kernel.now for kernel in self._kernels)
+        return max([kernel.now for kernel in self._kernels])
 
-    def horizon(self) -> int | None:
-        """See Kernel."""
-        found = (kernel.horizon() for kernel in self._kernels)
-        return min((horizon for horizon in found if horizon is not None), default=None)
+    def peek(self) -> float:
+        """See simpy.Environment."""
+        return min([kernel.peek() for kernel in self._kernels])
 
     def step(self) -> None:
         """Work off the next event."""
-        horizon = self.horizon()
-        next(kernel for kernel in self._kernels if kernel.horizon() == horizon).step()
+        min(self._kernels, key=Kernel.peek).step()
 
     def advance_to(self, time_ps: int) -> None:
         """See Kernel."""
