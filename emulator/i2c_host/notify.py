@@ -3,7 +3,6 @@
 linux/seccomp.h; needs Linux 5.9 for descriptors that are put into the process.
 """
 
-import contextlib
 import ctypes
 import errno
 import fcntl
@@ -18,14 +17,12 @@ _RECEIVE = 0xC050_2100
 _SEND = 0xC018_2101
 _VALID = 0x4008_2102
 _ADD_DESCRIPTOR = 0x4018_2103
-_SET_FLAGS = 0x4008_2104
 
 _NOTIFICATION = struct.Struct("=QIIiIQ6Q")
 _RESPONSE = struct.Struct("=QqiI")
 _ADDITION = struct.Struct("=QIIII")
 _ID = struct.Struct("=Q")
 
-_WAKE_HERE = struct.pack("=Q", 1)
 _CONTINUE = 1
 _AT_NUMBER = 1
 _AND_SEND = 2
@@ -61,9 +58,6 @@ class Listener:
         """Take over ``fd``."""
         self.fd = fd
         self._one_step = True
-        with contextlib.suppress(OSError):  # before Linux 6.6
-            # Caller and supervisor wait for each other: one processor is quickest for both.
-            fcntl.ioctl(fd, _SET_FLAGS, _WAKE_HERE)
 
     def receive(self) -> Notification | None:
         """The next call; waits for one. None when its process was killed meanwhile."""
