@@ -17,6 +17,7 @@ examples:
 
 import argparse
 import signal
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -114,21 +115,35 @@ def run(args: argparse.Namespace) -> int:
         kernel, adapter = _joined(devices)
         served = open_ports(args, devices, stack)
         endpoints = [endpoint for _, _, endpoint in served]
-        wait = wait_ready
+
+        def devices_busy() -> bool:
+            return any(device.board.busy() for device in devices)
+
+        wait, clock_ns = wait_ready, time.monotonic_ns
         if args.i2c is not None:
             from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely
             from cubestack.emulator.i2c_host.server import I2cServer
+            from cubestack.emulator.i2c_host.turns import Turns
 
             server = I2cServer(socket_path(args.i2c), adapter)
             stack.callback(server.close)
-            endpoints.append(server)
+            turns = Turns(
+                server.name, kernel, adapter, [server], devices_busy, fast=args.pace == "fast"
+            )
+            stack.callback(turns.close)
+            endpoints.append(turns)
             sharpen_timers()
-            wait = wait_precisely
+            wait, clock_ns = wait_precisely, turns.clock_ns
 
-        def busy() -> bool:
-            return adapter.busy or any(device.board.busy() for device in devices)
-
-        pump = Pump(kernel, endpoints, busy, pace=args.pace, report=say, wait=wait)
+        pump = Pump(
+            kernel,
+            endpoints,
+            lambda: adapter.busy or devices_busy(),
+            pace=args.pace,
+            report=say,
+            clock_ns=clock_ns,
+            wait=wait,
+        )
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: pump.stop())
         for device in devices:
