@@ -9,12 +9,18 @@ from typing import Any
 from bench import flat, frame, line, lines, picture, timed_test, vsync
 from benches_any_top import BENCH, works
 from cocotb.triggers import FallingEdge, Timer
-from cover_cubestar import TOP
 from cover_points import GROUPS
 from geometry import GEOMETRY
 from reference import Tick
 
 COLUMNS, ROWS = GEOMETRY
+
+TOP = {
+    "Bench": "published",
+    "SharedBench": "shared",
+    "DoubleBench": "double",
+    "BoardsBench": "boards",
+}[BENCH.__name__]
 
 #: What ends a store: levels of ENABLE and RNW.
 PINS = {"ENABLE": {"ENABLE": 0}, "RNW": {"RNW": 1}, "both": {"ENABLE": 0, "RNW": 1}}

@@ -54,7 +54,7 @@ def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -
     own = [clock for clock in clocks if window.start < clock.rise < window.end]
     stepped = list(steps([clock.pins for clock in own]))
     state = left_in(own, stepped, window.end)
-    if TOP == "published" or (left_by != "both" and _is_declared(state, left_by)):
+    if TOP == "published" or left_by == "ENABLE" or (left_by, TOP) == ("RNW", "double"):
         hit("cubestar store", top=TOP, left_in=state, left_by=left_by)
     if TOP != "published" or not own:
         return
@@ -66,12 +66,6 @@ def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -
         if end - clock.rise > STOPPED * period:
             level = "high" if min(clock.fall, end) - clock.rise > STOPPED * period else "low"
             hit("cubestar border", case=f"clock stops {level}", acknowledged=acknowledged)
-
-
-def _is_declared(state: str, left_by: str) -> bool:
-    """Whether a top of the next version is asked for that."""
-    regular = state not in ("surplus pixels", "short last row")
-    return regular and (left_by == "ENABLE" or TOP == "double")
 
 
 def _commands(clocks: Sequence[Clock], period: int, controls: Sequence[Controls]) -> None:

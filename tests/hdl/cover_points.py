@@ -177,9 +177,7 @@ GROUPS = {
             "left_by": ("ENABLE", "RNW", "both"),
         },
         lambda top, left_in, left_by: (
-            _can_leave(top, left_in, left_by)
-            and (left_by != "both" or top == "published")
-            and (top == "published" or left_in not in ("surplus pixels", "short last row"))
+            _can_leave(top, left_in, left_by) and (left_by != "both" or top == "published")
         ),
     ),
     "cubestar read": Group(

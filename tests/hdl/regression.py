@@ -131,12 +131,16 @@ def _pair(mcu_addressing: bool) -> Tier:
     return Tier(design, SMALLEST.columns, SMALLEST.rows, modules, environment)
 
 
+def _next(design: Callable[[int, int], Component], module: str, bench: str) -> Tier:
+    return Tier(design, 5, 3, (module, "benches_states"), {"BENCH": f"bench_next:{bench}"})
+
+
 #: By the tops' names in ``cubestack.hdl.designs``; some have a further one.
 TIERS = {
     "cubestar": Tier(CubeStarTop, 5, 3, ("benches_read", "benches_modes", "benches_store")),
-    "cubestar-shared": Tier(CubeStarShared, 5, 3, ("benches_shared",)),
-    "cubestar-double": Tier(CubeStarDouble, 5, 3, ("benches_double",)),
-    "cubestar-boards": Tier(CubeStarTwoBoards, 5, 3, ("benches_boards",)),
+    "cubestar-shared": _next(CubeStarShared, "benches_shared", "SharedBench"),
+    "cubestar-double": _next(CubeStarDouble, "benches_double", "DoubleBench"),
+    "cubestar-boards": _next(CubeStarTwoBoards, "benches_boards", "BoardsBench"),
     # Addresses of more than 8 bits, so that there is an address latch.
     "cubestar-shared-latch": Tier(CubeStarShared, 9, 9, ("benches_shared",)),
     "cubestar-double-latch": Tier(CubeStarDouble, 9, 9, ("benches_double",)),
