@@ -483,6 +483,8 @@ private:
         }
     }
 
+    // Settling after an edge of camera N's clock. A copy makes this edge's share only, unless its
+    // registers are in reset; clock_steps.py says more.
     template <int N> bool settle_rise(Top &top, int64_t time) { return settle(top, time); }
     template <int N> void settle_fall(Top &top, int64_t time) { settle(top, time); }
 

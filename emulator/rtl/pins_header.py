@@ -29,7 +29,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
       forget_derived_edges(top) has none of them seen.
     - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
       its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state that can
-      change, hold_0(from, to) the rest to the copy.
+      change, hold_0(from, to) the rest to the copy; its class is what clock_steps.py makes of it.
     """
     acknowledges = " | ".join(
         f"{_level(pin)} << {bit}" for bit, pin in enumerate(wiring.acknowledges)

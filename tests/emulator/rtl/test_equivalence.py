@@ -9,6 +9,7 @@ from cubestack.emulator.rtl.engine import PinEvent, make_engine
 from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
 from cubestack.emulator.sram import SramTiming
 from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.generate import rtlil_text
 
 from .comparison import Step, assert_same, engines, read, state
 
@@ -19,8 +20,9 @@ def wiring(size: tuple[int, int]) -> Wiring:
     return cubestar_wiring(CubeStarTop(*size))
 
 
-CAMERA_PINS, MCU_PINS = wiring(SIZES[0]).camera_pins, wiring(SIZES[0]).mcu_pins
-OUTPUT_PINS = wiring(SIZES[0]).output_pins
+BOARD = wiring(SIZES[0])
+CAMERA_PINS, MCU_PINS, OUTPUT_PINS = BOARD.camera_pins, BOARD.mcu_pins, BOARD.output_pins
+rtlil_text(BOARD.component)  # a design must be used, Amaranth says
 
 
 def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
