@@ -11,16 +11,19 @@ MUTANTS ?=
 SEED ?= 0
 SIMULATOR ?= icarus
 
+# Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
+MAKEFLAGS += --no-builtin-rules
+
 .PHONY: help venv run test test-hdl mutants lint bench clean
 
 help:
-	@echo "make run    set up, then boot the sensors, measure over their serial ports, and draw what they saw"
-	@echo "make test   set up, then run all tests"
-	@echo "make mutants  set up, then count the wrong gates that the gateware's benches notice; takes long"
+	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
+	@echo "make test      set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
-	@echo "make lint   ruff and mypy"
-	@echo "make bench  measure the cost of the hot paths"
-	@echo "make clean  remove .venv, out and caches"
+	@echo "make mutants   set up, then count the wrong gates that the gateware's benches notice; takes long"
+	@echo "make lint      ruff and mypy"
+	@echo "make bench     measure the cost of the hot paths"
+	@echo "make clean     remove .venv, out and caches"
 
 venv: .venv/ready-run
 
