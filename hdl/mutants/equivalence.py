@@ -122,7 +122,7 @@ class Equivalence:
             for name, bits in outputs.items()
             if len(bits) <= _NARROW_BITS and all(bit in registers for bit in bits)
         ]
-        self._invariants: list[str] | None = None
+        self._invariants: dict[str, list[str]] = {}  # by the block that they are of
 
     def compare(self, mutant: Mutant) -> Verdict:
         """Prove that the design with this change is no other one, or look for the difference."""
@@ -131,9 +131,11 @@ class Equivalence:
         equal = self._pins in self._kept(mutant, [self._pins, *common], [])
         steps = None if equal else self._counterexample(mutant, SOON)
         if not equal and steps is None:
-            if self._invariants is None:
-                self._invariants = self._kept(None, self._guesses(), [])
-            equal = self._pins in self._kept(mutant, [self._pins, *common], self._invariants)
+            block = _block_of(mutant)
+            if block not in self._invariants:
+                self._invariants[block] = self._kept(None, self._guesses(block), [])
+            known = self._invariants[block]
+            equal = self._pins in self._kept(mutant, [self._pins, *common], known)
             steps = None if equal else self._counterexample(mutant, STEPS)
         return Verdict(equal, steps, time.monotonic() - start)
 
@@ -152,13 +154,14 @@ class Equivalence:
         equal = f"(((gold{level} ^ gate{level}) & {mask}) == 0)"
         return f"((gold{enable} == gate{enable}) & {equal})"
 
-    def _guesses(self) -> list[str]:
-        """That a block's narrow registers never have some value, or some two values together."""
+    def _guesses(self, block: str) -> list[str]:
+        """That narrow registers below ``block`` never have some value, or two values together."""
         levels = {
             name: [
                 f"(gold{self._index[name]} == {value})" for value in range(1 << self._wires[name])
             ]
             for name in self._narrow
+            if name.startswith(block)
         }
         several = [values for values in levels.values() if len(values) > 2]
         single = [f"~{level}" for values in several for level in values]
@@ -258,6 +261,16 @@ class Equivalence:
         for name, values in vectors.items():
             lines += [f"  assign {name}[{n}] = {value};" for n, value in enumerate(values)]
         return "\n".join([*lines, "endmodule\n"])
+
+
+def _block_of(mutant: Mutant) -> str:
+    """Where its cell comes from, with a dot at its end; empty when that is not known."""
+    inside = mutant.module.removeprefix("dut").removeprefix(".")
+    parts = re.findall(r"\\([^\\]+)\.(?=[\\$])", mutant.cell)
+    path = [part for part in [inside, *parts] if part]
+    if path and path[-1].partition("$")[0] == "counter":
+        path.pop()
+    return "".join(f"{part}." for part in path)
 
 
 def _folder() -> "tempfile.TemporaryDirectory[str]":
