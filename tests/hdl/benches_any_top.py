@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 import cocotb
-from bench import Surroundings, picture
+from bench import Camera, Surroundings, picture
 from cocotb.triggers import Timer
 from cover import hit
 from geometry import GEOMETRY
@@ -21,6 +21,11 @@ BENCH: type[Surroundings] = getattr(import_module(MODULE), NAME)
 
 #: Slower than :func:`bench.timed_test` allows for: 1 MHz takes its time.
 slow_test = cocotb.test(timeout_time=300, timeout_unit="ms")
+
+
+def cameras(bench: Any) -> list[Camera]:
+    """One, or the sun's and the nadir's."""
+    return list(bench.cameras.values()) if hasattr(bench, "cameras") else [bench.camera]
 
 
 async def works(bench: Surroundings, place: Any) -> None:
@@ -53,6 +58,8 @@ async def left_at_any_moment(dut: Any) -> None:
         await wait(random.randrange(3 * GEOMETRY.pixels * 200_000), ODD)
         await bench.standby()
         await Timer(1, unit="ns")
+    for camera in cameras(bench):
+        await camera.sent()
     for place in BENCH.PLACES:
         await works(bench, place)
     await bench.check()

@@ -36,6 +36,7 @@ def steps(ticks: Sequence[Tick], gaps: bool = False) -> Iterator[Step]:
                 borders |= {"VSYNC after ACK"} if not vsync else set()
                 borders |= {"lines after ACK"} if hsync and vsync and seen_low else set()
                 seen_low = seen_low or not hsync
+            borders |= set() if vsync_seen else {"no VSYNC before a frame"}
             state, acknowledged = "ACK", True
         elif not vsync:
             if gaps and hsync:
@@ -71,7 +72,6 @@ def steps(ticks: Sequence[Tick], gaps: bool = False) -> Iterator[Step]:
             state = "in a line" if writes else "surplus pixels"
             borders |= set() if writes else {"line too long"}
             full = column == GEOMETRY.columns and row == GEOMETRY.rows - 1
-            borders |= {"no VSYNC before a frame"} if full and not vsync_seen else set()
         yield Step(state, writes, frozenset(borders))
 
 

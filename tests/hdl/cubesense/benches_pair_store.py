@@ -1,6 +1,7 @@
 """Storing pictures: own memory, both at once, and across the link."""
 
 import random
+from itertools import product
 from typing import Any
 
 from bench import flat, line, lines, picture, timed_test
@@ -167,3 +168,20 @@ async def any_waveform(dut: Any) -> None:
         await bench.mcu.standby()
     halves = await bench.check()
     assert any(half.pulses for half in halves.values())
+
+
+@timed_test
+async def lines_a_gap_apart(dut: Any) -> None:
+    """As many low clocks as a gap may not have make no frame's end; one more does."""
+    bench = await PairBench.start(dut)
+    for camera, memory in product(SIDES, SIDES):
+        source = bench.cameras[camera]
+        content = picture()
+        for pause in (GAP, GAP + 1):
+            await join(bench, camera, memory)
+            source.send([*frame(b""), *flat(lines(content, pause))])
+            await source.sent()
+            acknowledged = await bench.mcu.acknowledged(memory, 4 * source.period)
+            assert acknowledged == (pause == GAP)
+            await bench.mcu.standby()
+    await bench.check()
