@@ -28,7 +28,7 @@ COMMANDS = {
     "replay": "play a recording to an emulated device, compare what it says",
     "catalogue": "compile the onboard star catalogue and say what is in it",
     "memory": "list the firmware's buffers against the processor's memories",
-    "hdl": "look at the FPGA designs: area, Verilog files, proofs",
+    "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",
     "bench": "measure the cost of the hot paths on this machine",
 }
 
