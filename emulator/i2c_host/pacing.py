@@ -21,6 +21,12 @@ EARLY_S = 150e-6
 NAP_NS = 50_000
 """What it takes at most on a busy one, with real-time priority."""
 
+CROWDED_NS = 300_000
+"""Who gives the processor away for a moment and gets it back so late is not alone on it."""
+
+ALONE_AGAIN_NS = NS_PER_S
+"""So long nobody without priority waits awake after that."""
+
 _ENTRY = struct.Struct("=ihh")  # struct pollfd
 _TIMEOUT = struct.Struct("=qq")  # struct timespec
 
@@ -31,28 +37,38 @@ _libc.ppoll.argtypes = (ctypes.c_char_p, ctypes.c_ulong, ctypes.c_char_p, ctypes
 class Watch:
     """Waits for ports, mostly for the same ones again and again."""
 
-    def __init__(self, ports: Sequence[Endpoint]) -> None:
-        """Watch ``ports``."""
+    def __init__(self, ports: Sequence[Endpoint], *, always_asleep: bool = False) -> None:
+        """Watch ``ports``; ``always_asleep`` where callers wake this process quickly."""
         self._ports = ports
         self._poller = select.epoll()
         self._watched: dict[int, Endpoint] = {}
+        self._always_asleep = always_asleep
         # Then nobody of less importance gets the processor while we wait awake.
         self._first = os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR)
+        self._crowded_until_ns = 0
 
     def wait(self, timeout_ns: int, *, awake: bool = False) -> list[Endpoint]:
         """Wait until some are ready, or a signal comes, at most ``timeout_ns``; which are ready.
 
-        With ``awake``, waking up may not take time, if this process has real-time priority.
+        With ``awake``, waking up may not take time; that is for processes with real-time priority
+        and for idle machines.
         """
         watched = {fileno: port for port in self._ports for fileno, _ in port.watched()}
         if watched != self._watched:
             self._change(watched)
-        if awake and self._first:
-            end_ns = time.monotonic_ns() + timeout_ns
-            while not (ready := self._poller.poll(0)) and time.monotonic_ns() < end_ns:
+        now_ns = time.monotonic_ns()
+        end_ns = now_ns + timeout_ns
+        ready: list[tuple[int, int]] = []
+        if awake and not self._always_asleep:
+            while (self._first or now_ns >= self._crowded_until_ns) and now_ns < end_ns:
+                if ready := self._poller.poll(0):
+                    break
                 os.sched_yield()
-        else:
-            ready = self._poller.poll(timeout_ns / NS_PER_S)
+                before_ns, now_ns = now_ns, time.monotonic_ns()
+                if now_ns - before_ns > CROWDED_NS:
+                    self._crowded_until_ns = now_ns + ALONE_AGAIN_NS
+        if not ready:
+            ready = self._poller.poll(max(0, end_ns - now_ns) / NS_PER_S)
         return [watched[fileno] for fileno, _ in ready]
 
     def _change(self, watched: dict[int, Endpoint]) -> None:

@@ -138,6 +138,7 @@ def _emulate(
         [bus.port, *run.ports],
         bus.busy,
         fast=pace == "fast",
+        always_asleep=run.hands_over,
     )
     pump = Pump(
         bus.kernel,
@@ -191,6 +192,14 @@ class _Run:
         """Whether nobody is left who could call."""
         served = self._supervisor is not None and not self._supervisor.ended
         return self._dropped or (self._program.ended and not served)
+
+    @property
+    def hands_over(self) -> bool:
+        """Whether program and supervisor share a processor, so that no call takes time to get here.
+
+        Then waiting awake would only keep the program from it.
+        """
+        return self._supervisor is not None and self._supervisor.hands_over
 
     def signalled(self, number: int) -> None:
         """Pass a signal on, but for Ctrl-C: that comes to the program as well, and it decides."""

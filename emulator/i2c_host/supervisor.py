@@ -68,6 +68,7 @@ class Supervisor:
     Attributes:
         name: what it serves.
         ended: whether every process under the filter has ended.
+        hands_over: see Listener.
     """
 
     congested = False
@@ -78,6 +79,7 @@ class Supervisor:
         """Serve the device file ``node`` to the processes behind ``listener``."""
         self.name = node.path
         self.ended = False
+        self.hands_over = listener.hands_over
         self._listener = listener
         self._abi = abi
         self._node = node

@@ -64,6 +64,7 @@ class Turns:
         busy: Callable[[], bool],
         *,
         fast: bool,
+        always_asleep: bool = False,
     ) -> None:
         """Serve ``ports``, whose calls go to ``adapter``.
 
@@ -74,6 +75,7 @@ class Turns:
             ports: where calls come from; closed by their owner.
             busy: whether devices have work of their own.
             fast: whether virtual time need not follow wall time.
+            always_asleep: whether the next call is never waited for awake.
         """
         self.name = name
         self._kernel = kernel
@@ -84,7 +86,7 @@ class Turns:
         self._behind_ns = 0 if fast else TURNAROUND_NS
         self._origin_ns = 0
         self._begun = False
-        self._watch = Watch(ports)
+        self._watch = Watch(ports, always_asleep=always_asleep)
         self._came_ns = self._answered_ns = self._told_ns = self._late_ns = self._spare_ns = 0
         self._quickest_ns = TURNAROUND_NS
         adapter.driven = True

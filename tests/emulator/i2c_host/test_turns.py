@@ -207,7 +207,8 @@ class Bench:
 class AtWork:
     """Stands in for Watch."""
 
-    def __init__(self, ports: list[Port]) -> None:
+    def __init__(self, ports: list[Port], *, always_asleep: bool) -> None:
+        assert not always_asleep
         self._ports = ports
         self._world = ports[0]._world
 
