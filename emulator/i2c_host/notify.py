@@ -11,6 +11,8 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
+from cubestack.emulator.i2c_host.pacing import has_priority
+
 __all__ = ["Listener", "Notification", "read_memory", "read_text", "write_memory"]
 
 _RECEIVE = 0xC050_2100
@@ -56,18 +58,23 @@ class Listener:
     Attributes:
         fd: descriptor; readable while a call waits, hung up when all processes have ended.
         hands_over: a caller and this process wake each other on one processor. Waking another one
-            up takes longer than the rest of a call.
+            up takes longer than the rest of a call, unless we wait there awake, as we do with
+            real-time priority.
     """
 
     def __init__(self, fd: int) -> None:
         """Take over ``fd``."""
         self.fd = fd
         self._one_step = True
+        self.hands_over = not has_priority() and self._hand_over()
+
+    def _hand_over(self) -> bool:
+        """Have callers and us wake each other on one processor; returns whether it can be had."""
         try:
-            fcntl.ioctl(fd, _SET_FLAGS, _SAME_PROCESSOR)
-            self.hands_over = True
+            fcntl.ioctl(self.fd, _SET_FLAGS, _SAME_PROCESSOR)
         except OSError:  # before Linux 6.6
-            self.hands_over = False
+            return False
+        return True
 
     def receive(self) -> Notification | None:
         """The next call; waits for one. None when its process was killed meanwhile."""

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from cubestack.emulator.ports.pump import Watched
 from cubestack.emulator.ports.serial_port import Endpoint
 
-__all__ = ["Watch", "sharpen_timers", "wait_precisely"]
+__all__ = ["Watch", "has_priority", "sharpen_timers", "wait_precisely"]
 
 PR_SET_TIMERSLACK = 29
 NS_PER_S = 10**9
@@ -44,7 +44,7 @@ class Watch:
         self._watched: dict[int, Endpoint] = {}
         self._always_asleep = always_asleep
         # Then nobody of less importance gets the processor while we wait awake.
-        self._first = os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR)
+        self._first = has_priority()
         self._crowded_until_ns = 0
 
     def wait(self, timeout_ns: int, *, awake: bool = False) -> list[Endpoint]:
@@ -86,6 +86,11 @@ class Watch:
     def close(self) -> None:
         """Watch no longer; the ports are their owner's."""
         self._poller.close()
+
+
+def has_priority() -> bool:
+    """Whether this process has real-time priority."""
+    return os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR)
 
 
 def sharpen_timers() -> None:

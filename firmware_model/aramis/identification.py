@@ -279,7 +279,8 @@ class _Search:
                 self.measured.skew_px * self.field.scale[1],
                 self.meter,
             )
-        if sigma_rad > self.profile.motion_sigma_rad:
+        moved = self.measured.skew_px > self.profile.moved_px
+        if moved and sigma_rad > self.profile.motion_sigma_rad:
             return None
         return self._quest(straight, catalogue, weights)
 

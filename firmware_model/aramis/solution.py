@@ -68,8 +68,10 @@ class Profile:
         smear_px: with verification, where stars are drawn out farther, that is why there is no
             attitude.
         skew_px: with verification, stars that also moved farther from row to row are refused.
-        motion_sigma_rad: with verification, stars that moved are also refused when they leave more
-            doubt than that about the turn about the boresight.
+        moved_px: with verification, stars that moved farther from row to row are also refused when
+            they leave too much doubt about the turn about the boresight; below it, stars that look
+            long may just be drawn so by the lens.
+        motion_sigma_rad: that much doubt.
     """
 
     sigma_rad: float = 0.26 * 0.3759 / 582
@@ -85,6 +87,7 @@ class Profile:
     hint_tolerance_deg: float = 6.0
     smear_px: float = 4.0
     skew_px: float = 4.0
+    moved_px: float = 1.8
     motion_sigma_rad: float = 7e-4
 
     def __post_init__(self) -> None:
@@ -102,6 +105,7 @@ class Profile:
             "hint_tolerance_deg": (0, 180),
             "smear_px": (1, 1000),
             "skew_px": (0, 1000),
+            "moved_px": (0, 1000),
             "motion_sigma_rad": (0, 0.1),
         }
         for name, (low, high) in bounds.items():
