@@ -181,10 +181,6 @@ class AramisBoard:
         """Whether anything is under way that does not wait for the host."""
         return self.uart.busy or self.ppi.busy or not self.processor.dozing
 
-    def mean_power_mw(self) -> float:
-        """Mean power of the board since power-up, in mW."""
-        return self.power.charge_mas() * ARAMIS_POWER.volts * PS_PER_S / max(1, self.kernel.now)
-
     def close(self) -> None:
         """Release nothing: for symmetry with the boards that have an engine."""
 

@@ -1,6 +1,7 @@
 """Measure the cost of the hot paths on this machine, on one core.
 
 rtl_clocks_per_s  pixel clocks a second through the compiled FPGA, none skipped
+strobes_per_s     data clocks a second through it, while a picture is read
 capture_wall_ms   wall time of one capture: exposure, read-out, FPGA store
 readout_wall_ms   wall time of one transfer, FPGA's SRAM to processor
 realtime_ratio    simulated seconds per wall second of the full 1 Hz loop
@@ -14,6 +15,8 @@ pair_build_s      as cold_build_s, both of CubeSense's FPGAs
 aramis_ratio      as realtime_ratio, AraMiS, lost in space with verification
 aramis_frame_ms   AraMiS: rendering one frame with all its stars and noise
 aramis_solve_ms   AraMiS: one solve, from the picture to the attitude
+i2c_ROUTE_fast    byte reads a second of a program below `cubestack run`, by either route
+i2c_ROUTE_real    the same at 400 kHz in the wire's time, which would be 10 256
 
 --engines measures something else: the compiled engine beside a Verilator library, cocotb on Icarus
 Verilog and Amaranth's simulator, on every top (docs/engines.md).
@@ -78,13 +81,17 @@ def run(args: argparse.Namespace) -> int:
         pair_scan_ms,
         pair_store_ms,
         rtl_clocks_per_s,
+        strobes_per_s,
     )
     from cubestack.emulator.rtl.wiring import cubesense_wiring
     from cubestack.emulator.sky.attitude import quaternion_from_pointing
     from cubestack.emulator.sky.earth_sun import EarthSunScene
     from cubestack.emulator.sky.scene import SkyScene
 
-    figures: dict[str, float] = {"rtl_clocks_per_s": round(rtl_clocks_per_s())}
+    figures: dict[str, float] = {
+        "rtl_clocks_per_s": round(rtl_clocks_per_s()),
+        "strobes_per_s": round(strobes_per_s()),
+    }
     scene = SkyScene(quaternion=quaternion_from_pointing(84.0, -1.0, 0.0))
     with open_session(scene, engine="compiled") as session:
         figures |= _capture(session)

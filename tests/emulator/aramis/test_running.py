@@ -1,12 +1,11 @@
 """Camera, loop, buses and clocks of the whole star tracker."""
 
-import time
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cubestack.emulator.aramis import AramisBoard
+from cubestack.emulator.aramis import ARAMIS_POWER, AramisBoard
 from cubestack.emulator.sky.attitude import attitude_error_deg
 from cubestack.emulator.virtual_time import PS_PER_MS
 from cubestack.firmware_model.interface.aramis import (
@@ -85,15 +84,12 @@ def test_pictures_come_down_as_the_camera_took_them(active: Desk) -> None:
 # --- loop -----------------------------------------------------------------------------------------
 
 
-def test_the_loop_runs_at_1_hz_and_faster_than_real_time(active: Desk) -> None:
-    started, virtual = time.perf_counter(), active.now_s
+def test_the_loop_runs_at_1_hz(active: Desk) -> None:
     active.client.command("StartLoop", Period=1000, Mode=MeasurementMode.AIDED)
     active.client.pause(10)
-    wall = time.perf_counter() - started
     status = active.client.telemetry("LoopStatus")
     assert status["Iterations"] == 10
     assert status["LateIterations"] == 0
-    assert wall < active.now_s - virtual
     assert active.aramis.attitude().mode is MeasurementMode.AIDED
     assert active.error_deg()[0] < 0.01
     active.client.command("StopLoop")
@@ -211,11 +207,11 @@ def test_nothing_that_a_host_sends_stops_the_node(seed: int) -> None:
 
 def test_power_follows_what_runs(desk: Desk) -> None:
     desk.client.pause(1.0)
-    resting = desk.board.mean_power_mw()
+    resting_ma = desk.board.power.charge_mas() / desk.now_s
     desk.aramis.activate()
     desk.client.command("StartLoop", Period=1000, Mode=0)
     desk.client.pause(5.0)
-    assert desk.board.mean_power_mw() > resting + 200
+    assert desk.board.power.charge_mas() / desk.now_s > resting_ma + 200 / ARAMIS_POWER.volts
 
 
 def test_the_truth_is_that_of_the_frame_asked_for() -> None:
