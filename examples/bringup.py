@@ -7,9 +7,9 @@ TARGET is a serial port, tcp://HOST:PORT or rfc2217://HOST:PORT, of a real board
 import sys
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.cubestar import CubeStar
-from cubestack.host.node_client import NodeClient
-from cubestack.host.transport import open_transport
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.transport.streams import open_transport
 
 
 def step(number: int, text: str, good: bool) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from cubestack.emulator.faults.declaration import Fault
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 __all__ = ["FaultEvent", "Injection", "Report", "active"]
 

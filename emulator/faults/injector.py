@@ -22,7 +22,7 @@ from cubestack.emulator.faults.table import (
     make_fault,
 )
 from cubestack.emulator.faults.wire import BusFaults, LineFaults
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 __all__ = ["LOG_LIMIT", "Faults"]
 

@@ -7,11 +7,11 @@ import numpy as np
 import simpy
 from numpy.typing import NDArray
 
-from cubestack.emulator.bit_flips import flip_bit
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.injection import Injection, Report, active
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.pixels import FaultySource
+from cubestack.emulator.faults.seu import flip_bit
 from cubestack.emulator.faults.sites import CameraSite
 from cubestack.emulator.faults.table import (
     CameraDead,
@@ -22,9 +22,9 @@ from cubestack.emulator.faults.table import (
     RegisterFlip,
     RegisterUpsets,
 )
-from cubestack.emulator.power import PowerModel
-from cubestack.emulator.rtl.engine import RtlEngine
-from cubestack.emulator.virtual_time import PS_PER_S, Kernel
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 __all__ = ["CameraFaults", "MemoryFaults", "RegisterFaults", "SupplyFaults"]
 

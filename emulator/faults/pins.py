@@ -10,12 +10,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.external_bus import Transactions
 from cubestack.emulator.faults.injection import Injection, Report, active
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
-from cubestack.emulator.rtl.engine import RtlEngine
-from cubestack.emulator.virtual_time import PS_PER_US, Kernel
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.external_bus import Transactions
+from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 
 __all__ = ["PinFaults"]
 

@@ -22,7 +22,7 @@ from cubestack.emulator.faults.table import (
     PixelDead,
     PixelHot,
 )
-from cubestack.emulator.rtl.engine import PixelSource, StreamSegment
+from cubestack.emulator.rtl.contract import PixelSource, StreamSegment
 
 __all__ = ["FaultySource"]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.declaration import Site
-from cubestack.emulator.i2c import I2cBus
-from cubestack.emulator.power import PowerModel
-from cubestack.emulator.processor import Processor
-from cubestack.emulator.rtl.engine import PixelSource, RtlEngine
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import Kernel
+from cubestack.emulator.rtl.contract import PixelSource, RtlEngine
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.processor import Processor
+from cubestack.emulator.sim.virtual_time import Kernel
 
 __all__ = ["CameraSite", "Sites"]
 

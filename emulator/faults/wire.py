@@ -6,6 +6,8 @@ from typing import Any
 
 import simpy
 
+from cubestack.emulator.bus.i2c import LONGEST_STRETCH_PS, I2cBus, I2cNackError
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injection import Injection, Report
 from cubestack.emulator.faults.table import (
     I2cNack,
@@ -15,9 +17,7 @@ from cubestack.emulator.faults.table import (
     UartDelay,
     UartDrop,
 )
-from cubestack.emulator.i2c import LONGEST_STRETCH_PS, I2cBus, I2cNackError
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
 
 __all__ = ["BusFaults", "LineFaults"]
 

@@ -2,20 +2,20 @@
 
 The host side has the transport interface of `cubestack.host` (write, read, close) for the serial
 line, and for the I2C bus the one method of smbus2 that carries any transfer (i2c_rdwr); for all
-others give it to ``cubestack.host.smbus.CubeSMBus``. Waiting for an answer runs the simulation;
-nothing else does, so a run is repeatable to the byte.
+others give it to ``cubestack.host.transport.smbus.CubeSMBus``. Waiting for an answer runs the
+simulation; nothing else does, so a run is repeatable to the byte.
 """
 
 import errno
 from typing import Any
 
-from cubestack.emulator.i2c import I2cBus, I2cMessage
-from cubestack.emulator.i2c_host.adapter import I2cAdapter
-from cubestack.emulator.i2c_host.device_file import DeviceFile
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.ports.line import HostLine
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.interface.linux_i2c import Call, split_reply
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
 __all__ = ["DirectI2c", "DirectSerial"]
 
@@ -82,7 +82,7 @@ class DirectI2c:
                     message.buf[index] = bytes([byte])
 
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        """Do a packed call of the device file (see ``firmware_model/interface/linux_i2c.py``).
+        """Do a packed call of the device file (see ``firmware_model/formats/linux_i2c.py``).
 
         Returns the result, 0 or more or a negative errno, and data.
         """

@@ -12,8 +12,8 @@ import termios
 import tty
 from pathlib import Path
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.serial_port import Endpoint, PortError, SerialPort, poll_now
-from cubestack.emulator.uart import Uart
 
 __all__ = ["Endpoint", "PortError", "PtyEndpoint", "TcpEndpoint"]
 

@@ -2,8 +2,8 @@
 
 from collections import deque
 
-from cubestack.emulator.line_format import LineFormat, LineSampler
-from cubestack.emulator.uart import Uart
+from cubestack.emulator.bus.line_format import LineFormat, LineSampler
+from cubestack.emulator.bus.uart import Uart
 
 __all__ = ["HostLine"]
 

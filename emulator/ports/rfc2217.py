@@ -1,8 +1,8 @@
 """A serial port on TCP whose client chooses baud rate and format: RFC 2217, through pyserial.
 
 The device's end keeps its format. A client that chooses another one hears garbage and is not
-understood, as on a real line; see ``emulator.line_format``. Bytes with errors reach the client as
-they were received, as Linux's serial drivers hand them on; who asks for line states is told of
+understood, as on a real line; see ``emulator.bus.line_format``. Bytes with errors reach the client
+as they were received, as Linux's serial drivers hand them on; who asks for line states is told of
 them. A client that says nothing of a format has the device's. Accepted without effect: flow
 control and modem lines, as the line has neither.
 """
@@ -15,10 +15,10 @@ from typing import Any
 
 from serial.rfc2217 import IAC, IAC_DOUBLED, SERVER_NOTIFY_LINESTATE, PortManager
 
-from cubestack.emulator.line_format import LineFormat, Parity
+from cubestack.emulator.bus.line_format import LineFormat, Parity
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import TcpEndpoint
 from cubestack.emulator.ports.line import HostLine
-from cubestack.emulator.uart import Uart
 
 __all__ = ["Rfc2217Endpoint"]
 

@@ -14,8 +14,8 @@ import select
 from abc import ABC, abstractmethod
 from typing import Protocol
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.line import HostLine
-from cubestack.emulator.uart import Uart
 
 __all__ = ["MAX_UNREAD", "MAX_UNSENT", "Endpoint", "PortError", "SerialPort", "poll_now"]
 

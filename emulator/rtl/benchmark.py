@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from cubestack.emulator.rtl.build import library_for
-from cubestack.emulator.rtl.engine import RtlEngine, make_engine
+from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.rtl.cxxrtl.build import library_for
 from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring, cubesense_wiring, cubestar_wiring
-from cubestack.emulator.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
-from cubestack.firmware_model.interface.ov7620 import (
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
+from cubestack.firmware_model.interface.cameras.ov7620 import (
     CLOCKS_PER_LINE,
     LINES_PER_FRAME,
     PIXEL_CLOCK_HZ,
 )
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.hdl.cubestar.top import CubeStarTop
 
 __all__ = [
     "PAIR_STORES",

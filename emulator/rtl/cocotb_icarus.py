@@ -18,7 +18,7 @@ import numpy as np
 
 from cubestack.emulator.rtl.wiring import MEMORY_PINS
 from cubestack.emulator.rtl.workloads import Workload
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.flow.generate import verilog_text
 
 __all__ = ["CocotbError", "missing_for_cocotb", "run_cocotb"]
 

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.engine import PixelSource, StreamSegment
+from cubestack.emulator.rtl.contract import PixelSource, StreamSegment
 
 __all__ = ["LoadedSegment"]
 

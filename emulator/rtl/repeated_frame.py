@@ -24,7 +24,7 @@ class _Segment:
 
 @dataclass(frozen=True)
 class RepeatedFrame:
-    """A :class:`~cubestack.emulator.rtl.engine.PixelSource`: blanking, then the picture.
+    """A :class:`~cubestack.emulator.rtl.contract.PixelSource`: blanking, then the picture.
 
     Attributes:
         image: (rows, columns).

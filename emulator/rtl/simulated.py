@@ -10,9 +10,7 @@ from amaranth.sim import Simulator
 from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
-from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
-from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
-from cubestack.emulator.sram import (
+from cubestack.emulator.rtl.sram import (
     BETWEEN_FPGAS,
     Sram,
     SramPins,
@@ -20,6 +18,8 @@ from cubestack.emulator.sram import (
     Violation,
     ViolationLog,
 )
+from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
+from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
 __all__ = ["SimulatedEngine"]
 
@@ -41,7 +41,7 @@ class _Stream:
 
 
 class SimulatedEngine(SteppingEngine):
-    """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` at some ten thousand clocks a second.
+    """An :class:`~cubestack.emulator.rtl.contract.RtlEngine` at some ten thousand clocks a second.
 
     With ``skipping``, of longer time outside of lines only the clocks are made that the wiring says
     the design needs to settle.

@@ -14,11 +14,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.external_bus import STEPS, TAKE, Transactions
-from cubestack.emulator.rtl.engine import PinEvent, PixelSource
+from cubestack.emulator.rtl.contract import PinEvent, PixelSource
+from cubestack.emulator.rtl.external_bus import STEPS, TAKE, Transactions
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
+from cubestack.emulator.rtl.sram import Violation, ViolationKind, ViolationLog
 from cubestack.emulator.rtl.wiring import CameraPins, Wiring
-from cubestack.emulator.sram import Violation, ViolationKind, ViolationLog
 
 __all__ = ["Outcome", "SteppingEngine"]
 
@@ -44,7 +44,7 @@ class _Camera:
 
 
 class SteppingEngine(ABC):
-    """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` on top of a design that can be stepped.
+    """An ``RtlEngine`` on top of a design that can be stepped.
 
     Attributes:
         wiring: design and surroundings.

@@ -12,13 +12,18 @@ import subprocess
 from functools import partial
 from pathlib import Path
 
-from cubestack.emulator.rtl.build import Compiler, CompilerError, cached_library, compile_driver
-from cubestack.emulator.rtl.clock_steps import port
-from cubestack.emulator.rtl.compiled import CompiledEngine
-from cubestack.emulator.rtl.pins_header import pins_header
+from cubestack.emulator.rtl.cxxrtl.build import (
+    Compiler,
+    CompilerError,
+    cached_library,
+    compile_driver,
+)
+from cubestack.emulator.rtl.cxxrtl.clock_steps import port
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
+from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.emulator.sram import SramTiming
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.flow.generate import verilog_text
 
 __all__ = ["VerilatedEngine", "verilator_root"]
 
@@ -70,7 +75,7 @@ def verilator_root() -> Path | None:
 
 
 class VerilatedEngine(CompiledEngine):
-    """An :class:`~cubestack.emulator.rtl.engine.RtlEngine` that never skips a clock.
+    """An :class:`~cubestack.emulator.rtl.contract.RtlEngine` that never skips a clock.
 
     It has no ``registers``.
     """

@@ -9,12 +9,12 @@ from functools import cache, cached_property
 
 from amaranth.lib.wiring import Component, In
 
-from cubestack.firmware_model.interface.cubesense_fpga import COMMANDS, Action, actions
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 __all__ = [
     "MEMORY_PINS",

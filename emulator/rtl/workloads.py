@@ -22,10 +22,10 @@ from cubestack.emulator.rtl.wiring import (
     cubestar_two_boards_wiring,
     cubestar_wiring,
 )
-from cubestack.emulator.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
-from cubestack.firmware_model.interface.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
+from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 
 __all__ = ["WORKLOADS", "Workload", "WrongPictureError"]
 

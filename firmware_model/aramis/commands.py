@@ -8,16 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cubestack.firmware_model.aramis.commands_catalogue import CatalogueUpload
-from cubestack.firmware_model.aramis.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.camera import Camera
+from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.catalogue_commands import CatalogueUpload
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.host_link import Command
-from cubestack.firmware_model.aramis.program_camera import Camera
-from cubestack.firmware_model.aramis.program_measurement import Measuring
-from cubestack.firmware_model.aramis.program_settings import SETTING_COMMANDS
-from cubestack.firmware_model.aramis.program_state import State
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.hardware import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.aramis.measurement import Measuring
+from cubestack.firmware_model.aramis.settings import SETTING_COMMANDS
+from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import (
     BLOCK_BYTES,
     IMAGE_BYTES,
@@ -26,7 +24,9 @@ from cubestack.firmware_model.interface.aramis import (
     ResetCause,
     SensorState,
 )
-from cubestack.firmware_model.interface.frames import encode_frame
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
 
 __all__ = ["Commands"]
 

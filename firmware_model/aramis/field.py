@@ -13,8 +13,8 @@ from math import atan, cos, hypot, pi, radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.interface.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
+from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["FOV_DEG", "Field"]
 

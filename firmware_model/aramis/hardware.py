@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.hardware import FlashStore
+from cubestack.firmware_model.mcu.requests import FlashStore
 
 __all__ = ["AramisHardware", "FrameEnd"]
 
@@ -32,7 +32,7 @@ class AramisHardware(Protocol):
         sdram: the external dynamic memory, shape (bytes,), uint8.
         catalogue_flash: the flash chips of the coded catalogue, shape (bytes,), uint8, a live view.
         flash: pages of settings in the boot flash.
-        reset_cause: ``ResetCause`` of :mod:`cubestack.firmware_model.interface.aramis_codes`.
+        reset_cause: ``ResetCause`` of :mod:`cubestack.firmware_model.interface.aramis.codes`.
     """
 
     sdram: NDArray[np.uint8]

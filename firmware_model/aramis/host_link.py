@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from cubestack.firmware_model.aramis.hardware import AramisHardware
-from cubestack.firmware_model.aramis.program_state import State
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, INTERFACE, AckError
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.message import TELEMETRY_BIT, Kind, Message
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Kind, Message
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["LONGEST_COMMAND", "QUEUE_DEPTH", "SEND_BUFFER_BYTES", "Command", "HostLink"]
 

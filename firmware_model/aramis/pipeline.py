@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.background import Background
-from cubestack.firmware_model.aramis.database import Database
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.regions import find_regions, locate_stars
+from cubestack.firmware_model.aramis.detection.smear import is_drawn_out, smear_px
+from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.identification import identify
-from cubestack.firmware_model.aramis.regions import find_regions, locate_stars
-from cubestack.firmware_model.aramis.smear import is_drawn_out, smear_px
+from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.solution import (
     Outcome,
     Profile,
@@ -23,8 +24,7 @@ from cubestack.firmware_model.aramis.solution import (
     StarList,
     unsolved,
 )
-from cubestack.firmware_model.aramis.spikes import HALF, SpikeRemoval, remove_spikes
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["PUBLISHED", "VERIFIED", "Configuration", "Detection", "detect", "explain", "solve"]
 

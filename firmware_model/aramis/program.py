@@ -5,17 +5,17 @@ unless told otherwise; below a second the next frame comes while the last one is
 catalogue is reloaded in slices while there is nothing else to do.
 """
 
+from cubestack.firmware_model.aramis.camera import Camera
+from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.commands import Commands
-from cubestack.firmware_model.aramis.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.hardware import AramisHardware, FrameEnd
 from cubestack.firmware_model.aramis.host_link import HostLink
-from cubestack.firmware_model.aramis.program_camera import Camera
-from cubestack.firmware_model.aramis.program_measurement import Measuring
-from cubestack.firmware_model.aramis.program_state import State
+from cubestack.firmware_model.aramis.measurement import Measuring
+from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.aramis.telemetry import Telemetry
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.hardware import Pay, ReadTimer, Reset, Routine, Sleep
 from cubestack.firmware_model.interface.aramis import MeasurementMode
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine, Sleep
 
 __all__ = ["LATE_US", "AramisProgram"]
 

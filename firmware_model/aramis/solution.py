@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.matching import MatchEnd
+from cubestack.firmware_model.aramis.matching.matching import MatchEnd
 
 __all__ = ["NONE", "Outcome", "Profile", "Reason", "Solution", "StarList", "unsolved"]
 

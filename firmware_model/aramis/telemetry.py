@@ -6,19 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.geometry import angles_of
-from cubestack.firmware_model.algorithms.quest import dcm
+from cubestack.firmware_model.aramis.camera import Camera
+from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.commands import Commands
-from cubestack.firmware_model.aramis.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.host_link import HostLink
-from cubestack.firmware_model.aramis.program_camera import Camera
-from cubestack.firmware_model.aramis.program_state import State
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.aramis.state import State
+from cubestack.firmware_model.attitude.geometry import angles_of
+from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
-from cubestack.firmware_model.interface.aramis_flags import FLAG_NAMES
-from cubestack.firmware_model.interface.aramis_telemetry import SETTINGS_SHOWN
-from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
+from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["Telemetry", "body_quaternion"]
 

@@ -13,19 +13,17 @@ from collections.abc import Callable, Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.cubesense.edges import EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
-from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
-from cubestack.firmware_model.hardware import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.cubesense.vision.edges import EdgeList, NadirLines
+from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
+from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
     CaptureResult,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_fpga import (
+from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESS_BYTES,
     ADDRESSING_COMMANDS,
     COMMANDS,
@@ -34,7 +32,9 @@ from cubestack.firmware_model.interface.cubesense_fpga import (
     Actions,
     address_bytes,
 )
-from cubestack.firmware_model.interface.cubesense_pins import ENABLE
+from cubestack.firmware_model.interface.cubesense.pins import ENABLE
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
 
 __all__ = ["ACK_POLL_CYCLES", "ACK_TIMEOUT_US", "CHUNK", "Acquisition"]
 

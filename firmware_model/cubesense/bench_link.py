@@ -11,16 +11,16 @@ from collections import deque
 
 import numpy as np
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
-from cubestack.firmware_model.hardware import ReadTimer, Routine, Sleep
-from cubestack.firmware_model.interface.bench_letters import Letter
-from cubestack.firmware_model.interface.cubesense_bench import BENCH, CAPTURES, DOWNLOADS
-from cubestack.firmware_model.interface.cubesense_codes import IMAGE_BYTES, Camera, Sram
+from cubestack.firmware_model.interface.codec.letters import Letter
+from cubestack.firmware_model.interface.cubesense.bench import BENCH, CAPTURES, DOWNLOADS
+from cubestack.firmware_model.interface.cubesense.codes import IMAGE_BYTES, Camera, Sram
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
 __all__ = ["CHUNK_BYTES", "LETTERS", "BenchLink"]
 

@@ -9,17 +9,9 @@ setting changed, or the camera lost its supply, before the next picture is taken
 latter, so a camera that sends no picture counts as such.
 """
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.state import CameraSettings, State
 from cubestack.firmware_model.cubesense.supply import OFF_TIME_US, Supply
-from cubestack.firmware_model.hardware import ReadPin, ReadTimer, Routine, SetPin
-from cubestack.firmware_model.interface.cubesense_codes import COLUMNS, ROWS, Camera
-from cubestack.firmware_model.interface.cubesense_pins import (
-    CAMERA_POWER,
-    CAMERA_SCL,
-    CAMERA_SDA,
-)
-from cubestack.firmware_model.interface.ov7620 import (
+from cubestack.firmware_model.interface.cameras.ov7620 import (
     CLOCKS_PER_LINE,
     LINES_PER_FRAME,
     PIXEL_CLOCK_HZ,
@@ -27,6 +19,14 @@ from cubestack.firmware_model.interface.ov7620 import (
     window_column,
     window_row,
 )
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
+from cubestack.firmware_model.interface.cubesense.pins import (
+    CAMERA_POWER,
+    CAMERA_SCL,
+    CAMERA_SDA,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import ReadPin, ReadTimer, Routine, SetPin
 
 __all__ = ["EXPOSURE_SETTLE_US", "CameraControl", "register_values"]
 

@@ -8,26 +8,30 @@ still wait are lost with the latter.
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
-from cubestack.firmware_model.cubesense.distortion import DistortionError, Projection, fine_table
 from cubestack.firmware_model.cubesense.download import Download, PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, Telecommand
-from cubestack.firmware_model.cubesense.masks import Mask
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import CameraSettings, State, distortion_of
 from cubestack.firmware_model.cubesense.supply import Supply
-from cubestack.firmware_model.hardware import Pay, Routine
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.cubesense.vision.distortion import (
+    DistortionError,
+    Projection,
+    fine_table,
+)
+from cubestack.firmware_model.cubesense.vision.masks import Mask
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     NadirSearch,
     ResetTarget,
     Sram,
     SramSelection,
 )
-from cubestack.firmware_model.interface.node_codes import AckError
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, Routine
 
 __all__ = ["SOFTWARE_RESET", "Commands"]
 

@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.jobs import FrameRequest
 from cubestack.firmware_model.cubesense.thumbnail import OUTSIDE, frame_pixels
-from cubestack.firmware_model.hardware import Pay, Routine
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     EMPTY_FRAME,
     FRAME_BYTES,
     ImageSize,
     Sram,
     checksum,
 )
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, Routine
 
 __all__ = ["Download", "PictureReader"]
 

@@ -1,6 +1,6 @@
 """What CubeSense's program sees of its PIC18F45K20 beside the requests that take time.
 
-Pins have the names of :mod:`cubestack.firmware_model.interface.cubesense_pins` and of the FPGAs'
+Pins have the names of :mod:`cubestack.firmware_model.interface.cubesense.pins` and of the FPGAs'
 command table (RNW, CLK, EDGE, SHIFT; SUNACK and NADACK are inputs). At reset the enables are high
 and every other output is low.
 """
@@ -8,7 +8,7 @@ and every other output is low.
 from enum import StrEnum
 from typing import Protocol
 
-from cubestack.firmware_model.interface.cubesense_pins import Monitor
+from cubestack.firmware_model.interface.cubesense.pins import Monitor
 
 __all__ = ["CubeSenseHardware", "Port"]
 

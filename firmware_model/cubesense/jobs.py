@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cubestack.firmware_model.hardware import Routine
-from cubestack.firmware_model.interface.cubesense_codes import Camera, ImageSize, Sram
-from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.cubesense.codes import Camera, ImageSize, Sram
+from cubestack.firmware_model.mcu.requests import Routine
 
 __all__ = [
     "QUEUE_DEPTH",

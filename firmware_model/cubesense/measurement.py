@@ -10,27 +10,26 @@ shows a picture's end only. So the first row's time is ACK's, less the time in w
 
 from functools import cache
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
-from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, fine_table
-from cubestack.firmware_model.cubesense.edges import EdgeConfig, EdgeList, NadirLines
-from cubestack.firmware_model.cubesense.nadir import NadirConfig, find_nadir
-from cubestack.firmware_model.cubesense.sample_search import Between, around_samples
 from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
-from cubestack.firmware_model.cubesense.sun_centroid import (
-    COORDINATE_BYTES,
-    SunConfig,
-    find_sun,
-)
 from cubestack.firmware_model.cubesense.timer import (
     microseconds,
     read_ticks,
     ticks_of,
     ticks_since,
 )
-from cubestack.firmware_model.hardware import Pay, ReadTimer, Routine, Sleep
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
+from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
+from cubestack.firmware_model.cubesense.vision.sample_search import Between, around_samples
+from cubestack.firmware_model.cubesense.vision.sun_centroid import (
+    COORDINATE_BYTES,
+    SunConfig,
+    find_sun,
+)
+from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
+from cubestack.firmware_model.interface.cubesense.codes import (
     PIXELS_PER_DEGREE,
     ROWS,
     Camera,
@@ -39,9 +38,10 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     NadirSearch,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.firmware_model.interface.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
-from cubestack.firmware_model.pic18_costs import PIC18F45K20
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
 
 __all__ = ["READ_OUT_TICKS", "Measurement"]
 

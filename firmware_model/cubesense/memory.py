@@ -12,15 +12,15 @@ from enum import Enum
 import numpy as np
 
 from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
-from cubestack.firmware_model.cubesense.distortion import TABLE_ENTRIES
-from cubestack.firmware_model.cubesense.edges import MAX_EDGES
 from cubestack.firmware_model.cubesense.jobs import QUEUE_DEPTH
 from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
-from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
+from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES
+from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
+from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import FRAME_BYTES, MASK_AREAS, Camera
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.firmware_model.interface.cubesense_telecommands import (
+from cubestack.firmware_model.interface.cubesense.codes import FRAME_BYTES, MASK_AREAS, Camera
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.telecommands import (
     DISTORTION_TERMS,
     TELECOMMANDS,
 )

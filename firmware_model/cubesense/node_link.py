@@ -16,25 +16,25 @@ a host that waits for each answer never fills it.
 
 from collections.abc import Mapping
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.download import Download
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import JobQueue, Measure, Telecommand
-from cubestack.firmware_model.cubesense.lens_check import invertible
 from cubestack.firmware_model.cubesense.state import State, distortion_of
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
+from cubestack.firmware_model.cubesense.vision.lens_check import invertible
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message, Value
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.register_pointer import FILL
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     FRAME_BYTES,
     Camera,
     NadirSearch,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_telemetry import SCHEDULES
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.message import TELEMETRY_BIT, Message, Value
-from cubestack.firmware_model.interface.node_codes import AckError
-from cubestack.firmware_model.interface.register_pointer import FILL
+from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["LONGEST_COMMAND", "SEND_BYTES", "NodeLink"]
 

@@ -4,7 +4,6 @@ CubeSense thesis, section 6.4: the satellite's computer asks for a picture and f
 nothing runs by itself. While nothing is asked for, the program watches the memories' currents.
 """
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.bench_link import BenchLink
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
@@ -17,7 +16,8 @@ from cubestack.firmware_model.cubesense.register_link import RegisterLink
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
-from cubestack.firmware_model.hardware import ReadTimer, Reset, Routine
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import ReadTimer, Reset, Routine
 
 __all__ = ["DRAIN_US", "CubeSenseProgram"]
 

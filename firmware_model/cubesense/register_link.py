@@ -14,22 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, Telecommand
 from cubestack.firmware_model.cubesense.state import State
-from cubestack.firmware_model.hardware import Routine
+from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerRegister
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
     Measurement,
     NadirSearch,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
-from cubestack.firmware_model.interface.register_pointer import FILL, PointerRegister
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Routine
 
 __all__ = ["READ_AHEAD_BYTES", "ImageStream", "RegisterLink"]
 

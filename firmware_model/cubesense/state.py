@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.masks import Mask
+from cubestack.firmware_model.cubesense.vision.masks import Mask
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     MASK_AREAS,
     Camera,
     CaptureResult,
@@ -22,8 +23,7 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     Sram,
     coefficient,
 )
-from cubestack.firmware_model.interface.cubesense_telecommands import DISTORTION_TERMS
-from cubestack.firmware_model.interface.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 
 __all__ = ["CameraSettings", "Result", "State", "distortion_of"]
 

@@ -6,12 +6,12 @@ line that it reads. A memory that draws too much is cut at once and stays off un
 ClearOverCurrent, because whatever it held is lost.
 """
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.state import State
-from cubestack.firmware_model.hardware import Pay, ReadTimer, Routine, SetPin, Sleep
-from cubestack.firmware_model.interface.cubesense_codes import Sram
-from cubestack.firmware_model.interface.cubesense_pins import MA_PER_COUNT, SRAM_POWER, Monitor
+from cubestack.firmware_model.interface.cubesense.codes import Sram
+from cubestack.firmware_model.interface.cubesense.pins import MA_PER_COUNT, SRAM_POWER, Monitor
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, SetPin, Sleep
 
 __all__ = ["OFF_TIME_US", "OVER_CURRENT_MA", "SAMPLE_US", "SETTLE_US", "Supply"]
 

@@ -6,22 +6,22 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.download import Download
-from cubestack.firmware_model.cubesense.edges import MAX_EDGES
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
+from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     EDGE_UNIT,
     EDGES_PER_FRAME,
     Camera,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_pins import Monitor
-from cubestack.firmware_model.interface.cubesense_telemetry import RESULTS, SCHEDULES
-from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.cubesense.pins import Monitor
+from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["FIRMWARE_VERSION", "NODE_TYPE", "SERIAL_BYTES", "Telemetry"]
 

@@ -12,7 +12,7 @@ the memory nor the time.
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     COLUMNS,
     FRAME_BYTES,
     IMAGE_BYTES,

@@ -4,8 +4,8 @@ CubeSense thesis, section 7.4: time = ticks x 256 / 5 MHz, so a tick is 51.2 us 
 3.4 s. Every published duration has these steps, and so have ours.
 """
 
-from cubestack.firmware_model.hardware import ReadTimer, Routine
-from cubestack.firmware_model.pic18_costs import INSTRUCTION_HZ
+from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
 __all__ = ["PRESCALER", "microseconds", "read_ticks", "ticks_of", "ticks_since"]
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.geometry import angles_of
-from cubestack.firmware_model.algorithms.quest import dcm
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.attitude.geometry import angles_of
+from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["AttitudeReports"]
 

@@ -10,13 +10,12 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.detection import (
+from cubestack.firmware_model.cubestar.detection import (
     Detection,
     DetectionConfig,
     Look,
     search_stars,
 )
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.pictures import (
     ITERATION_US,
     CopiedPictures,
@@ -25,10 +24,11 @@ from cubestack.firmware_model.cubestar.pictures import (
 )
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.hardware import BusAccess, Hardware, Routine, SetPin
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
-from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import BusAccess, Hardware, Routine, SetPin
 
 __all__ = ["pictures_of"]
 

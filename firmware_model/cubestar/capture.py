@@ -13,8 +13,8 @@ from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.pictures import CopiedPictures, Pictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.hardware import AwaitPin, ReadTimer, Routine, Sleep
-from cubestack.firmware_model.interface.cubestar_codes import TaskStatus
+from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
+from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, Sleep
 
 __all__ = ["ImageCapture"]
 

@@ -8,23 +8,23 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.host_link import Command
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.hardware import Hardware, Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, UPLOAD_BLOCK_BYTES
-from cubestack.firmware_model.interface.cubestar_codes import (
+from cubestack.firmware_model.interface.cubestar.codes import (
     MatchMode,
     MemoryTest,
     ResetCause,
     TestPattern,
 )
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Hardware, Pay, ReadTimer, Routine, Sleep
 
 __all__ = ["WATCHDOG_US", "Commands"]
 

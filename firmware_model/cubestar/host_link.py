@@ -13,13 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.hardware import Hardware
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Kind, Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar_codes import AckError
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.message import TELEMETRY_BIT, Kind, Message
+from cubestack.firmware_model.interface.cubestar.codes import AckError
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Hardware
 
 __all__ = ["LONGEST_COMMAND", "QUEUE_DEPTH", "SEND_BUFFER_BYTES", "Command", "HostLink"]
 

@@ -5,8 +5,7 @@ CubeStar thesis, appendix D; register names and addresses are those of the senso
 
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.hardware import CameraTransfer, ReadTimer, Routine, Sleep
-from cubestack.firmware_model.interface.mlx75412 import (
+from cubestack.firmware_model.interface.cameras.mlx75412 import (
     CRYSTAL_HZ,
     LINE_CLOCKS,
     LONGEST_EXPOSURE,
@@ -14,6 +13,7 @@ from cubestack.firmware_model.interface.mlx75412 import (
     ROWS,
     SYNC_APPLY,
 )
+from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep
 
 __all__ = ["ImageSensor"]
 

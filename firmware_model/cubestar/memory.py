@@ -13,13 +13,13 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.assisted import CUT_RADIUS_DEG
-from cubestack.firmware_model.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.host_link import (
     LONGEST_COMMAND,
     QUEUE_DEPTH,
     SEND_BUFFER_BYTES,
 )
+from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import (
     ATTITUDE_PAGE,
     CONFIG_PAGE,
@@ -27,7 +27,7 @@ from cubestack.firmware_model.cubestar.state import (
     State,
 )
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
-from cubestack.firmware_model.star_catalogue import StarCatalogue
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
 
 __all__ = [
     "CAPACITY",

@@ -4,7 +4,7 @@ The phases are those of table 6.2 in the CubeStar thesis, and the steps of secti
 """
 
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.hardware import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
 __all__ = ["Phases"]
 

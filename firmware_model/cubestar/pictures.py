@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.detection import Detection, DetectionConfig, detect_stars
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.cubestar.detection import Detection, DetectionConfig, detect_stars
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.hardware import Hardware, Pay, Routine, SetPin, StrobeRead
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
-from cubestack.firmware_model.interface.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Hardware, Pay, Routine, SetPin, StrobeRead
 
 __all__ = ["ITERATION_US", "CopiedPictures", "Pictures", "test_pattern"]
 

@@ -13,25 +13,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.assisted import CUT_RADIUS_DEG, identify_assisted
-from cubestack.firmware_model.algorithms.detection import Detection, SearchEnd
-from cubestack.firmware_model.algorithms.geometry import direction_of, undistort, unit_vectors
-from cubestack.firmware_model.algorithms.identification import Identification, Outcome
-from cubestack.firmware_model.algorithms.quest import AttitudeError, dcm, quest
-from cubestack.firmware_model.algorithms.tracking import track
-from cubestack.firmware_model.algorithms.voting import identify
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.attitude.geometry import direction_of, undistort, unit_vectors
+from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.cubestar.capture import ImageCapture
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.configuration import (
     camera_parameters,
     detection_config,
     field_radius_deg,
 )
+from cubestack.firmware_model.cubestar.detection import Detection, SearchEnd
+from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG, identify_assisted
+from cubestack.firmware_model.cubestar.matching.identification import Identification, Outcome
+from cubestack.firmware_model.cubestar.matching.tracking import track
+from cubestack.firmware_model.cubestar.matching.voting import identify
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.state import Attitude, State
-from cubestack.firmware_model.hardware import ReadTimer, Routine
-from cubestack.firmware_model.interface.cubestar_codes import IdMode, MatchMode, TaskStatus
-from cubestack.firmware_model.star_catalogue import StarCatalogue
+from cubestack.firmware_model.interface.cubestar.codes import IdMode, MatchMode, TaskStatus
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
 __all__ = ["Processing", "Results"]
 

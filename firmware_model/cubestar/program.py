@@ -7,9 +7,9 @@ Ours: the reset waits until shortly before the next iteration, so that results c
 then, and leaves out a turn when the host is in the middle of a message.
 """
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
 from cubestack.firmware_model.cubestar.capture import ImageCapture
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.host_link import HostLink
 from cubestack.firmware_model.cubestar.phases import Phases
@@ -18,10 +18,10 @@ from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry import Telemetry
-from cubestack.firmware_model.hardware import Hardware, Pay, ReadTimer, Reset, Routine
-from cubestack.firmware_model.interface.cubestar_codes import ResetCause
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
-from cubestack.firmware_model.star_catalogue import StarCatalogue
+from cubestack.firmware_model.interface.cubestar.codes import ResetCause
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Hardware, Pay, ReadTimer, Reset, Routine
 
 __all__ = ["ITERATION_US", "RESET_LEAD_US", "CubeStarProgram"]
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.settings import Settings
-from cubestack.firmware_model.hardware import Hardware
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar_codes import MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskStatus
+from cubestack.firmware_model.mcu.requests import Hardware
 
 __all__ = ["ATTITUDE_PAGE", "CONFIG_PAGE", "MODE_PAGE", "Attitude", "Retained", "State"]
 

@@ -4,7 +4,7 @@ CubeStar thesis, section 5.2.3. The main loop later powers the channel up again.
 """
 
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.hardware import Hardware, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Hardware, ReadTimer, Routine, Sleep
 
 __all__ = ["CHANNELS", "OFF_TIME_US", "UNDER_CURRENT_MA", "SupplyMonitor"]
 

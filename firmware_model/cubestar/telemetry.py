@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubestar.attitude_reports import AttitudeReports
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.commands import Commands
@@ -12,11 +11,12 @@ from cubestack.firmware_model.cubestar.star_reports import StarReports
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry_tables import SETTINGS_SHOWN, TIMES_SHOWN
-from cubestack.firmware_model.hardware import Hardware
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar_codes import ImageBlockSize, SwitchState
-from cubestack.firmware_model.interface.cubestar_flags import flag_fields
-from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize, SwitchState
+from cubestack.firmware_model.interface.cubestar.flags import flag_fields
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Hardware
 
 __all__ = ["Telemetry"]
 

@@ -21,9 +21,9 @@ from itertools import combinations, product
 from pathlib import Path
 from typing import NamedTuple
 
-from cubestack.hdl.designs import Pin
+from cubestack.hdl.flow.tools import run_yosys
+from cubestack.hdl.flow.tops import Pin
 from cubestack.hdl.mutants.netlist import Mutant, Netlist
-from cubestack.hdl.tools import run_yosys
 
 __all__ = ["Equivalence", "Verdict"]
 

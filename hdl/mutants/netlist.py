@@ -18,7 +18,7 @@ from typing import NamedTuple
 from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
-from cubestack.hdl.tools import run_yosys
+from cubestack.hdl.flow.tools import run_yosys
 
 __all__ = ["Mutant", "Netlist", "mutants", "netlist", "selectable"]
 

@@ -4,7 +4,10 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from cubestack.hdl.proofs import cubesense, cubesense_i2c, cubestar, cubestar_next
+from cubestack.hdl.proofs.cubesense import i2c as cubesense_i2c
+from cubestack.hdl.proofs.cubesense import pair as cubesense
+from cubestack.hdl.proofs.cubestar import published as cubestar
+from cubestack.hdl.proofs.cubestar import successors as cubestar_next
 from cubestack.hdl.proofs.prover import Outcome, prove
 
 __all__ = ["PROOFS", "Verdict", "verdict_json", "verdict_text", "verdicts"]

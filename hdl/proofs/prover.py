@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 from amaranth.hdl import Instance, Module, Signal, Value
 from amaranth.lib.wiring import Component, In
 
-from cubestack.hdl.generate import rtlil_text
-from cubestack.hdl.tools import run_yosys
+from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.flow.tools import run_yosys
 
 __all__ = ["Fault", "Outcome", "Proof", "Register", "UnknownWireError", "past", "prove"]
 

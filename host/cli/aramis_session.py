@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.interface.aramis import INTERFACE
-from cubestack.host.aramis import Aramis
 from cubestack.host.cli.terminal import progress
-from cubestack.host.node_client import NodeClient
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.node import NodeClient
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from cubestack.emulator.aramis import AramisBoard
-    from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
-    from cubestack.emulator.camera.optics import Optics
-    from cubestack.emulator.sky.scene import Scene
-    from cubestack.firmware_model.aramis.database import Database
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.camera.common.optics import Optics
+    from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
+    from cubestack.emulator.scene.sky import Scene
+    from cubestack.firmware_model.aramis.catalogue.database import Database
 
 __all__ = ["DEFAULT_FIELD_DEG", "AramisSession", "aramis_board", "aramis_catalogue", "open_aramis"]
 
@@ -36,7 +36,7 @@ def aramis_catalogue(field_deg: float = DEFAULT_FIELD_DEG) -> Database:
 
     Shows its progress, so no other progress may be shown meanwhile.
     """
-    from cubestack.emulator.aramis_catalogue import CatalogueParameters, cached_database
+    from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, cached_database
 
     usual = CatalogueParameters()
     if abs(field_deg - usual.fov_deg) < 1e-3:
@@ -48,10 +48,10 @@ def aramis_board(
     path: Path | None, *, seed: int = 0, baud: int = INTERFACE.baud, lens: Optics | None = None
 ) -> AramisBoard:
     """Power up a star tracker that looks at the scene in ``path``, or at Orion."""
-    from cubestack.emulator.aramis import AramisBoard
-    from cubestack.emulator.camera.mt9m001_lens import aramis_lens
-    from cubestack.emulator.sky.attitude import quaternion_from_pointing
-    from cubestack.emulator.sky.scene import SkyScene, load_scene
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.sky import SkyScene, load_scene
 
     lens = lens or aramis_lens()
     scene: Scene
@@ -85,7 +85,7 @@ def open_aramis(
     noise: NoiseTerms | None = None,
 ) -> Iterator[AramisSession]:
     """Power up a star tracker that looks at ``scene`` and has the catalogue of ``field_deg``."""
-    from cubestack.emulator.aramis import AramisBoard
+    from cubestack.emulator.boards.aramis.board import AramisBoard
 
     board = AramisBoard(scene, aramis_catalogue(field_deg), seed=seed, noise=noise)
     try:

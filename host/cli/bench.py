@@ -31,8 +31,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import MeasurementMode
-from cubestack.firmware_model.interface.cubesense_codes import Camera
-from cubestack.firmware_model.interface.mt9m001 import REGISTERS
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.cli.aramis_session import aramis_catalogue, open_aramis
 from cubestack.host.cli.bench_engines import bench_engines
 from cubestack.host.cli.session import open_cubesense, open_session
@@ -84,9 +84,9 @@ def run(args: argparse.Namespace) -> int:
         strobes_per_s,
     )
     from cubestack.emulator.rtl.wiring import cubesense_wiring
-    from cubestack.emulator.sky.attitude import quaternion_from_pointing
-    from cubestack.emulator.sky.earth_sun import EarthSunScene
-    from cubestack.emulator.sky.scene import SkyScene
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.emulator.scene.sky import SkyScene
 
     figures: dict[str, float] = {
         "rtl_clocks_per_s": round(rtl_clocks_per_s()),
@@ -153,17 +153,17 @@ def _realtime_ratio(session: "Session") -> float:
 
 def _aramis() -> dict[str, float]:
     """The loop of the third sensor, and the wall times of what it spends them on."""
-    from cubestack.emulator.camera.mt9m001_imager import Mt9m001Imager
-    from cubestack.emulator.camera.mt9m001_lens import aramis_lens
-    from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
-    from cubestack.emulator.camera.mt9m001_registers import read_settings
-    from cubestack.emulator.camera.register_file import RegisterFile
-    from cubestack.emulator.sky.attitude import quaternion_from_pointing
-    from cubestack.emulator.sky.scene import SkyScene
-    from cubestack.firmware_model.aramis.background import Background
+    from cubestack.emulator.camera.common.register_file import RegisterFile
+    from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+    from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
+    from cubestack.emulator.camera.mt9m001.registers import read_settings
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.sky import SkyScene
+    from cubestack.firmware_model.aramis.detection.background import Background
     from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
-    from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
-    from cubestack.firmware_model.costs import Meter
+    from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+    from cubestack.firmware_model.mcu.costs import Meter
 
     database = aramis_catalogue()
     scene = SkyScene(quaternion_from_pointing(84.0, -1.0, 0.0), optics=aramis_lens())

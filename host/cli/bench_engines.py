@@ -17,8 +17,8 @@ __all__ = ["bench_engines"]
 
 def bench_engines(*, as_json: bool) -> int:
     """Measure and report; 2 when an engine fails, which is said."""
-    from cubestack.emulator.rtl.build import CompilerError
     from cubestack.emulator.rtl.cocotb_icarus import CocotbError
+    from cubestack.emulator.rtl.cxxrtl.build import CompilerError
     from cubestack.emulator.rtl.engine_speeds import ENGINES, absent, measure, prepare
     from cubestack.emulator.rtl.workloads import WORKLOADS, WrongPictureError
 

@@ -69,7 +69,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _cubestar(args: argparse.Namespace) -> dict[str, Any]:
-    from cubestack.emulator.onboard_catalogue import MAG_LIMIT, PAIR_LIMIT_DEG, onboard_catalogue
+    from cubestack.emulator.boards.cubestar.catalogue import (
+        MAG_LIMIT,
+        PAIR_LIMIT_DEG,
+        onboard_catalogue,
+    )
 
     mag_limit = MAG_LIMIT if args.mag_limit is None else args.mag_limit
     pair_limit = PAIR_LIMIT_DEG if args.pair_limit is None else args.pair_limit
@@ -90,7 +94,7 @@ def _cubestar(args: argparse.Namespace) -> dict[str, Any]:
 def _aramis(args: argparse.Namespace) -> dict[str, Any]:
     import hashlib
 
-    from cubestack.emulator.aramis_catalogue import (
+    from cubestack.emulator.boards.aramis.catalogue import (
         PUBLISHED,
         CatalogueParameters,
         cached_database,

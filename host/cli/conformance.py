@@ -17,7 +17,7 @@ import json
 from collections import Counter
 
 from cubestack.host.cli.targets import TARGETS, add_target_arguments, open_any_target
-from cubestack.host.conformance import Check, Outcome, Suite, compare
+from cubestack.host.conformance.suite import Check, Outcome, Suite, compare
 
 __all__ = ["add_arguments", "run"]
 

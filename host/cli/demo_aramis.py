@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.aramis import INTERFACE
-from cubestack.host.aramis import Aramis, Attitude
-from cubestack.host.cli.cubestar_frames import compare
 from cubestack.host.cli.serving import served
 from cubestack.host.cli.terminal import console, progress_bar
-from cubestack.host.node_client import NodeClient
-from cubestack.host.pictures import annotate, save_picture
-from cubestack.host.transport import open_transport
+from cubestack.host.clients.aramis.client import Aramis, Attitude
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.experiments.cubestar import compare
+from cubestack.host.pictures.frames import annotate, save_picture
+from cubestack.host.transport.streams import open_transport
 
 __all__ = ["show"]
 
@@ -23,7 +23,7 @@ ROUGHLY_OFF_DEG = 2.0
 
 def show(args: argparse.Namespace) -> bool:
     """Measure twice and download; returns whether both measurements were conclusive."""
-    from cubestack.emulator.sky.attitude import matrix_from_quaternion, quaternion_from_pointing
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
 
     started = time.monotonic()
     console.rule("star tracker without FPGA: Orion, 21.5 deg, 2026")

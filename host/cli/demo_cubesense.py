@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_bench import BENCH
-from cubestack.firmware_model.interface.cubesense_codes import PIXELS_PER_DEGREE, Camera
+from cubestack.firmware_model.interface.cubesense.bench import BENCH
+from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera
 from cubestack.host.cli.serving import served
 from cubestack.host.cli.terminal import console, progress_bar
-from cubestack.host.cubesense import CubeSense, Measurement, direction
-from cubestack.host.cubesense_bench import BenchClient
-from cubestack.host.node_client import NodeClient
-from cubestack.host.pictures import save_picture
-from cubestack.host.sensor_pictures import annotate_nadir, annotate_sun
-from cubestack.host.transport import open_transport
+from cubestack.host.clients.cubesense.bench import BenchClient
+from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.pictures.earth_sun import annotate_nadir, annotate_sun
+from cubestack.host.pictures.frames import save_picture
+from cubestack.host.transport.streams import open_transport
 
 __all__ = ["show"]
 

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.calibration import calibrate, load_camera
-from cubestack.host.cli.cubestar_frames import compare
 from cubestack.host.cli.serving import served
 from cubestack.host.cli.terminal import console, progress_bar
-from cubestack.host.cubestar import CubeStar
-from cubestack.host.node_client import NodeClient
-from cubestack.host.operator import find_threshold
-from cubestack.host.pictures import annotate, save_picture
-from cubestack.host.transport import open_transport
+from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.cubestar.operator import find_threshold
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.experiments.cubestar import compare
+from cubestack.host.pictures.frames import annotate, save_picture
+from cubestack.host.transport.streams import open_transport
 
 __all__ = ["RENDERED", "show"]
 
@@ -59,7 +59,7 @@ def show(args: argparse.Namespace) -> bool:
 
 
 def _sky(seed: int) -> _Subject:
-    from cubestack.emulator.sky.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
 
     ra, dec, roll = POINTING_DEG
     return _Subject(
@@ -140,7 +140,7 @@ def _show(subject: _Subject, out: Path) -> bool:
 def _report_attitude(
     valid: bool, quaternion: NDArray[np.float64], matched: int, truth: NDArray[np.float64]
 ) -> None:
-    from cubestack.emulator.sky.attitude import matrix_from_quaternion, pointing_from_matrix
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
 
     if not valid:
         console.print("no attitude found in this picture")

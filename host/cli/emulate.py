@@ -23,22 +23,22 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
-from cubestack.firmware_model.interface.linux_i2c import socket_path
-from cubestack.firmware_model.interface.recording_setup import Option
+from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.setup import Option
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.boards import DEVICES, open_board
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.cli.session import add_engine_arguments, add_layout_argument, tell_layout
-from cubestack.host.cli.setups import emulated_setup
 from cubestack.host.cli.terminal import say
+from cubestack.host.devices.boards import DEVICES, open_board
+from cubestack.host.recording.setups import emulated_setup
 
 if TYPE_CHECKING:
-    from cubestack.emulator.i2c_host.adapter import I2cAdapter
-    from cubestack.emulator.virtual_time import Kernel
-    from cubestack.host.cli.boards import Opened
+    from cubestack.emulator.i2cdev.adapter import I2cAdapter
+    from cubestack.emulator.sim.virtual_time import Kernel
+    from cubestack.host.devices.boards import Opened
 
 __all__ = ["add_arguments", "run"]
 
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    from cubestack.emulator.ports.pump import Pump, wait_ready
+    from cubestack.emulator.ports.realtime import Pump, wait_ready
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
@@ -121,9 +121,9 @@ def run(args: argparse.Namespace) -> int:
 
         wait, clock_ns = wait_ready, time.monotonic_ns
         if args.i2c is not None:
-            from cubestack.emulator.i2c_host.pacing import sharpen_timers, wait_precisely
-            from cubestack.emulator.i2c_host.server import I2cServer
-            from cubestack.emulator.i2c_host.turns import Turns
+            from cubestack.emulator.i2cdev.pacing import sharpen_timers, wait_precisely
+            from cubestack.emulator.i2cdev.scheduler import Turns
+            from cubestack.emulator.i2cdev.server import I2cServer
 
             server = I2cServer(socket_path(args.i2c), adapter)
             stack.callback(server.close)
@@ -163,8 +163,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _joined(devices: Sequence["Opened"]) -> tuple["Kernel", "I2cAdapter"]:
     """What drives all devices, and the master of their one I2C bus."""
-    from cubestack.emulator.i2c_host.adapter import I2cAdapter
-    from cubestack.emulator.i2c_host.joined import JoinedKernel, join_buses
+    from cubestack.emulator.i2cdev.adapter import I2cAdapter
+    from cubestack.emulator.i2cdev.joined import JoinedKernel, join_buses
 
     boards = [device.board for device in devices]
     join_buses(*((board.kernel, board.i2c_bus) for board in boards))

@@ -24,7 +24,7 @@ examples:
   cubestack hdl area
   cubestack hdl area cubestar "Sun search"
   cubestack hdl area --ice40    a public yardstick beside it: iCE40 cells
-  cubestack hdl area --ice40 --fmax --json    what hdl/area.json tracks"""
+  cubestack hdl area --ice40 --fmax --json    what hdl/flow/area.json tracks"""
 
 VERILOG = """One Verilog file that needs no other: a wrapper with the real pins,
 bidirectional ones too, around the design itself, with a list of the pins and a
@@ -108,7 +108,7 @@ def _subcommand(
 
 
 def _area(args: argparse.Namespace) -> int:
-    from cubestack.hdl.area_report import area_json, area_table, areas, designs
+    from cubestack.hdl.flow.area_report import area_json, area_table, areas, designs
     from cubestack.host.cli.terminal import progress
 
     names = args.names or list(designs())
@@ -123,8 +123,8 @@ def _area(args: argparse.Namespace) -> int:
 
 
 def _verilog(args: argparse.Namespace) -> int:
-    from cubestack.hdl.designs import TOPS
-    from cubestack.hdl.verilog_file import verilog_file
+    from cubestack.hdl.flow.tops import TOPS
+    from cubestack.hdl.flow.verilog import verilog_file
 
     if args.top not in TOPS:
         raise ValueError(f"{args.top!r} is no top; there are {', '.join(TOPS)}")

@@ -7,7 +7,7 @@ age        from the mid-exposure of a picture to its attitude in flash, from whe
 power      mean of the whole stack at 3.3 V, with its two LEDs
 energy     for each attitude
 pins       of each FPGA, of the AGLN030's 77
-tiles      of each FPGA, as in hdl/area.json
+tiles      of each FPGA, as in hdl/flow/area.json
 
 examples:
   cubestack layouts
@@ -25,16 +25,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.boards import cubestar_scene
-from cubestack.host.cli.cubestar_frames import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG
 from cubestack.host.cli.session import add_engine_arguments, open_session
 from cubestack.host.cli.terminal import console, progress
+from cubestack.host.devices.boards import cubestar_scene
+from cubestack.host.experiments.cubestar import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG
 
 if TYPE_CHECKING:
-    from cubestack.emulator.cubestar import CubeStarBoard
-    from cubestack.emulator.sky.scene import Scene
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.scene.sky import Scene
     from cubestack.host.cli.session import Engine
 
 __all__ = ["LayoutResult", "add_arguments", "measure_layout", "report", "run"]
@@ -121,7 +121,7 @@ def measure_layout(
     layout: Layout, scene: Scene, *, seconds: int, seed: int = 0, engine: Engine = "auto"
 ) -> LayoutResult:
     """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
-    from cubestack.emulator.cubestar_layouts import BOARDS, fpga_of
+    from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
 
     with open_session(scene, seed=seed, engine=engine, layout=layout) as session:
         session.cubestar.client.command("Trigger")
@@ -175,7 +175,7 @@ def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
 
     When the first one does not come, its place is told without it.
     """
-    from cubestack.emulator.sky.attitude import attitude_error_deg
+    from cubestack.emulator.scene.attitude import attitude_error_deg
     from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
 
     kernel, seen, end_ps = board.kernel, 0, board.kernel.now + (SETTLING + 3) * PS_PER_S

@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return FAILED
     except RuntimeError as error:
-        from cubestack.emulator.rtl.build import CompilerError
+        from cubestack.emulator.rtl.cxxrtl.build import CompilerError
 
         if not isinstance(error, CompilerError):
             raise

@@ -28,7 +28,7 @@ from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.terminal import collect, console
 
 if TYPE_CHECKING:
-    from cubestack.host.cli.aramis_frames import AramisResult
+    from cubestack.host.experiments.aramis import AramisResult
 
 __all__ = ["add_arguments", "run", "summarise"]
 
@@ -111,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure; returns 0 when every frame was measured, whether solved or not."""
-    from cubestack.host.cli.aramis_frames import measure_frames
+    from cubestack.host.experiments.aramis import measure_frames
 
     if args.image is None and args.crop != (0, 0):
         raise ValueError("--crop belongs to --image")

@@ -25,7 +25,7 @@ from cubestack.host.cli.session import add_engine_arguments
 from cubestack.host.cli.terminal import collect, console
 
 if TYPE_CHECKING:
-    from cubestack.host.cli.cubesense_frames import SensorResult
+    from cubestack.host.experiments.cubesense import SensorResult
 
 __all__ = ["add_arguments", "run", "summarise"]
 
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure; returns 0 when every result was read, whether anything was found or not."""
-    from cubestack.host.cli.cubesense_frames import measure_sensors
+    from cubestack.host.experiments.cubesense import measure_sensors
 
     given = [name for name in POSE_DEFAULTS if getattr(args, name) is not None]
     if args.scene is not None and (given or args.no_noise):

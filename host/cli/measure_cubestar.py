@@ -29,7 +29,7 @@ from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
 from cubestack.host.cli.terminal import collect, console, say
 
 if TYPE_CHECKING:
-    from cubestack.host.cli.cubestar_frames import FrameResult
+    from cubestack.host.experiments.cubestar import FrameResult
 
 __all__ = ["add_arguments", "run"]
 
@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure; returns 0 when every frame was measured, whether solved or not."""
-    from cubestack.host.cli.cubestar_frames import measure_frames
+    from cubestack.host.experiments.cubestar import measure_frames
 
     if args.image is None and (args.camera or args.crop != (0, 0)):
         raise ValueError("--crop and --camera belong to --image")

@@ -12,7 +12,7 @@ from cubestack.host.cli.arguments import whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.ports.serial_port import Endpoint
-    from cubestack.host.cli.boards import Opened, SerialLine
+    from cubestack.host.devices.boards import Opened, SerialLine
 
 __all__ = ["add_port_arguments", "open_ports"]
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cubestack.emulator.recording import Recorder
-    from cubestack.emulator.uart import Uart
-    from cubestack.firmware_model.interface.recording_setup import Setup
-    from cubestack.host.cli.boards import Opened
+    from cubestack.emulator.bus.uart import Uart
+    from cubestack.emulator.recording.recorder import Recorder
+    from cubestack.firmware_model.formats.setup import Setup
+    from cubestack.host.devices.boards import Opened
 
 __all__ = ["add_record_arguments", "create_file", "port_uarts", "record"]
 
@@ -44,9 +44,9 @@ def record(
     The board's I2C bus is replaced by one that is listened to. ``setup`` is for the recording's
     header. Returns what records, if anything. Raises ValueError for a file that can not be written.
     """
-    from cubestack.emulator.probes import firmware_probes
-    from cubestack.emulator.recording import Recorder
-    from cubestack.emulator.trace import VcdTrace
+    from cubestack.emulator.recording.probes import firmware_probes
+    from cubestack.emulator.recording.recorder import Recorder
+    from cubestack.emulator.recording.trace import VcdTrace
 
     board: Any = opened.board
     device, uarts = opened.title.lower(), port_uarts(opened)

@@ -12,7 +12,7 @@ import argparse
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.host.registers import FORMATS, render
+from cubestack.host.export.interface import FORMATS, render
 
 __all__ = ["add_arguments", "run"]
 

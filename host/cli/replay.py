@@ -19,18 +19,18 @@ import json
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
-from cubestack.firmware_model.interface.recording import Recording, load_recording
-from cubestack.firmware_model.interface.recording_setup import Setup
+from cubestack.firmware_model.formats.recording import Recording, load_recording
+from cubestack.firmware_model.formats.setup import Setup
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.board_controls import BoardControls
-from cubestack.host.cli.boards import DEVICES, Opened, open_board
 from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.records import add_record_arguments, port_uarts, record
 from cubestack.host.cli.session import Engine, add_engine_arguments
-from cubestack.host.cli.setups import setup_for, written
 from cubestack.host.cli.terminal import say
-from cubestack.host.targets import interface_of
+from cubestack.host.devices.boards import DEVICES, Opened, open_board
+from cubestack.host.devices.controls import BoardControls
+from cubestack.host.devices.targets import interface_of
+from cubestack.host.recording.setups import setup_for, written
 
 __all__ = ["add_arguments", "run"]
 
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay and report."""
-    from cubestack.emulator.replay import Replay
+    from cubestack.emulator.recording.replay import Replay
 
     recording = load_recording(args.recording)
     interface = interface_of(recording.device, str(args.recording))

@@ -22,19 +22,19 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.firmware_model.interface.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.boards import DEVICES, open_board
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.session import add_engine_arguments
 from cubestack.host.cli.terminal import say
+from cubestack.host.devices.boards import DEVICES, open_board
 
 if TYPE_CHECKING:
-    from cubestack.emulator.i2c_host.running import HostBus
+    from cubestack.emulator.i2cdev.running import HostBus
 
 __all__ = ["add_arguments", "run"]
 
@@ -115,8 +115,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the program; returns its exit code."""
-    from cubestack.emulator.i2c_host.program import RouteError
-    from cubestack.emulator.i2c_host.running import attached_bus, run_program
+    from cubestack.emulator.i2cdev.guest_process import RouteError
+    from cubestack.emulator.i2cdev.running import attached_bus, run_program
 
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")
@@ -141,10 +141,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     """Power up the devices on one bus."""
-    from cubestack.emulator.i2c_host.adapter import I2cAdapter
-    from cubestack.emulator.i2c_host.joined import JoinedKernel, join_buses
-    from cubestack.emulator.i2c_host.running import emulated_bus
-    from cubestack.emulator.virtual_time import PS_PER_S
+    from cubestack.emulator.i2cdev.adapter import I2cAdapter
+    from cubestack.emulator.i2cdev.joined import JoinedKernel, join_buses
+    from cubestack.emulator.i2cdev.running import emulated_bus
+    from cubestack.emulator.sim.virtual_time import PS_PER_S
 
     names = args.device or ["cubestar"]
     if len(names) > 1 and (args.scene or args.faults):

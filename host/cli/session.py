@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
-from cubestack.host.cubesense import CubeSense
-from cubestack.host.cubesense_bench import BenchClient
-from cubestack.host.cubestar import CubeStar
-from cubestack.host.node_client import NodeClient
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.host.clients.cubesense.bench import BenchClient
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.node import NodeClient
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from cubestack.emulator.cubesense import CubeSenseBoard
-    from cubestack.emulator.cubestar import CubeStarBoard
-    from cubestack.emulator.sky.earth_sun import EarthSunScene
-    from cubestack.emulator.sky.scene import Scene
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.emulator.scene.sky import Scene
 
 __all__ = [
     "CubeSenseSession",
@@ -71,7 +71,7 @@ def tell_layout(layout: Layout, tell: Callable[[str], None]) -> None:
     """Tell of a layout that can not be built from the published parts."""
     if layout is Layout.COPIED:
         return
-    from cubestack.emulator.cubestar_layouts import fpga_of
+    from cubestack.emulator.boards.cubestar.layouts import fpga_of
 
     fpga = fpga_of(layout)
     if not fpga.fits:
@@ -100,8 +100,8 @@ def open_session(
     scene: Scene, *, seed: int = 0, engine: Engine = "auto", layout: Layout = Layout.COPIED
 ) -> Iterator[Session]:
     """Power up a CubeStar that looks at ``scene``."""
-    from cubestack.emulator.cubestar import CubeStarBoard
-    from cubestack.emulator.onboard_catalogue import onboard_catalogue
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
     board = CubeStarBoard(scene, onboard_catalogue(), seed=seed, engine=engine, layout=layout)
     try:
@@ -131,7 +131,7 @@ def open_cubesense(
     scene: EarthSunScene, *, seed: int = 0, engine: Engine = "auto", mcu_addressing: bool = False
 ) -> Iterator[CubeSenseSession]:
     """Power up a CubeSense that looks at ``scene``."""
-    from cubestack.emulator.cubesense import CubeSenseBoard
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
     board = CubeSenseBoard(scene, seed=seed, engine=engine, mcu_addressing=mcu_addressing)
     try:

@@ -27,7 +27,7 @@ from pathlib import Path
 from cubestack.host.cli.targets import TARGETS, add_target_arguments, open_any_target
 from cubestack.host.cli.terminal import say
 from cubestack.host.errors import HostError
-from cubestack.host.shell import Result, Shell
+from cubestack.host.shell.language import Result, Shell
 
 __all__ = ["add_arguments", "run"]
 

@@ -1,4 +1,4 @@
-"""``emulated:DEVICE`` as a target, beside all that ``host.targets`` opens."""
+"""``emulated:DEVICE`` as a target, beside all that ``host.devices.targets`` opens."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.board_controls import BoardControls
-from cubestack.host.cli.boards import DEVICES
 from cubestack.host.cli.records import create_file, record
-from cubestack.host.cli.setups import emulated_setup, taped_setup
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.boards import DEVICES
+from cubestack.host.devices.controls import BoardControls
+from cubestack.host.devices.targets import INTERFACES, Target, interface_of, open_target, with_i2c
 from cubestack.host.errors import TargetError
-from cubestack.host.node_client import NodeClient
-from cubestack.host.tape import Tape
-from cubestack.host.targets import INTERFACES, Target, interface_of, open_target, with_i2c
+from cubestack.host.recording.host_recorder import Tape
+from cubestack.host.recording.setups import emulated_setup, taped_setup
 
 __all__ = ["add_target_arguments", "open_any_target"]
 
@@ -39,7 +39,7 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
 def open_any_target(text: str, args: argparse.Namespace) -> Target:
     """Open the target ``text`` with the options of ``add_target_arguments``.
 
-    Raises what ``host.targets.open_target`` does, and ValueError for a scene that is none.
+    Raises what ``host.devices.targets.open_target`` does, and ValueError for a scene that is none.
     """
     if not text.startswith(EMULATED):
         if args.scene is not None:
@@ -78,7 +78,7 @@ def open_emulated(
     ``path`` is of a recording, which is made at the device's pins.
     """
     from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
-    from cubestack.host.cli.boards import open_board
+    from cubestack.host.devices.boards import open_board
 
     opened = open_board(device, scene, seed=seed, engine="auto", baud=baud)
     board = opened.board

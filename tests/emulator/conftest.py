@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from cubestack.emulator.processor import Processor
-from cubestack.emulator.virtual_time import PS_PER_US, Kernel
-from cubestack.firmware_model.costs import Cost, CostTable, Meter
-from cubestack.firmware_model.hardware import CameraTransfer, Sleep
+from cubestack.emulator.sim.processor import Processor
+from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
+from cubestack.firmware_model.mcu.costs import Cost, CostTable, Meter
+from cubestack.firmware_model.mcu.requests import CameraTransfer, Sleep
 
 BOOT_US = 100
 POWER_ON = 1

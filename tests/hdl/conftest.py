@@ -19,7 +19,7 @@ import cover
 import waves
 from regression import BASE_SEED, HERE, SIMULATOR, build, frame_environment, simulate
 
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.flow.generate import verilog_text
 
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.

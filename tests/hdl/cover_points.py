@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
-from cubestack.firmware_model.interface.cubesense_fpga import (
+from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESSING_COMMANDS,
     COMMANDS,
     Action,

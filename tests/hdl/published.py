@@ -6,9 +6,9 @@ The bus rests, so nothing is read.
 from amaranth.hdl import Cat, Const, Fragment, Instance, Module, Mux, Signal
 from amaranth.lib.wiring import Component, In, SignatureMembers
 
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
 
 __all__ = ["AsPublished", "DoubleAsPublished", "SharedAsPublished"]
 

@@ -29,12 +29,12 @@ import pytest
 from amaranth.lib.wiring import Component
 from cocotb_tools.runner import Runner, get_runner
 
-from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 HERE = Path(__file__).parent
 
@@ -135,7 +135,7 @@ def _next(design: Callable[[int, int], Component], module: str, bench: str) -> T
     return Tier(design, 5, 3, (module, "benches_states"), {"BENCH": f"bench_next:{bench}"})
 
 
-#: By the tops' names in ``cubestack.hdl.designs``; some have a further one.
+#: By the tops' names in ``cubestack.hdl.flow.tops``; some have a further one.
 TIERS = {
     "cubestar": Tier(CubeStarTop, 5, 3, ("benches_read", "benches_modes", "benches_store")),
     "cubestar-shared": _next(CubeStarShared, "benches_shared", "SharedBench"),

@@ -9,8 +9,14 @@ import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
 
-from cubestack.hdl.area import AGLN030_PINS, AGLN030_TILES, TileCount, UnknownCellError, count_tiles
-from cubestack.hdl.area_report import (
+from cubestack.hdl.flow.area import (
+    AGLN030_PINS,
+    AGLN030_TILES,
+    TileCount,
+    UnknownCellError,
+    count_tiles,
+)
+from cubestack.hdl.flow.area_report import (
     AREA_FILE,
     Area,
     Ice40Count,
@@ -21,12 +27,12 @@ from cubestack.hdl.area_report import (
     grown,
     ice40_fmax,
 )
-from cubestack.hdl.designs import TOPS, pins_of
-from cubestack.hdl.generate import rtlil_text
-from cubestack.hdl.tools import have_nextpnr, have_yosys
+from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.flow.tools import have_nextpnr, have_yosys
+from cubestack.hdl.flow.tops import TOPS, pins_of
 
 #: What to do about growth that is meant.
-WANTED = "if it is worth it: cubestack hdl area --ice40 --fmax --json > hdl/area.json"
+WANTED = "if it is worth it: cubestack hdl area --ice40 --fmax --json > hdl/flow/area.json"
 
 DOCS = Path(__file__).parents[2] / "docs"
 

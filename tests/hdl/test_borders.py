@@ -7,10 +7,10 @@ from amaranth.lib.wiring import Component
 from published import AsPublished, DoubleAsPublished, SharedAsPublished
 from regression import TIERS
 
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import verilog_text
 
 COLUMNS, ROWS = 5, 3
 BOARDS: dict[type[AsPublished], type[Component]] = {

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
 FAILING = ["fails", "fails_in_the_background"]
 

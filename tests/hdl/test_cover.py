@@ -10,7 +10,7 @@ import cover
 import pytest
 from cover_points import GROUPS, row_of, states_of
 
-from cubestack.firmware_model.interface.cubesense_fpga import COMMANDS, Action
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action
 
 HERE = Path(__file__).parent
 

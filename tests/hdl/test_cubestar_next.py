@@ -7,11 +7,11 @@ import pytest
 from amaranth.hdl import Module
 from amaranth.lib.wiring import Component, In
 
-from cubestack.hdl.bus_port import BusPort
-from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.blocks.bus_port import BusPort
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 
 class PublishedPins(CubeStarTop):

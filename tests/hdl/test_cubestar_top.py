@@ -9,7 +9,7 @@ import pytest
 from amaranth.hdl import Fragment
 from amaranth.lib.wiring import Flow, SignatureMembers
 
-from cubestack.hdl.cubestar_top import PINS, CubeStarTop
+from cubestack.hdl.cubestar.top import PINS, CubeStarTop
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "gateware.md"
 

@@ -2,7 +2,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.hdl.frame_reader import FrameReader
+from cubestack.hdl.blocks.frame_reader import FrameReader
 
 
 @pytest.mark.parametrize("seed", [1, 2])

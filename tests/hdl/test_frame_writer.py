@@ -2,7 +2,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.hdl.frame_writer import FrameWriter
+from cubestack.hdl.blocks.frame_writer import FrameWriter
 
 
 @pytest.mark.parametrize("seed", [1, 2])

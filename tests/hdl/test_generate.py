@@ -9,8 +9,8 @@ import pytest
 from amaranth.hdl import Module, Signal
 from amaranth.lib.wiring import Component, In, Out
 
-from cubestack.hdl import generate
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow import generate
 
 TEXTS = [generate.rtlil_text, generate.verilog_text, generate.cxxrtl_text]
 TIMEOUT_S = 300
@@ -41,7 +41,7 @@ class Inverter(Component):
 def test_same_text_again_and_in_another_process(text):
     program = (
         "import sys\nfrom cubestack.hdl import generate\n"
-        "from cubestack.hdl.cubestar_top import CubeStarTop\n"
+        "from cubestack.hdl.cubestar.top import CubeStarTop\n"
         f"sys.stdout.write(generate.{text.__name__}(CubeStarTop(8, 4)))"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "7"}

@@ -5,7 +5,7 @@ from itertools import combinations, product
 
 import pytest
 
-from cubestack.hdl.lut_cover import FALSE, TRUE, GateNetwork
+from cubestack.hdl.flow.lut_cover import FALSE, TRUE, GateNetwork
 
 SOURCES, GATES = 4, 7
 

@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
 
 @pytest.mark.parametrize("seed", [1, 2])

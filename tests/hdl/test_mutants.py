@@ -12,10 +12,10 @@ sys.path.append(str(Path(__file__).parent / "mutants"))
 
 from suites import CounterAlone
 
-from cubestack.hdl.designs import pins_of
+from cubestack.hdl.flow.tools import have_yosys
+from cubestack.hdl.flow.tops import pins_of
 from cubestack.hdl.mutants.equivalence import Equivalence
 from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
-from cubestack.hdl.tools import have_yosys
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 

@@ -6,7 +6,7 @@ import pytest
 from planted import BUGS, STAR, Bug, planted
 from regression import FULL, TIERS, run_tier
 
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.flow.generate import verilog_text
 
 pytestmark = [
     pytest.mark.cocotb,

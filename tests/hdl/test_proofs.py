@@ -11,11 +11,11 @@ import pytest
 from amaranth.hdl import Assert, Module
 from amaranth.lib.wiring import Component, In, Out
 
-from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs.catalogue import PROOFS, Verdict, verdict_text
-from cubestack.hdl.proofs.claims import idle_is_reset
+from cubestack.hdl.proofs.properties import idle_is_reset
 from cubestack.hdl.proofs.prover import Fault, Outcome, Proof, UnknownWireError, prove
-from cubestack.hdl.tools import have_yosys
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 

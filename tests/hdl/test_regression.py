@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from regression import TIERS, build, frame_environment, run_tier, simulate
 
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.flow.generate import verilog_text
 
 pytestmark = pytest.mark.cocotb
 

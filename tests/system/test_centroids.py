@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.sky.attitude import matrix_from_quaternion, quaternion_from_pointing
-from cubestack.emulator.sky.hipparcos import load_sky
-from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.sky import SkyScene
 
 STARS = 18
 PUBLISHED_MEAN_ERROR_PX = (0.0244, 0.0427)

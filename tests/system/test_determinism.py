@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.scene.sky import SkyScene
 
 Wire = list[tuple[bytes, int, int]]
 

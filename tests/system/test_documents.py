@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.camera.optics import Optics
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.emulator.sky.earth_sun_file import load_earth_sun_scene
-from cubestack.emulator.sky.scene import SceneError, SkyScene, load_scene
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+from cubestack.emulator.scene.sky import SceneError, SkyScene, load_scene
 
 BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
 EARTH = 'kind = "earth-sun"\n'
@@ -131,9 +131,9 @@ def test_commands_of_the_fidelity_page_exist(root: Path) -> None:
 
 
 def test_commands_and_figures_of_cubesense_s_page(root: Path) -> None:
-    from cubestack.emulator.power import PowerModel
-    from cubestack.emulator.power_tables import CUBESENSE
-    from cubestack.emulator.virtual_time import Kernel
+    from cubestack.emulator.sim.power import PowerModel
+    from cubestack.emulator.sim.power_tables import CUBESENSE
+    from cubestack.emulator.sim.virtual_time import Kernel
     from cubestack.firmware_model.cubesense.memory import Memory, budget, used
     from cubestack.host.cli.main import make_parser
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.host.cli.cubestar_frames import compare
-from cubestack.host.cli.emulated_device import open_cubestar_device
+from cubestack.host.devices.emulated import open_cubestar_device
+from cubestack.host.experiments.cubestar import compare
 
 HERE = Path(__file__).parents[2] / "examples"
-PLUGIN = "cubestack.host.cli.pytest_plugin"
+PLUGIN = "cubestack.host.pytest_plugin"
 TIMEOUT_S = 120
 
 

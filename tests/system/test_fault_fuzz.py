@@ -13,23 +13,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.mt9m001_lens import aramis_lens
+from cubestack.emulator.bus.i2c import I2cMessage, I2cNackError
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.faults.table import FAULTS
-from cubestack.emulator.i2c import I2cMessage, I2cNackError
-from cubestack.emulator.sky.attitude import quaternion_from_pointing
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.message import TELEMETRY_BIT
 from cubestack.host.cli.aramis_session import open_aramis
 from cubestack.host.cli.session import open_cubesense, open_session
-from cubestack.host.i2c_client import I2cClient
-from cubestack.host.node_client import NodeClient
-from cubestack.host.shell_names import has_side_effect
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.shell.names import has_side_effect
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.sky.scene import PictureScene, SkyScene
+from cubestack.emulator.scene.sky import PictureScene, SkyScene
 
 ROWS = 512
 LINE_MS = 1322 / 10_000.0  # clocks a line at 10 MHz

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from smbus2 import i2c_msg
 
-from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.host.cli.cubestar_frames import compare
-from cubestack.host.cubestar import CubeStar
-from cubestack.host.i2c_client import I2cClient
-from cubestack.host.node_client import NodeClient
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.experiments.cubestar import compare
 
 UART_BYTES = 100_000
 I2C_MESSAGES = 10_000

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.cubestar_layouts import fpga_of
-from cubestack.emulator.probes import firmware_probes
-from cubestack.emulator.sky.attitude import quaternion_from_pointing
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.emulator.trace import VcdTrace
-from cubestack.firmware_model.interface.cubestar_codes import (
+from cubestack.emulator.boards.cubestar.layouts import fpga_of
+from cubestack.emulator.recording.probes import firmware_probes
+from cubestack.emulator.recording.trace import VcdTrace
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.cubestar.codes import (
     ImageBlockSize,
     MemoryTest,
     TaskStatus,
     TestPattern,
 )
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli import layouts
 from cubestack.host.cli.main import main
 from cubestack.host.cli.session import Session, tell_layout

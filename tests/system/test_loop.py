@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from cubestack.emulator.power_tables import CUBESTAR
-from cubestack.emulator.sky.attitude import attitude_error_deg, random_quaternion
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.emulator.virtual_time import PS_PER_S
+from cubestack.emulator.scene.attitude import attitude_error_deg, random_quaternion
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.power_tables import CUBESTAR
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
-from cubestack.host.cubestar import Attitude
+from cubestack.host.clients.cubestar.client import Attitude
 
 ITERATIONS = 6
 

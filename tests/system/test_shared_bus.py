@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.linux_i2c import socket_path
-from cubestack.host.targets import INTERFACES, open_target
+from cubestack.host.devices.targets import INTERFACES, open_target
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 

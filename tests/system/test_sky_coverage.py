@@ -7,7 +7,7 @@ the text's own field of the lens (table 3.5) shows that it is the diameter.
 import numpy as np
 import pytest
 
-from cubestack.emulator.sky.hipparcos import load_sky
+from cubestack.emulator.scene.hipparcos import load_sky
 
 POSES = 20_000
 DIAMETER_DEG = 42.33

@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 from vcd.reader import TokenKind, tokenize
 
-from cubestack.firmware_model.interface.cubestar_codes import TaskStatus
-from cubestack.firmware_model.interface.recording import load_recording
-from cubestack.host.cli.boards import open_board
+from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.host.cli.main import main
 from cubestack.host.cli.records import record
-from cubestack.host.cli.setups import emulated_setup
-from cubestack.host.node_client import NodeClient
-from cubestack.host.targets import INTERFACES
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.boards import open_board
+from cubestack.host.devices.targets import INTERFACES
+from cubestack.host.recording.setups import emulated_setup
 
 PS_PER_NS = 1000
 

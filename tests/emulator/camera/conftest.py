@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.sky.scene import PictureScene
+from cubestack.emulator.scene.sky import PictureScene
 
 
 @pytest.fixture

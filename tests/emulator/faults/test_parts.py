@@ -6,7 +6,7 @@ import pytest
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.parts import BATCH_S, MOST_UPSETS_PER_S, MemoryFaults
 from cubestack.emulator.faults.table import MemoryUpsets
-from cubestack.emulator.virtual_time import PS_PER_S, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 BITS = 1 << 20
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck
-from cubestack.firmware_model.hardware import AwaitPin
+from cubestack.firmware_model.mcu.requests import AwaitPin
 
 ROSE_US, TIMEOUT_US = 40, 200
 MOST_BURSTS = 100

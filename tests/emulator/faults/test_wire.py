@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.table import UartCorrupt, UartDelay, UartDrop
 from cubestack.emulator.faults.wire import LineFaults
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import Kernel
+from cubestack.emulator.sim.virtual_time import Kernel
 
 BAUD = 10_000
 BYTE_PS = 10**9

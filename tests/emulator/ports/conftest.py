@@ -16,11 +16,11 @@ from typing import Any
 
 import pytest
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.pump import Pump, wait_ready
+from cubestack.emulator.ports.realtime import Pump, wait_ready
 from cubestack.emulator.ports.serial_port import Endpoint
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import Kernel
+from cubestack.emulator.sim.virtual_time import Kernel
 
 TIMEOUT_S = 20.0  # of a client that waits for what must come
 

@@ -9,16 +9,16 @@ import tracemalloc
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.emulator.i2c import I2cBus
-from cubestack.emulator.i2c_host.adapter import I2cAdapter
-from cubestack.emulator.i2c_host.server import I2cServer
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.pump import Pump
+from cubestack.emulator.ports.realtime import Pump
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.interface.linux_i2c import (
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.formats.linux_i2c import (
     LENGTH,
     Call,
     Ioctl,

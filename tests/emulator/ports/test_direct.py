@@ -5,10 +5,10 @@ import errno
 import pytest
 from smbus2 import i2c_msg
 
-from cubestack.emulator.i2c import I2cBus, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cNackError
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
-from cubestack.emulator.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.interface.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
 
 BYTE = 10_000_000
 

@@ -11,7 +11,7 @@ import tty
 import pytest
 
 from cubestack.emulator.ports.endpoint import PortError, PtyEndpoint
-from cubestack.emulator.ports.pump import wait_ready
+from cubestack.emulator.ports.realtime import wait_ready
 from cubestack.emulator.ports.serial_port import MAX_UNSENT, poll_now
 
 ALL_BYTES = bytes(range(256))

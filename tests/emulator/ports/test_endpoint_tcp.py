@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from cubestack.emulator.ports.endpoint import PortError, TcpEndpoint
-from cubestack.emulator.ports.pump import wait_ready
+from cubestack.emulator.ports.realtime import wait_ready
 from cubestack.emulator.ports.serial_port import MAX_UNSENT, poll_now
 
 ALL_BYTES = bytes(range(256))

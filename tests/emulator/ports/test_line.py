@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.line import HostLine
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import Kernel
+from cubestack.emulator.sim.virtual_time import Kernel
 
 BYTE = 10_000_000
 

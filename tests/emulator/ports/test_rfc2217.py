@@ -9,9 +9,9 @@ import pytest
 import serial
 from serial import rfc2217 as telnet
 
-from cubestack.emulator.line_format import LineFormat
+from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.ports.endpoint import PortError
-from cubestack.emulator.ports.pump import wait_ready
+from cubestack.emulator.ports.realtime import wait_ready
 from cubestack.emulator.ports.rfc2217 import CHUNK_BYTES, Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, poll_now
 

@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from cubestack.emulator.rtl.engine import RtlEngine, make_engine
+from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.emulator.sram import SramTiming
 
 Step = Callable[[RtlEngine], object]
 

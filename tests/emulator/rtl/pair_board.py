@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cubestack.emulator.rtl.engine import RtlEngine
-from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.generate import verilog_text
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.flow.generate import verilog_text
 
 from .conftest import ListCamera
 

@@ -7,17 +7,17 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from cubestack.emulator.external_bus import Transactions
-from cubestack.emulator.rtl.build import find_compiler
-from cubestack.emulator.rtl.compiled import CompiledEngine
-from cubestack.emulator.rtl.engine import RtlEngine, make_engine
+from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.external_bus import Transactions
 from cubestack.emulator.rtl.stepping import SteppingEngine
 from cubestack.emulator.rtl.wiring import Wiring, wiring_of
-from cubestack.firmware_model.external_bus import BusTiming
-from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.firmware_model.mcu.external_bus import BusTiming
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 from .comparison import Step, assert_same, engines
 

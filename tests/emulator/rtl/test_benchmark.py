@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.rtl import benchmark
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 

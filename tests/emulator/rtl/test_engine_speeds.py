@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.rtl import engine_speeds
-from cubestack.emulator.rtl.build import find_compiler
 from cubestack.emulator.rtl.cocotb_icarus import CocotbError, missing_for_cocotb, run_cocotb
-from cubestack.emulator.rtl.engine import make_engine
+from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.engine_speeds import ENGINES, absent, measure
 from cubestack.emulator.rtl.verilated import verilator_root
 from cubestack.emulator.rtl.workloads import WORKLOADS, WrongPictureError
-from cubestack.hdl.designs import TOPS
-from cubestack.hdl.generate import rtlil_text
+from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.flow.tops import TOPS
 
 
 def test_every_top_that_has_a_wiring_is_measured():

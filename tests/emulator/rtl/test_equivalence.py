@@ -5,11 +5,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import PinEvent, make_engine
+from cubestack.emulator.rtl.contract import PinEvent, make_engine
+from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
-from cubestack.emulator.sram import SramTiming
-from cubestack.hdl.cubestar_top import CubeStarTop
-from cubestack.hdl.generate import rtlil_text
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import rtlil_text
 
 from .comparison import Step, assert_same, engines, read, state
 

@@ -7,12 +7,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import PinEvent, make_engine
+from cubestack.emulator.rtl.contract import PinEvent, make_engine
+from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import cubesense_wiring, cubestar_wiring
-from cubestack.emulator.sram import SramTiming
-from cubestack.firmware_model.interface.cubesense_fpga import COMMANDS
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubestar.top import CubeStarTop
 
 from .comparison import Step, assert_same, engines, read, state
 from .conftest import ListCamera, plain_camera

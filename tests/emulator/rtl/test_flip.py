@@ -2,11 +2,11 @@
 
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
-from cubestack.emulator.rtl.compiled import CompiledEngine
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring, cubesense_wiring, cubestar_wiring
-from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.hdl.cubesense.pair import CubeSensePair
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import make_engine
-from cubestack.hdl.cubestar_top import CubeStarTop
-from cubestack.hdl.generate import verilog_text
+from cubestack.emulator.rtl.contract import make_engine
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import verilog_text
 
 pytestmark = pytest.mark.skipif(
     shutil.which("iverilog") is None, reason="Icarus Verilog (iverilog) is not installed"

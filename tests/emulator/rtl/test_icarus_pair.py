@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
-from cubestack.emulator.rtl.engine import make_engine
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
-from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.hdl.cubesense.pair import CubeSensePair
 
 from .conftest import ListCamera
 from .pair_board import (

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl import build
-from cubestack.emulator.sram import RULES, Sram, SramPins, SramTiming, Violation
+from cubestack.emulator.rtl.cxxrtl import build
+from cubestack.emulator.rtl.sram import RULES, Sram, SramPins, SramTiming, Violation
 
 SIZE = 16
 COMPILER = build.find_compiler()

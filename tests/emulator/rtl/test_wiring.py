@@ -5,11 +5,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.engine import make_engine
+from cubestack.emulator.rtl.contract import make_engine
 from cubestack.emulator.rtl.wiring import cubesense_wiring, cubestar_wiring, wiring_of
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubestar_top import CubeStarTop
-from cubestack.hdl.generate import rtlil_text
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import rtlil_text
 
 from .pair_board import CONTROLS, SIZES, stores
 

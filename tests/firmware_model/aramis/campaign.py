@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from cubestack.emulator.aramis_catalogue import CatalogueParameters
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.identification import identify
+from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
 from cubestack.firmware_model.aramis.solution import Outcome, Profile
-from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 
 from .sky import Light, database, in_published_sense, is_right, misnamed, picture
 

@@ -6,17 +6,17 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.program_memory import FLASH_BYTES, SDRAM_BYTES
-from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.hardware import (
+from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import (
     CameraTransfer,
     FlashStore,
     Pay,
     ReadTimer,
     Sleep,
 )
-from cubestack.firmware_model.interface.mt9m001 import REGISTERS
 
 T = TypeVar("T")
 

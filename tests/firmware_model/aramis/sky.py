@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.aramis_catalogue import CatalogueParameters, build_database
-from cubestack.emulator.sky.hipparcos import load_sky
-from cubestack.firmware_model.aramis.database import Database
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.solution import NONE, Solution, StarList
 

@@ -5,8 +5,8 @@ import pytest
 from scipy import integrate
 
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 
 from .sky import project, within
 

@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.aramis.host_link import LONGEST_COMMAND, Command, HostLink
-from cubestack.firmware_model.aramis.program_state import State
+from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import INTERFACE, AckError
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.message import Message
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Message
 
 from .program_bench import Bench
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.background import Background
+from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.pipeline import (
     PUBLISHED,
@@ -17,9 +18,8 @@ from cubestack.firmware_model.aramis.pipeline import (
     solve,
 )
 from cubestack.firmware_model.aramis.solution import Outcome, Reason
-from cubestack.firmware_model.aramis.spikes import SpikeRemoval
-from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 
 from .sky import Light, Picture, database, errors_deg, picture
 

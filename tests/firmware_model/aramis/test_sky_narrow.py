@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.aramis_catalogue import CatalogueParameters
-from cubestack.firmware_model.aramis.background import Background
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
+from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, solve
 from cubestack.firmware_model.aramis.solution import Outcome
-from cubestack.firmware_model.blackfin_costs import BLACKFIN_BF533
-from cubestack.firmware_model.costs import Meter
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 
 from .sky import database, errors_deg
 

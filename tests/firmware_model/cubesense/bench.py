@@ -11,10 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
-from cubestack.firmware_model.hardware import (
+from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
+from cubestack.firmware_model.interface.cubesense.pins import (
+    CAMERA_POWER,
+    CAMERA_SCL,
+    CAMERA_SDA,
+    ENABLE,
+    MA_PER_COUNT,
+    SRAM_POWER,
+    Monitor,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.firmware_model.mcu.requests import (
     AwaitPin,
     Pay,
     ReadPin,
@@ -25,21 +40,6 @@ from cubestack.firmware_model.hardware import (
     Sleep,
     StrobeRead,
 )
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import COLUMNS, ROWS, Camera, Sram
-from cubestack.firmware_model.interface.cubesense_fpga import Action, actions
-from cubestack.firmware_model.interface.cubesense_pins import (
-    CAMERA_POWER,
-    CAMERA_SCL,
-    CAMERA_SDA,
-    ENABLE,
-    MA_PER_COUNT,
-    SRAM_POWER,
-    Monitor,
-)
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.ov7620 import REGISTERS
-from cubestack.firmware_model.pic18_costs import PIC18F45K20
 
 from .scenery import scan, window
 

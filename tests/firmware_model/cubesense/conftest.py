@@ -1,8 +1,8 @@
 import pytest
 
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, fine_table
-from cubestack.firmware_model.pic18_costs import PIC18F45K20
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
 from .bench import Bench
 

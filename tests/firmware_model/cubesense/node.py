@@ -10,7 +10,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.bench_link import BenchLink
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
@@ -23,18 +22,19 @@ from cubestack.firmware_model.cubesense.register_link import RegisterLink
 from cubestack.firmware_model.cubesense.state import Result, State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
-from cubestack.firmware_model.hardware import Pay, ReadTimer, Request, Routine, Sleep
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
     CaptureResult,
     DetectResult,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_pins import Monitor
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.pic18_costs import PIC18F45K20
+from cubestack.firmware_model.interface.cubesense.pins import Monitor
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Request, Routine, Sleep
 
 BENCH_BYTE_US = 87
 

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense_fpga import (
+from cubestack.firmware_model.interface.cubesense.fpga import (
     FULL_SIZE,
     SUN_NOT_FOUND,
     ReadOut,

@@ -12,13 +12,12 @@ from cubestack.firmware_model.cubesense.acquisition import (
     SAMPLE_BYTES,
     Acquisition,
 )
-from cubestack.firmware_model.cubesense.edges import EdgeConfig, NadirLines
-from cubestack.firmware_model.cubesense.sample_search import around_samples
 from cubestack.firmware_model.cubesense.state import State
-from cubestack.firmware_model.cubesense.sun_centroid import window_bytes
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
-from cubestack.firmware_model.hardware import Request, SetPin, StrobeRead
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.vision.sample_search import around_samples
+from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
+from cubestack.firmware_model.interface.cubesense.codes import (
     COLUMNS,
     IMAGE_BYTES,
     ROWS,
@@ -26,7 +25,8 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     CaptureResult,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_fpga import Action, Actions, actions
+from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions, actions
+from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .bench import FRAME_US, READ_OUT_US, Bench
 from .scenery import earth, scan, sun, window

@@ -5,16 +5,16 @@ import pytest
 
 from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
 from cubestack.firmware_model.cubesense.hardware import Port
-from cubestack.firmware_model.hardware import Request
-from cubestack.firmware_model.interface.cubesense_bench import CAPTURES, DOWNLOADS
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.bench import CAPTURES, DOWNLOADS
+from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
     CaptureResult,
     DetectResult,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.mcu.requests import Request
 
 from .node import BENCH_BYTE_US, Node
 

@@ -4,12 +4,12 @@ import logging
 
 import pytest
 
-from cubestack.emulator.camera.sccb import SccbSlave
+from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.firmware_model.cubesense.camera_control import EXPOSURE_SETTLE_US
-from cubestack.firmware_model.hardware import ReadPin, Request, SetPin
-from cubestack.firmware_model.interface.cubesense_codes import Camera, ResetTarget, Sram
-from cubestack.firmware_model.interface.cubesense_pins import CAMERA_SCL, CAMERA_SDA
-from cubestack.firmware_model.interface.ov7620 import REGISTERS
+from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS
+from cubestack.firmware_model.interface.cubesense.codes import Camera, ResetTarget, Sram
+from cubestack.firmware_model.interface.cubesense.pins import CAMERA_SCL, CAMERA_SDA
+from cubestack.firmware_model.mcu.requests import ReadPin, Request, SetPin
 
 from .bench import Bench
 

@@ -8,9 +8,8 @@ import pytest
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.thumbnail import thumbnail
-from cubestack.firmware_model.hardware import SetPin
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     EMPTY_FRAME,
     Camera,
     CaptureResult,
@@ -23,7 +22,8 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     checksum,
     split_coefficient,
 )
-from cubestack.firmware_model.interface.cubesense_pins import CAMERA_POWER
+from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER
+from cubestack.firmware_model.mcu.requests import SetPin
 
 from .bench import Bench
 from .scenery import earth, place, sun

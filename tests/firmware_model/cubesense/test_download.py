@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.thumbnail import thumbnail
-from cubestack.firmware_model.hardware import Request
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     EMPTY_FRAME,
     IMAGE_BYTES,
     ImageSize,
     Sram,
 )
+from cubestack.firmware_model.mcu.requests import Request
 
 from .node import Node
 

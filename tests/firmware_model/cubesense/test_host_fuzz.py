@@ -7,16 +7,16 @@ import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.thumbnail import thumbnail
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     DetectResult,
     ImageSize,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
 from .bench import Bench
 from .scenery import earth

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import Meter
-from cubestack.firmware_model.cubesense.distortion import Projection, fine_table
-from cubestack.firmware_model.cubesense.edges import EdgeConfig, NadirLines
 from cubestack.firmware_model.cubesense.measurement import READ_OUT_TICKS
-from cubestack.firmware_model.cubesense.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.state import distortion_of
-from cubestack.firmware_model.cubesense.sun_centroid import SunConfig, find_sun
 from cubestack.firmware_model.cubesense.timer import microseconds
-from cubestack.firmware_model.hardware import Request, SetPin, StrobeRead
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, fine_table
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
+from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     EDGE_UNIT,
     Camera,
     CaptureResult,
@@ -24,7 +22,9 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     NadirSearch,
     Sram,
 )
-from cubestack.firmware_model.pic18_costs import PIC18F45K20
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .bench import FRAME_US, READ_OUT_US, Bench
 from .scenery import (

@@ -1,8 +1,8 @@
 import numpy as np
 
-from cubestack.firmware_model.cubesense.edges import MAX_EDGES, EdgeConfig, NadirLines
 from cubestack.firmware_model.cubesense.memory import CAPACITY, Memory, budget, report, used
-from cubestack.firmware_model.interface.cubesense_codes import Sram
+from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig, NadirLines
+from cubestack.firmware_model.interface.cubesense.codes import Sram
 
 from .bench import Bench
 from .scenery import chequered

@@ -4,18 +4,18 @@ import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.node_link import LONGEST_COMMAND, SEND_BYTES
-from cubestack.firmware_model.hardware import Request
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
     DetectResult,
     ImageSize,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_telemetry import SCHEDULES
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
+from cubestack.firmware_model.mcu.requests import Request
 
 from .node import Node
 

@@ -6,16 +6,16 @@ import pytest
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.program import DRAIN_US
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US
-from cubestack.firmware_model.hardware import Request, Reset, SetPin, Sleep
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
     DetectResult,
     ResetTarget,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_pins import CAMERA_POWER, SRAM_POWER
+from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER, SRAM_POWER
+from cubestack.firmware_model.mcu.requests import Request, Reset, SetPin, Sleep
 
 from .bench import BOOT_US, LOST, Bench
 from .scenery import earth

@@ -7,7 +7,8 @@ import pytest
 
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
 from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.codec.register_pointer import FILL
+from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
     CaptureResult,
@@ -17,8 +18,7 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     Sram,
     SramSelection,
 )
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
-from cubestack.firmware_model.interface.register_pointer import FILL
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
 from .node import Node
 

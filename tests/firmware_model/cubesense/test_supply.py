@@ -8,15 +8,15 @@ from cubestack.firmware_model.cubesense.supply import (
     OVER_CURRENT_MA,
     SAMPLE_US,
 )
-from cubestack.firmware_model.hardware import Request, SetPin, Sleep
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     ResetTarget,
     Sram,
     SramSelection,
 )
-from cubestack.firmware_model.interface.cubesense_pins import SRAM_POWER, Monitor
+from cubestack.firmware_model.interface.cubesense.pins import SRAM_POWER, Monitor
+from cubestack.firmware_model.mcu.requests import Request, SetPin, Sleep
 
 from .bench import Bench
 

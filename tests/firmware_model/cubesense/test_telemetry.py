@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.masks import Mask
 from cubestack.firmware_model.cubesense.state import Result
 from cubestack.firmware_model.cubesense.telemetry import FIRMWARE_VERSION, NODE_TYPE
+from cubestack.firmware_model.cubesense.vision.masks import Mask
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.firmware_model.interface.cubesense.codes import (
     EMPTY_FRAME,
     Camera,
     CaptureResult,
@@ -20,8 +21,7 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     Sram,
     checksum,
 )
-from cubestack.firmware_model.interface.cubesense_telemetry import RESULTS, SCHEDULES
-from cubestack.firmware_model.interface.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 
 from .node import Node
 

@@ -3,7 +3,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.thumbnail import OUTSIDE, frame_pixels, thumbnail
-from cubestack.firmware_model.interface.cubesense_codes import ImageSize
+from cubestack.firmware_model.interface.cubesense.codes import ImageSize
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from cubestack.firmware_model.cubesense.timer import (
     ticks_of,
     ticks_since,
 )
-from cubestack.firmware_model.hardware import ReadTimer, Routine
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
 
 def answered(routine: Routine[int], now_us: int) -> int:

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.costs import CostTable, Meter
-from cubestack.firmware_model.cubesense.distortion import Projection, RadiusTable, byte_table
-from cubestack.firmware_model.cubesense.edges import EdgeConfig, NadirLines
-from cubestack.firmware_model.cubesense.nadir import NadirConfig, find_nadir
-from cubestack.firmware_model.cubesense.sun_centroid import SunConfig, find_sun, window_bytes
-from cubestack.firmware_model.interface.cubesense_codes import DetectResult
-from cubestack.firmware_model.pic18_costs import (
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
+from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun, window_bytes
+from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.mcu.costs import CostTable, Meter
+from cubestack.firmware_model.mcu.pic18 import (
     FITTED_SUN_PIXELS,
     FITTED_SUN_SECONDS,
     PIC18F45K20,

@@ -11,10 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTION_BYTES
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
-from cubestack.firmware_model.hardware import (
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause, TaskStatus
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.requests import (
     AwaitPin,
     CameraTransfer,
     FlashStore,
@@ -26,10 +30,6 @@ from cubestack.firmware_model.hardware import (
     Sleep,
     StrobeRead,
 )
-from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause, TaskStatus
-from cubestack.firmware_model.interface.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.mlx75412 import REGISTERS
-from cubestack.firmware_model.star_catalogue import StarCatalogue
 
 FRAME_US = 386_000
 BOOT_US = 3_000

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.star_catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
 from .bench import Bench
 from .sky import Sky, take

@@ -3,12 +3,12 @@
 import pytest
 
 from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
-from cubestack.firmware_model.hardware import Pay, Request, SetPin
 from cubestack.firmware_model.interface.cubestar import (
     MemoryTest,
     ResetCause,
     TaskStatus,
 )
+from cubestack.firmware_model.mcu.requests import Pay, Request, SetPin
 
 from .bench import Bench
 from .effects import shown, telecommand

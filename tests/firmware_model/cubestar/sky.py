@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.star_catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
 COLUMNS, ROWS = 1024, 512
 FX, FY, CX, CY = 1147.5, 1147.4, 539.0, 175.5

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.algorithms.detection import DetectionConfig, detect_stars
-from cubestack.firmware_model.costs import CORTEX_M3, Meter
 from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
+from cubestack.firmware_model.cubestar.detection import DetectionConfig, detect_stars
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
 from cubestack.firmware_model.cubestar.pictures import ITERATION_US, Pictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.external_bus import EBI
-from cubestack.firmware_model.hardware import BusAccess, FlashStore, Routine, SetPin
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
-from cubestack.firmware_model.interface.cubestar_layouts import Layout
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.external_bus import EBI
+from cubestack.firmware_model.mcu.requests import BusAccess, FlashStore, Routine, SetPin
 
 from .sky import Sky
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubestar.capture import ACK_TIMEOUT_US
-from cubestack.firmware_model.hardware import (
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, TaskStatus
+from cubestack.firmware_model.mcu.requests import (
     AwaitPin,
     CameraTransfer,
     SetPin,
     Sleep,
     StrobeRead,
 )
-from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, TaskStatus
-from cubestack.firmware_model.interface.mlx75412 import REGISTERS
 
 from .bench import FRAME_US, Bench
 from .sky import Sky

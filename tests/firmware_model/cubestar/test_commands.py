@@ -3,11 +3,11 @@
 import pytest
 
 from cubestack.firmware_model.cubestar.commands import STREAM_BACKLOG_BYTES
-from cubestack.firmware_model.hardware import Sleep
 from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
     ResetCause,
 )
+from cubestack.firmware_model.mcu.requests import Sleep
 
 from . import effects_node, effects_picture
 from .bench import FRAME_US, Bench

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.algorithms.detection import DetectionConfig
-from cubestack.firmware_model.algorithms.geometry import CameraParameters
+from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.configuration import (
     camera_parameters,
     detection_config,
     field_radius_deg,
 )
+from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.cubestar.settings import Settings
 
 

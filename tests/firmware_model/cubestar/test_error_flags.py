@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.host_link import QUEUE_DEPTH
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Field, Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError, IdMode
-from cubestack.firmware_model.interface.cubestar_flags import NEVER_RAISED
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.message import Field, Message
-from cubestack.firmware_model.star_catalogue import StarCatalogue
+from cubestack.firmware_model.interface.cubestar.flags import NEVER_RAISED
 
 from .bench import Bench
 from .sky import Sky, draw, take

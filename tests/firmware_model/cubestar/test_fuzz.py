@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
-from cubestack.firmware_model.interface.frames import encode_frame
 
 from .bench import Bench
 from .sky import Sky

@@ -4,15 +4,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.host_link import (
     LONGEST_COMMAND,
     QUEUE_DEPTH,
     SEND_BUFFER_BYTES,
 )
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.firmware_model.interface.message import Message
-from cubestack.firmware_model.star_catalogue import StarCatalogue
 
 from .bench import Bench
 

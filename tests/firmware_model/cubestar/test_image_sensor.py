@@ -2,8 +2,8 @@
 
 import pytest
 
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import TaskStatus
-from cubestack.firmware_model.interface.mlx75412 import REGISTERS
 
 from .bench import CAMERA_BYTE_US, Bench
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.algorithms.quest import AttitudeError
+from cubestack.firmware_model.attitude.quest import AttitudeError
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
-from cubestack.firmware_model.star_catalogue import StarCatalogue
 
 from .bench import Bench
 from .sky import Sky, attitude_of, error_deg, take

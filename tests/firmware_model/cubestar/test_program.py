@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.program import ITERATION_US, RESET_LEAD_US
-from cubestack.firmware_model.hardware import (
+from cubestack.firmware_model.interface.cubestar import ResetCause
+from cubestack.firmware_model.mcu.requests import (
     AwaitPin,
     CameraTransfer,
     Pay,
@@ -16,8 +18,6 @@ from cubestack.firmware_model.hardware import (
     SetPin,
     StrobeRead,
 )
-from cubestack.firmware_model.interface.cubestar import ResetCause
-from cubestack.firmware_model.star_catalogue import StarCatalogue
 
 from .bench import BOOT_US, Bench
 from .sky import Sky, attitude_of, error_deg, take

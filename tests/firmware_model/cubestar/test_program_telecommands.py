@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubestar.program import ITERATION_US, RESET_LEAD_US
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, TaskStatus
-from cubestack.firmware_model.interface.frames import encode_frame
 
 from .bench import BOOT_US, Bench
 from .sky import Sky

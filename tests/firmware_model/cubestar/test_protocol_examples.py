@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from cubestack.firmware_model.interface.frames import encode_frame
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 
 from .bench import Bench
 

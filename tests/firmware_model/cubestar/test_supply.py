@@ -3,8 +3,8 @@
 import pytest
 
 from cubestack.firmware_model.cubestar.supply import CHANNELS, OFF_TIME_US, UNDER_CURRENT_MA
-from cubestack.firmware_model.hardware import AwaitPin, Request, Sleep, StrobeRead
 from cubestack.firmware_model.interface.cubestar import TaskStatus
+from cubestack.firmware_model.mcu.requests import AwaitPin, Request, Sleep, StrobeRead
 
 from .bench import Bench
 from .sky import Sky

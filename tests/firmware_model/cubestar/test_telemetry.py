@@ -10,6 +10,7 @@ from cubestack.firmware_model.cubestar.telemetry import (
     NODE_TYPE,
     SERIAL_NUMBER,
 )
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
     IdMode,
@@ -18,7 +19,6 @@ from cubestack.firmware_model.interface.cubestar import (
     ResetCause,
     TaskStatus,
 )
-from cubestack.firmware_model.interface.frames import encode_frame
 
 from .bench import BOOT_US, FRAME_US, Bench
 from .sky import Sky

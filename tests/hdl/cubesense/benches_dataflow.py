@@ -9,7 +9,7 @@ from cocotb.triggers import Timer
 from cocotb.types import LogicArray
 from small import MCU_ADDRESSING
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action, actions, link_shows_enables
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
 
 SIDE = os.environ["SIDE"]
 OUTPUTS = {

@@ -12,7 +12,7 @@ from pair import OTHER, PREFIXES, PairBench
 from pair_reference import SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense_fpga import ADDRESS_BYTES, address_bytes
+from cubestack.firmware_model.interface.cubesense.fpga import ADDRESS_BYTES, address_bytes
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 CORNERS = [(x, y) for x in (0, COLUMNS - 1) for y in (0, ROWS - 1)]

@@ -12,7 +12,7 @@ from pair import PREFIXES, STANDBY, PairBench, frame, levels
 from pair_reference import SIDES
 from small import MCU_ADDRESSING
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action, actions, link_shows_enables
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
 
 #: Idle times in ps, from a glitch to a few clocks.
 MOMENTS = (1, 100, 3_000, 20_000, 100_000, 1_000_000)

@@ -18,7 +18,7 @@ from pair_reference import SIDES
 from reference import Tick
 from small import MCU_ADDRESSING, READ_OUT
 
-from cubestack.firmware_model.interface.cubesense_fpga import ADDRESSING_COMMANDS, COMMANDS, Action
+from cubestack.firmware_model.interface.cubesense.fpga import ADDRESSING_COMMANDS, COMMANDS, Action
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 ROWS_OF_TABLE = COMMANDS[1:] + ADDRESSING_COMMANDS * MCU_ADDRESSING

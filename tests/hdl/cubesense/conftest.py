@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from amaranth.lib.wiring import Component
 
-from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
 HERE = Path(__file__).parent
 

@@ -21,7 +21,7 @@ from reference import Clock, Tick
 from small import MCU_ADDRESSING, READ_OUT
 from store_states import left_in, steps
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action
+from cubestack.firmware_model.interface.cubesense.fpga import Action
 
 #: The design that is simulated, or None for one that is no pair of ours.
 TOP = PAIRS.get(os.environ.get("DESIGN", ""))

@@ -13,7 +13,7 @@ from geometry import GEOMETRY
 from reference import Clock, Pulse, Tick, taken
 from small import MCU_ADDRESSING, READ_OUT
 
-from cubestack.firmware_model.interface.cubesense_fpga import (
+from cubestack.firmware_model.interface.cubesense.fpga import (
     SUN_RUN,
     SUN_THRESHOLD,
     Action,

@@ -7,7 +7,7 @@ from typing import Any
 
 from cocotb.triggers import Timer
 
-from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
 READ_OUT = ReadOut(**json.loads(os.environ["READ_OUT"]))
 

@@ -7,14 +7,14 @@ import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
 
-from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
-from cubestack.hdl.cubesense_dataflow import DataflowControl
-from cubestack.hdl.cubesense_top import CubeSenseFpga
-from cubestack.hdl.frame_gap import FrameGap
-from cubestack.hdl.gray_counter import GrayCounter
-from cubestack.hdl.nadir_scan import NadirScan
-from cubestack.hdl.sun_search import SunSearch
-from cubestack.hdl.sun_window import SunWindow
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.blocks.frame_gap import FrameGap
+from cubestack.hdl.blocks.gray_counter import GrayCounter
+from cubestack.hdl.cubesense.dataflow import DataflowControl
+from cubestack.hdl.cubesense.nadir_scan import NadirScan
+from cubestack.hdl.cubesense.sun_search import SunSearch
+from cubestack.hdl.cubesense.sun_window import SunWindow
+from cubestack.hdl.cubesense.top import CubeSenseFpga
 
 
 class AsynchronousReset(Component):

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from regression import FULL, SMALLEST
 
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
-from cubestack.hdl.cubesense_pair import CubeSensePair
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.hdl.cubesense.pair import CubeSensePair
 
 MODULES = ["benches_pair_store", "benches_pair_read", "benches_pair_modes", "benches_pair_failures"]
 

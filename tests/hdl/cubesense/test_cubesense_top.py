@@ -7,11 +7,11 @@ import pytest
 from amaranth.hdl import Shape
 from amaranth.lib.wiring import Component
 
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubesense_top import ADDRESSING_PINS, PINS, CubeSenseFpga
-from cubestack.hdl.frame_gap import FrameGap
-from cubestack.hdl.generate import rtlil_text
-from cubestack.hdl.gray_counter import GrayCounter
+from cubestack.hdl.blocks.frame_gap import FrameGap
+from cubestack.hdl.blocks.gray_counter import GrayCounter
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubesense.top import ADDRESSING_PINS, PINS, CubeSenseFpga
+from cubestack.hdl.flow.generate import rtlil_text
 
 
 def test_published_pins() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cubestack.emulator.rtl.engine import PinEvent
+from cubestack.emulator.rtl.contract import PinEvent
 from cubestack.emulator.rtl.wiring import (
     CameraPins,
     Wiring,
@@ -18,17 +18,17 @@ from cubestack.emulator.rtl.wiring import (
     cubestar_two_boards_wiring,
     cubestar_wiring,
 )
-from cubestack.firmware_model.interface.cubesense_fpga import (
+from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESSING_COMMANDS,
     COMMANDS,
     Action,
     ReadOut,
 )
-from cubestack.hdl.cubesense_pair import CubeSensePair
-from cubestack.hdl.cubestar_boards import CubeStarTwoBoards
-from cubestack.hdl.cubestar_double_top import CubeStarDouble
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.cubestar_top import CubeStarTop
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 SPACING_PS = 10
 """Between two events at least; a bench in Verilog needs some of it to settle."""
@@ -240,7 +240,7 @@ def _star(make: Callable[[int, int], Wiring], script: Callable[[Rng], Iterator[S
     return Board(lambda narrow: make(COLUMNS - narrow, ROWS), COLUMNS, ROWS, 9, script)
 
 
-#: By the top's name in ``cubestack.hdl.designs``.
+#: By the top's name in ``cubestack.hdl.flow.tops``.
 BOARDS = {
     "cubestar": _star(lambda *size: cubestar_wiring(CubeStarTop(*size)), _cubestar),
     "cubestar-shared": _star(

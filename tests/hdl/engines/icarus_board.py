@@ -1,6 +1,6 @@
 """Icarus Verilog as an engine: the same events on a top's Verilog, and what its pins settle on.
 
-The memories are those of :mod:`cubestack.emulator.sram` once more, in Verilog: they look at the
+The memories are those of :mod:`cubestack.emulator.rtl.sram` once more, in Verilog: they look at the
 settled pins a picosecond after each event, and what they then offer has another one to settle.
 """
 
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.engine import PinEvent
+from cubestack.emulator.rtl.contract import PinEvent
 from cubestack.emulator.rtl.wiring import MEMORY_PINS, MemoryPins, Wiring
 
 LIMIT_S = 120

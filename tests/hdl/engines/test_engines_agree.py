@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.build import find_compiler
-from cubestack.emulator.rtl.compiled import CompiledEngine
-from cubestack.emulator.rtl.engine import PinEvent
+from cubestack.emulator.rtl.contract import PinEvent
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.stepping import SteppingEngine
 from cubestack.emulator.rtl.verilated import VerilatedEngine, verilator_root
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.hdl.generate import rtlil_text, verilog_text
+from cubestack.hdl.flow.generate import rtlil_text, verilog_text
 
 from .board_events import BOARDS, random_events
 from .icarus_board import IcarusBoard, Played

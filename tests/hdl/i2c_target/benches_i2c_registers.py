@@ -15,7 +15,7 @@ from instants import ODD, wait
 from pair_reference import SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
     RESET_COMMAND,

@@ -10,8 +10,8 @@ from pair import OTHER, frame
 from pair_reference import NOT_FOUND, SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action, Actions
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
     Register,

@@ -9,8 +9,8 @@ from cocotb.triggers import RisingEdge, Timer
 from instants import now
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action, Actions
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
     command_byte,

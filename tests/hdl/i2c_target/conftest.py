@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from amaranth.lib.wiring import Component
 
-from cubestack.firmware_model.interface.cubesense_fpga import ReadOut
-from cubestack.hdl.cubesense_i2c_pair import CubeSenseI2cPair
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.cubesense.i2c.pair import CubeSenseI2cPair
 
 HERE = Path(__file__).parent
 

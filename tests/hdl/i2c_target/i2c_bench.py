@@ -16,8 +16,8 @@ from pair_reference import SIDES, Controls, Half, behaviour
 from small import READ_OUT
 from sram import UNKNOWN, Sram
 
-from cubestack.firmware_model.interface.cubesense_fpga import COMMANDS, Action, Actions
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     RESET_COMMAND,
     Register,
     StatusBits,

@@ -14,8 +14,8 @@ from cocotbext.i2c import I2cMaster
 from i2c_model import FpgaModel
 from instants import ODD, now, wait
 
-from cubestack.firmware_model.interface.cubesense_fpga import Actions
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga import Actions
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
     Register,

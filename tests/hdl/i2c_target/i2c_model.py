@@ -5,8 +5,8 @@ from enum import Enum
 
 from geometry import GEOMETRY
 
-from cubestack.firmware_model.interface.cubesense_fpga import Action
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga import Action
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
     REGISTER_BITS,

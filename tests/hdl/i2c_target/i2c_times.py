@@ -6,7 +6,7 @@ each byte nine.
 
 from fractions import Fraction
 
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 
 START, STOP, AGAIN, BYTE = Fraction(1, 2), Fraction(3, 4), Fraction(1), 9
 

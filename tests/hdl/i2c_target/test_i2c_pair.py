@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 
 SMALL = {
     "benches_i2c_registers": ReadOut(

@@ -13,20 +13,20 @@ import pytest
 from amaranth.hdl import Shape
 from amaranth.lib.wiring import Component
 
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.firmware_model.interface.cubesense_fpga_registers import (
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
     REGISTERS,
     Register,
     command_of,
 )
-from cubestack.hdl.area import AGLN030_TILES, count_tiles
-from cubestack.hdl.cubesense_i2c_pair import CubeSenseI2cPair
-from cubestack.hdl.cubesense_i2c_top import PINS, CubeSenseI2cFpga
-from cubestack.hdl.cubesense_top import PINS as PARALLEL_PINS
-from cubestack.hdl.generate import rtlil_text
-from cubestack.hdl.i2c_target import I2cTarget
+from cubestack.hdl.blocks.i2c_target import I2cTarget
+from cubestack.hdl.cubesense.i2c.pair import CubeSenseI2cPair
+from cubestack.hdl.cubesense.i2c.top import PINS, CubeSenseI2cFpga
+from cubestack.hdl.cubesense.top import PINS as PARALLEL_PINS
+from cubestack.hdl.flow.area import AGLN030_TILES, count_tiles
+from cubestack.hdl.flow.generate import rtlil_text
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "gateware-cubesense-i2c.md"
 

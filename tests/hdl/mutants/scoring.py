@@ -18,8 +18,8 @@ from typing import Any
 from regression import build, simulate
 from suites import Stage, Suite
 
-from cubestack.hdl.designs import pins_of
-from cubestack.hdl.generate import verilog_text
+from cubestack.hdl.flow.generate import verilog_text
+from cubestack.hdl.flow.tops import pins_of
 from cubestack.hdl.mutants.equivalence import Equivalence
 from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
 

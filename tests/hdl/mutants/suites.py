@@ -8,8 +8,8 @@ from amaranth.lib.wiring import Component, In
 from published import AsPublished, DoubleAsPublished, SharedAsPublished
 from regression import TIERS, frame_environment
 
-from cubestack.hdl.cubestar_shared_top import CubeStarShared
-from cubestack.hdl.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
 
 __all__ = ["SUITES", "Stage", "Suite"]
 
@@ -109,7 +109,7 @@ BENCHES = {
     "cubesense-pair": "pair:PairBench",
 }
 
-#: By name: tops as in ``cubestack.hdl.designs``, one's bus, and a block that is done in seconds.
+#: By name: tops as in ``cubestack.hdl.flow.tops``, one's bus, and a block that is done in seconds.
 SUITES = {
     "cubestar": _suite(
         "cubestar",

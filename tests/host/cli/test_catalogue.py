@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.firmware_model.aramis.database import Database
+from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.host.cli.main import main
 
 SMALL = ("--fov", "20", "--stars-per-field", "3", "--mag-limit", "3", "--step", "5")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.host.cli.main import main
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.host.cli.main import main
 
 LATCH_UP = "[[fault]]\nkind = 'latch-up'\nat = 0.3\n"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.hdl import tools
-from cubestack.hdl.area_report import AREA_FILE
+from cubestack.hdl.flow import tools
+from cubestack.hdl.flow.area_report import AREA_FILE
+from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs.catalogue import PROOFS
 from cubestack.hdl.proofs.prover import Fault
-from cubestack.hdl.tools import have_yosys
 from cubestack.host.cli.main import main
 
 

@@ -179,7 +179,7 @@ def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, image
 
 
 def test_no_compiler(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cubestack.emulator.rtl.build.find_compiler", lambda: None)
+    monkeypatch.setattr("cubestack.emulator.rtl.cxxrtl.build.find_compiler", lambda: None)
     outcome = run("measure", "cubestar", "--engine", "compiled")
     assert (outcome.code, outcome.out) == (FAILED, "")
     (line,) = outcome.err.splitlines()

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.aramis_catalogue import CatalogueParameters, build_database
-from cubestack.emulator.camera.mt9m001_imager import Mt9m001Imager
-from cubestack.emulator.camera.mt9m001_lens import aramis_lens
-from cubestack.emulator.camera.mt9m001_noise import NoiseTerms
-from cubestack.emulator.camera.mt9m001_registers import read_settings
-from cubestack.emulator.camera.register_file import RegisterFile
-from cubestack.emulator.camera.shutter import RollingShutter
-from cubestack.emulator.sky.attitude import attitude_error_deg, quaternion_from_pointing
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.firmware_model.aramis.database import Database
-from cubestack.firmware_model.interface.mt9m001 import REGISTERS
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
+from cubestack.emulator.camera.mt9m001.registers import read_settings
+from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.host.cli import aramis_session, measure_aramis
 
 

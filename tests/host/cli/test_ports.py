@@ -5,12 +5,12 @@ from contextlib import ExitStack
 
 import pytest
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.serial_port import PortError
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import Kernel
-from cubestack.host.cli.boards import Opened, SerialLine
+from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import port_uarts
+from cubestack.host.devices.boards import Opened, SerialLine
 
 
 class Board:

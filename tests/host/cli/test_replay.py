@@ -6,16 +6,16 @@ from contextlib import ExitStack
 
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.cli import replay
-from cubestack.host.cli.boards import open_board
 from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.main import main
 from cubestack.host.cli.records import record
-from cubestack.host.cli.setups import emulated_setup
-from cubestack.host.node_client import NodeClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.boards import open_board
+from cubestack.host.recording.setups import emulated_setup
 
 HEADER = '{"recording":1,"device":"cubesense","lines":{}'
 

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from cubestack.emulator.rtl.build import find_compiler
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.host.cli.main import main
 from cubestack.host.cli.shell import split_commands
 

@@ -7,16 +7,16 @@ import threading
 
 import pytest
 
-from cubestack.emulator.i2c_host.adapter import I2cAdapter
-from cubestack.emulator.i2c_host.server import I2cServer
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.pump import Pump
+from cubestack.emulator.ports.realtime import Pump
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
-from cubestack.emulator.rtl.build import find_compiler
-from cubestack.firmware_model.interface.linux_i2c import socket_path
-from cubestack.firmware_model.interface.recording import load_recording
-from cubestack.host.cli.boards import open_board
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.main import main
+from cubestack.host.devices.boards import open_board
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),

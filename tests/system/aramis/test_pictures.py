@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.sky.attitude import attitude_error_deg
+from cubestack.emulator.scene.attitude import attitude_error_deg
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "sky_narrow"
 PICTURES = sorted(FOLDER.glob("*.png"))

@@ -10,14 +10,14 @@ import pytest
 import serial
 from PIL import Image
 
-from cubestack.emulator.camera.mt9m001_lens import aramis_lens
-from cubestack.emulator.sky.attitude import attitude_error_deg, quaternion_from_pointing
-from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.aramis import INTERFACE, CatalogueState
-from cubestack.host.aramis import Aramis
 from cubestack.host.cli.aramis_session import open_aramis
 from cubestack.host.cli.main import main
-from cubestack.host.i2c_client import I2cClient
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.i2c import I2cClient
 from tests.system.conftest import COMMAND, Served
 
 POINTING_DEG = (84.0, -1.0, 20.0)

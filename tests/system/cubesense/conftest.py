@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.cubesense import HALVES
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cubesense_codes import COLUMNS, IMAGE_BYTES, ROWS, Camera
+from cubestack.emulator.boards.cubesense.board import HALVES
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, IMAGE_BYTES, ROWS, Camera
 from cubestack.host.cli.main import main
 from cubestack.host.cli.session import CubeSenseSession, open_cubesense
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.fisheye import LENSES, angles_from_vector, vector_from_angles
-from cubestack.emulator.sky.earth_sun import EarthSunScene, Reflection
-from cubestack.firmware_model.interface.cubesense_codes import Camera
-from cubestack.host.cubesense import Measurement
+from cubestack.emulator.camera.ov7620.fisheye import LENSES, angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.clients.cubesense.client import Measurement
 
 from .conftest import NADIR_DEG, SUN_DEG
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.fisheye import angles_from_vector
-from cubestack.emulator.rtl.build import find_compiler
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.emulator.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cubesense_codes import Camera, CaptureResult, Sram
+from cubestack.emulator.camera.ov7620.fisheye import angles_from_vector
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.host.cli.session import CubeSenseSession
-from cubestack.host.cubesense import Measurement
+from cubestack.host.clients.cubesense.client import Measurement
 
 from .conftest import NADIR_DEG, SUN_DEG
 

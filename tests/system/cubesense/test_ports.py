@@ -11,13 +11,13 @@ import pytest
 import serial
 from smbus2 import i2c_msg
 
-from cubestack.emulator.sky.earth_sun import EarthSunScene
+from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import Camera
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
-from cubestack.host.cubesense import CubeSense
-from cubestack.host.i2c_client import I2cClient
-from cubestack.host.register_client import RegisterClient
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.registers import RegisterClient
 from tests.system.conftest import COMMAND, Served
 
 from .conftest import NADIR_DEG, SUN_DEG

@@ -4,20 +4,20 @@ import io
 
 import pytest
 
-from cubestack.emulator.probes import firmware_probes
-from cubestack.emulator.recording import Recorder
-from cubestack.emulator.replay import Replay
-from cubestack.emulator.trace import VcdTrace
+from cubestack.emulator.recording.probes import firmware_probes
+from cubestack.emulator.recording.recorder import Recorder
+from cubestack.emulator.recording.replay import Replay
+from cubestack.emulator.recording.trace import VcdTrace
 from cubestack.firmware_model.cubesense.state import CameraSettings
+from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense_codes import Camera
-from cubestack.firmware_model.interface.recording import Recording, load_recording
-from cubestack.host.cubesense import CubeSense
-from cubestack.host.cubesense_bench import BenchClient
-from cubestack.host.i2c_client import I2cClient
-from cubestack.host.node_client import NodeClient
-from cubestack.host.recording import RecordedI2c, RecordedTransport
-from cubestack.host.register_client import RegisterClient
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.clients.cubesense.bench import BenchClient
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 
 
 def lines(board):

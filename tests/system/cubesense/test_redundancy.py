@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
     DetectResult,
@@ -20,8 +20,8 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     SramSelection,
 )
 from cubestack.host.cli.session import CubeSenseSession
-from cubestack.host.cubesense import Measurement
-from cubestack.host.cubesense_download import download_image, picture_of
+from cubestack.host.clients.cubesense.client import Measurement
+from cubestack.host.clients.cubesense.download import download_image, picture_of
 
 from .conftest import NADIR_DEG, SUN_DEG
 

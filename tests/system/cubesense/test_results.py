@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.fisheye import LENSES, angles_from_vector
-from cubestack.emulator.sky.earth_sun import EarthSunScene, Reflection
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.emulator.camera.ov7620.fisheye import LENSES, angles_from_vector
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
     DetectResult,

@@ -7,23 +7,23 @@ from typing import Any
 
 from smbus2 import i2c_msg
 
-from cubestack.emulator.aramis import AramisBoard
-from cubestack.emulator.aramis_catalogue import CatalogueParameters, build_database
-from cubestack.emulator.camera.mt9m001_lens import aramis_lens
+from cubestack.emulator.boards.aramis.board import AramisBoard
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.faults.injection import Injection
-from cubestack.emulator.sky.attitude import quaternion_from_pointing
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.emulator.uart import Uart
-from cubestack.emulator.virtual_time import PS_PER_S
-from cubestack.firmware_model.aramis.database import Database
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
-from cubestack.firmware_model.interface.frames import encode_frame
-from cubestack.host.aramis import Aramis
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.cli.session import open_cubesense, open_session
-from cubestack.host.cubesense import CubeSense
-from cubestack.host.cubestar import CubeStar
-from cubestack.host.node_client import NodeClient
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.node import NodeClient
 
 SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
 ORION_DEG = (84.0, -1.0)

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.shutter import RollingShutter
-from cubestack.emulator.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cubesense.codes import (
     FRAME_BYTES,
     Camera,
     DetectResult,
@@ -15,8 +15,8 @@ from cubestack.firmware_model.interface.cubesense_codes import (
     ImageSize,
     Sram,
 )
-from cubestack.firmware_model.interface.cubesense_fpga import FULL_SIZE
-from cubestack.host.cubesense import Measurement
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.host.clients.cubesense.client import Measurement
 
 from .bench import NADIR_DEG, SUN_DEG, Bench
 

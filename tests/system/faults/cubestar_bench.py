@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.firmware_model.interface.cubestar_codes import ImageBlockSize
+from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize
 
 from .bench import Bench
 

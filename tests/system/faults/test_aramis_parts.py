@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.faults.declaration import FaultError
-from cubestack.emulator.sky.attitude import attitude_error_deg
-from cubestack.firmware_model.aramis.hamming import CODED_BYTES, DATA_BYTES
-from cubestack.firmware_model.aramis.program_memory import CATALOGUE_AT, PICTURES_AT
+from cubestack.emulator.scene.attitude import attitude_error_deg
+from cubestack.firmware_model.aramis.catalogue.hamming import CODED_BYTES, DATA_BYTES
+from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, PICTURES_AT
 from cubestack.firmware_model.interface.aramis import CatalogueState, LatchUpStep, Reason
 
 from .bench import Bench

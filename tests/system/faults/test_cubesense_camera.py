@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
     DetectResult,

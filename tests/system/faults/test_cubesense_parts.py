@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cubesense_codes import (
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
     DetectResult,
     ResetTarget,
     Sram,
 )
-from cubestack.host.cubesense_bench import BenchClient
+from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.errors import NoAnswerError
 
 from .bench import NADIR_DEG, Bench

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.sky.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cubesense_codes import Camera, CaptureResult, DetectResult
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
 
 from .bench import SUN_DEG, Bench
 from .cubesense_bench import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
+from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
 
 from .bench import Bench
 from .cubestar_bench import (

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.sky.attitude import attitude_error_deg
-from cubestack.emulator.sky.scene import SkyScene
+from cubestack.emulator.scene.attitude import attitude_error_deg
+from cubestack.emulator.scene.sky import SkyScene
 
 from .bench import Bench
 from .cubestar_bench import (

@@ -4,8 +4,8 @@ import errno
 
 import pytest
 
-from cubestack.firmware_model.interface.node_codes import AckError
-from cubestack.host.i2c_client import I2cClient
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.host.clients.i2c import I2cClient
 
 from .bench import Bench
 from .test_serial import SETTINGS

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.firmware_model.interface.frames import encode_frame
+from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.errors import NoAnswerError
 
 from .bench import Bench

@@ -9,12 +9,12 @@ import pytest
 from cubestack.emulator.faults.declaration import Fault, FaultError, Parameter
 from cubestack.emulator.faults.plan import parse_plan
 from cubestack.emulator.faults.table import FAULTS
-from cubestack.emulator.sky.scene import SkyScene
-from cubestack.firmware_model.interface.cubesense_codes import Camera
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.cli.main import main
 from cubestack.host.cli.session import open_session
 from cubestack.host.cli.targets import open_emulated
-from cubestack.host.shell import Shell
+from cubestack.host.shell.language import Shell
 
 from .bench import BENCHES, Bench
 

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import pytest
 
-from cubestack.emulator.i2c_host.adapter import I2cAdapter
-from cubestack.emulator.i2c_host.pacing import wait_precisely
-from cubestack.emulator.i2c_host.server import I2cServer
-from cubestack.emulator.i2c_host.shim import find_c_compiler
-from cubestack.emulator.ports.pump import Pump
-from cubestack.host.cli.boards import open_board
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.pacing import wait_precisely
+from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
+from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.ports.realtime import Pump
+from cubestack.host.devices.boards import open_board
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
 ENVIRONMENT = os.environ | {"PATH": f"{os.environ['PATH']}:/usr/sbin:/sbin"}

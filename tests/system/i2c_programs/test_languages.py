@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.i2c_host.shim import find_c_compiler
+from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 
 from .conftest import TIMEOUT_S, Run, needs_c
 
@@ -53,7 +53,10 @@ def test_smbus2(run: Run) -> None:
 
 
 def test_cube_smbus_finds_the_bus_around_it(run: Run, served: Path) -> None:
-    script = "from cubestack.host.smbus import CubeSMBus as B; print(B(3).read_byte_data(26, 131))"
+    script = (
+        "from cubestack.host.transport.smbus import CubeSMBus as B; "
+        "print(B(3).read_byte_data(26, 131))"
+    )
     options = ("--attach", served, "--bus", 3)
     assert run(sys.executable, "-c", script, options=options) == (0, "1\n", "")
 

@@ -1,7 +1,7 @@
 """Paced programs: a transfer takes its time on the wire, by the wall clock.
 
 How near to it single bytes come depends on the machine: `cubestack bench` measures that, and
-`tests/emulator/i2c_host/test_turns.py` holds the rules in a made-up time.
+`tests/emulator/i2cdev/test_scheduler.py` holds the rules in a made-up time.
 """
 
 import subprocess
@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from cubestack.emulator.i2c_host.turns import MAX_DEBT_NS
+from cubestack.emulator.i2cdev.scheduler import MAX_DEBT_NS
 
 from .conftest import COMMAND, ENVIRONMENT, TIMEOUT_S
 

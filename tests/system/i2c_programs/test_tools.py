@@ -8,10 +8,10 @@ from cubestack.firmware_model.aramis import telemetry as aramis
 from cubestack.firmware_model.cubesense import telemetry as cubesense
 from cubestack.firmware_model.cubestar import telemetry as cubestar
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubesense_registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.firmware_model.interface.message import Interface
 
 from .conftest import LATCH, Run, needs_tools
 

@@ -1,0 +1,1 @@
+"""The boards: which pin goes where; one folder for each sensor."""

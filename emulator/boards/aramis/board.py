@@ -1,0 +1,276 @@
+"""AraMiS' star tracker: which pin goes where.
+
+AraMiS thesis, sections 2.3 to 2.5 and figures 2.2 and 2.12: the camera unit's pixel lines go
+straight into the Blackfin's parallel peripheral interface, its registers hang on a two-wire bus;
+flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
+"""
+
+from collections import deque
+from fractions import Fraction
+from functools import cached_property
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.boards.aramis.ppi import Ppi
+from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
+from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.faults.seu import flip_bits
+from cubestack.emulator.faults.sites import Sites
+from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.sim.no_fpga import NoFpga
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.power_tables import Part, PowerTable
+from cubestack.emulator.sim.processor import Processor
+from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
+from cubestack.firmware_model.aramis.hardware import FrameEnd
+from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
+from cubestack.firmware_model.aramis.program import AramisProgram
+from cubestack.firmware_model.interface.aramis import INTERFACE, ResetCause
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS, ROWS
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import CameraTransfer, FlashStore
+
+__all__ = ["ARAMIS_POWER", "AramisBoard"]
+
+BOOT_US = 50_000
+"""Reset to main: the boot code copies the program from flash to memory (assumed)."""
+
+CAMERA_BUS_HZ = 100_000
+"""Standard mode; the part has no such interface, its program moves two pins (assumed rate)."""
+
+SILENCE_BYTES = 100
+"""Byte times of silence after which the UART gives up a half frame; ours."""
+
+REMEMBERED = 8
+"""Frames whose exposure is kept."""
+
+#: MT9M001 data sheet: 363 mW working, 294 uW in standby, at 3.3 V. The others are assumed; the
+#: thesis sums its parts in a figure only (2.16).
+ARAMIS_POWER = PowerTable(
+    volts=3.3,
+    parts={
+        "camera": Part("camera", {"standby": 0.1, "working": 110.0}),
+        "processor": Part(None, {"sleep": 15.0, "run": 110.0}),
+        "sdram": Part(None, {"on": 60.0}),
+        "flash": Part(None, {"on": 5.0}),
+    },
+    channels={"camera": None},
+)
+
+
+class AramisBoard:
+    """One emulated star tracker.
+
+    Attributes:
+        kernel: virtual time.
+        camera: image sensor, which looks at the scene.
+        ppi: interface between the two.
+        power: supplies; the place for latch-ups.
+        processor: ADSP-BF533 with the running program.
+        uart: the satellite's serial line.
+        i2c_bus: the satellite's I2C bus.
+        sdram: external memory, shape (bytes,), uint8.
+        catalogue_flash: flash of the coded catalogue, shape (bytes,), uint8.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        catalogue: Database | None,
+        *,
+        seed: int = 0,
+        noise: NoiseTerms | None = None,
+        baud: int = INTERFACE.baud,
+        i2c_address: int = INTERFACE.i2c_address,
+    ) -> None:
+        """Power up.
+
+        Args:
+            scene: what the camera sees; its lens must be that of an MT9M001.
+            catalogue: stars and triangles in flash; None leaves it erased.
+            seed: of everything random but the scene: memory at power-up, hot pixels, bit flips.
+            noise: which terms of noise the sensor has, all unless given.
+            baud: of the satellite's UART.
+            i2c_address: 7-bit address on the satellite's bus.
+        """
+        self.kernel = Kernel()
+        self._seed = seed
+        self._rng = np.random.default_rng([seed, 0xA7A])
+        self.sdram = np.frombuffer(self._rng.bytes(SDRAM_BYTES), np.uint8).copy()
+        self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
+        if catalogue is not None:
+            coded = flash_image(catalogue.pack())
+            self.catalogue_flash[: len(coded)] = coded
+        self.power = PowerModel(self.kernel, ARAMIS_POWER)
+        self.camera = Mt9m001(scene, seed=seed, noise=noise)
+        self.ppi = Ppi(self.kernel, self.camera)
+        self.ppi.on_end = self._frame_ended
+        self.uart = Uart(
+            self.kernel,
+            baud,
+            lambda byte: self.program.link.uart_byte(byte),
+            lambda: self.program.link.uart_silence(),
+            silence_bytes=SILENCE_BYTES,
+        )
+        self._hardware = _Blackfin(self)
+        self._frames: deque[RollingShutter] = deque(maxlen=REMEMBERED)
+        self._frame = 0
+        meter = Meter(BLACKFIN_BF533)
+
+        def boot(cause: int) -> AramisProgram:
+            self._hardware.reset_cause = cause
+            self._frames.clear()
+            self._frame = 0
+            return AramisProgram(self._hardware, meter)
+
+        self.processor = Processor(
+            self.kernel,
+            meter,
+            cast(RtlEngine, NoFpga()),  # it has what a processor calls
+            _CameraBus(self),
+            boot,
+            power_on_cause=ResetCause.POWER_ON,
+            boot_us=BOOT_US,
+            on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
+        )
+        self.power.on_switch = self._supply_switched
+        self.i2c_bus = I2cBus(self.kernel)
+        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
+        self._show_camera()
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Injects faults into this board; its camera and processor have none of their own."""
+        sites = Sites(
+            self.kernel,
+            self.processor,
+            {"uart": self.uart},
+            {"i2c": self.i2c_bus},
+            self.power,
+            memories={"sdram": self.sdram, "flash": self.catalogue_flash},
+        )
+        return Faults(sites, self._seed)
+
+    @property
+    def program(self) -> AramisProgram:
+        """The firmware program that runs now."""
+        program = self.processor.program
+        assert isinstance(program, AramisProgram)
+        return program
+
+    def serial(self) -> DirectSerial:
+        """Host's end of the UART, in this process."""
+        return DirectSerial(self.kernel, self.uart)
+
+    def i2c(self) -> DirectI2c:
+        """Host's end of the I2C bus, in this process."""
+        return DirectI2c(self.kernel, self.i2c_bus)
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+        return self.uart.busy or self.ppi.busy or not self.processor.dozing
+
+    def close(self) -> None:
+        """Release nothing: for symmetry with the boards that have an engine."""
+
+    def truth(self, frame: int | None = None) -> NDArray[np.float64] | None:
+        """Attitude (4,) at the mid-exposure of the middle row of a stored frame.
+
+        For whoever compares results; None when that frame is not known (any longer) or the scene
+        has no attitude.
+
+        Args:
+            frame: its number since the program started; None: the one stored last.
+        """
+        age = 0 if frame is None else self._frame - frame
+        if not 0 <= age < len(self._frames):
+            return None
+        shutter = self._frames[-1 - age]
+        return self.camera.scene.truth(shutter.mid_exposure_ps((ROWS - 1) / 2))
+
+    def irradiate(self, memory: Literal["flash", "sdram"], rate: float) -> int:
+        """Turn over each bit of the catalogue's flash or of the SDRAM with probability ``rate``.
+
+        Returns how many; ValueError for a rate that is no probability.
+        """
+        target = self.catalogue_flash if memory == "flash" else self.sdram
+        return flip_bits(target, rate, self._rng)
+
+    def _frame_ended(self, end: FrameEnd) -> None:
+        if end is FrameEnd.STORED and self.ppi.stored is not None:
+            self._frames.append(self.ppi.stored)
+            self._frame += 1
+        self.program.frame_ended(end)
+
+    def _supply_switched(self, _channel: str, on: bool) -> None:
+        self.camera.power(on, self.kernel.now)
+        self._show_camera()
+
+    def _show_camera(self) -> None:
+        self.power.set_state("camera", "working" if self.camera.enabled else "standby")
+
+
+class _Blackfin:
+    """The processor's peripherals, as its program sees them."""
+
+    def __init__(self, board: AramisBoard) -> None:
+        self._board = board
+        self.sdram = board.sdram
+        self.catalogue_flash = board.catalogue_flash
+        self.flash = FlashStore()
+        self.reset_cause = int(ResetCause.POWER_ON)
+
+    def start_capture(self, target: NDArray[np.uint8]) -> None:
+        self._board.ppi.start(target)
+
+    def stop_capture(self) -> None:
+        self._board.ppi.stop()
+
+    def switch_camera(self, on: bool) -> None:
+        self._board.power.switch("camera", on)
+
+    def camera_current_ma(self) -> float:
+        return self._board.power.current_ma("camera")
+
+    def uart_send(self, data: bytes) -> None:
+        self._board.uart.send(data)
+
+    def uart_backlog(self) -> int:
+        return self._board.uart.backlog
+
+    def wake(self) -> None:
+        self._board.processor.wake()
+
+    def uptime_us(self) -> int:
+        return self._board.kernel.now // PS_PER_US
+
+
+class _CameraBus:
+    """The camera's control bus, which nobody else uses."""
+
+    def __init__(self, board: AramisBoard) -> None:
+        self._board = board
+
+    def transfer_ps(self, request: CameraTransfer) -> int:
+        bytes_on_wire = 1 + len(request.data) + (1 + request.read if request.read else 0)
+        starts_and_stop = 3 if request.read else 2
+        bits = Fraction(9 * bytes_on_wire + starts_and_stop)
+        return int(bits * PS_PER_S / CAMERA_BUS_HZ)
+
+    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
+        camera = self._board.camera
+        if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
+            return None
+        self._board._show_camera()
+        return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)

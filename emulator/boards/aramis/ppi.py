@@ -1,0 +1,149 @@
+"""The Blackfin's parallel peripheral interface: one frame from the pixel lines to memory, by DMA.
+
+ADSP-BF533 Hardware Reference, chapter "Parallel Peripheral Interface" (general-purpose input with
+two external syncs), AraMiS thesis, section 2.5.2: FRAME_VALID and LINE_VALID are the frame and line
+syncs, PIXCLK is the clock, and no other part stands in between.
+
+Started, it waits for FRAME_VALID to rise and then takes lines. A line with more or fewer clocks
+than programmed is an error that is only reported, with what there was of it in memory. When
+FRAME_VALID falls before all lines came, the frame is given up. The memory is written when the frame
+ends: nobody looks at it before.
+"""
+
+from collections.abc import Callable, Generator
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+import simpy
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.aramis.hardware import FrameEnd
+
+__all__ = ["PixelLines", "Ppi"]
+
+
+class PixelLines(Protocol):
+    """A camera's pixel lines."""
+
+    on_change: Callable[[], None]
+    active_columns: int
+    line_clocks: int
+
+    @property
+    def period(self) -> Fraction:
+        """Time of one pixel clock in ps."""
+
+    def segment_at(self, time_ps: int) -> StreamSegment | None:
+        """What is sent at ``time_ps``; None without a clock."""
+
+    def frame_from(self, time_ps: int) -> RollingShutter | None:
+        """Exposure of the first frame whose read-out starts at ``time_ps`` or later."""
+
+
+class Ppi:
+    """The interface and its DMA channel.
+
+    Attributes:
+        on_end: interrupt: a frame came to its end.
+        stored: exposure of the frame that was stored last; for whoever compares results.
+    """
+
+    def __init__(self, env: Kernel, camera: PixelLines) -> None:
+        """Connect to ``camera``'s lines; nothing is taken before ``start``."""
+        self._env = env
+        self._camera = camera
+        camera.on_change = self._lines_changed
+        self.on_end: Callable[[FrameEnd], None] = lambda _end: None
+        self.stored: RollingShutter | None = None
+        self._changed = env.event()
+        self._run = 0
+
+    @property
+    def busy(self) -> bool:
+        """Whether it waits for a frame or takes one."""
+        return self._run % 2 == 1
+
+    def start(self, target: NDArray[np.uint8]) -> None:
+        """Take the next whole frame into ``target``, shape (rows, columns); gives up another."""
+        self.stop()
+        self._run += 1
+        self._env.process(self._take(self._run, target))
+
+    def stop(self) -> None:
+        """Give up the frame that is waited for or taken; no interrupt comes."""
+        self._run += self._run % 2
+        self._lines_changed()
+
+    def _lines_changed(self) -> None:
+        changed, self._changed = self._changed, self._env.event()
+        changed.succeed()
+
+    def _take(self, run: int, target: NDArray[np.uint8]) -> Generator[simpy.Event, Any, None]:
+        rows, columns = target.shape
+        pieces: list[NDArray[np.uint8]] = []
+        taken = 0
+        wrong_lines = False
+        level = 1  # until it was seen low
+        shutter = None
+        while run == self._run:
+            segment = self._camera.segment_at(self._env.now)
+            if segment is None:
+                level = 0
+                yield self._changed
+                continue
+            rose, level = segment.vsync > level, segment.vsync
+            if rose:
+                shutter = self._camera.frame_from(self._env.now)
+                pieces, taken, wrong_lines = [], 0, False
+            collecting = shutter is not None
+            if collecting and not level:
+                self._end(run, FrameEnd.TOO_SHORT)
+                return
+            end_ps = self._end_ps(segment)
+            lines = min(segment.rows, rows - taken) if collecting else 0
+            if lines and taken + lines == rows:
+                end_ps = self._last_pixel_ps(segment, lines)
+            if (yield from self._until(end_ps)) and lines:
+                assert segment.pixels is not None
+                picture = segment.pixels()[:lines]
+                wrong_lines |= picture.shape[1] != columns
+                pieces.append(picture)
+                taken += lines
+            if taken == rows and run == self._run:
+                _store(pieces, target)
+                self.stored = shutter
+                self._end(run, FrameEnd.WRONG_LINES if wrong_lines else FrameEnd.STORED)
+                return
+
+    def _until(self, end_ps: int) -> Generator[simpy.Event, Any, bool]:
+        """Wait for the end of a segment; False when the lines changed before."""
+        changed = self._changed
+        timeout = self._env.timeout(max(0, end_ps - self._env.now))
+        yield simpy.AnyOf(self._env, [timeout, changed])
+        return not changed.triggered or self._env.now >= end_ps
+
+    def _end_ps(self, segment: StreamSegment) -> int:
+        return int(segment.start_ps + segment.clocks * self._camera.period)
+
+    def _last_pixel_ps(self, segment: StreamSegment, lines: int) -> int:
+        """When the last pixel of the segment's line ``lines`` - 1 has come."""
+        clocks = (lines - 1) * self._camera.line_clocks + self._camera.active_columns
+        return int(segment.start_ps + clocks * self._camera.period)
+
+    def _end(self, run: int, end: FrameEnd) -> None:
+        if run == self._run:
+            self._run += 1
+            self.on_end(end)
+
+
+def _store(pieces: list[NDArray[np.uint8]], target: NDArray[np.uint8]) -> None:
+    row = 0
+    columns = target.shape[1]
+    for piece in pieces:
+        width = min(columns, piece.shape[1])
+        target[row : row + len(piece), :width] = piece[:, :width]
+        row += len(piece)

@@ -1,0 +1,1 @@
+"""CubeSense's board."""

@@ -1,0 +1,316 @@
+"""CubeSense's board: which pin goes where.
+
+CubeSense thesis, figure 3.9 and tables 3.3 and 3.4: two halves of camera, FPGA and SRAM, one
+microcontroller for both, its buses to the satellite, and its switches and current monitors.
+"""
+
+from collections.abc import Callable
+from functools import cached_property, lru_cache
+from typing import Literal, Protocol
+
+import numpy as np
+
+from cubestack.emulator.boards.cubesense.gpio import Lines
+from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
+from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.ov7620.sensor import Ov7620
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.faults.sites import CameraSite, Sites
+from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.power_tables import CUBESENSE
+from cubestack.emulator.sim.processor import Processor
+from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
+from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.cubesense.program import CubeSenseProgram
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense.bench import BENCH
+from cubestack.firmware_model.interface.cubesense.codes import ROWS, Camera, Sram
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, actions
+from cubestack.firmware_model.interface.cubesense.pins import ENABLE
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.hdl.cubesense.pair import CubeSensePair
+
+__all__ = ["CubeSenseBoard"]
+
+BOOT_US = 1_000
+"""Oscillator start-up and the C library's own start: assumed."""
+
+SILENCE_BYTES = 100
+"""Byte times of silence after which a UART gives up a half frame; ours."""
+
+HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
+"""Name of each half's camera and memory in the engine, and of its parts in the power table."""
+
+STORING = (Action.STORE, Action.STORE_OTHER)
+CLOCKED = (*STORING, Action.SEND_PICTURE)
+
+
+@lru_cache(maxsize=2)
+def _design(mcu_addressing: bool) -> CubeSensePair:
+    """Both FPGAs; kept, as the engine knows its library by the design's text, which takes time."""
+    return CubeSensePair(mcu_addressing=mcu_addressing)
+
+
+class _UartLink(Protocol):
+    """What the program has behind a serial line."""
+
+    def uart_byte(self, byte: int) -> None: ...
+
+    def uart_silence(self) -> None: ...
+
+
+class CubeSenseBoard:
+    """One emulated CubeSense.
+
+    Attributes:
+        kernel: virtual time.
+        engine: both FPGAs and their SRAMs.
+        cameras: both image sensors.
+        power: supplies; the place for latch-ups.
+        hardware: the processor's peripherals, as its program sees them.
+        processor: PIC18F45K20 with the running program.
+        uart: serial line with the node protocol.
+        bench_uart: serial line with the bench protocol.
+        i2c_bus: the satellite's I2C bus.
+    """
+
+    def __init__(
+        self,
+        scene: EarthSunScene,
+        *,
+        seed: int = 0,
+        engine: Literal["auto", "compiled", "python"] = "auto",
+        baud: int = INTERFACE.baud,
+        bench_baud: int = BENCH.baud,
+        i2c_address: int = INTERFACE.i2c_address,
+        register_address: int = REGISTERS.i2c_address,
+        mcu_addressing: bool = False,
+    ) -> None:
+        """Power up.
+
+        Args:
+            scene: what the cameras see.
+            seed: of what the memories hold after power-up.
+            engine: see ``make_engine``.
+            baud: of the serial line with the node protocol.
+            bench_baud: of the one with the bench protocol.
+            i2c_address: 7-bit address of the node protocol.
+            register_address: 7-bit address of the register-pointer protocol.
+            mcu_addressing: FPGAs with the option that lets the processor choose addresses.
+        """
+        self.kernel = Kernel()
+        self._seed = seed
+        self._rng = np.random.default_rng(seed)
+        self.engine = make_engine(_design(mcu_addressing), kind=engine)
+        self.cameras = {camera: Ov7620(scene, camera) for camera in Camera}
+        self._failed: set[Camera] = set()
+        self.power = PowerModel(self.kernel, CUBESENSE)
+        self.uart = self._serial_line(baud, lambda: self.program.node)
+        self.bench_uart = self._serial_line(bench_baud, lambda: self.program.bench)
+        for camera in Camera:
+            self._scramble(Sram(camera))
+            self._connect(camera)
+        self._lines = Lines(self.kernel, self.cameras, self.power)
+        self.power.on_switch = self._supply_switched
+        self._commanded: dict[Camera, Action] = dict.fromkeys(Camera, Action.STANDBY)
+        self._storing_since_ps: dict[Camera, int] = {}
+        self._stored: dict[Camera, RollingShutter] = {}
+        meter = Meter(PIC18F45K20)
+        self.hardware = Pic18f45k20(
+            self.kernel,
+            {Port.NODE: self.uart, Port.BENCH: self.bench_uart},
+            self.power,
+            lambda: self.processor.wake(),
+            mcu_addressing=mcu_addressing,
+        )
+
+        def boot(_cause: int) -> CubeSenseProgram:
+            self.hardware.reset()
+            self._release_pins()
+            return CubeSenseProgram(self.hardware, meter)
+
+        self.processor = Processor(
+            self.kernel,
+            meter,
+            self.engine,
+            None,
+            boot,
+            power_on_cause=0,
+            boot_us=BOOT_US,
+            other_pins=self._lines,
+            on_pin=lambda pin, _level: self._pin_changed(pin),
+        )
+        self.i2c_bus = I2cBus(self.kernel)
+        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.node))
+        self.i2c_bus.attach(register_address, CurrentTarget(lambda: self.program.registers))
+
+    @property
+    def program(self) -> CubeSenseProgram:
+        """The firmware program that runs now."""
+        program = self.processor.program
+        assert isinstance(program, CubeSenseProgram)
+        return program
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Injects faults into this board."""
+        sites = Sites(
+            self.kernel,
+            self.processor,
+            {"uart": self.uart, "bench": self.bench_uart},
+            {"i2c": self.i2c_bus},
+            self.power,
+            self.engine,
+            controls=("RNW", "EDGE", "SHIFT", *ENABLE),
+            cameras={
+                half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")
+                for camera, half in HALVES.items()
+            },
+        )
+        return Faults(sites, self._seed)
+
+    @property
+    def scene(self) -> EarthSunScene:
+        """What the cameras see; a new one is seen by the next frame that is rendered."""
+        return self.cameras[Camera.SUN].scene
+
+    @scene.setter
+    def scene(self, scene: EarthSunScene) -> None:
+        for camera in self.cameras.values():
+            camera.scene = scene
+
+    def serial(self) -> DirectSerial:
+        """Host's end of the node protocol's UART, in this process."""
+        return DirectSerial(self.kernel, self.uart)
+
+    def bench_serial(self) -> DirectSerial:
+        """Host's end of the bench protocol's UART, in this process."""
+        return DirectSerial(self.kernel, self.bench_uart)
+
+    def i2c(self) -> DirectI2c:
+        """Host's end of the I2C bus, in this process."""
+        return DirectI2c(self.kernel, self.i2c_bus)
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+        return self.uart.busy or self.bench_uart.busy or not self.processor.dozing
+
+    def truth(self, camera: Camera) -> SensorTruth | None:
+        """What ``camera`` should have measured in the frame that was stored last.
+
+        At the mid-exposure of its middle row. For whoever compares results; None when nothing was
+        stored.
+        """
+        shutter = self.stored_frame(camera)
+        if shutter is None:
+            return None
+        return self.scene.truth(camera, shutter.mid_exposure_ps((ROWS - 1) / 2))
+
+    def stored_frame(self, camera: Camera) -> RollingShutter | None:
+        """Exposure of the frame of ``camera`` that was stored last; None before."""
+        return self._stored.get(camera)
+
+    def fail_camera(self, camera: Camera) -> None:
+        """Let a camera die: no clock, no answer on its control lines, whatever is switched."""
+        self._failed.add(camera)
+        self._advance_engine()
+        self.cameras[camera].power(False, self.engine.now_ps)
+        self._connect(camera)
+
+    def fail_memory(self, sram: Sram) -> None:
+        """Let a memory latch up for good: it draws too much whenever it is switched on."""
+        self.power.latch_up(sram.name, lasting=True)
+
+    def close(self) -> None:
+        """Release the engine."""
+        self.engine.close()
+
+    def _serial_line(self, baud: int, link: Callable[[], _UartLink]) -> Uart:
+        return Uart(
+            self.kernel,
+            baud,
+            lambda byte: link().uart_byte(byte),
+            lambda: link().uart_silence(),
+            silence_bytes=SILENCE_BYTES,
+        )
+
+    def _scramble(self, sram: Sram) -> None:
+        """What a static RAM holds after power-up."""
+        memory = self.engine.memories[HALVES[Camera(sram)]]
+        memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
+
+    def _connect(self, camera: Camera) -> None:
+        sensor, half = self.cameras[camera], HALVES[camera]
+        sensor.on_change = lambda: self.engine.stream_changed(half)
+        self.engine.attach(None if camera in self._failed else sensor, half)
+
+    def _advance_engine(self) -> None:
+        """Bring the engine up to now; it may have run ahead, see emulator/sim/processor.py."""
+        self.engine.run(max(self.kernel.now, self.engine.now_ps))
+
+    def _release_pins(self) -> None:
+        """The processor is reset: its pins float to where resistors pull them."""
+        self._advance_engine()
+        for pin in (*ENABLE, "RNW", "CLK", "EDGE", "SHIFT"):
+            self.engine.set_pin(pin, int(pin in ENABLE))
+        self._command()
+        self._lines.release()
+        self.power.set_state("processor", "reset")
+        started = self.kernel.timeout(BOOT_US * PS_PER_US)
+        assert started.callbacks is not None
+        started.callbacks.append(lambda _event: self.power.set_state("processor", "on"))
+
+    def _pin_changed(self, pin: str) -> None:
+        if pin in (*ENABLE, "RNW", "EDGE", "SHIFT"):
+            self._command()
+
+    def _command(self) -> None:
+        """Follow what the control lines command: currents, and which frame is stored."""
+        levels = (self.engine.get_pin(pin) for pin in ("SHIFT", "EDGE", "RNW", *ENABLE))
+        commanded = actions(*levels)
+        before, self._commanded = self._commanded, dict(zip(Camera, commanded, strict=True))
+        for camera, action in self._commanded.items():
+            part = f"{HALVES[camera]}_fpga"
+            self.power.set_state(part, "imaging" if action in CLOCKED else "idle")
+            storing = action in STORING
+            self.power.set_state(Sram(camera).name.lower(), "active" if storing else "standby")
+        for camera in Camera:
+            was, stores = (_stores(commanded, camera) for commanded in (before, self._commanded))
+            if stores and not was:
+                self._storing_since_ps[camera] = self.kernel.now
+            elif was and not stores:
+                self._note_stored(camera)
+
+    def _note_stored(self, camera: Camera) -> None:
+        sensor = self.cameras[camera]
+        if not sensor.running:
+            return
+        # The FPGA stores the first frame whose gap it has seen from its start on.
+        since_ps = self._storing_since_ps[camera] + round(FULL_SIZE.frame_gap * sensor.period)
+        shutter = sensor.frame_from(since_ps)
+        if self.kernel.now >= shutter.readout_ps + ROWS * shutter.line_ps:
+            self._stored[camera] = shutter
+
+    def _supply_switched(self, channel: str, on: bool) -> None:
+        self._advance_engine()
+        for camera, half in HALVES.items():
+            sram = Sram(camera)
+            if channel == sram.name:
+                self.engine.power_memory(half, on)
+                if not on:
+                    self._scramble(sram)
+            elif channel == f"{half}_camera":
+                self.cameras[camera].power(on and camera not in self._failed, self.engine.now_ps)
+
+
+def _stores(commanded: dict[Camera, Action], camera: Camera) -> bool:
+    """Whether ``camera``'s picture is being stored, in whichever memory."""
+    other = Camera(1 - camera)
+    return commanded[camera] is Action.STORE or commanded[other] is Action.STORE_OTHER

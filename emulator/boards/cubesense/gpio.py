@@ -1,0 +1,69 @@
+"""CubeSense's pins of the microcontroller that do not lead to the FPGAs.
+
+CubeSense thesis, sections 3.2 and 6.4.1: each camera's two control lines, open drain with pull-up
+resistors, and the switches of memories and cameras.
+"""
+
+from collections.abc import Mapping
+
+from cubestack.emulator.camera.ov7620.sensor import Ov7620
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
+from cubestack.firmware_model.interface.cubesense.pins import (
+    CAMERA_POWER,
+    CAMERA_SCL,
+    CAMERA_SDA,
+    SRAM_POWER,
+)
+
+__all__ = ["CHANNELS", "Lines"]
+
+#: Load switch of the power table behind each switching pin.
+CHANNELS = {
+    **{SRAM_POWER[sram]: sram.name for sram in Sram},
+    **{pin: f"{camera.name.lower()}_camera" for camera, pin in CAMERA_POWER.items()},
+}
+
+_CONTROL = {
+    **{pin: (camera, "SCL") for camera, pin in CAMERA_SCL.items()},
+    **{pin: (camera, "SDA") for camera, pin in CAMERA_SDA.items()},
+}
+
+
+class Lines:
+    """Camera control lines and load switches; see ``emulator.sim.processor.Pins``."""
+
+    def __init__(self, env: Kernel, cameras: Mapping[Camera, Ov7620], power: PowerModel) -> None:
+        """Start released: control lines high, all switches off."""
+        self._env = env
+        self._cameras = cameras
+        self._power = power
+        self._driven: dict[str, int] = {}
+        self.release()
+
+    def __contains__(self, pin: object) -> bool:
+        """Whether ``pin`` is one of these."""
+        return pin in _CONTROL or pin in CHANNELS
+
+    def release(self) -> None:
+        """The processor was reset: resistors pull control lines up and switches off."""
+        for pin in CHANNELS:
+            self.set(pin, 0)
+        for pin in _CONTROL:
+            self.set(pin, 1)
+
+    def set(self, pin: str, level: int) -> None:
+        """Drive a pin."""
+        self._driven[pin] = level
+        if pin in CHANNELS:
+            self._power.switch(CHANNELS[pin], bool(level))
+        else:
+            camera, line = _CONTROL[pin]
+            self._cameras[camera].on_pin(line, level, self._env.now)
+
+    def get(self, pin: str) -> int:
+        """Level of a pin; a camera may pull its data line low."""
+        if pin in _CONTROL and _CONTROL[pin][1] == "SDA":
+            return self._driven[pin] & self._cameras[_CONTROL[pin][0]].sda
+        return self._driven[pin]

@@ -1,0 +1,76 @@
+"""CubeSense's microcontroller: its peripherals as its program sees them.
+
+CubeSense thesis, table 3.3: two serial ports, the converter behind the current monitors, a timer.
+"""
+
+from collections.abc import Callable, Mapping
+
+from cubestack.emulator.boards.cubesense.gpio import CHANNELS
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
+from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.interface.cubesense.pins import (
+    ADC_FULL_SCALE,
+    CAMERA_POWER,
+    MA_PER_COUNT,
+    Monitor,
+)
+
+__all__ = ["Pic18f45k20"]
+
+
+class Pic18f45k20:
+    """The peripherals; see ``firmware_model.cubesense.hardware``."""
+
+    serial_number = "CSEMU1"
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        uarts: Mapping[Port, Uart],
+        power: PowerModel,
+        wake: Callable[[], None],
+        *,
+        mcu_addressing: bool,
+    ) -> None:
+        """Power up: ``wake`` ends the program's sleep, ``power`` is what the monitors look at."""
+        self._kernel = kernel
+        self._uarts = uarts
+        self._power = power
+        self._wake = wake
+        self._reset_ps = 0
+        self.mcu_addressing = mcu_addressing
+
+    def reset(self) -> None:
+        """The part starts anew, its timer from 0."""
+        self._reset_ps = self._kernel.now
+
+    def uart_send(self, port: Port, data: bytes) -> None:
+        """Queue ``data`` for ``port``."""
+        self._uarts[port].send(data)
+
+    def uart_backlog(self, port: Port) -> int:
+        """Bytes that ``port`` still has to send."""
+        return self._uarts[port].backlog
+
+    def wake(self) -> None:
+        """End the program's sleep."""
+        self._wake()
+
+    def adc_counts(self, monitor: Monitor) -> int:
+        """Result of a conversion, 0 to 1023."""
+        match monitor:
+            case Monitor.SUPPLY_5V:
+                current = self._power.current_ma()
+            case Monitor.SUPPLY_3V3:
+                # The cameras' own regulator feeds them from the 5 V supply.
+                cameras = (CHANNELS[pin] for pin in CAMERA_POWER.values())
+                current = self._power.current_ma() - sum(map(self._power.current_ma, cameras))
+            case Monitor.SRAM1 | Monitor.SRAM2:
+                current = self._power.current_ma(monitor.value)
+        return min(ADC_FULL_SCALE, round(current / MA_PER_COUNT))
+
+    def uptime_ms(self) -> int:
+        """Time since the latest reset in ms."""
+        return (self._kernel.now - self._reset_ps) // PS_PER_MS

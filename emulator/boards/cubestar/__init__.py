@@ -1,0 +1,1 @@
+"""CubeStar's board."""

@@ -1,0 +1,288 @@
+"""The CubeStar stack: which pin goes where.
+
+CubeStar thesis, section 5.2 and tables C.1 to C.4. Camera to FPGA and SRAM, FPGA to processor,
+processor to the satellite's UART and I2C, and the supplies of all three boards. Other memory
+layouts than the published one are in :mod:`cubestack.emulator.boards.cubestar.layouts`.
+"""
+
+from collections import deque
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.boards.cubestar.layouts import BOARDS
+from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.camera.common.optics import ROWS
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.faults.sites import CameraSite, Sites
+from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.processor import Processor
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTION_BYTES
+from cubestack.firmware_model.cubestar.program import CubeStarProgram
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cubestar.codes import ResetCause
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.requests import CameraTransfer, FlashStore
+
+__all__ = ["CubeStarBoard"]
+
+BOOT_US = 3_000
+"""Reset to main: "a few milliseconds" (section 5.3.6)."""
+
+CAMERA_BUS_HZ = 100_000
+"""Standard mode; the sources give no rate."""
+
+SILENCE_BYTES = 100
+"""Byte times of silence after which the UART gives up a half frame; ours."""
+
+
+class CubeStarBoard:
+    """One emulated CubeStar.
+
+    Attributes:
+        kernel: virtual time.
+        engine: FPGA and its SRAM.
+        camera: image sensor, which looks at the scene.
+        power: supplies; the place for latch-ups.
+        processor: EFM32GG with the running program.
+        uart: the satellite's serial line.
+        i2c_bus: the satellite's I2C bus.
+        stored: exposures of the frames stored last, the newest one at the end; None for a frame
+            that was not sent.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        catalogue: StarCatalogue,
+        *,
+        seed: int = 0,
+        engine: Literal["auto", "compiled", "python"] = "auto",
+        baud: int = INTERFACE.baud,
+        i2c_address: int = INTERFACE.i2c_address,
+        layout: Layout = Layout.COPIED,
+    ) -> None:
+        """Power up.
+
+        Args:
+            scene: what the camera sees.
+            catalogue: star catalogue in the processor's flash.
+            seed: of everything random but the scene: memories at power-up, undefined frames.
+            engine: see ``make_engine``.
+            baud: of the satellite's UART.
+            i2c_address: 7-bit address on the satellite's bus.
+            layout: memory layout, with the program that belongs to it.
+        """
+        self.kernel = Kernel()
+        self._seed = seed
+        self._rng = np.random.default_rng(seed)
+        self._layout = BOARDS[layout]
+        self.engine = make_engine(self._layout.wiring(), kind=engine)
+        self.camera = Mlx75412(scene, seed=seed)
+        self.power = PowerModel(self.kernel, self._layout.power)
+        self.uart = Uart(
+            self.kernel,
+            baud,
+            lambda byte: self.program.link.uart_byte(byte),
+            lambda: self.program.link.uart_silence(),
+            silence_bytes=SILENCE_BYTES,
+        )
+        self._hardware = _Efm32gg(self)
+        self._scramble(self._hardware.external_ram)
+        for memory in self.engine.memories.values():
+            self._scramble(memory)
+        self.engine.attach(self.camera)
+        self.camera.on_change = self._camera_changed
+        meter = Meter(CORTEX_M3)
+
+        def boot(cause: int) -> CubeStarProgram:
+            self._hardware.reset_cause = cause
+            return CubeStarProgram(self._hardware, meter, catalogue, layout)
+
+        self.processor = Processor(
+            self.kernel,
+            meter,
+            self.engine,
+            _CameraBus(self),
+            boot,
+            power_on_cause=ResetCause.POWER_ON,
+            boot_us=BOOT_US,
+            on_pin=self._pin_changed,
+            on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
+            on_access=self._accessed,
+        )
+        self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
+        self.power.on_switch = self._supply_switched
+        self.i2c_bus = I2cBus(self.kernel)
+        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
+        self._pins = dict(self._layout.controls)
+        self._accesses = False
+        self._storing_since_ps = 0
+        self.stored: deque[RollingShutter | None] = deque([None], maxlen=4)
+
+    @property
+    def program(self) -> CubeStarProgram:
+        """The firmware program that runs now."""
+        program = self.processor.program
+        assert isinstance(program, CubeStarProgram)
+        return program
+
+    @property
+    def flash(self) -> FlashStore:
+        """The processor's flash, as a debugger sees it."""
+        return self._hardware.flash
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Injects faults into this board."""
+        sites = Sites(
+            self.kernel,
+            self.processor,
+            {"uart": self.uart},
+            {"i2c": self.i2c_bus},
+            self.power,
+            self.engine,
+            controls=tuple(self._layout.controls),
+            cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
+            memories={"external": self._hardware.external_ram} if self._layout.external_ram else {},
+        )
+        return Faults(sites, self._seed)
+
+    def serial(self) -> DirectSerial:
+        """Host's end of the UART, in this process."""
+        return DirectSerial(self.kernel, self.uart)
+
+    def i2c(self) -> DirectI2c:
+        """Host's end of the I2C bus, in this process."""
+        return DirectI2c(self.kernel, self.i2c_bus)
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+        return self.uart.busy or not self.processor.waiting
+
+    def close(self) -> None:
+        """Release the engine."""
+        self.engine.close()
+
+    def _camera_changed(self) -> None:
+        self.engine.stream_changed()
+        self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")
+
+    def _scramble(self, memory: NDArray[np.uint8]) -> None:
+        """What a static RAM holds after power-up."""
+        memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
+
+    def truth(self) -> NDArray[np.float64] | None:
+        """Attitude (4,) at the mid-exposure of the middle row of the frame stored last.
+
+        For whoever compares results; None when nothing was stored or the scene has no attitude.
+        """
+        latest = self.stored[-1]
+        if latest is None:
+            return None
+        return self.camera.scene.truth(latest.mid_exposure_ps((ROWS - 1) / 2))
+
+    def _pin_changed(self, pin: str, level: int) -> None:
+        stored, self._pins[pin] = self._layout.storing(self._pins), level
+        stores = self._layout.storing(self._pins)
+        if stores > stored:
+            self._storing_since_ps = self.kernel.now
+        elif stores < stored:
+            # The first whole frame was stored, however long the program let the FPGA go on.
+            self.stored.append(self.camera.frame_from(self._storing_since_ps))
+        self._set_states()
+
+    def _accessed(self, busy: bool) -> None:
+        self._accesses = busy
+        self._set_states()
+
+    def _set_states(self) -> None:
+        for part, state in self._layout.states(self._pins, self._accesses).items():
+            self.power.set_state(part, state)
+
+    def _supply_switched(self, channel: str, on: bool) -> None:
+        # A latch-up comes from outside, so the FPGA may have run ahead; see sim/processor.py.
+        now_ps = max(self.kernel.now, self.engine.now_ps)
+        self.engine.run(now_ps)
+        if channel == "imager":
+            self.camera.power(on, now_ps)
+        memories = self.engine.memories
+        if not self._layout.external_ram:
+            # Without supply an FPGA leads nowhere, as a memory without supply does.
+            reached = all(self.power.is_on(name) for name in ("imager", "memory"))
+            for name in memories:
+                self.engine.power_memory(name, reached)
+        lost = list(memories.values())
+        if self._layout.external_ram:
+            lost = [self._hardware.external_ram] if channel == "memory" else lost
+        elif channel == "imager":
+            lost = []
+        if not on:
+            for memory in lost:
+                self._scramble(memory)
+
+
+class _Efm32gg:
+    """The processor's peripherals, as its program sees them."""
+
+    def __init__(self, board: CubeStarBoard) -> None:
+        self._board = board
+        bytes_there = EXTERNAL_RAM_BYTES if board._layout.external_ram else 0
+        self.external_ram = np.zeros(bytes_there, np.uint8)
+        self.retention = bytearray(RETENTION_BYTES)
+        self.flash = FlashStore()
+        self.reset_cause = int(ResetCause.POWER_ON)
+
+    def uart_send(self, data: bytes) -> None:
+        self._board.uart.send(data)
+
+    def uart_backlog(self) -> int:
+        return self._board.uart.backlog
+
+    def bus_read(self, select: int, address: int, count: int) -> bytes:
+        return self._board.processor.load(select, address, count)
+
+    def wake(self) -> None:
+        self._board.processor.wake()
+
+    def switch_supply(self, channel: str, on: bool) -> None:
+        self._board.power.switch(channel, on)
+
+    def supply_current_ma(self, channel: str) -> float:
+        return self._board.power.current_ma(channel)
+
+    def uptime_ms(self) -> int:
+        return self._board.kernel.now // PS_PER_MS
+
+    def temperature_c(self) -> float:
+        return self._board.camera.temperature_c
+
+
+class _CameraBus:
+    """The camera's control bus, which nobody else uses."""
+
+    def __init__(self, board: CubeStarBoard) -> None:
+        self._board = board
+
+    def transfer_ps(self, request: CameraTransfer) -> int:
+        bytes_on_wire = 1 + len(request.data) + (1 + request.read if request.read else 0)
+        starts_and_stop = 3 if request.read else 2
+        return (9 * bytes_on_wire + starts_and_stop) * PS_PER_S // CAMERA_BUS_HZ
+
+    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
+        camera = self._board.camera
+        if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
+            return None
+        return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)

@@ -1,0 +1,187 @@
+"""CubeStar's memory layouts as boards: which FPGA designs, what draws which current.
+
+CubeStar thesis, section 3.3, table 6.2 and section 7.2. The currents of the layouts that were never
+built follow from those of the published one: its FPGA board contains an SRAM, whose current is
+taken to be that of the processor's (``SRAM_MA``) and stands alone here, because the program's
+supply channel "memory" watches the memory with the picture. An FPGA whose bus is open draws what it
+draws standing by; only accesses draw as much as reading.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from amaranth.hdl import Fragment
+
+from cubestack.emulator.rtl.wiring import (
+    Wiring,
+    cubestar_double_wiring,
+    cubestar_shared_wiring,
+    cubestar_two_boards_wiring,
+    cubestar_wiring,
+)
+from cubestack.emulator.sim.power_tables import CUBESTAR, Part, PowerTable
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+
+__all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
+
+Pins = Mapping[str, int]
+States = dict[str, str]
+
+SRAM_MA = CUBESTAR.parts["memory"].ma
+
+
+@dataclass(frozen=True)
+class LayoutBoard:
+    """One layout.
+
+    Attributes:
+        top: name of the design in each of its FPGAs.
+        fpgas: how many there are.
+        wiring: of them.
+        controls: pins that command them, with their levels after power-up.
+        power: what draws current.
+        storing: how many memories a camera's picture may go to, by the control pins.
+        states: of the parts "fpga"... and "memory", by the control pins and whether the processor
+            accesses a memory.
+        external_ram: the processor has a memory of its own.
+    """
+
+    top: str
+    fpgas: int
+    wiring: Callable[[], Wiring]
+    controls: Pins
+    power: PowerTable
+    storing: Callable[[Pins], int]
+    states: Callable[[Pins, bool], States]
+    external_ram: bool = False
+
+
+def _powered(fpgas: tuple[str, ...], memories: int) -> PowerTable:
+    """Currents with ``fpgas`` boards and so many memories, each for itself."""
+    parts = {name: part for name, part in CUBESTAR.parts.items() if name not in ("fpga", "memory")}
+    whole = CUBESTAR.parts["fpga"].ma
+    alone = {
+        "standby": whole["standby"] - SRAM_MA["standby"],
+        "storing": whole["storing"] - SRAM_MA["transfer"],
+        "reading": whole["reading"] - SRAM_MA["transfer"],
+    }
+    idle, used = SRAM_MA["standby"], SRAM_MA["transfer"]
+    memory = {f"{n} used": n * used + (memories - n) * idle for n in range(memories + 1)}
+    return replace(
+        CUBESTAR,
+        parts={
+            **parts,
+            "memory": Part("memory", memory),
+            **{name: Part("imager", alone) for name in fpgas},
+        },
+    )
+
+
+def _stores(pins: Pins, board: str = "") -> bool:
+    return bool(pins[f"{board}ENABLE"] and not pins[f"{board}RNW"])
+
+
+def _copied_states(pins: Pins, _accessed: bool) -> States:
+    state = "standby"
+    if pins["ENABLE"]:
+        state = "reading" if pins["RNW"] else "storing"
+    return {"fpga": state, "memory": "transfer" if state == "reading" else "standby"}
+
+
+def _one_fpga_states(pins: Pins, accessed: bool) -> States:
+    """Both at once only where there are two memories."""
+    storing = _stores(pins)
+    state = "storing" if storing else "reading" if accessed else "standby"
+    return {"fpga": state, "memory": f"{storing + accessed} used"}
+
+
+def _two_board_states(pins: Pins, accessed: bool) -> States:
+    """A board that stores is not accessed; else it is the first one that is."""
+    storing = [_stores(pins, board) for board in _TWO]
+    reading = storing.index(False) if accessed and not all(storing) else None
+    states = {
+        f"fpga{number + 1}": "storing" if stores else "reading" if number == reading else "standby"
+        for number, stores in enumerate(storing)
+    }
+    return {**states, "memory": f"{sum(storing) + (reading is not None)} used"}
+
+
+_TWO = ("BOARD1_", "BOARD2_")
+_ONE_FPGA = {"ENABLE": 0, "RNW": 0}
+
+#: Every layout.
+BOARDS = {
+    Layout.COPIED: LayoutBoard(
+        "cubestar",
+        1,
+        cubestar_wiring,
+        _ONE_FPGA,
+        CUBESTAR,
+        _stores,
+        _copied_states,
+        external_ram=True,
+    ),
+    Layout.SHARED: LayoutBoard(
+        "cubestar-shared",
+        1,
+        cubestar_shared_wiring,
+        _ONE_FPGA,
+        _powered(("fpga",), 1),
+        _stores,
+        _one_fpga_states,
+    ),
+    Layout.TWO_MEMORIES: LayoutBoard(
+        "cubestar-double",
+        1,
+        cubestar_double_wiring,
+        _ONE_FPGA,
+        _powered(("fpga",), 2),
+        _stores,
+        _one_fpga_states,
+    ),
+    Layout.TWO_BOARDS: LayoutBoard(
+        "cubestar-shared",
+        2,
+        cubestar_two_boards_wiring,
+        {f"{board}{name}": 0 for board in _TWO for name in _ONE_FPGA},
+        _powered(("fpga1", "fpga2"), 2),
+        lambda pins: sum(_stores(pins, board) for board in _TWO),
+        _two_board_states,
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Fpga:
+    """What each FPGA of a layout takes of its part.
+
+    Attributes:
+        pins, tiles: taken.
+        part_pins, part_tiles: there are.
+    """
+
+    pins: int
+    tiles: int
+    part_pins: int
+    part_tiles: int
+
+    @property
+    def fits(self) -> bool:
+        """Whether it can be built."""
+        return self.pins <= self.part_pins and self.tiles <= self.part_tiles
+
+
+def fpga_of(layout: Layout) -> Fpga:
+    """Pins of the design, and the tiles that ``hdl/flow/area.json`` has for it."""
+    from cubestack.hdl.flow.area import AGLN030_PINS, AGLN030_TILES
+    from cubestack.hdl.flow.area_report import AREA_FILE
+    from cubestack.hdl.flow.tops import TOPS, pins_of
+
+    name = BOARDS[layout].top
+    top = TOPS[name]
+    component = top.make()
+    Fragment.get(component, None)  # Amaranth complains of a design that was never made
+    pins = sum(pin.width for pin in pins_of(component, top.meanings))
+    areas = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]
+    return Fpga(pins, int(areas[name]["tiles"]), AGLN030_PINS, AGLN030_TILES)

@@ -1,0 +1,292 @@
+"""The satellite's I2C bus: messages with their time on the wire, and targets that answer.
+
+Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR. A target that has no byte
+ready stretches the clock. Targets may also listen to the general call, address 0. Not modelled: the
+acknowledge of a byte that the host reads, 10-bit addresses, and several hosts at one time: whole
+transfers queue for the wire.
+"""
+
+import errno
+from collections import deque
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import simpy
+
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+
+__all__ = ["CurrentTarget", "I2cBus", "I2cDisturbance", "I2cMessage", "I2cNackError", "I2cTarget"]
+
+BITS_PER_BYTE = 9  # eight data bits and the acknowledge
+
+LONGEST_STRETCH_PS = PS_PER_S
+"""A host gives up a transfer whose clock is held low for longer, as Linux's drivers do."""
+
+GENERAL_CALL = 0x00
+
+MAX_BLOCK_BYTES = 32
+"""Length that a target may send in front of a block; SMBus 2.0, section 5.5.7."""
+
+
+@dataclass
+class I2cMessage:
+    """A message to a 7-bit ``address``: ``data`` to write, or ``read`` bytes to fetch into it.
+
+    With neither, only the address goes out, for writing: a probe.
+
+    Attributes:
+        address: 7-bit address.
+        data: bytes to write, or the bytes read.
+        read: bytes to read.
+        block: a read whose first byte says how many follow it, beside the ``read`` ones.
+        probe_read: only the address goes out, for reading.
+    """
+
+    address: int
+    data: bytearray = field(default_factory=bytearray)
+    read: int = 0
+    block: bool = False
+    probe_read: bool = False
+
+    @property
+    def reading(self) -> bool:
+        """Whether the address goes out for reading."""
+        return self.read > 0 or self.probe_read
+
+
+class I2cNackError(OSError):
+    """A transfer failed; errno as on Linux.
+
+    ENXIO: no acknowledge of an address; EIO: of a byte; ETIMEDOUT: the clock was held low too long;
+    EPROTO: a target sent a block length that is none.
+    """
+
+
+class I2cTarget(Protocol):
+    """A device on the bus; called byte by byte, like the interrupts of a slave peripheral."""
+
+    def i2c_start(self, read: bool) -> None:
+        """A (repeated) start addressed this target."""
+
+    def i2c_write(self, byte: int) -> bool:
+        """A byte came; returns whether it is acknowledged."""
+
+    def i2c_read(self) -> int | None:
+        """The next byte to send, 0..255; None stretches the clock: asked again a bit later."""
+
+    def i2c_stop(self) -> None:
+        """The transfer ended, or went on with another target."""
+
+
+class I2cDisturbance(Protocol):
+    """Stands between a host and the targets; each hook may wait, or raise I2cNackError."""
+
+    def before_start(self) -> Generator[simpy.Event, Any, None]:
+        """A host is about to begin a transfer."""
+
+    def after_address(self, address: int) -> Generator[simpy.Event, Any, None]:
+        """The address of a message was sent."""
+
+    def after_byte(self, address: int, read: bool) -> Generator[simpy.Event, Any, None]:
+        """A byte was sent by the host, or by the target, and is not acknowledged yet."""
+
+
+class CurrentTarget:
+    """Hands every call on to the program that runs now, which a reset replaces."""
+
+    def __init__(self, link: Callable[[], I2cTarget]) -> None:
+        """Ask ``link`` for the program's end of the bus at each call."""
+        self._link = link
+
+    def i2c_start(self, read: bool) -> None:
+        """See I2cTarget."""
+        self._link().i2c_start(read)
+
+    def i2c_write(self, byte: int) -> bool:
+        """See I2cTarget."""
+        return self._link().i2c_write(byte)
+
+    def i2c_read(self) -> int | None:
+        """See I2cTarget."""
+        return self._link().i2c_read()
+
+    def i2c_stop(self) -> None:
+        """See I2cTarget."""
+        self._link().i2c_stop()
+
+
+class I2cBus:
+    """One bus with any number of targets.
+
+    Attributes:
+        bit_ps: time of one bit.
+        disturbance: what is on the wires, if anything.
+    """
+
+    def __init__(self, env: Kernel, hz: int = 100_000) -> None:
+        """Make an idle bus at ``hz`` bits a second (positive, else ValueError)."""
+        if hz <= 0:
+            raise ValueError(f"an I2C bus needs a positive bit rate, not {hz} Hz")
+        self._env = env
+        self._targets: dict[int, I2cTarget] = {}
+        self._general = _GeneralCall()
+        self._taken = False
+        self._turns: deque[simpy.Event] = deque()
+        self.disturbance: I2cDisturbance | None = None
+        self.bit_ps = PS_PER_S // hz
+
+    def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
+        """Put ``target`` on the bus at a free 7-bit ``address`` (else ValueError).
+
+        With ``general_call`` it also hears what is written to address 0.
+        """
+        if not 0x08 <= address <= 0x77:
+            raise ValueError(f"I2C address {address:#04x} is not in 0x08..0x77")
+        if address in self._targets:
+            raise ValueError(f"I2C address {address:#04x} is taken already")
+        self._targets[address] = target
+        if general_call:
+            self._general.listeners.append(target)
+
+    @property
+    def targets(self) -> Mapping[int, I2cTarget]:
+        """Who answers at which address."""
+        return self._targets
+
+    def move(self, address: int, new_address: int) -> None:
+        """Let the target at ``address`` answer at another one; both as for ``attach``."""
+        if address not in self._targets:
+            raise ValueError(f"no I2C device is at address {address:#04x}")
+        if address != new_address:
+            self.attach(new_address, self._targets[address])
+            del self._targets[address]
+
+    def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
+        """Perform one transfer, behind those already under way.
+
+        Read data lands in the messages. Raises I2cNackError, after the stop condition.
+        """
+        if self._taken:
+            yield from self._take_turn()
+        self._taken = True
+        try:
+            yield from self._transfer(messages)
+        finally:
+            self._hand_on()
+
+    def _take_turn(self) -> Generator[simpy.Event, Any, None]:
+        turn = self._env.event()
+        self._turns.append(turn)
+        try:
+            yield turn
+        except BaseException:  # who waits no longer holds up nobody
+            if turn.triggered:
+                self._hand_on()
+            else:
+                self._turns.remove(turn)
+            raise
+
+    def _hand_on(self) -> None:
+        """Give the wire to the next one, for whom it stays taken, or free it."""
+        if self._turns:
+            self._turns.popleft().succeed()
+        else:
+            self._taken = False
+
+    def _transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
+        addressed: I2cTarget | None = None
+        failure: I2cNackError | None = None
+        if self.disturbance is not None:
+            yield from self.disturbance.before_start()
+        try:
+            for message in messages:
+                yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
+                if self.disturbance is not None:
+                    yield from self.disturbance.after_address(message.address)
+                target = self._find(message)
+                if addressed is not None and addressed is not target:
+                    addressed.i2c_stop()
+                addressed = target
+                target.i2c_start(message.reading)
+                yield from self._bytes(target, message)
+        except I2cNackError as error:
+            failure = error
+        yield self._env.timeout(self.bit_ps)
+        if addressed is not None:
+            addressed.i2c_stop()
+        if failure is not None:
+            raise failure
+
+    def _find(self, message: I2cMessage) -> I2cTarget:
+        address = message.address
+        if address == GENERAL_CALL and self._general.listeners and not message.reading:
+            return self._general
+        target = self._targets.get(address)
+        if target is None:
+            raise I2cNackError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
+        return target
+
+    def _bytes(self, target: I2cTarget, message: I2cMessage) -> Generator[simpy.Event, Any, None]:
+        if message.reading:
+            message.data = bytearray()
+            wanted = message.read
+            while len(message.data) < wanted:
+                byte = yield from self._next_byte(target, message.address)
+                yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+                if self.disturbance is not None:
+                    yield from self.disturbance.after_byte(message.address, read=True)
+                if message.block and not message.data:
+                    wanted += _block_length(byte, message.address)
+                message.data.append(byte)
+            return
+        for byte in message.data:
+            yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+            if self.disturbance is not None:
+                yield from self.disturbance.after_byte(message.address, read=False)
+            if not target.i2c_write(byte):
+                raise I2cNackError(
+                    errno.EIO, f"I2C device {message.address:#04x} refused byte {byte:#04x}"
+                )
+
+    def _next_byte(self, target: I2cTarget, address: int) -> Generator[simpy.Event, Any, int]:
+        """Wait while ``target`` stretches the clock."""
+        give_up_ps = self._env.now + LONGEST_STRETCH_PS
+        while (byte := target.i2c_read()) is None:
+            if self._env.now >= give_up_ps:
+                raise I2cNackError(
+                    errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s"
+                )
+            yield self._env.timeout(self.bit_ps)
+        return byte
+
+
+def _block_length(byte: int, address: int) -> int:
+    if not 1 <= byte <= MAX_BLOCK_BYTES:
+        raise I2cNackError(
+            errno.EPROTO,
+            f"I2C device {address:#04x} sent block length {byte}, not 1..{MAX_BLOCK_BYTES}",
+        )
+    return byte
+
+
+class _GeneralCall:
+    """Those that listen to address 0, as one target: one acknowledge is enough."""
+
+    def __init__(self) -> None:
+        self.listeners: list[I2cTarget] = []
+
+    def i2c_start(self, read: bool) -> None:
+        for target in self.listeners:
+            target.i2c_start(read)
+
+    def i2c_write(self, byte: int) -> bool:
+        acknowledges = [target.i2c_write(byte) for target in self.listeners]
+        return any(acknowledges)
+
+    def i2c_read(self) -> int:
+        raise AssertionError("nobody answers a read from the general call address")
+
+    def i2c_stop(self) -> None:
+        for target in self.listeners:
+            target.i2c_stop()

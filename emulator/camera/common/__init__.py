@@ -1,0 +1,1 @@
+"""What all camera models share: optics, exposure, pixel stream, registers."""

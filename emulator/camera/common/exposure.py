@@ -1,0 +1,177 @@
+"""Starlight on the sensor: where each star's electrons land while the camera turns.
+
+CubeStar thesis, section 4.1.1 (defocused stars as a two-dimensional Gaussian, eq. 4.1.7) and
+appendix C (rolling shutter). The Gaussian is integrated over each pixel's square, as a detector
+does, not sampled at its centre.
+
+Motion is a sum over instants of the exposure, closer together than one sigma of the spot. A star
+is taken at the instants of the row that it then falls on, so a rolling shutter shifts, bends
+and stretches its streak. Within one spot all rows share that row's instants: what is neglected is
+a shear of the spot by the motion in one line time, a hundredth of a pixel a row at 4 deg/s.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.photometry import electrons_per_second
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.scene.attitude import matrix_from_quaternion
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+
+__all__ = ["FAINTEST_V", "star_light", "star_pixels"]
+
+FAINTEST_V = 8.0
+"""Stars beyond it are left out: at the longest exposure their peak is below one count of 8 bits."""
+
+SPOT_SIGMAS = 5.0
+CELLS_AT_ONCE = 3_400_000  # of all spots: bounds the memory of long streaks and wide spots
+VELOCITY_STEP_S = 0.01
+
+_Z = np.arange(-8.0, 8.0, 1 / 512)
+#: The normal distribution function; linear interpolation in it is good to 1e-7.
+_PHI = np.array([0.5 * (1 + math.erf(z / math.sqrt(2))) for z in _Z])
+
+
+def star_light(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float32]:
+    """Mean number of electrons that starlight frees in each pixel, shape (rows, columns)."""
+    vectors, rates = _stars(scene, shutter)
+    phases = _phases(scene, shutter)
+    pixels, light = [], []
+    for phase in phases:
+        places, weights = _instant(scene, shutter, vectors, phase)
+        pixels.append(places)
+        light.append(rates * weights / len(phases))
+    if scene.false_stars:
+        false_pixels, false_rates = _false_stars(scene)
+        pixels.append(false_pixels)
+        light.append(false_rates)
+    electrons = np.concatenate(light) * shutter.exposure_s
+    return _spots(np.concatenate(pixels), electrons, scene.optics)
+
+
+def star_pixels(
+    scene: SkyScene, shutter: RollingShutter
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Where the stars' centres are at the middle of their exposure: for tests and drawings.
+
+    Returns:
+        Hipparcos numbers (n,) and pixel coordinates (n, 2) of the stars on the sensor.
+    """
+    sky = load_sky(scene.epoch, _limit(scene))
+    pixels, _ = _instant(scene, shutter, sky.vectors, 0.5)
+    columns, rows = scene.optics.columns, scene.optics.rows
+    x, y = pixels.T
+    seen = (np.abs(x - (columns - 1) / 2) <= columns / 2) & (np.abs(y - (rows - 1) / 2) <= rows / 2)
+    return sky.hip[seen], pixels[seen]
+
+
+def _rate(scene: SkyScene, v_mag: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Electrons per second (n,) through the scene's lens."""
+    return electrons_per_second(v_mag, scene.optics.aperture_mm, scene.optics.effective_width_a)
+
+
+def _limit(scene: SkyScene) -> float:
+    return FAINTEST_V if scene.mag_limit is None else scene.mag_limit
+
+
+def _stars(
+    scene: SkyScene, shutter: RollingShutter
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit vectors (n, 3) and electrons per second (n,) of the stars that may come into view."""
+    sky = load_sky(scene.epoch, _limit(scene))
+    seconds = shutter.exposure_s + scene.optics.rows * shutter.line_s
+    reach = scene.optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
+    boresight = matrix_from_quaternion(scene.truth(_time_ps(scene, shutter, 0.5)))[2]
+    near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
+    return sky.vectors[near], _rate(scene, sky.v_mag[near])
+
+
+def _false_stars(scene: SkyScene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Pixels (n, 2) and electrons per second (n,) of lights that no catalogue has."""
+    generator = np.random.default_rng([scene.seed, 0xFA15E])
+    last = [scene.optics.columns - 1, scene.optics.rows - 1]
+    pixels = generator.uniform([0, 0], last, (scene.false_stars, 2))
+    v_mag = generator.uniform(*scene.false_star_mag, scene.false_stars)
+    return pixels, _rate(scene, v_mag)
+
+
+def _phases(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float64]:
+    """Instants to sum over, as fractions of the exposure."""
+    # The scale of the picture is largest at its corners, by a fifth or so.
+    px_per_deg = 1.25 * scene.optics.fx * math.pi / 180
+    travel_px = scene.speed_deg_s * shutter.exposure_s * px_per_deg
+    samples = max(1, math.ceil(travel_px / scene.optics.psf_sigma_px))
+    return (np.arange(samples) + 0.5) / samples
+
+
+def _time_ps(scene: SkyScene, shutter: RollingShutter, phase: float) -> int:
+    """The instant ``phase`` of the middle row's exposure."""
+    exposure_ps = shutter.exposure_lines * shutter.line_ps
+    middle_row = (scene.optics.rows - 1) / 2
+    return shutter.mid_exposure_ps(middle_row) + round((phase - 0.5) * exposure_ps)
+
+
+def _instant(
+    scene: SkyScene, shutter: RollingShutter, vectors: NDArray[np.float64], phase: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stars at the instant ``phase`` of the exposures of their own rows.
+
+    Returns:
+        Pixels (n, 2), and weights (n,) of the light there: a star that moves down with the
+        read-out is exposed by more rows, each for the full time.
+    """
+    now = _time_ps(scene, shutter, phase)
+    optics = scene.optics
+    in_camera = vectors @ matrix_from_quaternion(scene.truth(now)).T
+    pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
+    if not scene.speed_deg_s:
+        return pixels, weights
+    # The pose that holds now, even where the next one begins: its velocity is wanted.
+    later = scene.pose_at(now).at(now / PS_PER_S + VELOCITY_STEP_S)
+    moved = optics.project(vectors @ matrix_from_quaternion(later).T)
+    per_line = (moved - pixels) * (shutter.line_s / VELOCITY_STEP_S)
+    # y + vy * (row - middle) = row, solved for the row, counted from the middle one.
+    stretch = 1 / (1 - per_line[:, 1])
+    lines = (pixels[:, 1] - (optics.rows - 1) / 2) * stretch
+    return pixels + per_line * lines[:, None], weights * stretch
+
+
+def _spots(
+    pixels: NDArray[np.float64], electrons: NDArray[np.float64], optics: Optics
+) -> NDArray[np.float32]:
+    """Sum of Gaussian spots at ``pixels`` (n, 2), NaN left out, on the sensor's (rows, columns)."""
+    sigma_px = optics.psf_sigma_px
+    half = math.ceil(SPOT_SIGMAS * sigma_px) + 1
+    columns, rows = optics.columns, optics.rows
+    with np.errstate(invalid="ignore"):
+        seen = np.all((pixels > -half) & (pixels < (columns - 1 + half, rows - 1 + half)), axis=1)
+    pixels, electrons = pixels[seen], electrons[seen]
+    # A canvas with a margin, so that the spots of all these stars lie on it.
+    margin = 2 * half + 1
+    height, width = rows + 2 * margin, columns + 2 * margin
+    canvas = np.zeros(height * width)
+    cells = np.arange(-half, half + 1)
+    at_once = CELLS_AT_ONCE // len(cells) ** 2
+    for first in range(0, len(pixels), at_once):
+        some = slice(first, first + at_once)
+        nearest = np.rint(pixels[some]).astype(np.int64)
+        shares = _shares(pixels[some] - nearest, half, sigma_px)
+        shares[:, 1] *= electrons[some, None]
+        spots = shares[:, 1, :, None] * shares[:, 0, None, :]
+        starts = (nearest[:, 1, None] + margin + cells) * width
+        index = starts[:, :, None] + (nearest[:, 0, None] + margin + cells)[:, None, :]
+        canvas += np.bincount(index.ravel(), spots.ravel(), canvas.size)
+    image = canvas.reshape(height, width)[margin:-margin, margin:-margin]
+    return image.astype(np.float32)
+
+
+def _shares(offsets: NDArray[np.float64], half: int, sigma_px: float) -> NDArray[np.float64]:
+    """Share of each spot in the columns and rows around it: (n, 2) to (n, 2, 2 * half + 1)."""
+    edges = np.arange(-half, half + 2) - 0.5
+    z = (edges - offsets[:, :, None]) / sigma_px
+    return np.diff(np.interp(z, _Z, _PHI), axis=-1)

@@ -1,0 +1,120 @@
+"""A camera's registers behind its control bus: address pointer, values, and the wait for a sync.
+
+An address holds a byte, or a wider word where the camera's table says so.
+
+What is declared as not modelled, or not declared at all, is stored and logged when accessed.
+"""
+
+import logging
+
+from cubestack.firmware_model.interface.cameras.registers import (
+    CameraRegister,
+    CameraRegisterMap,
+    RegisterAccess,
+)
+
+__all__ = ["RegisterFile"]
+
+logger = logging.getLogger(__name__)
+
+
+class RegisterFile:
+    """The registers of one camera.
+
+    Reading gives what was written. What is *active* is the same for registers that act at once,
+    and the state at the last sync for the others.
+    """
+
+    def __init__(self, table: CameraRegisterMap) -> None:
+        """Make a file with the reset values of ``table``."""
+        self._table = table
+        self._pointer = 0
+        self._written: dict[int, int] = {}
+        self._active: dict[int, int] = {}
+        self.reset()
+
+    def reset(self) -> None:
+        """Go back to the reset values."""
+        self._pointer = 0
+        self._written = {
+            address: byte
+            for register in self._table
+            for address, byte in zip(
+                register.addresses, register.units(register.reset), strict=True
+            )
+        }
+        self._active = dict(self._written)
+
+    def select(self, address: int) -> None:
+        """Set the address of the next byte read or written."""
+        self._pointer = address
+
+    def write(self, byte: int) -> CameraRegister | None:
+        """Write the next byte; returns the register that it belongs to, None if there is none."""
+        address, register = self._step()
+        if register is None:
+            logger.warning(
+                "%s: wrote %#04x to %#06x, where no register is known",
+                self._table.camera,
+                byte,
+                address,
+            )
+        elif register.access is RegisterAccess.READ_ONLY:
+            logger.warning("%s: wrote to %s, which is read-only", self._table.camera, register.name)
+        else:
+            self._log_unmodelled(register, address, byte)
+            self._written[address] = byte
+            if not register.needs_sync:
+                self._active[address] = byte
+        return register
+
+    def read(self) -> int:
+        """Read the next byte; 0 where no register is known."""
+        address, register = self._step()
+        if register is None:
+            logger.warning(
+                "%s: read %#06x, where no register is known", self._table.camera, address
+            )
+            return 0
+        if not register.modelled:
+            logger.info("%s: read %s, which is not modelled", self._table.camera, register.name)
+        return self._written[address]
+
+    def sync(self) -> None:
+        """Make all written values active."""
+        self._active = dict(self._written)
+
+    def active(self, name: str) -> int:
+        """Value of register ``name`` that is in effect."""
+        register, value = self._table[name], 0
+        for address in register.addresses:
+            value = value << register.unit_bits | self._active[address]
+        return value
+
+    def store(self, name: str, value: int) -> None:
+        """Set a register from the camera's side, active at once."""
+        register = self._table[name]
+        for address, byte in zip(register.addresses, register.units(value), strict=True):
+            self._written[address] = self._active[address] = byte
+
+    def _step(self) -> tuple[int, CameraRegister | None]:
+        """The pointer's address and register; the pointer moves on."""
+        address = self._pointer
+        self._pointer = (address + 1) % (1 << (8 * self._table.address_bytes))
+        return address, self._table.at(address)
+
+    def _log_unmodelled(self, register: CameraRegister, address: int, byte: int) -> None:
+        camera = self._table.camera
+        if not register.modelled:
+            logger.info("%s: wrote %s, which is not modelled", camera, register.name)
+            return
+        value = byte << (register.unit_bits * (register.addresses[-1] - address))
+        for field in register.fields:
+            if value & field.mask and not field.modelled:
+                logger.info(
+                    "%s: set %s of %s, which is not modelled", camera, field.name, register.name
+                )
+        if undeclared := value & ~register.bits:
+            logger.warning(
+                "%s: set bits %#04x of %s, which are not known", camera, undeclared, register.name
+            )

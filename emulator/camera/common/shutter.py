@@ -1,0 +1,50 @@
+"""When a rolling shutter exposes which row.
+
+CubeStar thesis, appendix C (figure C.1): rows are read out one line time after the other, and each
+is exposed for the same number of line times up to its own readout.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+
+__all__ = ["RollingShutter"]
+
+
+@dataclass(frozen=True)
+class RollingShutter:
+    """One frame's exposure: row r is exposed in the ``exposure_lines`` before its readout.
+
+    Attributes:
+        readout_ps: time at which row 0 is read out; row r follows r line times later.
+        line_ps: one line time in ps, exact.
+        exposure_lines: exposure in line times.
+        programmed_lines: exposure that the registers ask for; it differs only in the undefined
+            frame after the sensor was enabled.
+    """
+
+    readout_ps: int
+    line_ps: Fraction
+    exposure_lines: int
+    programmed_lines: int
+
+    @property
+    def exposure_s(self) -> float:
+        """Exposure of each row in s."""
+        return float(self.exposure_lines * self.line_ps / PS_PER_S)
+
+    @property
+    def line_s(self) -> float:
+        """One line time in s."""
+        return float(self.line_ps / PS_PER_S)
+
+    @property
+    def relative_exposure(self) -> float:
+        """Exposure divided by the programmed one."""
+        return self.exposure_lines / self.programmed_lines
+
+    def mid_exposure_ps(self, row: float) -> int:
+        """Middle of the exposure of ``row``, counted from 0; fractions are between two rows."""
+        lines = Fraction(row) - Fraction(self.exposure_lines, 2)
+        return self.readout_ps + round(lines * self.line_ps)

@@ -1,0 +1,1 @@
+"""The MLX75412 image sensor of CubeStar."""

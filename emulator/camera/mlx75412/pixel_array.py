@@ -1,0 +1,145 @@
+"""The sensor's pixels: electrons become 8-bit counts, with all that disturbs them.
+
+CubeStar thesis, section 3.4.4 (dark current and its subtraction), appendix C (upper 8 of 12 bits)
+and appendix E: 2.28 electrons per count of 12 bits, dark signal of 1008 counts a second at 65 C.
+Nothing is published about read noise, fixed pattern, defects, and how the dark signal depends on
+temperature; those constants are assumed, at what automotive sensors of that time had.
+
+Shot, dark and read noise are drawn at once, as one normal distribution with the mean and the
+variance of the Poisson and normal parts together. What is lost is the skewness of the Poisson
+part: beside this read noise never more than 0.034. A frame costs one normal field that way.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.optics import COLUMNS, ROWS
+from cubestack.emulator.camera.common.photometry import (
+    DN12_PER_DN8,
+    ELECTRONS_PER_DN12,
+    FULL_SCALE_DN12,
+)
+
+__all__ = ["Corrections", "PixelArray", "dark_dn12_per_second", "ideal_counts"]
+
+DARK_DN12_PER_S_AT_65_C = 1008.0  # published
+DARK_DOUBLING_K = 8.0  # assumed: what silicon usually does
+DARK_NON_UNIFORMITY = 0.1  # assumed: standard deviation, relative
+READ_NOISE_ELECTRONS = 11.4  # assumed: 5 counts of 12 bits
+GAIN_NON_UNIFORMITY = 0.005  # assumed: standard deviation, relative
+COLUMN_PATTERN_DN12 = 4.0  # assumed: "very faint vertical noise" (appendix C), standard deviation
+PIXEL_PATTERN_DN12 = 2.0  # assumed: standard deviation
+PATTERN_LEFT = 0.1  # assumed: share of the pattern that the on-chip correction leaves
+FACTORY_DEAD = 30  # assumed: pixels without light, known to the sensor
+FACTORY_HOT = 30  # assumed: pixels with much dark current, known to the sensor
+HOT_DN12_PER_S_AT_20_C = 1500.0  # assumed: mean of an exponential distribution
+
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Which of the sensor's corrections are on.
+
+    Attributes:
+        defects: known defective pixels take the mean of their neighbours in the row.
+        fixed_pattern: most of the fixed pattern is subtracted.
+        dark: the mean of the dark rows is subtracted.
+    """
+
+    defects: bool = True
+    fixed_pattern: bool = True
+    dark: bool = True
+
+
+def dark_dn12_per_second(temperature_c: float) -> float:
+    """Mean dark signal in counts of 12 bits per second."""
+    return float(DARK_DN12_PER_S_AT_65_C * 2 ** ((temperature_c - 65) / DARK_DOUBLING_K))
+
+
+def ideal_counts(electrons: Image) -> NDArray[np.uint8]:
+    """What a sensor without noise and defects makes of ``electrons``: upper 8 of 12 bits."""
+    return _upper_bits(electrons * np.float32(1 / ELECTRONS_PER_DN12))
+
+
+class PixelArray:
+    """One sensor with its own fixed pattern and its own defects."""
+
+    def __init__(self, seed: int = 0) -> None:
+        """Make the sensor that ``seed`` stands for."""
+        generator = np.random.default_rng([seed, 0xD1E])
+        shape = (ROWS, COLUMNS)
+
+        def field(sigma: float, shape: tuple[int, ...] = shape) -> Image:
+            return np.float32(sigma) * generator.standard_normal(shape, np.float32)
+
+        self._gain = 1 + field(GAIN_NON_UNIFORMITY)
+        self._dark_share = np.maximum(1 + field(DARK_NON_UNIFORMITY), 0)
+        self._pattern = field(COLUMN_PATTERN_DN12, (1, COLUMNS)) + field(PIXEL_PATTERN_DN12)
+        # Away from the outer columns, whose pixels lack a neighbour to correct from.
+        places = generator.choice(ROWS * (COLUMNS - 2), FACTORY_DEAD + FACTORY_HOT, replace=False)
+        rows, columns = np.divmod(places, COLUMNS - 2)
+        self._defects = rows, columns + 1
+        self._gain[rows[:FACTORY_DEAD], columns[:FACTORY_DEAD] + 1] = 0
+        self._hot = rows[FACTORY_DEAD:], columns[FACTORY_DEAD:] + 1
+        self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
+
+    def read_out(
+        self,
+        electrons: Image,
+        exposure_s: float,
+        temperature_c: float,
+        corrections: Corrections,
+        generator: np.random.Generator,
+        grown_hot: tuple[NDArray[np.int64], Image] | None = None,
+    ) -> NDArray[np.uint8]:
+        """One frame of counts, shape (512, 1024).
+
+        Args:
+            electrons: mean number of electrons that light frees, shape (512, 1024).
+            exposure_s: exposure of each pixel.
+            temperature_c: of the sensor.
+            corrections: which of them are on.
+            generator: source of this frame's noise.
+            grown_hot: flat indices and strengths (1 is the usual one) of hot pixels that the
+                sensor does not know of.
+        """
+        per_second = dark_dn12_per_second(temperature_c)
+        dark_electrons = np.float32(per_second * exposure_s * ELECTRONS_PER_DN12)
+        hot_electrons = np.float32(
+            HOT_DN12_PER_S_AT_20_C
+            * (per_second / dark_dn12_per_second(20.0))
+            * (exposure_s * ELECTRONS_PER_DN12)
+        )
+        mean = self._dark_share * dark_electrons
+        mean += electrons * self._gain
+        mean[self._hot] += self._hot_share * hot_electrons
+        if grown_hot is not None:
+            mean.ravel()[grown_hot[0]] += grown_hot[1] * hot_electrons
+        signal = generator.standard_normal(mean.shape, np.float32)
+        signal *= np.sqrt(mean + np.float32(READ_NOISE_ELECTRONS**2))
+        signal += mean
+        signal *= np.float32(1 / ELECTRONS_PER_DN12)
+        signal += self._pattern * np.float32(PATTERN_LEFT if corrections.fixed_pattern else 1)
+        if corrections.dark:
+            signal -= np.float32(per_second * exposure_s)
+        if corrections.defects:
+            rows, columns = self._defects
+            signal[rows, columns] = (signal[rows, columns - 1] + signal[rows, columns + 1]) / 2
+        return _upper_bits(signal)
+
+
+def grown_hot_pixels(seed: int, count: int) -> tuple[NDArray[np.int64], Image]:
+    """Flat indices and strengths of ``count`` pixels that radiation has made hot."""
+    generator = np.random.default_rng([seed, 0x407])
+    places = generator.choice(ROWS * COLUMNS, count, replace=False)
+    return places, generator.exponential(size=count).astype(np.float32)
+
+
+def _upper_bits(dn12: Image) -> NDArray[np.uint8]:
+    """Converts to whole counts of 12 bits, saturated, and takes the upper 8 bits."""
+    counts: Image = np.clip(dn12 + np.float32(0.5), 0, FULL_SCALE_DN12)
+    counts *= np.float32(1 / DN12_PER_DN8)  # a power of two: exact, so truncation drops 4 bits
+    return counts.astype(np.uint8, order="C")

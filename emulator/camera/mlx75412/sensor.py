@@ -1,0 +1,298 @@
+"""The MLX75412 image sensor: registers on its control bus, frames on its pixel lines.
+
+CubeStar thesis, appendices C and D. What it leaves open, we take:
+
+- PIXCLK runs whenever the part has power and its reset pin is high, on a fixed grid from then on.
+  While the part is disabled, HSync, VSync and data are low.
+- Enabling starts the read-out of a frame with an undefined exposure at once. No VSync low separates
+  it from the first good frame, which explains the published split pictures; all later frames are
+  preceded by VSync low during the whole vertical blanking.
+- Disabling ends the output in the middle of whatever it was.
+- Frame length and the next frame's exposure are taken over when a frame's read-out starts.
+- Synchronised values become active with the write of the sync register.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.optics import COLUMNS, ROWS
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.emulator.camera.mlx75412.frame_timing import LINE_CLOCKS, exposure_lines, frame_lines
+from cubestack.emulator.camera.mlx75412.imager import Imager
+from cubestack.emulator.camera.mlx75412.pixel_array import Corrections
+from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, REGISTERS, SYNC_APPLY
+
+__all__ = ["Mlx75412"]
+
+IDLE_CLOCKS = 4096 * LINE_CLOCKS
+"""Length in which the endless blanking of the disabled sensor is handed out."""
+
+REMEMBERED = 8
+"""Spans and frames kept: more than anybody looks ahead or back."""
+
+_ENABLE = REGISTERS["MODE_SELECT"].field("ENABLE")
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What was settled when a frame's read-out started."""
+
+    number: int  # since the sensor was enabled; 0 is the undefined one
+    shutter: RollingShutter
+    corrections: Corrections
+    lines: int  # to the next frame
+    next_exposure: int
+
+
+@dataclass(frozen=True)
+class _Span:
+    """A stretch of output, in numbers of clock edges."""
+
+    first: int
+    clocks: int
+    vsync: int
+    frame: _Frame | None = None  # that is read out, or that the blanking follows
+    rows: int = 0
+    cut: bool = False  # ended early by a change; never handed out again
+
+    @property
+    def end(self) -> int:
+        return self.first + self.clocks
+
+
+class Mlx75412:
+    """One sensor, powered from time 0 on.
+
+    Attributes:
+        scene: what it looks at. A new one is seen by the next frame that is rendered.
+        line_clocks: pixel clocks of a line.
+        active_columns: those of them with HSync high.
+        on_change: called after the output from now on has become another than announced.
+    """
+
+    line_clocks = LINE_CLOCKS
+    active_columns = COLUMNS
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        seed: int = 0,
+        crystal_hz: int = CRYSTAL_HZ,
+        vsync_before_first_frame: bool = False,
+    ) -> None:
+        """Power up with the reset pin high.
+
+        Args:
+            scene: what it looks at.
+            seed: of the part's defects and of the undefined exposures.
+            crystal_hz: input clock; PIXCLK has the same frequency.
+            vsync_before_first_frame: whether VSync goes low between the undefined and the first
+                good frame.
+        """
+        self.scene = scene
+        self.on_change: Callable[[], None] = lambda: None
+        self._seed = seed
+        self._hz = crystal_hz
+        self._vsync_before_first_frame = vsync_before_first_frame
+        self._imager = Imager(seed)
+        self._registers = RegisterFile(REGISTERS)
+        self._clock: PixelClock | None = PixelClock(crystal_hz)
+        self._powered = True
+        self._reset_pin = 1
+        self._enables = 0
+        self._spans: deque[_Span] = deque(maxlen=REMEMBERED)
+        self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)
+        self._rendered: tuple[_Frame, Scene, NDArray[np.uint8]] | None = None
+
+    @property
+    def period(self) -> Fraction:
+        """Time of one pixel clock in ps."""
+        return Fraction(PS_PER_S, self._hz)
+
+    @property
+    def running(self) -> bool:
+        """Whether the part has power and is out of reset."""
+        return self._clock is not None
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it gathers images."""
+        return self.running and bool(_ENABLE.of(self._registers.active("MODE_SELECT")))
+
+    @property
+    def temperature_c(self) -> float:
+        """Temperature of the sensor, in degrees Celsius."""
+        return self.scene.temperature_c
+
+    # --- supply and reset -----------------------------------------------------------------------
+
+    def power(self, on: bool, now_ps: int) -> None:
+        """Turn the supply on or off."""
+        self._powered = on
+        self._start_or_stop(now_ps)
+
+    def set_reset_pin(self, level: int, now_ps: int) -> None:
+        """Drive the camera reset pin, low active."""
+        self._reset_pin = level
+        self._start_or_stop(now_ps)
+
+    def _start_or_stop(self, now_ps: int) -> None:
+        run = self._powered and bool(self._reset_pin)
+        if run == self.running:
+            return
+        self._registers.reset()
+        self._spans.clear()
+        self._forget_frames(now_ps)
+        self._clock = PixelClock(self._hz, now_ps) if run else None
+        self.on_change()
+
+    # --- control bus ----------------------------------------------------------------------------
+
+    def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
+        """A write message to the 7-bit ``address`` ended; returns whether it was acknowledged.
+
+        Two bytes of register address, then bytes for that register and those that follow.
+        """
+        if not self.running or address != REGISTERS.i2c_address:
+            return False
+        if len(data) < REGISTERS.address_bytes:
+            return True
+        was_enabled, stale = self.enabled, False
+        self._registers.select(int.from_bytes(data[: REGISTERS.address_bytes]))
+        for byte in data[REGISTERS.address_bytes :]:
+            register = self._registers.write(byte)
+            if register is REGISTERS["SYNC"]:
+                self._registers.store("SYNC", 0)
+                if byte == SYNC_APPLY:
+                    self._registers.sync()
+                    stale = True
+        if self.enabled != was_enabled or stale:
+            self._replan(now_ps, cut=self.enabled != was_enabled)
+        return True
+
+    def i2c_read(self, address: int, count: int, now_ps: int) -> bytes | None:
+        """Read ``count`` bytes from the last register address on; None if not acknowledged."""
+        del now_ps
+        if not self.running or address != REGISTERS.i2c_address:
+            return None
+        return bytes(self._registers.read() for _ in range(count))
+
+    # --- pixel lines ----------------------------------------------------------------------------
+
+    def segment_at(self, time_ps: int) -> StreamSegment | None:
+        """The stretch of output at ``time_ps``, not before the last change; None without clock."""
+        clock = self._clock
+        if clock is None:
+            return None
+        if not self._spans:
+            self._append(_Span(0, IDLE_CLOCKS, vsync=0))
+        while self._spans[-1].cut or self._end_ps(clock, self._spans[-1]) <= time_ps:
+            self._append(self._after(clock, self._spans[-1]))
+        span = next(s for s in self._spans if not s.cut and self._end_ps(clock, s) > time_ps)
+        pixels = None
+        if span.rows and span.frame is not None:
+            pixels = self._renderer(span.frame)
+        return StreamSegment(clock.edge_ps(span.first), span.clocks, span.vsync, span.rows, pixels)
+
+    def frame_from(self, time_ps: int) -> RollingShutter | None:
+        """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
+
+        None when its output was not announced yet; of long ago, only the last frames are known.
+        """
+        if self._clock is not None:
+            self.segment_at(time_ps)
+        later = (f.shutter for f in self._frames if f.shutter.readout_ps >= time_ps)
+        return next(later, None)
+
+    def _end_ps(self, clock: PixelClock, span: _Span) -> int:
+        """Where a consumer that counts from the span's first edge sees its end."""
+        return clock.edge_ps(span.first) + span.clocks * PS_PER_S // self._hz
+
+    def _append(self, span: _Span) -> None:
+        self._spans.append(span)
+        if span.rows and span.frame is not None:
+            self._frames.append(span.frame)
+
+    def _after(self, clock: PixelClock, last: _Span) -> _Span:
+        """What follows ``last`` when nothing changes."""
+        if not self.enabled:
+            return _Span(last.end, IDLE_CLOCKS, vsync=0)
+        if last.frame is None or last.cut:
+            return self._read_out(clock, last.end, None)
+        if not last.rows:
+            return self._read_out(clock, last.end, last.frame)
+        undefined = last.frame.number == 0
+        vsync = int(undefined and not self._vsync_before_first_frame)
+        clocks = (last.frame.lines - ROWS) * LINE_CLOCKS
+        return _Span(last.end, clocks, vsync, last.frame)
+
+    def _read_out(self, clock: PixelClock, first: int, before: _Frame | None) -> _Span:
+        """The read-out of the frame after ``before``, or of the undefined one."""
+        active = self._registers.active
+        lines = frame_lines(active("CLOCKS_PER_SECOND"), active("FRAMES_PER_SECOND"))
+        programmed = exposure_lines(active("EXPOSURE_RULE"), active("EXPOSURE"), lines)
+        if before is None:
+            generator = np.random.default_rng([self._seed, 0xF125, self._enables])
+            exposure, wanted = int(generator.integers(1, lines)), programmed
+        else:
+            exposure = wanted = before.next_exposure
+        shutter = RollingShutter(
+            clock.edge_ps(first), LINE_CLOCKS * self.period, exposure, programmed_lines=wanted
+        )
+        number = 0 if before is None else before.number + 1
+        frame = _Frame(number, shutter, self._corrections(), lines, next_exposure=programmed)
+        return _Span(first, ROWS * LINE_CLOCKS, 1, frame, ROWS)
+
+    def _corrections(self) -> Corrections:
+        register, value = (
+            REGISTERS["HARDWARE_FEATURES"],
+            self._registers.active("HARDWARE_FEATURES"),
+        )
+        return Corrections(
+            defects=bool(register.field("DEFECT_CORRECTION").of(value)),
+            fixed_pattern=bool(register.field("FPN_CORRECTION").of(value)),
+            dark=bool(register.field("DARK_SUBTRACTION").of(value)),
+        )
+
+    def _replan(self, now_ps: int, *, cut: bool) -> None:
+        """Forget what was planned from ``now_ps`` on; with ``cut``, the present span too."""
+        clock = self._clock
+        assert clock is not None
+        self.segment_at(now_ps)
+        edge = clock.first_edge(now_ps)
+        while self._spans[-1].first >= edge and len(self._spans) > 1:
+            self._spans.pop()
+        self._forget_frames(now_ps)
+        last = self._spans[-1]
+        if last.first > edge:
+            raise ValueError(
+                f"the sensor can not change at {now_ps} ps after its output was looked up to "
+                f"{clock.edge_ps(last.first)} ps"
+            )
+        if cut:
+            self._enables += self.enabled
+            self._spans[-1] = replace(last, clocks=edge - last.first, cut=True)
+        self.on_change()
+
+    def _forget_frames(self, now_ps: int) -> None:
+        while self._frames and self._frames[-1].shutter.readout_ps >= now_ps:
+            self._frames.pop()
+
+    def _renderer(self, frame: _Frame) -> Callable[[], NDArray[np.uint8]]:
+        def render() -> NDArray[np.uint8]:
+            if self._rendered is None or self._rendered[:2] != (frame, self.scene):
+                picture = self._imager.picture(self.scene, frame.shutter, frame.corrections)
+                self._rendered = frame, self.scene, picture
+            return self._rendered[2]
+
+        return render

@@ -1,0 +1,1 @@
+"""The MT9M001 image sensor of AraMiS."""

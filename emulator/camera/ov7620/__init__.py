@@ -1,0 +1,1 @@
+"""The OV7620 image sensor of CubeSense, with its fisheye."""

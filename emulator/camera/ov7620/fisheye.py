@@ -1,0 +1,157 @@
+"""CubeSense's fisheye lens: directions to pixels and back, and the directions of all pixels.
+
+CubeSense thesis, section 5.1.1 (boresight, table 5.1), section 5.2.1 (2.9 px for a degree of field
+angle, equation 5.2.1, and the measured distortion polynomial, equation 5.2.3) and appendix A.3
+(field of 190 deg). By the polynomial the field ends 226.6 px from the boresight; table 5.1 gives
+the rim as 226 px.
+
+Equation 5.2.3 gives 0.10 px at no field angle at all. What it puts within that radius is taken to
+be the boresight.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cubestack.firmware_model.interface.cubesense.codes import (
+    COLUMNS,
+    PIXELS_PER_DEGREE,
+    ROWS,
+    Camera,
+)
+
+__all__ = [
+    "DISTORTION",
+    "FIELD_DEG",
+    "LENSES",
+    "Fisheye",
+    "angles_from_vector",
+    "distorted",
+    "undistorted",
+    "vector_from_angles",
+]
+
+DISTORTION = (-2.5572e-6, 7.6076e-5, 0.9953, 0.1036)
+"""Coefficients of equation 5.2.3, highest power first; radii in px."""
+
+FIELD_DEG = 95.0
+"""Largest angle from the boresight that the lens images, half of 190 deg (appendix A.3)."""
+
+_NEWTON_STEPS = 8
+
+
+def distorted(radius_px: ArrayLike) -> NDArray[np.float64]:
+    """Distance from the boresight in the picture of what belongs at ``radius_px`` (equation 5.2.3).
+
+    Rises with ``radius_px`` up to 370 px, far beyond the field's 275.5 px.
+    """
+    return np.asarray(np.polyval(DISTORTION, np.asarray(radius_px, np.float64)))
+
+
+def undistorted(radius_px: ArrayLike) -> NDArray[np.float64]:
+    """Inverse of :func:`distorted` within the field, exact; 0 below its smallest value."""
+    target = np.asarray(radius_px, np.float64)
+    radius = np.minimum(target, distorted(FIELD_DEG * PIXELS_PER_DEGREE))
+    slope = np.polyder(DISTORTION)
+    for _ in range(_NEWTON_STEPS):
+        radius = radius - (distorted(radius) - target) / np.polyval(slope, radius)
+    return np.maximum(radius, 0)
+
+
+def vector_from_angles(alpha_deg: ArrayLike, beta_deg: ArrayLike) -> NDArray[np.float64]:
+    """Unit vectors (..., 3) in camera axes of a sensor's two angles in degrees.
+
+    The angles are undistorted picture coordinates: their root sum of squares is the angle from the
+    boresight, and they divide it into x (right) and y (down).
+    """
+    theta, phi = np.radians(np.hypot(alpha_deg, beta_deg)), np.arctan2(beta_deg, alpha_deg)
+    return np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    )
+
+
+def angles_from_vector(vector: ArrayLike) -> tuple[float, float]:
+    """A sensor's alpha and beta in degrees of a direction (3,) in camera axes, of any length."""
+    x, y, z = np.asarray(vector, np.float64)
+    theta, phi = np.degrees(np.arctan2(np.hypot(x, y), z)), np.arctan2(y, x)
+    return float(theta * np.cos(phi)), float(theta * np.sin(phi))
+
+
+@dataclass(frozen=True)
+class Fisheye:
+    """One camera's lens. Pixel coordinates have (0, 0) at the first pixel's centre.
+
+    Attributes:
+        cx, cy: boresight and centre of distortion, px.
+    """
+
+    cx: float
+    cy: float
+
+    def project(self, vector: ArrayLike) -> NDArray[np.float64] | None:
+        """Pixel coordinates (2,) of a direction (3,) in camera axes; None outside the field."""
+        angles = np.array(angles_from_vector(vector))
+        theta = float(np.hypot(*angles))
+        if theta > FIELD_DEG:
+            return None
+        if theta == 0:
+            return np.array([self.cx, self.cy])
+        stretch = distorted(theta * PIXELS_PER_DEGREE) / theta
+        return np.array([self.cx, self.cy]) + angles * stretch
+
+    def unproject(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Unit vectors (n, 3) in camera axes of pixel coordinates (n, 2) within the field."""
+        offset = np.asarray(pixels, np.float64) - (self.cx, self.cy)
+        radius = np.hypot(offset[:, 0], offset[:, 1])
+        theta = undistorted(radius) / PIXELS_PER_DEGREE
+        angles = offset * (theta / np.where(radius == 0, 1, radius))[:, None]
+        return vector_from_angles(angles[:, 0], angles[:, 1])
+
+    @cached_property
+    def field(self) -> "FieldOfView":
+        """Directions of all pixels that see anything."""
+        return FieldOfView.of(self)
+
+
+@dataclass(frozen=True, eq=False)
+class FieldOfView:
+    """The pixels within a lens' field, in the order of the picture.
+
+    Attributes:
+        index: flat indices (n,) in the picture of 480 rows of 640.
+        vectors: unit vectors (n, 3) in camera axes, float32.
+        pixel_rad: angle (n,) that a pixel covers, the mean of both directions, float32.
+        lit: share (n,) of each pixel within the field; below 1 only along the rim, float32.
+    """
+
+    index: NDArray[np.int64]
+    vectors: NDArray[np.float32]
+    pixel_rad: NDArray[np.float32]
+    lit: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, lens: Fisheye) -> "FieldOfView":
+        """Work it out for ``lens``."""
+        rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
+        radius = np.hypot(columns - lens.cx, rows - lens.cy)
+        rim = float(distorted(FIELD_DEG * PIXELS_PER_DEGREE))
+        lit = np.clip(rim - radius + 0.5, 0, 1)
+        index = np.flatnonzero(lit)
+        wide = undistorted(np.minimum(radius[index], rim))
+        # Across the radius a pixel is 1 / radius of a turn, along it as long as the slope says.
+        along = 1 / np.polyval(np.polyder(DISTORTION), wide)
+        across = np.sin(np.radians(wide / PIXELS_PER_DEGREE)) / np.maximum(radius[index], 1)
+        along_rad = np.radians(along / PIXELS_PER_DEGREE)
+        across_rad = np.where(radius[index] < 1, along_rad, across)
+        return cls(
+            index,
+            lens.unproject(np.stack([columns[index], rows[index]], axis=1)).astype(np.float32),
+            np.sqrt(along_rad * across_rad).astype(np.float32),
+            lit[index].astype(np.float32),
+        )
+
+
+LENSES = {Camera.SUN: Fisheye(369, 250), Camera.NADIR: Fisheye(371, 236)}
+"""Each camera's own boresight (table 5.1)."""

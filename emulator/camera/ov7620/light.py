@@ -1,0 +1,152 @@
+"""Light of a scene through CubeSense's fisheyes: Earth, Sun, Moon and reflections on the pixels.
+
+CubeSense thesis, section 3.1.2.2 (the ND 4 filter on the sun side), section 5.1.3.2 (the Sun's
+image is 8 px in radius on the boresight and 6 px near the rim, for its 0.27 deg), section 5.1.4
+(sun exposure) and section 5.7 (levels). Unit: grey values above black for one line time of
+exposure at gain 1.
+
+The thesis explains the Sun's size by charge that flows over from full pixels into their neighbours.
+Here its image is a round Gaussian spot of light, wider than the Sun and saturated in its middle, of
+the published size. The nadir camera, without a filter, makes a far brighter spot of it.
+
+A picture is taken as of one instant: what is neglected is the satellite's turn during a read-out.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.ov7620.fisheye import LENSES, Fisheye, vector_from_angles
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
+from cubestack.firmware_model.interface.cubesense.codes import (
+    COLUMNS,
+    PIXELS_PER_DEGREE,
+    ROWS,
+    Camera,
+)
+
+__all__ = ["USUAL_EXPOSURE", "scene_light"]
+
+USUAL_EXPOSURE = {Camera.SUN: 1, Camera.NADIR: 4}
+"""Counts of the exposure register that the published levels belong to.
+
+Sun: 127 us (published). Nadir: "set once", to what is not published; assumed.
+"""
+
+EARTH_LEVEL = 120.4
+"""Grey values above black of radiance 1 in the nadir camera: fitted.
+
+The whole Earth, seen from 750 km with the Sun behind the satellite, then has the published mean of
+153, 119 above black.
+"""
+
+FILTER = {Camera.SUN: 1e-4, Camera.NADIR: 1.0}
+"""Transmission (published)."""
+
+SUN_EDGE = 65.0
+"""Grey values above black that bound the Sun's image: 30 % of its level, 99 with black (5.7)."""
+
+SUN_SPOT = 0.367
+"""Standard deviation of the Sun's spot by its radius on the boresight: fitted.
+
+The spot is then bright enough to shrink from 8 px to the measured 6 px where the filter takes as
+much as :func:`_slant_transmission` says at the rim.
+"""
+
+PIXEL_MM, BACK_FOCAL_MM = 7.6e-3, 2.77
+"""Appendix A.1 and A.3."""
+
+MOON_RADIANCE = 0.4
+"""Full Moon by the mean Earth: albedo 0.12 by 0.3."""
+
+MOON_RADIUS_DEG = 0.26
+MOON_SPOT_PX = 0.6  # assumed: its disc, 0.75 px in radius, and the sharp lens
+FAINTEST = 1e-3
+"""Light that is left out, grey values a line time."""
+
+Light = NDArray[np.float32]
+
+
+def scene_light(scene: EarthSunScene, camera: Camera, time_ps: int) -> Light:
+    """Grey values (480, 640) above black that ``camera`` gains in each line time of exposure."""
+    lens = LENSES[camera]
+    light = np.zeros((ROWS, COLUMNS), np.float32)
+    sun = scene.seen(scene.sun, camera, time_ps)
+    earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(Camera.NADIR)
+    seen, radiance = scene.earth.radiance(
+        lens.field.vectors,
+        lens.field.pixel_rad,
+        scene.seen(scene.nadir, camera, time_ps),
+        sun,
+        scene.axes(camera, time_ps),
+    )
+    radiance *= lens.field.lit[seen] * np.float32(earth_level)
+    light.ravel()[lens.field.index[seen]] = radiance
+    if not scene.hidden(scene.sun):
+        _add_sun(light, scene.bloom_px, camera, sun)
+    if scene.moon is not None and not scene.hidden(scene.moon):
+        moon = scene.seen(scene.moon, camera, time_ps)
+        _add_moon(light, lens, moon, earth_level * MOON_RADIANCE * (1 - float(moon @ sun)) / 2)
+    for reflection in scene.reflections:
+        if reflection.camera is camera:
+            centre = lens.project(vector_from_angles(reflection.alpha_deg, reflection.beta_deg))
+            assert centre is not None  # its angles have been checked
+            _add_disc(light, centre, reflection.radius_px, reflection.level / _usual_lines(camera))
+    return light
+
+
+def _usual_lines(camera: Camera) -> int:
+    return USUAL_EXPOSURE[camera] * EXPOSURE_LINES
+
+
+def _add_sun(light: Light, bloom_px: float, camera: Camera, vector: NDArray[np.float64]) -> None:
+    lens = LENSES[camera]
+    centre = lens.project(vector)
+    if centre is None:
+        return
+    peak = SUN_EDGE * math.exp(1 / (2 * SUN_SPOT**2))
+    unfiltered = peak / FILTER[Camera.SUN] / _usual_lines(Camera.SUN)
+    transmission = _slant_transmission(FILTER[camera], math.dist(centre, (lens.cx, lens.cy)))
+    _add_spot(light, centre, SUN_SPOT * bloom_px, unfiltered * transmission)
+
+
+def _slant_transmission(straight: float, radius_px: float) -> float:
+    """Transmission of a filter behind the lens for light that reaches ``radius_px``.
+
+    Assumed: the path through the filter is as oblique as the line from the centre of the last lens
+    element, and not refracted. At the rim a fifth of the filtered light is left.
+    """
+    return float(straight ** math.hypot(1, radius_px * PIXEL_MM / BACK_FOCAL_MM))
+
+
+def _add_moon(light: Light, lens: Fisheye, vector: NDArray[np.float64], level: float) -> None:
+    centre = lens.project(vector)
+    if centre is not None:
+        area_px = math.pi * (MOON_RADIUS_DEG * PIXELS_PER_DEGREE) ** 2
+        _add_spot(light, centre, MOON_SPOT_PX, level * area_px / (2 * math.pi * MOON_SPOT_PX**2))
+
+
+def _add_spot(light: Light, centre: NDArray[np.float64], sigma_px: float, peak: float) -> None:
+    """Add a round Gaussian of light."""
+    if peak > FAINTEST:
+        reach = sigma_px * math.sqrt(2 * math.log(peak / FAINTEST))
+        patch, distance2 = _patch(light, centre, reach)
+        patch += np.float32(peak) * np.exp(distance2 * np.float32(-0.5 / sigma_px**2))
+
+
+def _add_disc(light: Light, centre: NDArray[np.float64], radius_px: float, level: float) -> None:
+    """Add an even disc, its edge a pixel wide."""
+    patch, distance2 = _patch(light, centre, radius_px + 1)
+    patch += np.float32(level) * np.clip(radius_px + 0.5 - np.sqrt(distance2), 0, 1)
+
+
+def _patch(light: Light, centre: NDArray[np.float64], reach: float) -> tuple[Light, Light]:
+    """The part of the picture around ``centre``, and its squared distances from there."""
+    x, y = centre
+    left, top = max(0, math.ceil(x - reach)), max(0, math.ceil(y - reach))
+    patch = light[top : max(0, math.floor(y + reach) + 1), left : max(0, math.floor(x + reach) + 1)]
+    rows, columns = patch.shape
+    dx, dy = np.arange(left, left + columns) - x, np.arange(top, top + rows) - y
+    return patch, (dx * dx + (dy * dy)[:, None]).astype(np.float32)

@@ -1,0 +1,64 @@
+"""From light on the OV7620's pixels to its 8-bit Y output, with all that disturbs it.
+
+CubeSense thesis, section 5.7 (a dark picture has the mean level 34), section 6.6.1 (pixels that
+are stuck above a threshold) and appendix A.1 (signal to noise ratio above 48 dB). The split of the
+noise into a part that is always there and one that grows with the light is assumed; both together
+give 48 dB at full scale and gain 1. Dark current and fixed pattern are left out: at these exposures
+and 8 bits neither reaches a tenth of a grey value.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
+
+__all__ = ["BLACK", "FULL_SCALE", "luminance", "stuck_pixels"]
+
+BLACK = 34
+"""Level of no light (published, for both cameras)."""
+
+FULL_SCALE = 255
+READ_NOISE = 0.7  # grey values (assumed)
+SHOT_NOISE = (1 - READ_NOISE**2) / (FULL_SCALE - BLACK)
+"""Variance of one grey value of light: makes one grey value of noise, 48 dB, at full scale."""
+
+
+def luminance(
+    light: NDArray[np.float32],
+    gain: float,
+    generator: np.random.Generator | None,
+    stuck: NDArray[np.int64],
+) -> NDArray[np.uint8]:
+    """Grey values (480, 640) of ``light``, of the same shape.
+
+    Args:
+        light: grey values above black at gain 1, without a limit.
+        gain: amplification.
+        generator: source of this frame's noise; None for an ideal sensor.
+        stuck: flat indices of pixels at full scale.
+    """
+    if generator is None:
+        signal = light * np.float32(gain)
+    else:
+        signal = generator.standard_normal(light.shape, np.float32)
+        signal *= np.sqrt(light * np.float32(SHOT_NOISE) + np.float32(READ_NOISE**2))
+        signal += light
+        signal *= np.float32(gain)
+    signal += np.float32(BLACK + 0.5)
+    grey = np.clip(signal, 0, FULL_SCALE, out=signal).astype(np.uint8)
+    grey.ravel()[stuck] = FULL_SCALE
+    return grey
+
+
+@lru_cache(maxsize=8)
+def stuck_pixels(seed: int, camera: Camera, singles: int, pairs: int) -> NDArray[np.int64]:
+    """Flat indices of ``singles`` stuck pixels and ``pairs`` of them side by side in a row."""
+    generator = np.random.default_rng([seed, camera, 0x407])
+    # Slots of four columns, so that no two of them make a run of three.
+    slots = 4 * generator.choice(ROWS * COLUMNS // 4, singles + pairs, replace=False)
+    first = slots + generator.integers(0, 2, len(slots))
+    stuck: NDArray[np.int64] = np.concatenate([first, first[:pairs] + 1])
+    stuck.flags.writeable = False
+    return stuck

@@ -1,0 +1,283 @@
+"""The OV7620 image sensor: registers on its two control lines, frames on its pixel lines.
+
+CubeSense thesis, sections 3.2 and 6.4.1 and appendix A; OV7620 product specifications, section
+1.13. A frame has 525 lines of 858 clocks at 13.5 MHz. What the sources leave open, we take:
+
+- PCLK runs whenever the part has power, on a fixed grid, and frames follow each other from then on.
+  A frame begins with blanking; VSYN is high in all blanking between frames.
+- HREF rises with a line's first clock, wherever the window begins. The window's rows keep their
+  places in the frame. It is cut to 640 x 480 pixels, at least 4 x 2: the rest of the 664 x 492
+  pixels is never sent.
+- Values count from the next frame on; the exposure one frame later, as its rows are exposed while
+  the frame before is read out.
+- Automatic exposure and gain settle at once on a mean level of the picture.
+- Without black-and-white mode, Y is the mean of two rows.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.emulator.camera.ov7620.light import scene_light
+from cubestack.emulator.camera.ov7620.luminance import BLACK, luminance, stuck_pixels
+from cubestack.emulator.camera.ov7620.sccb import SccbSlave
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cameras.ov7620 import (
+    CLOCKS_PER_LINE,
+    EXPOSURE_LINES,
+    LINES_PER_FRAME,
+    PIXEL_CLOCK_HZ,
+    REGISTERS,
+    window_column,
+    window_row,
+)
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
+
+__all__ = ["Ov7620"]
+
+FRAME_CLOCKS = LINES_PER_FRAME * CLOCKS_PER_LINE
+LINES_BEFORE = LINES_PER_FRAME - ROWS
+"""Blanking before the picture's first row: all of the frame's."""
+
+AUTO_LEVEL = 100.0
+"""Mean grey value that automatic exposure and gain aim at: assumed."""
+
+LONGEST_EXPOSURE, HIGHEST_GAIN = 255, 7.75  # of EXPOSURE and GAIN
+REMEMBERED = 8
+"""Frames kept: more than anybody looks ahead or back."""
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """What the registers ask for when a frame begins."""
+
+    columns: range
+    rows: range
+    gain: float
+    exposure_lines: int
+    mirror: bool
+    monochrome: bool
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """One frame, counted from power-up."""
+
+    number: int
+    settings: _Settings
+    shutter: RollingShutter
+
+
+class Ov7620:
+    """One camera of CubeSense, powered from time 0 on.
+
+    Attributes:
+        scene: what it looks at. A new one is seen by the next frame that is rendered.
+        camera: which of the two it is.
+        line_clocks: pixel clocks of a line.
+        active_columns: those of them with HREF high, in the segment handed out last.
+        on_change: called after the output from now on has become another than announced.
+    """
+
+    line_clocks = CLOCKS_PER_LINE
+
+    def __init__(self, scene: EarthSunScene, camera: Camera) -> None:
+        """Power up."""
+        self.scene = scene
+        self.camera = camera
+        self.active_columns = COLUMNS
+        self.on_change: Callable[[], None] = lambda: None
+        self._registers = RegisterFile(REGISTERS)
+        self._sccb = SccbSlave(REGISTERS.i2c_address, self._write)
+        self._clock: PixelClock | None = PixelClock(PIXEL_CLOCK_HZ)
+        self._frames: OrderedDict[int, _Frame] = OrderedDict()
+        self._light: tuple[EarthSunScene, int, NDArray[np.float32]] | None = None
+        self._rendered: tuple[_Frame, EarthSunScene, NDArray[np.uint8]] | None = None
+
+    @property
+    def period(self) -> Fraction:
+        """Time of one pixel clock in ps."""
+        return Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+
+    @property
+    def running(self) -> bool:
+        """Whether the part has power."""
+        return self._clock is not None
+
+    def power(self, on: bool, now_ps: int) -> None:
+        """Turn the supply on or off; registers then have their reset values."""
+        if on == self.running:
+            return
+        self._registers.reset()
+        self._sccb = SccbSlave(REGISTERS.i2c_address, self._write)
+        self._frames.clear()
+        self._clock = PixelClock(PIXEL_CLOCK_HZ, now_ps) if on else None
+        self.on_change()
+
+    # --- control lines --------------------------------------------------------------------------
+
+    @property
+    def sda(self) -> int:
+        """0 while the camera pulls SDA low, else 1."""
+        return self._sccb.sda
+
+    def on_pin(self, name: str, level: int, now_ps: int) -> None:
+        """The microcontroller set SCL or SDA; nothing happens without power."""
+        if self.running:
+            self._sccb.on_pin(name, level, now_ps)
+
+    def _write(self, address: int, value: int, now_ps: int) -> None:
+        clock = self._clock
+        assert clock is not None
+        # What has begun keeps its settings, and the frame after it their exposure.
+        begun = self._frame(clock, max(0, clock.first_edge(now_ps + 1) - 1) // FRAME_CLOCKS)
+        self._registers.select(address)
+        self._registers.write(value)
+        common_a = REGISTERS["COMMON_A"]
+        if common_a.field("RESET").of(self._registers.active("COMMON_A")):
+            self._registers.reset()
+        stale = [number for number in self._frames if number > begun.number]
+        for number in stale:
+            del self._frames[number]
+        if stale:
+            self.on_change()
+
+    # --- pixel lines ----------------------------------------------------------------------------
+
+    def segment_at(self, time_ps: int) -> StreamSegment | None:
+        """The stretch of output at ``time_ps``, not before the last change; None without clock."""
+        clock = self._clock
+        if clock is None:
+            return None
+        number = max(0, clock.first_edge(time_ps) - 1) // FRAME_CLOCKS
+        while True:
+            frame = self._frame(clock, number)
+            first = number * FRAME_CLOCKS
+            for rows, lines in self._stretches(frame.settings):
+                clocks = lines * CLOCKS_PER_LINE
+                start = clock.edge_ps(first)
+                # Where a consumer that counts from the first edge sees the end.
+                if start + clocks * PS_PER_S // PIXEL_CLOCK_HZ > time_ps:
+                    self.active_columns = len(frame.settings.columns)
+                    pixels = self._renderer(frame) if rows else None
+                    return StreamSegment(start, clocks, int(not rows), rows, pixels)
+                first += clocks
+            number += 1
+
+    def frame_from(self, time_ps: int) -> RollingShutter:
+        """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
+
+        Only a part with power has frames, and only the last few are remembered as they were.
+        """
+        clock = self._clock
+        assert clock is not None
+        number = max(0, clock.first_edge(time_ps) - LINES_BEFORE * CLOCKS_PER_LINE) // FRAME_CLOCKS
+        while (shutter := self._frame(clock, number).shutter).readout_ps < time_ps:
+            number += 1
+        return shutter
+
+    @staticmethod
+    def _stretches(settings: _Settings) -> list[tuple[int, int]]:
+        """Rows sent, and lines, of each part of a frame."""
+        before = LINES_BEFORE + settings.rows.start
+        after = LINES_PER_FRAME - before - len(settings.rows)
+        parts = [(0, before), (len(settings.rows), len(settings.rows)), (0, after)]
+        return [(rows, lines) for rows, lines in parts if lines]
+
+    def _frame(self, clock: PixelClock, number: int) -> _Frame:
+        if number in self._frames:
+            return self._frames[number]
+        # A frame row's time is that of its line, so row 0 counts even if it is not sent.
+        readout_ps = clock.edge_ps(number * FRAME_CLOCKS + LINES_BEFORE * CLOCKS_PER_LINE)
+        settings = self._settings(readout_ps)
+        before = self._frames.get(number - 1)
+        exposure = settings.exposure_lines if before is None else before.settings.exposure_lines
+        shutter = RollingShutter(readout_ps, CLOCKS_PER_LINE * self.period, exposure, exposure)
+        self._frames[number] = frame = _Frame(number, settings, shutter)
+        while len(self._frames) > REMEMBERED:
+            self._frames.popitem(last=False)
+        return frame
+
+    def _settings(self, time_ps: int) -> _Settings:
+        active = self._registers.active
+
+        def bit(register: str, field: str) -> bool:
+            return bool(REGISTERS[register].field(field).of(active(register)))
+
+        exposure, gain = max(active("EXPOSURE"), 1), _gain(active("GAIN"))
+        automatic = bit("COMMON_B", "AUTO_ADJUST")
+        if automatic and not bit("COMMON_I", "MANUAL_EXPOSURE"):
+            counts = self._wanted(time_ps) / (EXPOSURE_LINES * gain)
+            exposure = round(min(max(counts, 1), LONGEST_EXPOSURE))
+        if automatic and bit("COMMON_A", "AUTO_GAIN"):
+            gain = self._wanted(time_ps) / (EXPOSURE_LINES * exposure)
+            gain = min(max(gain, 1.0), HIGHEST_GAIN)
+        return _Settings(
+            _window(active("HSTART") - window_column(0), active("HSTOP") - window_column(0), 4),
+            _window(active("VSTART") - window_row(0), active("VSTOP") - window_row(0), 2),
+            gain,
+            EXPOSURE_LINES * exposure,
+            bit("COMMON_A", "MIRROR"),
+            bit("COMMON_H", "BLACK_AND_WHITE"),
+        )
+
+    # --- the picture ----------------------------------------------------------------------------
+
+    def _renderer(self, frame: _Frame) -> Callable[[], NDArray[np.uint8]]:
+        def render() -> NDArray[np.uint8]:
+            if self._rendered is None or self._rendered[:2] != (frame, self.scene):
+                self._rendered = frame, self.scene, self._picture(frame)
+            return self._rendered[2]
+
+        return render
+
+    def _picture(self, frame: _Frame) -> NDArray[np.uint8]:
+        scene, settings, shutter = self.scene, frame.settings, frame.shutter
+        light = self._light_at(shutter.mid_exposure_ps((ROWS - 1) / 2))
+        light = light * np.float32(shutter.exposure_lines)
+        if not settings.monochrome:
+            light[:-1] = (light[:-1] + light[1:]) / 2
+        generator = None
+        if scene.noise:
+            # By frame time, so that a frame nobody looked at does not change the next one's noise.
+            seed = [scene.seed, self.camera, shutter.readout_ps]
+            generator = np.random.Generator(np.random.SFC64(seed))
+        stuck = stuck_pixels(scene.seed, self.camera, scene.hot_pixels, scene.hot_pairs)
+        grey = luminance(light, settings.gain, generator, stuck)
+        rows, columns = settings.rows, settings.columns
+        window = grey[rows.start : rows.stop, columns.start : columns.stop]
+        return np.ascontiguousarray(window[:, ::-1] if settings.mirror else window)
+
+    def _light_at(self, time_ps: int) -> NDArray[np.float32]:
+        if not np.any(self.scene.rate_deg_s):
+            time_ps = 0  # the same at all times
+        if self._light is None or self._light[:2] != (self.scene, time_ps):
+            self._light = self.scene, time_ps, scene_light(self.scene, self.camera, time_ps)
+        return self._light[2]
+
+    def _wanted(self, time_ps: int) -> float:
+        """Line times of exposure at gain 1 that bring the picture's mean to the level aimed at."""
+        mean = float(self._light_at(time_ps).mean())
+        return (AUTO_LEVEL - BLACK) / max(mean, 1e-6)
+
+
+def _gain(value: int) -> float:
+    """Amplification by register GAIN (OV7620 product specifications, section 1.13)."""
+    register = REGISTERS["GAIN"]
+    fine, double, again = (register.field(f).of(value) for f in ("FINE", "DOUBLE", "DOUBLE_AGAIN"))
+    return (1 + fine / 16) * (1 + double) * (1 + again)
+
+
+def _window(start: int, stop: int, step: int) -> range:
+    """Columns or rows sent, by the window registers less their offset."""
+    limit = COLUMNS if step == 4 else ROWS
+    first = min(max(start * step, 0), limit - step)
+    return range(first, min(max(stop * step, first + step), limit))

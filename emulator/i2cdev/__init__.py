@@ -1,0 +1,1 @@
+"""/dev/i2c-N for unmodified programs."""

@@ -1,0 +1,172 @@
+"""Starts a program that sees the emulated /dev/i2c-N, by one of two routes.
+
+seccomp  the kernel sends the program's calls to a supervisor in this process: any program, also one
+         that is linked statically, and no compiler. Needs Linux 5.9, and leave to filter.
+preload  a library in the program takes the calls: programs that are linked dynamically with glibc.
+         Needs a C compiler, once; it works where a container refuses the other.
+"""
+
+import contextlib
+import ctypes
+import errno
+import os
+import select
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+from cubestack.emulator.i2cdev.device_node import DeviceNode
+from cubestack.emulator.i2cdev.preload.elf import is_static
+from cubestack.emulator.i2cdev.seccomp.filter import make_filter, native_abi
+from cubestack.emulator.i2cdev.seccomp.notify import Listener, read_memory
+from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor, descriptor_range
+from cubestack.emulator.ports.serial_port import poll_now
+
+__all__ = ["Program", "Route", "RouteError", "bus_environment", "start_filtered", "start_preloaded"]
+
+Route = Literal["seccomp", "preload"]
+
+LAUNCHER = Path(__file__).parent / "seccomp" / "launcher.py"
+MESSAGE_BYTES = 4096
+PR_SET_CHILD_SUBREAPER = 36
+SEPARATORS = frozenset(": \t\n")
+"""What separates libraries in LD_PRELOAD."""
+
+SIGNALLED = 128
+"""Exit code of a program that a signal ended, less the signal: as shells have it."""
+
+
+class RouteError(RuntimeError):
+    """A route is not there on this machine; the text says why."""
+
+
+def bus_environment(bus: int, path: str) -> dict[str, str]:
+    """What a program finds in its environment: the bus, and the socket that serves it."""
+    return {"CUBESTACK_I2C_BUS": str(bus), "CUBESTACK_I2C_SOCKET": path}
+
+
+class Program:
+    """A running program; as a port of the pump it wakes it when the program ends.
+
+    Attributes:
+        name: what was started.
+    """
+
+    congested = False
+
+    def __init__(
+        self, process: "subprocess.Popen[bytes]", name: str, *, adopts: bool = False
+    ) -> None:
+        """Watch ``process``; ``adopts`` says that what it leaves behind becomes ours."""
+        self.name = name
+        self._adopts = adopts
+        self._process = process
+        self._pidfd = os.pidfd_open(process.pid)
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended, as far as ``exchange`` has seen."""
+        return self._process.returncode is not None
+
+    @property
+    def exit_code(self) -> int:
+        """Its exit code as a shell would give it; waits for the end."""
+        code = self._process.wait()
+        return code if code >= 0 else SIGNALLED - code
+
+    def send(self, number: int) -> None:
+        """Send it a signal, if it still runs."""
+        self._process.send_signal(number)
+
+    def watched(self) -> list[tuple[int, int]]:
+        """See Endpoint."""
+        return [] if self.ended else [(self._pidfd, select.POLLIN)]
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+        if not self.ended:
+            if poll_now(self._pidfd, select.POLLIN):
+                self._process.poll()
+        elif self._adopts:
+            _bury_children()
+
+    def release_ps(self, count: int) -> int | None:
+        """See Endpoint."""
+        return None
+
+    def close(self) -> None:
+        """See Endpoint."""
+        os.close(self._pidfd)
+
+
+def start_filtered(
+    command: Sequence[str], environment: dict[str, str], node: DeviceNode, files: Files
+) -> tuple[Program, Supervisor]:
+    """Start ``command`` under a supervisor, which must be served from now on.
+
+    Raises RouteError when the kernel, or whoever runs this container, does not allow it.
+    """
+    abi = native_abi()
+    if abi is None:
+        raise RouteError(f"no table of system calls for {os.uname().machine}")
+    numbers = descriptor_range()
+    # A kernel that lets a process look into its descendants only (yama) shall let us.
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with ours, theirs:
+        theirs.set_inheritable(True)
+        launch = [sys.executable, "-I", "-S", str(LAUNCHER), str(theirs.fileno())]
+        process = subprocess.Popen(
+            [*launch, str(abi.seccomp), *command],
+            env=os.environ | environment,
+            close_fds=False,  # what was handed to us is for the program
+        )
+        theirs.close()
+        _check_access(process)
+        ours.send(make_filter(abi, numbers))
+        answer, descriptors, _, _ = socket.recv_fds(ours, MESSAGE_BYTES, 1)
+    if not descriptors:
+        process.wait()
+        raise RouteError(answer[1:].decode() or "the launcher failed")
+    supervisor = Supervisor(Listener(descriptors[0]), abi, node, numbers, files)
+    return Program(process, command[0], adopts=True), supervisor
+
+
+def start_preloaded(command: Sequence[str], environment: dict[str, str], library: Path) -> Program:
+    """Start ``command`` with the shim ``library``; the socket that it will use must be served.
+
+    Raises RouteError when nothing can be loaded into it.
+    """
+    program = shutil.which(command[0])
+    if program is not None and is_static(Path(program)):
+        raise RouteError(f"{program} is linked statically, so no library can be loaded into it")
+    if SEPARATORS & set(str(library)):
+        raise RouteError(f"{library} has a blank or colon; XDG_CACHE_HOME names another folder")
+    others = os.environ.get("LD_PRELOAD")
+    preload = f"{library} {others}" if others else str(library)
+    process = subprocess.Popen(
+        command, env=os.environ | environment | {"LD_PRELOAD": preload}, close_fds=False
+    )
+    return Program(process, command[0])
+
+
+def _check_access(process: "subprocess.Popen[bytes]") -> None:
+    """Raise RouteError unless we may read the memory of ``process``, which is ended then."""
+    try:
+        read_memory(process.pid, 0, 1)
+    except OSError as error:
+        if error.errno != errno.EFAULT:  # which says that we may, but that nothing is there
+            process.kill()
+            process.wait()
+            raise RouteError(f"no access to the program's memory ({error.strerror})") from None
+
+
+def _bury_children() -> None:
+    """Let processes that have ended go: only then does the kernel let their filter go."""
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass

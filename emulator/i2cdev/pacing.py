@@ -1,0 +1,105 @@
+"""Waiting for descriptors: not at all, or to the microsecond, as a byte takes 22.5 of them."""
+
+import ctypes
+import os
+import select
+import struct
+import time
+from collections.abc import Sequence
+
+from cubestack.emulator.ports.realtime import Watched
+from cubestack.emulator.ports.serial_port import Endpoint
+
+__all__ = ["Watch", "has_priority", "sharpen_timers", "wait_precisely"]
+
+PR_SET_TIMERSLACK = 29
+NS_PER_S = 10**9
+
+EARLY_S = 150e-6
+"""Waking up takes that long on an idle machine; who is early asks again."""
+
+NAP_NS = 50_000
+"""What it takes at most on a busy one, with real-time priority."""
+
+CROWDED_NS = 300_000
+"""Who gives the processor away for a moment and gets it back so late is not alone on it."""
+
+ALONE_AGAIN_NS = NS_PER_S
+"""So long nobody without priority waits awake after that."""
+
+_ENTRY = struct.Struct("=ihh")  # struct pollfd
+_TIMEOUT = struct.Struct("=qq")  # struct timespec
+
+_libc = ctypes.CDLL(None)
+_libc.ppoll.argtypes = (ctypes.c_char_p, ctypes.c_ulong, ctypes.c_char_p, ctypes.c_void_p)
+
+
+class Watch:
+    """Waits for ports, mostly for the same ones again and again."""
+
+    def __init__(self, ports: Sequence[Endpoint], *, always_asleep: bool = False) -> None:
+        """Watch ``ports``; ``always_asleep`` where callers wake this process quickly."""
+        self._ports = ports
+        self._poller = select.epoll()
+        self._watched: dict[int, Endpoint] = {}
+        self._always_asleep = always_asleep
+        # Then nobody of less importance gets the processor while we wait awake.
+        self._first = has_priority()
+        self._crowded_until_ns = 0
+
+    def wait(self, timeout_ns: int, *, awake: bool = False) -> list[Endpoint]:
+        """Wait until some are ready, or a signal comes, at most ``timeout_ns``; which are ready.
+
+        With ``awake``, waking up may not take time; that is for processes with real-time priority
+        and for idle machines.
+        """
+        watched = {fileno: port for port in self._ports for fileno, _ in port.watched()}
+        if watched != self._watched:
+            self._change(watched)
+        now_ns = time.monotonic_ns()
+        end_ns = now_ns + timeout_ns
+        ready: list[tuple[int, int]] = []
+        if awake and not self._always_asleep:
+            while (self._first or now_ns >= self._crowded_until_ns) and now_ns < end_ns:
+                if ready := self._poller.poll(0):
+                    break
+                os.sched_yield()
+                before_ns, now_ns = now_ns, time.monotonic_ns()
+                if now_ns - before_ns > CROWDED_NS:
+                    self._crowded_until_ns = now_ns + ALONE_AGAIN_NS
+        if not ready:
+            ready = self._poller.poll(max(0, end_ns - now_ns) / NS_PER_S)
+        return [watched[fileno] for fileno, _ in ready]
+
+    def _change(self, watched: dict[int, Endpoint]) -> None:
+        for fileno in self._watched.keys() - watched.keys():
+            self._poller.unregister(fileno)
+        for fileno in watched.keys() - self._watched.keys():
+            self._poller.register(fileno, select.EPOLLIN)
+        self._watched = watched
+
+    def nap(self, duration_ns: int) -> None:
+        """Sleep less than ``duration_ns``, where waking up is quick."""
+        if self._first and duration_ns > NAP_NS:
+            time.sleep((duration_ns - NAP_NS) / NS_PER_S)
+
+    def close(self) -> None:
+        """Watch no longer; the ports are their owner's."""
+        self._poller.close()
+
+
+def has_priority() -> bool:
+    """Whether this process has real-time priority."""
+    return os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR)
+
+
+def sharpen_timers() -> None:
+    """Ask the kernel to wake this process in time, not up to 50 us late as it usually does."""
+    _libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+
+
+def wait_precisely(watched: Watched, timeout_s: float) -> None:
+    """Like the pump's ``wait_ready``, but never too late: it may end ``EARLY_S`` early."""
+    entries = b"".join(_ENTRY.pack(fileno, events, 0) for fileno, events in watched)
+    timeout_ns = max(0, int((timeout_s - EARLY_S) * NS_PER_S))
+    _libc.ppoll(entries, len(watched), _TIMEOUT.pack(*divmod(timeout_ns, NS_PER_S)), None)

@@ -1,0 +1,157 @@
+"""The bus of an emulation in another process, through its socket, for a supervisor here."""
+
+import errno
+import select
+import socket
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from cubestack.emulator.ports.serial_port import PortError
+from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, reply, request
+
+__all__ = ["RemoteBus"]
+
+CHUNK_BYTES = 1 << 16
+Done = Callable[[bytes], None]
+
+
+class RemoteBus:
+    """A port of the pump, as in ``emulator/ports/endpoint.py``.
+
+    Attributes:
+        name: path of the socket.
+    """
+
+    congested = False
+
+    def __init__(self, path: Path) -> None:
+        """Use the socket at ``path``; raises PortError when nobody serves it."""
+        self.name = str(path)
+        self._files: dict[int, _RemoteFile] = {}
+        self._poller = select.epoll()
+        self._connect().close()
+
+    def open(self) -> "_RemoteFile":
+        """Open a device file; raises PortError."""
+        link = self._connect()
+        fileno = link.fileno()
+        self._poller.register(fileno, select.EPOLLIN)
+        file = _RemoteFile(link, partial(self._poller.modify, fileno), partial(self._drop, fileno))
+        self._files[fileno] = file
+        return file
+
+    def _drop(self, fileno: int) -> None:
+        self._poller.unregister(fileno)
+        del self._files[fileno]
+
+    def _connect(self) -> socket.socket:
+        link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            link.connect(self.name)
+        except OSError as error:
+            link.close()
+            raise PortError(
+                f"no emulation serves {self.name} ({error.strerror or error}); "
+                "start one with cubestack emulate, or leave out --attach"
+            ) from error
+        link.setblocking(False)
+        return link
+
+    def watched(self) -> list[tuple[int, int]]:
+        """See Endpoint."""
+        return [(self._poller.fileno(), select.POLLIN)]
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+        for fileno, _ in self._poller.poll(0):
+            if fileno in self._files:
+                self._files[fileno].exchange()
+
+    def release_ps(self, count: int) -> int | None:
+        """See Endpoint."""
+        return None
+
+    def close(self) -> None:
+        """See Endpoint."""
+        for file in list(self._files.values()):
+            file.close()
+        self._poller.close()
+
+
+class _RemoteFile:
+    """One connection: the other side keeps the file's state."""
+
+    def __init__(
+        self, link: socket.socket, watch: Callable[[int], None], drop: Callable[[], None]
+    ) -> None:
+        """Use ``link``, watched for input; ``watch`` gets other events, ``drop`` ends it."""
+        self._link = link
+        self._watch = watch
+        self._drop = drop
+        self._due: deque[Done] = deque()
+        self._received = bytearray()
+        self._unsent = bytearray()
+        self._blocked = False
+        self.gone = False
+
+    def perform(self, call: Call, body: bytes, done: Done) -> None:
+        """See OpenFile; EIO when the emulation has gone."""
+        if self.gone:
+            done(reply(-errno.EIO))
+            return
+        data = request(0, call, body)
+        self._due.append(done)
+        self._unsent += LENGTH.pack(len(data)) + data
+        self._send()
+
+    def close(self) -> None:
+        """See OpenFile."""
+        if self.gone:
+            return
+        self.gone = True
+        self._drop()
+        self._link.close()
+        while self._due:
+            self._due.popleft()(reply(-errno.EIO))
+
+    def exchange(self) -> None:
+        self._send()
+        if self.gone:
+            return
+        try:
+            data = self._link.recv(CHUNK_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        self._received += data
+        while self._due and (answer := self._take_answer()) is not None:
+            self._due.popleft()(answer)
+        if not data:
+            self.close()
+
+    def _take_answer(self) -> bytes | None:
+        if len(self._received) < LENGTH.size:
+            return None
+        (length,) = LENGTH.unpack_from(self._received)
+        end = LENGTH.size + length
+        if len(self._received) < end:
+            return None
+        answer = bytes(self._received[LENGTH.size : end])
+        del self._received[:end]
+        return answer
+
+    def _send(self) -> None:
+        try:
+            while self._unsent and not self.gone:
+                del self._unsent[: self._link.send(self._unsent)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.close()
+        blocked = bool(self._unsent)
+        if blocked != self._blocked and not self.gone:
+            self._blocked = blocked
+            self._watch(select.EPOLLIN | (select.EPOLLOUT if blocked else 0))

@@ -1,0 +1,252 @@
+"""A program with an emulated bus: where the bus comes from, by which route, until it ends."""
+
+import gc
+import signal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.device_file import DeviceFile
+from cubestack.emulator.i2cdev.device_node import DeviceNode
+from cubestack.emulator.i2cdev.guest_process import (
+    Program,
+    Route,
+    RouteError,
+    bus_environment,
+    start_filtered,
+    start_preloaded,
+)
+from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers, wait_precisely
+from cubestack.emulator.i2cdev.preload.shim import shim_library
+from cubestack.emulator.i2cdev.remote import RemoteBus
+from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, Turns
+from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
+from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.sim.virtual_time import Kernel
+
+__all__ = ["HostBus", "attached_bus", "emulated_bus", "run_program"]
+
+IDLE_NS = 100_000_000
+
+FORWARDED = (signal.SIGTERM, signal.SIGHUP)
+
+
+@dataclass(frozen=True)
+class HostBus:
+    """A bus for programs.
+
+    Attributes:
+        kernel: what to drive.
+        busy: whether its devices have work of their own.
+        adapter: its master; None when that is in another process.
+        port: to serve with the pump.
+        files: opens a device file of it.
+        path: of the socket that serves it.
+    """
+
+    kernel: Kernel
+    busy: Callable[[], bool]
+    adapter: I2cAdapter | None
+    port: Endpoint
+    files: Files
+    path: str
+
+
+def emulated_bus(
+    kernel: Kernel, busy: Callable[[], bool], adapter: I2cAdapter, path: Path
+) -> HostBus:
+    """The bus of an emulation in this process, served at ``path`` as well; raises PortError."""
+    return HostBus(
+        kernel,
+        busy,
+        adapter,
+        server := I2cServer(path, adapter),
+        lambda: DeviceFile(adapter),
+        server.name,
+    )
+
+
+def attached_bus(path: Path) -> HostBus:
+    """The bus that another process serves at ``path``; raises PortError."""
+    remote = RemoteBus(path)
+    return HostBus(Kernel(), lambda: False, None, remote, remote.open, remote.name)
+
+
+def run_program(
+    command: Sequence[str],
+    number: int,
+    bus: HostBus,
+    *,
+    pace: Literal["real", "fast"],
+    route: Route | None = None,
+    say: Callable[[str], None] = lambda _text: None,
+) -> int:
+    """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit code.
+
+    Without a ``route``, seccomp is tried, then preload; ``say`` gets which one and why. Processes
+    that the program leaves behind are served until they end as well.
+
+    Raises:
+        RouteError: the kernel refuses the route.
+        CompilerError: the library of the preload route can not be built.
+    """
+    running: list[_Run] = []
+    early: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        if running:
+            running[0].signalled(number)
+        else:
+            early.append(number)  # perhaps the program runs, and we do not know it yet
+
+    handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
+    try:
+        program, supervisor, reason = _start(command, number, bus, route)
+        running.append(run := _Run(program, supervisor))
+        for each in early:
+            run.signalled(each)
+        say(f"/dev/i2c-{number} by way of {reason}")
+        sharpen_timers()
+        if bus.adapter is None:
+            _serve([bus.port, *run.ports], run)
+        else:
+            _emulate(bus, bus.adapter, run, pace=pace, say=say)
+    finally:
+        for signal_number, handler in handlers.items():
+            signal.signal(signal_number, handler)
+        for run in running:
+            run.close()
+    return program.exit_code
+
+
+def _emulate(
+    bus: HostBus,
+    adapter: I2cAdapter,
+    run: "_Run",
+    *,
+    pace: Literal["real", "fast"],
+    say: Callable[[str], None],
+) -> None:
+    turns = Turns(
+        "program and bus",
+        bus.kernel,
+        adapter,
+        [bus.port, *run.ports],
+        bus.busy,
+        fast=pace == "fast",
+        always_asleep=run.hands_over,
+    )
+    pump = Pump(
+        bus.kernel,
+        [turns, run],
+        lambda: adapter.busy or bus.busy(),
+        pace=pace,
+        report=say,
+        clock_ns=turns.clock_ns,
+        wait=wait_precisely,
+    )
+    run.on_end = pump.stop
+    gc.freeze()  # the catalogue need not be looked through for garbage between two transfers
+    try:
+        pump.run()
+    finally:
+        gc.unfreeze()
+        turns.close()
+
+
+def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
+    """Serve without a pump: the bus is in another process."""
+    watch = Watch(ports)
+    while not run.ended:
+        ready = watch.wait(TURNAROUND_NS, awake=True) or watch.wait(IDLE_NS)
+        for port in ready or ports:
+            port.exchange(0)
+    watch.close()
+
+
+class _Run:
+    """A program under way; as a port of the pump it notices the end.
+
+    Attributes:
+        name: of the program.
+        ports: what has to be served for it.
+        on_end: called when there is nobody left to serve.
+    """
+
+    congested = False
+
+    def __init__(self, program: Program, supervisor: Supervisor | None) -> None:
+        self.name = program.name
+        self.ports: list[Endpoint] = [supervisor, program] if supervisor else [program]
+        self.on_end: Callable[[], None] = lambda: None
+        self._program = program
+        self._supervisor = supervisor
+        self._dropped = False
+
+    @property
+    def ended(self) -> bool:
+        """Whether nobody is left who could call."""
+        served = self._supervisor is not None and not self._supervisor.ended
+        return self._dropped or (self._program.ended and not served)
+
+    @property
+    def hands_over(self) -> bool:
+        """Whether program and supervisor share a processor, so that no call takes time to get here.
+
+        Then waiting awake would only keep the program from it.
+        """
+        return self._supervisor is not None and self._supervisor.hands_over
+
+    def signalled(self, number: int) -> None:
+        """Pass a signal on, but for Ctrl-C: that comes to the program as well, and it decides."""
+        if self._program.ended:
+            self._dropped = True  # only what the program left behind was still served
+        elif number != signal.SIGINT:
+            self._program.send(number)
+
+    def watched(self) -> list[tuple[int, int]]:
+        """See Endpoint; ``ports`` are watched by themselves."""
+        return []
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint."""
+        if self.ended:
+            self.on_end()
+
+    def release_ps(self, count: int) -> int | None:
+        """See Endpoint."""
+        return None
+
+    def close(self) -> None:
+        """Release program and supervisor; the bus is the caller's."""
+        for port in self.ports:
+            port.close()
+
+
+def _start(
+    command: Sequence[str], number: int, bus: HostBus, route: Route | None
+) -> tuple[Program, Supervisor | None, str]:
+    """The program, its supervisor if it has one, and the route with the reason for it."""
+    environment = bus_environment(number, bus.path)
+    refused = ""
+    if route != "preload":
+        try:
+            program, supervisor = start_filtered(
+                command, environment, DeviceNode(number), bus.files
+            )
+        except RouteError as error:
+            if route == "seccomp":
+                raise RouteError(f"seccomp: {error}; try --route preload") from None
+            refused = f", as seccomp is not there: {error}"
+        else:
+            asked = "as asked" if route else "which any program can take"
+            return program, supervisor, f"seccomp, {asked}"
+    try:
+        program = start_preloaded(command, environment, shim_library())
+    except RouteError as error:
+        raise RouteError(f"preload: {error}{refused}") from None
+    return program, None, f"preload{refused or ', as asked'}"

@@ -1,0 +1,212 @@
+"""Takes turns with programs: their calls come in, transfers run, answers go out in time.
+
+The pump looks at each event, and at all ports between two of them. A transfer of one byte takes
+less time on the wire than that, so here transfers are done in one go, and the next call is awaited
+at once. Paced, virtual time runs ahead for that, and each answer is held back until wall time gets
+to the end of its transfer.
+
+When a transfer begins, paced: the way of a call to us and of the answer back is no part of a bus.
+
+- A call within ``TURNAROUND_NS`` of the last transfer's answer begins where that transfer ended,
+  so in the mean transfers one after the other take the wire's time. Answers that were late are made
+  up for, up to ``MAX_DEBT_NS``; what a program itself does between two such calls is not counted.
+- Any other call begins before it came: by the quickest way there and back that was seen so far, up
+  to ``TURNAROUND_NS``, and by what the last answer was late, up to ``MAX_DEBT_NS``.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.pacing import Watch
+from cubestack.emulator.ports.serial_port import Endpoint
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
+
+__all__ = ["AHEAD_PS", "MAX_DEBT_NS", "SPIN_NS", "TURNAROUND_NS", "Turns"]
+
+AHEAD_PS = 2 * PS_PER_MS
+"""How far virtual time may be ahead of wall time during a transfer, when it is paced."""
+
+TURNAROUND_NS = 200_000
+"""How soon after an answer the next call belongs to the same loop of a program."""
+
+MAX_DEBT_NS = 1_000_000
+"""Lateness that is made up for; what is beyond it was lost to other work on this machine."""
+
+SPIN_NS = 200_000
+"""An answer that is due so soon is waited for without sleep; the pump wakes that early for it."""
+
+SPARE_NS = 30_000
+"""Answers that are ready no longer than this before they are due are worth the processor time
+that it takes to be quicker."""
+
+VISIT_NS = 5_000_000
+"""Wall time between two looks of the pump at its other ports."""
+
+PS_PER_NS = 1000
+
+
+class Turns:
+    """Ports that lead to one bus, as one port of the pump.
+
+    Attributes:
+        name: what it serves.
+    """
+
+    congested = False
+
+    def __init__(
+        self,
+        name: str,
+        kernel: Kernel,
+        adapter: I2cAdapter,
+        ports: Sequence[Endpoint],
+        busy: Callable[[], bool],
+        *,
+        fast: bool,
+        always_asleep: bool = False,
+    ) -> None:
+        """Serve ``ports``, whose calls go to ``adapter``.
+
+        Args:
+            name: for messages.
+            kernel: that of ``adapter``, or kernels joined to it; its time is in ps.
+            adapter: the master of the bus; from now on driven.
+            ports: where calls come from; closed by their owner.
+            busy: whether devices have work of their own.
+            fast: whether virtual time need not follow wall time.
+            always_asleep: whether the next call is never waited for awake.
+        """
+        self.name = name
+        self._kernel = kernel
+        self._adapter = adapter
+        self._ports = ports
+        self._busy = busy
+        self._fast = fast
+        self._behind_ns = 0 if fast else TURNAROUND_NS
+        self._origin_ns = 0
+        self._begun = False
+        self._watch = Watch(ports, always_asleep=always_asleep)
+        self._came_ns = self._answered_ns = self._told_ns = self._late_ns = self._spare_ns = 0
+        self._quickest_ns = TURNAROUND_NS
+        adapter.driven = True
+        adapter.holding = not fast
+
+    def clock_ns(self) -> int:
+        """Wall time for the pump; paced, so far back that a call may begin before it came.
+
+        It is virtual time when the pump starts, so that both have one scale.
+        """
+        if not self._begun:
+            self._origin_ns = time.monotonic_ns() - self._kernel.now // PS_PER_NS - self._behind_ns
+        return self._now_ns() - self._behind_ns
+
+    def _now_ns(self) -> int:
+        return time.monotonic_ns() - self._origin_ns
+
+    def watched(self) -> list[tuple[int, int]]:
+        """See Endpoint."""
+        return [item for port in self._ports for item in port.watched()]
+
+    def release_ps(self, count: int) -> int | None:
+        """See Endpoint; on the scale of ``clock_ns``."""
+        due_ps = self._adapter.release_ps()
+        return None if due_ps is None else due_ps - self._behind_ns * PS_PER_NS
+
+    def close(self) -> None:
+        """See Endpoint; the ports are their owner's."""
+        self._watch.close()
+
+    def exchange(self, now_ps: int) -> None:
+        """See Endpoint; goes on as long as calls come one after the other, up to ``VISIT_NS``."""
+        self._begun = True
+        came = bool(self._watch.wait(0))
+        self._serve(self._ports, came=came)
+        leave_ns = self._now_ns() + VISIT_NS
+        while self._turn() or (self._now_ns() < leave_ns and self._await_call()):
+            pass
+
+    def _serve(self, ports: Iterable[Endpoint], *, came: bool) -> None:
+        """Look at ``ports``; ``came`` says whether there is something to see."""
+        if came:
+            self._came_ns = self._now_ns()
+            self._quickest_ns = min(self._quickest_ns, self._came_ns - self._answered_ns)
+        now_ps = self._kernel.now
+        for port in ports:
+            port.exchange(now_ps)
+        if came and not self._pending():  # calls without a transfer are answered at once
+            self._answered_ns = self._now_ns()
+
+    def _pending(self) -> bool:
+        """Whether an answer is due."""
+        return self._adapter.busy or self._adapter.release_ps() is not None
+
+    def _turn(self) -> bool:
+        """Go on with a transfer or give an answer; returns whether it came to an end."""
+        adapter = self._adapter
+        if adapter.busy:
+            told = adapter.told
+            self._drive()
+            if adapter.told > told:
+                self._answered_ns = self._told_ns = self._now_ns()
+                return True
+            if adapter.busy and not adapter.beginning:
+                return False
+        due_ps = adapter.release_ps()
+        return due_ps is not None and self._release(-(-due_ps // PS_PER_NS))
+
+    def _drive(self) -> None:
+        """Run transfers as far as virtual time may."""
+        kernel, adapter = self._kernel, self._adapter
+        clock = time.monotonic_ns
+        end_ns = clock() + VISIT_NS
+        if self._fast:
+
+            def goes_on() -> bool:
+                return clock() < end_ns
+        else:
+            if adapter.beginning:
+                kernel.advance_to(self._start_ns() * PS_PER_NS)
+            limit_ps = self._now_ns() * PS_PER_NS + AHEAD_PS
+
+            def goes_on() -> bool:
+                return clock() < end_ns and (kernel.horizon() or 0) <= limit_ps
+
+        adapter.drive(kernel, goes_on)
+        while kernel.horizon() == kernel.now:  # what is left of it
+            kernel.step()
+
+    def _start_ns(self) -> int:
+        """When a call that has come begins on the wire, unless that is busy still."""
+        if self._came_ns - self._told_ns <= TURNAROUND_NS:
+            return self._came_ns - MAX_DEBT_NS
+        way_ns = self._quickest_ns if self._quickest_ns < TURNAROUND_NS else 0
+        return self._came_ns - way_ns - min(self._late_ns, MAX_DEBT_NS)
+
+    def _release(self, due_ns: int) -> bool:
+        """Give the answer that is due next, unless that is too far away."""
+        clock, origin_ns = time.monotonic_ns, self._origin_ns
+        left_ns = due_ns - (clock() - origin_ns)
+        if left_ns > SPIN_NS:
+            return False
+        self._spare_ns = left_ns
+        self._watch.nap(left_ns)
+        while (now_ns := clock() - origin_ns) < due_ns:
+            pass
+        self._late_ns = now_ns - due_ns
+        self._adapter.release(now_ns * PS_PER_NS)
+        self._answered_ns = self._told_ns = self._now_ns()
+        return True
+
+    def _await_call(self) -> bool:
+        """Virtual time stands still for a moment: most programs call again at once."""
+        if self._pending() or (self._fast and self._busy()):
+            return False
+        left_ns = self._answered_ns + TURNAROUND_NS - self._now_ns()
+        if left_ns <= 0:
+            return False
+        awake = self._fast or self._spare_ns < SPARE_NS
+        ready = self._watch.wait(left_ns, awake=awake)
+        if ready:
+            self._serve(ready, came=True)
+        return bool(ready)

@@ -1,0 +1,1 @@
+"""A program's calls, taken by seccomp user notification."""

@@ -1,0 +1,217 @@
+"""Seccomp user notification: the calls of a filtered process, and what it gets back.
+
+linux/seccomp.h; needs Linux 5.9 for descriptors that are put into the process.
+"""
+
+import ctypes
+import errno
+import fcntl
+import os
+import struct
+from collections.abc import Callable
+from typing import NamedTuple
+
+from cubestack.emulator.i2cdev.pacing import has_priority
+
+__all__ = ["Listener", "Notification", "read_memory", "read_text", "write_memory"]
+
+_RECEIVE = 0xC050_2100
+_SEND = 0xC018_2101
+_VALID = 0x4008_2102
+_SET_FLAGS = 0x4008_2104
+_ADD_DESCRIPTOR = 0x4018_2103
+
+_NOTIFICATION = struct.Struct("=QIIiIQ6Q")
+_RESPONSE = struct.Struct("=QqiI")
+_ADDITION = struct.Struct("=QIIII")
+_ID = struct.Struct("=Q")
+
+_CONTINUE = 1
+_AT_NUMBER = 1
+_AND_SEND = 2
+
+_SAME_PROCESSOR = 1  # SECCOMP_USER_NOTIF_FD_SYNC_WAKE_UP
+
+PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+CHUNK_BYTES = 256  # most paths are shorter
+
+
+class Notification(NamedTuple):
+    """A call that waits.
+
+    Attributes:
+        id: for the answer.
+        pid: thread that called.
+        number: of the system call.
+        arguments: six of them.
+    """
+
+    id: int
+    pid: int
+    number: int
+    arguments: tuple[int, ...]
+
+
+class Listener:
+    """The supervisor's end of a filter.
+
+    Attributes:
+        fd: descriptor; readable while a call waits, hung up when all processes have ended.
+        hands_over: a caller and this process wake each other on one processor. Waking another one
+            up takes longer than the rest of a call, unless we wait there awake, as we do with
+            real-time priority.
+    """
+
+    def __init__(self, fd: int) -> None:
+        """Take over ``fd``."""
+        self.fd = fd
+        self._one_step = True
+        self.hands_over = not has_priority() and self._hand_over()
+
+    def _hand_over(self) -> bool:
+        """Have callers and us wake each other on one processor; returns whether it can be had."""
+        try:
+            fcntl.ioctl(self.fd, _SET_FLAGS, _SAME_PROCESSOR)
+        except OSError:  # before Linux 6.6
+            return False
+        return True
+
+    def receive(self) -> Notification | None:
+        """The next call; waits for one. None when its process was killed meanwhile."""
+        buffer = bytearray(_NOTIFICATION.size)
+        try:
+            fcntl.ioctl(self.fd, _RECEIVE, buffer, True)
+        except OSError as error:
+            if error.errno in (errno.ENOENT, errno.EINTR):
+                return None
+            raise
+        identifier, pid, _, number, _, _, *arguments = _NOTIFICATION.unpack(buffer)
+        return Notification(identifier, pid, number, tuple(arguments))
+
+    def waits(self, call: Notification) -> bool:
+        """Whether the caller still waits, so that its number names nobody else."""
+        try:
+            fcntl.ioctl(self.fd, _VALID, _ID.pack(call.id))
+        except OSError:
+            return False
+        return True
+
+    def let_pass(self, call: Notification) -> None:
+        """Let the kernel do the call as if there were no filter."""
+        self._send(_RESPONSE.pack(call.id, 0, 0, _CONTINUE))
+
+    def answer(self, call: Notification, result: int) -> None:
+        """End the call with ``result``: 0 or more, or a negative errno."""
+        self._send(_RESPONSE.pack(call.id, max(0, result), min(0, result), 0))
+
+    def answer_with_descriptor(
+        self, call: Notification, fd: int, number: int, *, close_on_exec: bool
+    ) -> None:
+        """Put a copy of ``fd`` into the process as ``number``, and let the call return that."""
+        flags = os.O_CLOEXEC if close_on_exec else 0
+        if self._one_step:
+            wanted = _ADDITION.pack(call.id, _AT_NUMBER | _AND_SEND, fd, number, flags)
+            try:
+                fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, wanted)
+                return
+            except OSError as error:
+                if error.errno == errno.ENOENT:
+                    return
+                if error.errno != errno.EINVAL:
+                    self.answer(call, -(error.errno or errno.EIO))
+                    return
+                self._one_step = False  # before Linux 5.14
+        wanted = _ADDITION.pack(call.id, _AT_NUMBER, fd, number, flags)
+        try:
+            fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, wanted)
+        except OSError as error:
+            self.answer(call, -(error.errno or errno.EIO))
+            return
+        self.answer(call, number)
+
+    def _send(self, response: bytes) -> None:
+        try:
+            fcntl.ioctl(self.fd, _SEND, response)
+        except OSError as error:
+            if error.errno != errno.ENOENT:  # killed meanwhile
+                raise
+
+
+class _Part(ctypes.Structure):
+    _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
+
+
+_libc = ctypes.CDLL(None, use_errno=True)
+_types = (
+    ctypes.c_int,
+    ctypes.c_void_p,
+    ctypes.c_ulong,
+    ctypes.c_void_p,
+    ctypes.c_ulong,
+    ctypes.c_ulong,
+)
+_readv, _writev = _libc.process_vm_readv, _libc.process_vm_writev
+for _function in (_readv, _writev):
+    _function.argtypes = _types
+    _function.restype = ctypes.c_ssize_t
+
+
+class _Window:
+    """Moves bytes between this process and another one; its buffer is made once."""
+
+    SIZE = 1 << 14
+
+    def __init__(self) -> None:
+        self._buffer = ctypes.create_string_buffer(self.SIZE)
+        self._view = memoryview(self._buffer).cast("B")
+        self._here = _Part(ctypes.addressof(self._buffer), 0)
+        self._there = _Part(0, 0)
+        self._parts = ctypes.byref(self._here), ctypes.byref(self._there)
+
+    def read(self, pid: int, address: int, count: int) -> bytes:
+        self._move(_readv, pid, address, count)
+        return self._view[:count].tobytes()
+
+    def write(self, pid: int, address: int, data: bytes) -> None:
+        self._view[: len(data)] = data
+        self._move(_writev, pid, address, len(data))
+
+    def _move(self, function: Callable[..., int], pid: int, address: int, count: int) -> None:
+        self._here.length = self._there.length = count
+        self._there.base = address
+        here, there = self._parts
+        done = function(pid, here, 1, there, 1, 0)
+        if done < 0:
+            number = ctypes.get_errno()
+            raise OSError(number, f"can not reach process {pid}: {os.strerror(number)}")
+        if done != count:
+            raise OSError(errno.EFAULT, f"process {pid} has no {count} bytes at {address:#x}")
+
+
+_window = _Window()
+
+
+def read_memory(pid: int, address: int, count: int) -> bytes:
+    """``count`` bytes of a process, at most 16384; raises OSError, EFAULT where it has none."""
+    return _window.read(pid, address, count) if count else b""
+
+
+def write_memory(pid: int, address: int, data: bytes) -> None:
+    """Put ``data``, at most 16384 bytes, into a process; raises OSError, EFAULT if it can not."""
+    if data:
+        _window.write(pid, address, data)
+
+
+def read_text(pid: int, address: int, limit: int) -> bytes:
+    """The bytes before the next zero byte, at most ``limit``; raises OSError."""
+    text = b""
+    while len(text) < limit:
+        rest_of_page = PAGE_BYTES - address % PAGE_BYTES
+        count = min(rest_of_page, CHUNK_BYTES, limit - len(text))
+        part = read_memory(pid, address, count)
+        end = part.find(0)
+        if end >= 0:
+            return text + part[:end]
+        text += part
+        address += count
+    return text

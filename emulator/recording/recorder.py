@@ -1,0 +1,146 @@
+"""Records what goes over a board's serial lines and I2C bus.
+
+Every byte with its side, port and virtual time, as its sender sent it: what a fault does to it on
+its way is not on record, so that it can be done again. The format is that of
+``firmware_model.formats.recording``; ``replay`` plays it back.
+"""
+
+from collections.abc import Generator, Mapping
+from types import TracebackType
+from typing import IO, Any, Self
+
+import simpy
+
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c_tap import BusTap
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.formats.recording import (
+    BusMessage,
+    BusTransfer,
+    Control,
+    LineBytes,
+    LineError,
+    RecordingWriter,
+    Side,
+)
+from cubestack.firmware_model.formats.setup import Setup
+
+__all__ = ["RecordedBus", "Recorder"]
+
+BLOCK_BYTES = 256
+"""Longest run of bytes in one event."""
+
+
+class Recorder:
+    """Writes a recording; attach it before anything is said."""
+
+    def __init__(
+        self,
+        stream: IO[str],
+        device: str,
+        uarts: Mapping[str, Uart],
+        setup: Setup | None = None,
+    ) -> None:
+        """Record ``uarts`` by the names of their ports; ``stream`` stays its owner's."""
+        bauds = {port: uart.form.baud for port, uart in uarts.items()}
+        self._writer = RecordingWriter(stream, device, bauds, setup)
+        self._taps = [_Tap(self._writer, port, uart) for port, uart in uarts.items()]
+
+    def bus(self, kernel: Kernel, bus: I2cBus, port: str = "i2c") -> "RecordedBus":
+        """``bus``, with its transfers on record; to be used in its place."""
+        return RecordedBus(kernel, bus, port, self._writer)
+
+    def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
+        """The device was told so, from outside of its ports; see ``Control``."""
+        self._writer.write(Control(time_ps, words, text))
+
+    def close(self) -> None:
+        """Write what is pending and detach."""
+        for tap in self._taps:
+            tap.close()
+
+    def __enter__(self) -> Self:
+        """Use the recorder in a ``with`` block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
+
+
+class _Tap:
+    """Joins bytes that follow each other without a gap."""
+
+    def __init__(self, writer: RecordingWriter, port: str, uart: Uart) -> None:
+        self._writer = writer
+        self._port = port
+        self._uart = uart
+        self._side: Side = "host"
+        self._data = bytearray()
+        self._start_ps = 0
+        uart.taps.append(self)
+        uart.host_taps.append(self._host_sent)
+
+    def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
+        self._add("device", data, first_ps - byte_ps)
+
+    def device_heard(self, byte: int, start_ps: int) -> None:
+        pass
+
+    def _host_sent(self, byte: int, start_ps: int) -> None:
+        self._add("host", bytes([byte]), start_ps)
+
+    def framing_error(self, time_ps: int) -> None:
+        self._flush()
+        self._writer.write(LineError(time_ps, self._port))
+
+    def close(self) -> None:
+        self._flush()
+        self._uart.taps.remove(self)
+        self._uart.host_taps.remove(self._host_sent)
+
+    def _add(self, side: Side, data: bytes, start_ps: int) -> None:
+        next_ps = self._start_ps + len(self._data) * self._uart.byte_ps
+        if side != self._side or start_ps != next_ps or len(self._data) >= BLOCK_BYTES:
+            self._flush()
+        if not self._data:
+            self._side, self._start_ps = side, start_ps
+        self._data += data
+
+    def _flush(self) -> None:
+        if self._data:
+            event = LineBytes(
+                self._start_ps, self._port, self._side, bytes(self._data), self._uart.byte_ps
+            )
+            self._writer.write(event)
+            self._data.clear()
+
+
+class RecordedBus(BusTap):
+    """An I2C bus with its transfers on record."""
+
+    def __init__(self, kernel: Kernel, bus: I2cBus, port: str, writer: RecordingWriter) -> None:
+        """Stand in for ``bus``."""
+        self._kernel = kernel
+        super().__init__(bus)
+        self._port = port
+        self._writer = writer
+
+    def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
+        """See I2cBus."""
+        start_ps, errno = self._kernel.now, 0
+        try:
+            yield from self._bus.transfer(messages)
+        except I2cNackError as error:
+            errno = error.errno or 0
+            raise
+        finally:
+            found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
+            event = BusTransfer(start_ps, self._port, self._kernel.now, found, errno)
+            self._writer.write(event)

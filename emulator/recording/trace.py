@@ -1,0 +1,201 @@
+"""A run as a VCD file for waveform viewers: lines, buses, FPGA pins and firmware on one time axis.
+
+- Serial lines: levels of both directions as a scope would show them, and each byte as it begins.
+- I2C: whether the bus is busy, the address, and a text for each transfer.
+- FPGA: every input from the microcontroller and every output, as they stand after each event of the
+  simulation. What happens within one event is not there: the pulses of a transfer loop, and memory
+  cycles while a picture is stored.
+- Firmware: whether the processor is awake, and variables that are looked at as a debugger would.
+
+Times are rounded down to 1 ns.
+"""
+
+import heapq
+from collections.abc import Callable, Generator, Mapping
+from itertools import count
+from typing import IO, Any
+
+import simpy
+from vcd import VCDWriter
+
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
+from cubestack.emulator.bus.i2c_tap import BusTap
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.sim.virtual_time import Kernel
+
+__all__ = ["Probe", "TracedBus", "VcdTrace"]
+
+PS_PER_NS = 1000
+
+Probe = Callable[[], int | str]
+"""Looks at a value: a text, or a number of at most 32 bits."""
+
+
+class VcdTrace:
+    """Writes a VCD file while the simulation runs; attach it before that."""
+
+    def __init__(
+        self,
+        stream: IO[str],
+        device: str,
+        kernel: Kernel,
+        uarts: Mapping[str, Uart],
+        engine: RtlEngine | None = None,
+        probes: Mapping[str, Probe] | None = None,
+    ) -> None:
+        """Trace ``uarts`` and ``probes`` by their names; ``stream`` stays its owner's."""
+        self._kernel = kernel
+        self._engine = engine
+        self._device = device
+        self._writer = VCDWriter(stream, timescale="1 ns", version="cubestack", date="")
+        self._probes = dict(probes or {})
+        self._variables: dict[str, Any] = {}
+        self._last: dict[str, int | str] = {}
+        self._pending: list[tuple[int, int, str, int | str]] = []
+        self._numbers = count()
+        self._written_ns = 0
+        self._lag_ps = 2 * max((uart.byte_ps for uart in uarts.values()), default=0)
+        for name, probe in self._probes.items():
+            self._declare(f"firmware.{name}", None if isinstance(probe(), str) else 32)
+        self._pins = self._declare_pins()
+        self._taps = [(uart, _LineTap(self, port, uart)) for port, uart in uarts.items()]
+        for uart, tap in self._taps:
+            uart.taps.append(tap)
+        self._look()
+        # SimPy has no hook for observers but the method itself.
+        self._step = kernel.step
+        vars(kernel)["step"] = self._observed_step
+
+    def bus(self, bus: I2cBus, port: str = "i2c") -> "TracedBus":
+        """``bus``, with its transfers in the trace; to be used in its place."""
+        return TracedBus(self, bus, port)
+
+    def put(self, time_ps: int, name: str, value: int | str) -> None:
+        """A declared variable has a value from ``time_ps`` on."""
+        heapq.heappush(self._pending, (time_ps // PS_PER_NS, next(self._numbers), name, value))
+
+    def declare(self, name: str, bits: int | None, init: int | str = 0) -> None:
+        """A variable, dots between its scopes; ``bits`` None is a text."""
+        self._declare(name, bits, init)
+
+    @property
+    def now_ps(self) -> int:
+        """Virtual time."""
+        return self._kernel.now
+
+    def close(self) -> None:
+        """Write what is pending and detach."""
+        vars(self._kernel).pop("step", None)
+        for uart, tap in self._taps:
+            uart.taps.remove(tap)
+        self._flush(None)
+        self._writer.close(max(self._written_ns, self._kernel.now // PS_PER_NS))
+
+    def _declare(self, name: str, bits: int | None, init: int | str = 0) -> None:
+        *scopes, last = name.split(".")
+        scope = ".".join([self._device, *scopes])
+        if bits is None:
+            variable = self._writer.register_var(scope, last, "string", init=str(init or ""))
+        else:
+            variable = self._writer.register_var(scope, last, "wire", size=bits, init=init)
+        self._variables[name] = variable
+
+    def _declare_pins(self) -> tuple[str, ...]:
+        if self._engine is None:
+            return ()
+        wiring = self._engine.wiring
+        pins = (*wiring.mcu_pins, *wiring.output_pins)
+        for pin in pins:
+            self._declare(f"fpga.{pin}", wiring.widths[pin], self._engine.get_pin(pin))
+        return pins
+
+    def _observed_step(self) -> None:
+        self._step()
+        self._look()
+        self._flush(self._kernel.now - self._lag_ps)
+
+    def _look(self) -> None:
+        for name, probe in self._probes.items():
+            self._change(self._kernel.now, f"firmware.{name}", probe())
+        if self._engine is not None:
+            # The FPGA may be ahead of the kernel, never behind what it shows.
+            time_ps = max(self._engine.now_ps, 0)
+            for pin in self._pins:
+                self._change(time_ps, f"fpga.{pin}", self._engine.get_pin(pin))
+
+    def _change(self, time_ps: int, name: str, value: int | str) -> None:
+        if self._last.get(name) != value:
+            self._last[name] = value
+            self.put(time_ps, name, value)
+
+    def _flush(self, until_ps: int | None) -> None:
+        """Write what can not be preceded by anything any more."""
+        pending = self._pending
+        while pending and (until_ps is None or pending[0][0] * PS_PER_NS < until_ps):
+            time_ns, _, name, value = heapq.heappop(pending)
+            self._written_ns = max(self._written_ns, time_ns)
+            self._writer.change(self._variables[name], self._written_ns, value)
+
+
+class _LineTap:
+    """A serial line in the trace."""
+
+    def __init__(self, trace: VcdTrace, port: str, uart: Uart) -> None:
+        self._trace = trace
+        self._port = port
+        self._form = uart.form
+        for direction in ("rx", "tx"):
+            trace.declare(f"{port}.{direction}", 1, 1)
+            trace.declare(f"{port}.{direction}_byte", 8)
+        trace.declare(f"{port}.framing_errors", 32)
+        self._uart = uart
+
+    def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
+        for index, byte in enumerate(data):
+            self._draw("tx", byte, first_ps + (index - 1) * byte_ps)
+
+    def device_heard(self, byte: int, start_ps: int) -> None:
+        self._draw("rx", byte, start_ps)
+
+    def framing_error(self, time_ps: int) -> None:
+        self._trace.put(time_ps, f"{self._port}.framing_errors", self._uart.framing_errors)
+
+    def _draw(self, direction: str, byte: int, start_ps: int) -> None:
+        name, last = f"{self._port}.{direction}", 1
+        self._trace.put(start_ps, f"{name}_byte", byte)
+        for bit, level in enumerate([*self._form.levels(byte), 1]):
+            if level != last:
+                self._trace.put(start_ps + self._form.after_ps(bit), name, level)
+                last = level
+
+
+class TracedBus(BusTap):
+    """An I2C bus with its transfers in a trace."""
+
+    def __init__(self, trace: VcdTrace, bus: I2cBus, port: str) -> None:
+        """Stand in for ``bus``."""
+        self._trace = trace
+        super().__init__(bus)
+        self._port = port
+        trace.declare(f"{port}.busy", 1)
+        trace.declare(f"{port}.address", 8)
+        trace.declare(f"{port}.transfer", None, "")
+
+    def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
+        """See I2cBus."""
+        self._put("busy", 1)
+        self._put("address", messages[0].address & 0xFF if messages else 0)
+        outcome = "refused"
+        try:
+            yield from self._bus.transfer(messages)
+            outcome = ",".join(
+                f"{'R' if m.reading else 'W'}{m.address:02x}:{bytes(m.data).hex()}"
+                for m in messages
+            )
+        finally:
+            self._put("busy", 0)
+            self._put("transfer", outcome)
+
+    def _put(self, name: str, value: int | str) -> None:
+        self._trace.put(self._trace.now_ps, f"{self._port}.{name}", value)

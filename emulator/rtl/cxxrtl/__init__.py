@@ -1,0 +1,1 @@
+"""The compiled engine: CXXRTL, a C++ driver around it, and their build."""

@@ -1,0 +1,157 @@
+"""The wiring as C++, for driver.cpp to include: pins.h."""
+
+import re
+from collections.abc import Sequence
+
+from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps, port
+from cubestack.emulator.rtl.cxxrtl.variants import held, members
+from cubestack.emulator.rtl.wiring import MEMORY_PINS, BusPins, CameraPins, MemoryPins, Wiring
+
+__all__ = ["pins_header"]
+
+_ESCAPE = re.compile("__|_([0-9a-f]{2})_")
+
+
+def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> str:
+    """Text of pins.h; ``design`` is CXXRTL's C++ of the wiring's component.
+
+    ``variants`` are those of the design at each of the wiring's burst levels.
+
+    - PINS: INPUT(name, port, initial level) and OUTPUT(name, port) of every pin.
+    - CAMERAS: CAMERA(number, clock, data, line, how the frame pin follows ``level``).
+    - MEMORIES: MEMORY(number, A, D_I, D_O, D_OE, CE_N, OE_N, WE_N).
+    - DATA_CLOCK_NAME, DATA_CLOCK, DATA: of the transfer loop.
+    - BUS_HIGH, BUS_LOW_I, BUS_LOW_O, BUS_LOW_OE, BUS_LATCH, BUS_READ, BUS_WRITE: of the external
+      bus, where there is one; BUS_SELECTS: SELECT(number, port) of every chip select.
+    - ACKNOWLEDGES, CONTENTION: levels in one word each.
+    - REGISTERS: REGISTER(name, port, bits) of every register.
+    - derived_edge(top): whether a clock that is no pin has an edge that takes effect;
+      forget_derived_edges(top) has none of them seen.
+    - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
+      its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state that can
+      change, hold_0(from, to) the rest to the copy; its class is what clock_steps.py makes of it.
+    """
+    acknowledges = " | ".join(
+        f"{_level(pin)} << {bit}" for bit, pin in enumerate(wiring.acknowledges)
+    )
+    definitions = {
+        "PINS": " \\\n    ".join(_pin(wiring, name) for name in wiring.widths),
+        "CAMERA_COUNT": str(len(wiring.cameras)),
+        "CAMERAS": " ".join(_camera(n, camera) for n, camera in enumerate(wiring.cameras)),
+        "MEMORY_COUNT": str(len(wiring.memories)),
+        "MEMORIES": " ".join(_memory(n, memory) for n, memory in enumerate(wiring.memories)),
+        "DATA_CLOCK_NAME": f'"{wiring.data_clock}"',
+        "DATA_CLOCK": port(wiring.data_clock),
+        "DATA": port(wiring.data),
+        "ACKNOWLEDGES": f"({acknowledges})",
+        "CONTENTION": "0u" if wiring.contention is None else _level(wiring.contention),
+        "REGISTERS": " \\\n    ".join(_registers(design)),
+        **_bus(wiring.bus),
+        "VARIANTS": " ".join(f"VARIANT({n})" for n in range(len(variants))),
+    }
+    text = "".join(f"#define {name} {text}\n" for name, text in definitions.items())
+    text += _derived_edges(wiring, design, "cxxrtl_design")
+    for number, variant in enumerate(variants):
+        text += _variant(wiring, design, variant, number)
+    return text
+
+
+def _level(name: str) -> str:
+    return f"top.{port(name)}.template get<uint32_t>()"
+
+
+def _pin(wiring: Wiring, name: str) -> str:
+    if name in wiring.initial:
+        return f'INPUT("{name}", {port(name)}, {wiring.initial[name]}u)'
+    return f'OUTPUT("{name}", {port(name)})'
+
+
+def _camera(number: int, camera: CameraPins) -> str:
+    ports = ", ".join(port(pin) for pin in (camera.clock, camera.data, camera.line))
+    frame = "(void)level" if camera.frame is None else f"top.{port(camera.frame)}.set<bool>(level)"
+    return f"CAMERA({number}, {ports}, {frame})"
+
+
+def _memory(number: int, memory: MemoryPins) -> str:
+    return f"MEMORY({number}, {', '.join(port(memory[pin]) for pin in MEMORY_PINS)})"
+
+
+def _bus(bus: BusPins | None) -> dict[str, str]:
+    if bus is None:
+        return {}
+    pins = {
+        "HIGH": bus.high,
+        **{f"LOW_{side}": f"{bus.low}_{side}" for side in ("I", "O", "OE")},
+        "LATCH": bus.latch,
+        "READ": bus.read,
+        "WRITE": bus.write,
+    }
+    selects = (f"SELECT({number}, {port(name)})" for number, name in enumerate(bus.selects))
+    return {
+        **{f"BUS_{name}": port(pin) for name, pin in pins.items()},
+        "BUS_SELECTS": " ".join(selects),
+    }
+
+
+def _registers(design: str) -> list[str]:
+    """What CXXRTL buffers are registers; it escapes what C++ does not take in a name."""
+    registers = []
+    for member, kind in (members(design) if design else {}).items():
+        if kind.startswith("wire"):
+            name = _ESCAPE.sub(_plain, member.removeprefix("p_"))
+            registers.append(f'REGISTER("{name}", {member}, {kind[len("wire<") : -1]})')
+    return registers
+
+
+def _plain(escape: re.Match[str]) -> str:
+    return chr(int(escape[1], 16)) if escape[1] else "_"
+
+
+def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
+    """Ask CXXRTL's own edge detectors, but for those of the pins."""
+    pins = {port(name) for name in wiring.initial}
+    detectors = re.findall(r"bool ((?:pos|neg)edge_(\w+))\(\) const", design)
+    edges = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
+    clocks = [clock for clock in re.findall(r"prev_(p_\w+) = \1;", design) if clock not in pins]
+    forget = " ".join(f"top.prev_{clock} = top.{clock};" for clock in clocks)
+    return (
+        f"inline bool derived_edge(const {namespace}::p_top &top) "
+        f"{{ (void)top; return {' || '.join(edges) or 'false'}; }}\n"
+        f"inline void forget_derived_edges({namespace}::p_top &top) {{ (void)top; {forget} }}\n"
+    )
+
+
+def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
+    namespace = f"cxxrtl_variant_{number}"
+    whole, part = members(design), members(variant)
+    shared = [
+        name + side
+        for name, kind in part.items()
+        if whole.get(name) == kind
+        for side in ((".curr", ".next") if kind.startswith("wire") else ("",))
+    ]
+    holding = " ".join(
+        f"to.{name} = from.{name}.curr;"
+        for name in held(variant)
+        if whole.get(name, "").startswith("wire")
+    )
+    suits = " && ".join(f"{_level(pin)} == {level}u" for pin, level in wiring.burst_levels[number])
+    same = " && ".join(f"a.{port(pin)} == b.{port(pin)}" for pin in wiring.output_pins)
+    return (
+        f"#define cxxrtl_design {namespace}\n"
+        f"#define cxxrtl_design_create {namespace}_create\n"
+        f'#include "variant_{number}.cpp"\n'
+        "#undef cxxrtl_design\n"
+        "#undef cxxrtl_design_create\n"
+        + _derived_edges(wiring, variant, namespace)
+        + f"inline bool suits_{number}(const cxxrtl_design::p_top &top) {{ return {suits}; }}\n"
+        "template <class A, class B> "
+        f"bool same_{number}(const A &a, const B &b) {{ return {same}; }}\n"
+        "template <class From, class To> "
+        f"void copy_{number}(const From &from, To &to) "
+        f"{{ {' '.join(f'to.{name} = from.{name};' for name in shared)} }}\n"
+        "template <class From, class To> "
+        f"void hold_{number}(const From &from, To &to) "
+        f"{{ (void)from, (void)to; {holding} }}\n"
+        + clock_steps(wiring, variant, dict(part), number)
+    )

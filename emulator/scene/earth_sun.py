@@ -1,0 +1,210 @@
+"""What a sun and nadir sensor looks at: the Earth below, the Sun, the Moon, and false lights.
+
+CubeSense thesis, sections 5.1.3.2 and 5.5. Directions are unit vectors in *scene axes*, which are
+the satellite's body axes at time 0. Each camera has a mounting: the directions of its boresight and
+of its picture's right side in body axes.
+
+A sensor's alpha and beta are the undistorted picture coordinates, x right and y down, in degrees:
+the angle from the boresight is their root sum of squares.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cubestack.emulator.camera.ov7620.fisheye import (
+    FIELD_DEG,
+    angles_from_vector,
+    vector_from_angles,
+)
+from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
+from cubestack.emulator.scene.earth import Earth, angular_radius_deg
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+
+__all__ = ["EarthSunScene", "Mounting", "Reflection", "SensorTruth"]
+
+_IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+def _unit(name: str, vector: ArrayLike) -> NDArray[np.float64]:
+    v = np.asarray(vector, np.float64)
+    if v.shape != (3,) or not 0 < np.linalg.norm(v) < np.inf:
+        raise SceneError(f"{name} must be 3 numbers, not all 0, not {vector!r}")
+    return v / np.linalg.norm(v)
+
+
+@dataclass(frozen=True, eq=False)
+class Mounting:
+    """How a camera sits on the satellite.
+
+    Attributes:
+        boresight: (3,) in body axes.
+        right: (3,) in body axes; what of it is along the boresight is left out.
+    """
+
+    boresight: ArrayLike
+    right: ArrayLike = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse directions that make no axes."""
+        if np.linalg.norm(np.cross(_unit("boresight", self.boresight), self._right)) < 1e-6:
+            raise SceneError(f"right must not be along the boresight {self.boresight!r}")
+
+    @property
+    def _right(self) -> NDArray[np.float64]:
+        return _unit("right", self.right)
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """Rotation (3, 3) from body axes to camera axes."""
+        z = _unit("boresight", self.boresight)
+        x = _unit("right", self._right - (self._right @ z) * z)
+        return np.array([x, np.cross(z, x), z])
+
+
+@dataclass(frozen=True)
+class Reflection:
+    """A false light in one camera's picture: an even disc.
+
+    Attributes:
+        camera: that sees it.
+        alpha_deg, beta_deg: its centre.
+        radius_px: its size.
+        level: grey values above black, at the exposure that the published levels belong to.
+    """
+
+    camera: Camera
+    alpha_deg: float
+    beta_deg: float
+    radius_px: float
+    level: float
+
+    def __post_init__(self) -> None:
+        """Refuse a disc that can not be."""
+        for name in ("radius_px", "level"):
+            if not getattr(self, name) > 0:
+                raise SceneError(f"{name} must be above 0, not {getattr(self, name)}")
+        if not np.hypot(self.alpha_deg, self.beta_deg) <= FIELD_DEG:
+            raise SceneError(
+                f"at_deg must be within {FIELD_DEG} deg of the boresight, "
+                f"not {self.alpha_deg}, {self.beta_deg}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class SensorTruth:
+    """What a sensor should measure. For whoever compares results; never for the firmware.
+
+    Attributes:
+        vector: unit vector (3,) in camera axes, to the Sun or to the Earth's centre.
+        alpha_deg, beta_deg: the same as the sensor's angles.
+        visible: whether the Sun, or any part of the Earth, is in the camera's field.
+    """
+
+    vector: NDArray[np.float64]
+    alpha_deg: float
+    beta_deg: float
+    visible: bool
+
+
+@dataclass(frozen=True, eq=False)
+class EarthSunScene:
+    """Surroundings of a satellite with a sun and a nadir camera.
+
+    Attributes:
+        nadir: direction (3,) of the Earth's centre, scene axes.
+        sun: direction (3,) of the Sun, scene axes.
+        moon: direction (3,) of the Moon, scene axes; its phase follows from the Sun's. None: none.
+        altitude_km: of the satellite.
+        rate_deg_s: body rate (3,) in body axes.
+        nadir_camera, sun_camera: how they are mounted.
+        bloom_px: radius of the Sun's image on the boresight of the sun camera at the published
+            exposure, where its level crosses from background to object (thesis: 8 px).
+        unevenness: standard deviation of the Earth's brightness, relative (assumed).
+        glow_km: scale height of the glow above the limb; 0 for none (assumed).
+        reflections: false lights.
+        hot_pixels: pixels of each camera that are stuck at full scale.
+        hot_pairs: pairs of such pixels, side by side.
+        noise: False makes the sensors ideal but for their hot pixels.
+        seed: of noise, surface and hot pixels.
+    """
+
+    nadir: ArrayLike = (0.0, 0.0, 1.0)
+    sun: ArrayLike = (0.0, 0.0, -1.0)
+    moon: ArrayLike | None = None
+    altitude_km: float = 750.0
+    rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
+    nadir_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, 1.0)))
+    sun_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, -1.0)))
+    bloom_px: float = 7.0
+    unevenness: float = 0.1
+    glow_km: float = 10.0
+    reflections: tuple[Reflection, ...] = ()
+    hot_pixels: int = 0
+    hot_pairs: int = 0
+    noise: bool = True
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse surroundings that can not be; directions become unit vectors."""
+        for name in ("nadir", "sun", "moon"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _unit(name, getattr(self, name)))
+        rate = np.asarray(self.rate_deg_s, np.float64)
+        if rate.shape != (3,) or not np.all(np.isfinite(rate)):
+            raise SceneError(f"rate_deg_s must be 3 numbers in deg/s, not {self.rate_deg_s!r}")
+        for name in ("altitude_km", "bloom_px"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise SceneError(f"{name} must be above 0, not {getattr(self, name)}")
+        for name in ("unevenness", "glow_km", "hot_pixels", "hot_pairs", "seed"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise SceneError(f"{name} must not be negative, not {getattr(self, name)}")
+
+    @classmethod
+    def facing(
+        cls,
+        sun_deg: tuple[float, float] = (0.0, 0.0),
+        nadir_deg: tuple[float, float] = (0.0, 0.0),
+        **others: Any,
+    ) -> "EarthSunScene":
+        """A scene whose sensors should measure these (alpha, beta) at time 0.
+
+        ``others`` are attributes as of the class, but for ``sun`` and ``nadir``.
+        """
+        mounted = cls(**others)
+        others["sun"] = mounted.sun_camera.matrix.T @ vector_from_angles(*sun_deg)
+        others["nadir"] = mounted.nadir_camera.matrix.T @ vector_from_angles(*nadir_deg)
+        return cls(**others)
+
+    @property
+    def earth(self) -> Earth:
+        """The Earth below."""
+        return Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed)
+
+    def axes(self, camera: Camera, time_ps: int) -> NDArray[np.float64]:
+        """Rotation (3, 3) from scene axes to a camera's axes at a time."""
+        mounting = self.sun_camera if camera is Camera.SUN else self.nadir_camera
+        turned = propagate(_IDENTITY, self.rate_deg_s, time_ps / PS_PER_S)
+        return mounting.matrix @ matrix_from_quaternion(turned)
+
+    def seen(self, direction: ArrayLike, camera: Camera, time_ps: int) -> NDArray[np.float64]:
+        """``direction`` (3,) of scene axes in a camera's axes at a time."""
+        return self.axes(camera, time_ps) @ np.asarray(direction, np.float64)
+
+    def hidden(self, direction: ArrayLike) -> bool:
+        """Whether the Earth is in front of what lies in ``direction`` (3,), scene axes."""
+        cosine = float(np.dot(np.asarray(direction, np.float64), np.asarray(self.nadir)))
+        return cosine > float(np.cos(np.radians(angular_radius_deg(self.altitude_km))))
+
+    def truth(self, camera: Camera, time_ps: int) -> SensorTruth:
+        """What the sensor of ``camera`` should measure at a time."""
+        of_sun = camera is Camera.SUN
+        vector = self.seen(self.sun if of_sun else self.nadir, camera, time_ps)
+        alpha, beta = angles_from_vector(vector)
+        reach = FIELD_DEG if of_sun else FIELD_DEG + angular_radius_deg(self.altitude_km)
+        visible = bool(np.hypot(alpha, beta) <= reach) and not (of_sun and self.hidden(self.sun))
+        return SensorTruth(vector, alpha, beta, visible)

@@ -1,0 +1,127 @@
+"""Scene files for a sun and nadir sensor: TOML, every key but ``kind`` may be left out::
+
+    kind = "earth-sun"
+    altitude_km = 750.0
+    nadir = [0.0, 0.0, 1.0]        # towards the Earth's centre; or, as the nadir camera sees it at
+                                   # time 0, nadir_deg = [alpha, beta]
+    sun = [0.0, 0.0, -1.0]         # or, as the sun camera sees it, sun_deg = [alpha, beta]
+    moon = [1.0, 0.0, 0.0]         # leave out for none
+    rate_deg_s = [0.0, 0.1, 0.0]   # body rate in body axes
+    bloom_px = 7.0                 # radius of the Sun's image
+    [nadir_camera]
+    boresight = [0.0, 0.0, 1.0]    # in body axes
+    right = [1.0, 0.0, 0.0]
+    [[reflections]]
+    camera = "sun"
+    at_deg = [20.0, -10.0]         # alpha and beta
+    radius_px = 4.0
+    level = 200.0                  # grey values above black
+
+Directions are in scene axes, the satellite's body axes at time 0; see `EarthSunScene` for the rest.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cubestack.emulator.camera.ov7620.fisheye import vector_from_angles
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection
+from cubestack.emulator.scene.file import (
+    Readers,
+    SceneError,
+    flag,
+    load_toml,
+    number,
+    read_table,
+    several,
+    whole,
+)
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+
+__all__ = ["load_earth_sun_scene"]
+
+
+def load_earth_sun_scene(path: Path) -> EarthSunScene:
+    """The scene that a TOML file describes; SceneError names the key that is wrong."""
+    table = load_toml(path)
+    try:
+        kind = table.pop("kind", None)
+        if kind != "earth-sun":
+            raise SceneError(f'kind must be "earth-sun" for a sun and nadir sensor, not {kind!r}')
+        return _scene(read_table(table, _SCENE))
+    except ValueError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def _scene(values: dict[str, Any]) -> EarthSunScene:
+    angles = {}
+    for name in ("sun", "nadir"):
+        if f"{name}_deg" in values:
+            if name in values:
+                raise SceneError(f"give either {name} or {name}_deg, not both")
+            angles[name] = values.pop(f"{name}_deg")
+    scene = EarthSunScene(**values)
+    for name, camera in (("sun", scene.sun_camera), ("nadir", scene.nadir_camera)):
+        if name in angles:
+            values[name] = camera.matrix.T @ vector_from_angles(*angles[name])
+    return EarthSunScene(**values) if angles else scene
+
+
+def _mounting(value: Any) -> Mounting:
+    values = _table(value, {"boresight": several(3, number), "right": several(3, number)})
+    if "boresight" not in values:
+        raise SceneError("needs the key boresight")
+    return Mounting(**values)
+
+
+def _camera(value: Any) -> Camera:
+    names = {camera.name.lower(): camera for camera in Camera}
+    if value not in names:
+        raise SceneError(f"must be one of {list(names)}, not {value!r}")
+    return names[value]
+
+
+def _reflections(value: Any) -> tuple[Reflection, ...]:
+    if not isinstance(value, list):
+        raise SceneError("must be tables, each under [[reflections]]")
+    return tuple(_reflection(_table(item, _REFLECTION)) for item in value)
+
+
+def _reflection(values: dict[str, Any]) -> Reflection:
+    if missing := _REFLECTION.keys() - values.keys():
+        raise SceneError(f"needs the keys {', '.join(sorted(missing))}")
+    alpha, beta = values.pop("at_deg")
+    return Reflection(alpha_deg=alpha, beta_deg=beta, **values)
+
+
+def _table(value: Any, readers: Readers) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise SceneError(f"must be a table, not {value!r}")
+    return read_table(value, readers)
+
+
+_REFLECTION: Readers = {
+    "camera": _camera,
+    "at_deg": several(2, number),
+    "radius_px": number,
+    "level": number,
+}
+_SCENE: Readers = {
+    "nadir": several(3, number),
+    "nadir_deg": several(2, number),
+    "sun": several(3, number),
+    "sun_deg": several(2, number),
+    "moon": several(3, number),
+    "altitude_km": number,
+    "rate_deg_s": several(3, number),
+    "nadir_camera": _mounting,
+    "sun_camera": _mounting,
+    "bloom_px": number,
+    "unevenness": number,
+    "glow_km": number,
+    "reflections": _reflections,
+    "hot_pixels": whole,
+    "hot_pairs": whole,
+    "noise": flag,
+    "seed": whole,
+}

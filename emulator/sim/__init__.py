@@ -1,0 +1,1 @@
+"""Virtual time, the processor that spends it, and the supplies."""

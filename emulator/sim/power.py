@@ -1,0 +1,118 @@
+"""Supply currents, load switches, latch-up and the comparators that watch for it.
+
+Which parts there are and what they draw is in :mod:`cubestack.emulator.sim.power_tables`.
+"""
+
+from collections.abc import Callable
+
+import simpy
+
+from cubestack.emulator.sim.power_tables import PowerTable
+from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
+
+__all__ = ["COMPARATOR_US", "PowerModel"]
+
+COMPARATOR_US = 2
+"""Response time of monitor and comparator: assumed."""
+
+
+class PowerModel:
+    """Sums what the parts draw, and cuts off a channel only when the firmware says so.
+
+    Attributes:
+        table: what the parts draw.
+        on_overcurrent: interrupt: the comparator of a channel tripped.
+        on_switch: told (channel, on) when a load switch changed.
+    """
+
+    def __init__(self, env: Kernel, table: PowerTable) -> None:
+        """Start with every part in its first state and all switches on."""
+        self._env = env
+        self.table = table
+        self._states = {name: next(iter(part.ma)) for name, part in table.parts.items()}
+        self._on = dict.fromkeys(table.channels, True)
+        self._latch_up_ma = dict.fromkeys(table.channels, 0.0)
+        self._failed: dict[str, float] = {}
+        self._tripped = dict.fromkeys(table.channels, False)
+        self._charge_ma_ps = 0.0
+        self._since_ps = env.now
+        self.on_overcurrent: Callable[[str], None] = lambda _channel: None
+        self.on_switch: Callable[[str, bool], None] = lambda _channel, _on: None
+
+    def set_state(self, part: str, state: str) -> None:
+        """Part ``part`` is in ``state`` from now on (names of the table, else ValueError)."""
+        parts = self.table.parts
+        if part not in parts:
+            raise ValueError(f"no supplied part {part!r}, only {sorted(parts)}")
+        if state not in parts[part].ma:
+            raise ValueError(f"{part} has no state {state!r}, only {sorted(parts[part].ma)}")
+        self._integrate()
+        self._states[part] = state
+        self._compare()
+
+    def switch(self, channel: str, on: bool) -> None:
+        """Turn a load switch; turning it off also ends a latch-up behind it."""
+        self._check_channel(channel)
+        if self._on[channel] == on:
+            return
+        self._integrate()
+        self._on[channel] = on
+        self._latch_up_ma[channel] = self._failed.get(channel, 0.0) if on else 0.0
+        self._compare()
+        self.on_switch(channel, on)
+
+    def is_on(self, channel: str) -> bool:
+        """Whether a load switch is on."""
+        self._check_channel(channel)
+        return self._on[channel]
+
+    def latch_up(self, channel: str, extra_ma: float = 300.0, *, lasting: bool = False) -> None:
+        """A particle strike: ``channel`` draws ``extra_ma`` more until it is switched off.
+
+        A ``lasting`` one comes back with each switching on. Nothing else happens to a channel that
+        is off.
+        """
+        self._check_channel(channel)
+        if lasting:
+            self._failed[channel] = extra_ma
+        if self._on[channel]:
+            self._integrate()
+            self._latch_up_ma[channel] = extra_ma
+            self._compare()
+
+    def current_ma(self, channel: str | None = None) -> float:
+        """Current of ``channel``, or of the whole stack, in mA."""
+        if channel is not None:
+            self._check_channel(channel)
+        total = 0.0
+        for name, part in self.table.parts.items():
+            if channel in (None, part.channel) and (part.channel is None or self._on[part.channel]):
+                total += part.ma[self._states[name]]
+        return total + sum(
+            extra for name, extra in self._latch_up_ma.items() if channel in (None, name)
+        )
+
+    def charge_mas(self) -> float:
+        """Charge drawn since the start, in mA s."""
+        self._integrate()
+        return self._charge_ma_ps / PS_PER_S
+
+    def _integrate(self) -> None:
+        self._charge_ma_ps += self.current_ma() * (self._env.now - self._since_ps)
+        self._since_ps = self._env.now
+
+    def _compare(self) -> None:
+        for channel, limit in self.table.channels.items():
+            above = limit is not None and self.current_ma(channel) > limit
+            if above and not self._tripped[channel]:
+                self._env.process(self._interrupt(channel))
+            self._tripped[channel] = above
+
+    def _interrupt(self, channel: str) -> simpy.events.ProcessGenerator:
+        yield self._env.timeout(COMPARATOR_US * PS_PER_US)
+        if self._tripped[channel]:
+            self.on_overcurrent(channel)
+
+    def _check_channel(self, channel: str) -> None:
+        if channel not in self.table.channels:
+            raise ValueError(f"no supply channel {channel!r}, only {sorted(self.table.channels)}")

@@ -1,0 +1,306 @@
+"""Runs a firmware program in virtual time: spends its cycles and performs its requests.
+
+While the processor waits for the FPGA, the FPGA runs ahead of the kernel, in bursts that end at
+the next scheduled event and within ``LOOK_AHEAD_PS``. What is scheduled from outside in between
+(a host that starts to write) can only be late for the FPGA, by no more than that.
+"""
+
+from collections.abc import Callable, Generator
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+import simpy
+
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.external_bus import Transactions
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import (
+    AwaitPin,
+    BusAccess,
+    CameraTransfer,
+    Pay,
+    ReadPin,
+    ReadTimer,
+    Request,
+    Reset,
+    Routine,
+    SetPin,
+    Sleep,
+    StrobeRead,
+)
+
+__all__ = ["LOOK_AHEAD_PS", "CameraBus", "Pins", "Processor", "Program"]
+
+LOOK_AHEAD_PS = 10 * PS_PER_MS
+
+Steps = Generator[simpy.Event, Any, Any]
+
+
+class Program(Protocol):
+    """A firmware program: its main routine never returns, it ends in a ``Reset`` request."""
+
+    def main(self) -> Routine[None]:
+        """Run from reset."""
+
+
+class CameraBus(Protocol):
+    """The bus over which the processor controls the camera."""
+
+    def transfer_ps(self, request: CameraTransfer) -> int:
+        """How long ``request`` occupies the bus, in ps."""
+
+    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
+        """Perform ``request``, which ends at ``now_ps``; None when not acknowledged."""
+
+
+class Pins(Protocol):
+    """Pins of the processor that do not lead to the FPGA."""
+
+    def __contains__(self, pin: object) -> bool:
+        """Whether this is one of them."""
+
+    def set(self, pin: str, level: int) -> None:
+        """Drive an output pin from now on."""
+
+    def get(self, pin: str) -> int:
+        """Level of a pin now."""
+
+
+class Processor:
+    """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
+
+    Attributes:
+        engine: what the processor has at its pins to the FPGA.
+        program: the running program, for the interrupt lines of the peripherals.
+        resets: number of resets since power-up.
+        waiting: asleep until an interrupt, with no deadline.
+        dozing: asleep until an interrupt, with or without a deadline.
+    """
+
+    def __init__(
+        self,
+        env: Kernel,
+        meter: Meter,
+        engine: RtlEngine,
+        camera_bus: CameraBus | None,
+        boot: Callable[[int], Program],
+        *,
+        power_on_cause: int,
+        boot_us: int,
+        other_pins: Pins | None = None,
+        on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
+        on_activity: Callable[[bool], None] = lambda _busy: None,
+        on_access: Callable[[bool], None] = lambda _busy: None,
+    ) -> None:
+        """Power up.
+
+        Args:
+            env: kernel; its time is in ps.
+            meter: what the program charges its cycles to; its table gives the clock.
+            engine: the FPGA board.
+            camera_bus: the camera's control bus; None where the program drives its lines as pins.
+            boot: makes the program after a reset; its argument is the cause (see ``Reset``).
+            power_on_cause: cause of the first start.
+            boot_us: time from reset to the first instruction of ``main``.
+            other_pins: pins that do not lead to the FPGA.
+            on_pin: told about every output pin change, after it happened.
+            on_activity: told when the processor falls asleep (False), starts or awakes (True).
+            on_access: told when the program begins to use the external bus (True), and when it
+                requests something else after that.
+        """
+        self._env = env
+        self._meter = meter
+        self.engine = engine
+        self._camera_bus = camera_bus
+        self._boot = boot
+        self._boot_us = boot_us
+        self._other_pins = other_pins
+        self._on_pin = on_pin
+        self._on_activity = on_activity
+        self._on_access = on_access
+        self._accesses = False
+        self._clock = CycleClock(meter.table.clock_hz)
+        self._wake = env.event()
+        self.resets = 0
+        self.waiting = self.dozing = False
+        self.program = boot(power_on_cause)
+        env.process(self._run())
+
+    def wake(self) -> None:
+        """End the running wakeable sleep, or the next one at once."""
+        if not self._wake.triggered:
+            self._wake.succeed()
+
+    def load(self, select: int, address: int, count: int) -> bytes:
+        """Read bytes over the external bus in an interrupt, which still has to charge them.
+
+        The engine is ahead of the kernel then, until they are paid.
+        """
+        self._follow()
+        addresses = np.arange(address, address + count, dtype=np.int32)
+        reads = Transactions(
+            addresses,
+            np.zeros(count, np.uint8),
+            False,
+            self._cycle,
+            self._meter.table.operations["ebi_read"].cycles,
+            select,
+        )
+        self.engine.access(reads, self.engine.now_ps + int(count * reads.period))
+        return reads.data.tobytes()
+
+    def _run(self) -> Steps:
+        self._on_activity(True)
+        while True:
+            yield self._env.timeout(self._boot_us * PS_PER_US)
+            cause = yield from self._execute(self.program)
+            self.resets += 1
+            self._wake = self._env.event()  # a reset clears pending interrupts
+            self.program = self._boot(cause)
+
+    def _execute(self, program: Program) -> Steps:
+        routine = program.main()
+        answer: object = None
+        while True:
+            try:
+                request = routine.send(answer)
+            except StopIteration:
+                raise RuntimeError(
+                    f"{program!r} returned from main: it must end in Reset"
+                ) from None
+            yield from self._pay()
+            if isinstance(request, Reset):
+                routine.close()
+                return request.cause
+            answer = yield from self._perform(request)
+
+    def _pay(self) -> Steps:
+        """Be busy for the charged cycles, and for those that interrupts charge meanwhile."""
+        while cycles := self._meter.take():
+            yield self._env.timeout(self._clock.elapse(cycles))
+
+    def _perform(self, request: Request) -> Steps:
+        if self._accesses != isinstance(request, BusAccess):
+            self._accesses = not self._accesses
+            self._on_access(self._accesses)
+        match request:
+            case Pay():
+                return None
+            case ReadTimer():
+                return self._env.now // PS_PER_US
+            case SetPin(pin, level):
+                self._follow()
+                if self._other_pins is not None and pin in self._other_pins:
+                    self._other_pins.set(pin, level)
+                else:
+                    self.engine.set_pin(pin, level)
+                self._meter.charge(port_write=1)
+                self._on_pin(pin, level)
+                return None
+            case ReadPin(pin):
+                self._follow()
+                self._meter.charge(port_read=1)
+                if self._other_pins is not None and pin in self._other_pins:
+                    return self._other_pins.get(pin)
+                return self.engine.get_pin(pin)
+            case AwaitPin():
+                return (yield from self._await_pin(request))
+            case Sleep():
+                return (yield from self._sleep(request))
+            case StrobeRead():
+                return (yield from self._strobe_read(request))
+            case BusAccess():
+                return (yield from self._bus_access(request))
+            case CameraTransfer():
+                assert self._camera_bus is not None
+                yield self._env.timeout(self._camera_bus.transfer_ps(request))
+                self._follow()
+                return self._camera_bus.transfer(request, self._env.now)
+            case _:
+                raise TypeError(f"a program can not request {request!r}")
+
+    @property
+    def _cycle(self) -> Fraction:
+        return Fraction(PS_PER_S, self._clock.hz)
+
+    def _follow(self) -> None:
+        """Let the FPGA be where the processor is; after an interrupt's accesses it is ahead."""
+        self.engine.run(max(self._env.now, self.engine.now_ps))
+
+    def _horizon(self) -> int:
+        """Nothing else happens before this time, so the FPGA may run ahead up to it."""
+        limit = self._env.now + LOOK_AHEAD_PS
+        horizon = self._env.horizon()
+        return limit if horizon is None else min(limit, horizon)
+
+    def _await_pin(self, request: AwaitPin) -> Steps:
+        start = self._env.now
+        deadline = start + request.timeout_us * PS_PER_US
+        self._follow()
+        reached = start
+        while self.engine.get_pin(request.pin) != request.level:
+            if self._env.now >= deadline:
+                return False
+            until = max(self.engine.now_ps, min(deadline, self._horizon()))
+            reached = self.engine.run(until, (request.pin, request.level))
+            yield self._env.timeout(reached - self._env.now)
+        poll = request.poll_cycles * PS_PER_S
+        polls = max(1, -(-(reached - start) * self._clock.hz // poll))
+        yield self._env.timeout(start + polls * poll // self._clock.hz - self._env.now)
+        return True
+
+    def _sleep(self, request: Sleep) -> Steps:
+        if request.deadline_us is None and not request.wakeable:
+            raise ValueError(f"nothing can end {request!r}: give a deadline or make it wakeable")
+        deadline = None if request.deadline_us is None else request.deadline_us * PS_PER_US
+        if deadline is not None and deadline <= self._env.now:
+            return False
+        alternatives: list[simpy.Event] = [self._wake] if request.wakeable else []
+        if deadline is not None:
+            alternatives.append(self._env.timeout(deadline - self._env.now))
+        self.waiting, self.dozing = deadline is None, request.wakeable
+        self._on_activity(False)
+        yield simpy.AnyOf(self._env, alternatives)
+        self._on_activity(True)
+        self.waiting = self.dozing = False
+        if request.wakeable and self._wake.triggered:
+            self._wake = self._env.event()
+            return True
+        return False
+
+    def _strobe_read(self, request: StrobeRead) -> Steps:
+        period = Fraction(request.cycles * PS_PER_S, self._clock.hz)
+        done = 0
+        while done < len(request.target):
+            yield from self._pay()
+            self._follow()
+            # At least one cycle: an event inside it is an interrupt in the middle of the loop.
+            limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
+            done += self.engine.strobe_read(request.target[done:], period, limit)
+            yield self._env.timeout(self.engine.now_ps - self._env.now)
+        return None
+
+    def _bus_access(self, request: BusAccess) -> Steps:
+        done, total = 0, len(request.addresses)
+        while done < total:
+            yield from self._pay()
+            self._follow()
+            wanted = Transactions(
+                request.addresses[done:],
+                request.data[done:],
+                request.write,
+                self._cycle,
+                request.cycles,
+                request.select,
+                request.above,
+            )
+            # At least one, as above.
+            one = -(-wanted.period.numerator // wanted.period.denominator)
+            limit = max(self._horizon(), self.engine.now_ps + one)
+            done += self.engine.access(wanted, limit)
+            yield self._env.timeout(self.engine.now_ps - self._env.now)
+            if not request.write and request.data[done - 1] > request.above:
+                break
+        return done

@@ -1,1 +1,0 @@
-"""What cameras look at: star catalogue, Earth, Sun and Moon, attitudes, scenes, picture files."""

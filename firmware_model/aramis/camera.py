@@ -1,0 +1,200 @@
+"""The camera unit as the program uses it: set-up, start and stop, pictures by DMA.
+
+AraMiS thesis, sections 2.4 and 2.5.2; registers are those of the sensor's own table. The camera
+sends frames without a break while the star tracker is active; a picture is the next whole frame.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.hardware import AramisHardware, FrameEnd
+from cubestack.firmware_model.aramis.memory import PICTURES_AT
+from cubestack.firmware_model.aramis.state import State
+from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, Reason
+from cubestack.firmware_model.interface.cameras.mt9m001 import (
+    CHIP_VERSION,
+    COLUMNS,
+    FRAME_END_CLOCKS,
+    FRAME_START_CLOCKS,
+    PIXEL_CLOCK_HZ,
+    REGISTERS,
+    ROWS,
+    gain_register,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep
+
+__all__ = ["Camera"]
+
+SETTLE_US = 2_000
+"""From power-up to the first register access; assumed."""
+
+ROW_CLOCKS = COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS
+BLANK_ROWS = REGISTERS["VERTICAL_BLANKING"].reset + 1
+MARGIN_US = 20_000
+"""Added to three frames before a picture is given up; ours."""
+
+_ENABLE = REGISTERS["OUTPUT_CONTROL"].field("CHIP_ENABLE").mask
+
+
+class Camera:
+    """Registers over the control bus, and pictures.
+
+    Attributes:
+        selected_register: address and value of the register read last; None: no answer.
+        off: its supply was switched off by a latch-up action.
+        latest: which of the two places holds the latest picture; None before the first.
+    """
+
+    def __init__(self, hardware: AramisHardware, state: State, meter: Meter) -> None:
+        """Set up as the settings in ``state`` say."""
+        self._hardware = hardware
+        self._state = state
+        self._meter = meter
+        self.selected_register: tuple[int, int | None] = (0, None)
+        self.off = False
+        self.latest: int | None = None
+        self._set_up: tuple[int, int] | None = None
+        self._pending: int | None = None
+        self._ended: tuple[FrameEnd, int] | None = None
+        self._exposure_rows = 0  # of the frame that is waited for
+
+    # --- interrupts -------------------------------------------------------------------------------
+
+    def frame_ended(self, end: FrameEnd) -> None:
+        """Interrupt: the transfer of a frame ended."""
+        self._meter.charge(frame_interrupt=1)
+        self._ended = end, self._hardware.uptime_us()
+        self._hardware.wake()
+
+    def cut(self) -> None:
+        """Interrupt: turn the supply off at once."""
+        self._give_up()
+        self._hardware.switch_camera(False)
+        self.off = True
+        self._set_up = None
+        self._hardware.wake()
+
+    # --- supply and set-up ------------------------------------------------------------------------
+
+    def restore(self) -> Routine[None]:
+        """Turn the supply on and wait until the sensor is ready, at its reset values."""
+        self._hardware.switch_camera(True)
+        self.off = False
+        yield from self._settle()
+
+    def start(self) -> Routine[Reason | None]:
+        """Let the sensor send frames as the settings say; why it does not."""
+        if self.off:
+            return self._fail(Reason.CAMERA_OFF, "CameraOff")
+        gain = gain_register(float(self._state.settings.get("SetGain", "Gain")))
+        rows = int(self._state.settings.get("SetExposure", "Rows"))
+        if self._set_up == (gain, rows):
+            return None
+        self._set_up = None
+        self._give_up()
+        if (yield from self.read("CHIP_VERSION")) != CHIP_VERSION:
+            return self._fail(Reason.CAMERA_SILENT, "CameraSilent")
+        for name, value in (
+            ("SHUTTER_WIDTH", rows),
+            ("GLOBAL_GAIN", gain),
+            ("OUTPUT_CONTROL", _ENABLE),
+        ):
+            if not (yield from self.write(REGISTERS[name].address, value)):
+                return self._fail(Reason.CAMERA_SILENT, "CameraSilent")
+        self._set_up = gain, rows
+        return None
+
+    def stop(self) -> Routine[None]:
+        """Let the sensor rest."""
+        self._give_up()
+        self._set_up = None
+        if not self.off:
+            yield from self.write(REGISTERS["OUTPUT_CONTROL"].address, 0)
+
+    def _settle(self) -> Routine[None]:
+        now_us: int = yield ReadTimer()
+        yield Sleep(now_us + SETTLE_US, wakeable=False)
+
+    def _fail(self, reason: Reason, flag: str) -> Reason:
+        self._state.raise_flag(flag)
+        return reason
+
+    # --- pictures ---------------------------------------------------------------------------------
+
+    def picture(self, place: int) -> NDArray[np.uint8]:
+        """One of the two pictures in SDRAM, shape (1024, 1280), a live view."""
+        start = PICTURES_AT[place]
+        return self._hardware.sdram[start : start + IMAGE_BYTES].reshape(ROWS, COLUMNS)
+
+    def expose(self) -> None:
+        """Let the next whole frame come while the program goes on."""
+        place = 0 if self.latest is None else 1 - self.latest
+        self._ended = None
+        self._pending = place
+        self._exposure_rows = int(self._state.settings.get("SetExposure", "Rows"))
+        self._hardware.start_capture(self.picture(place))
+
+    def _give_up(self) -> None:
+        """The frame that was asked for is not wanted any longer."""
+        self._hardware.stop_capture()
+        self._pending = None
+
+    def take(self) -> Routine[Reason | None]:
+        """Wait for the frame, asking for it if ``expose`` did not; why there is none."""
+        if self._pending is None:
+            self.expose()
+        started_us: int = yield ReadTimer()
+        deadline_us = started_us + 3 * self._frame_us() + MARGIN_US
+        while self._ended is None:
+            if self.off:
+                return self._fail(Reason.CAMERA_OFF, "CameraOff")
+            now_us: int = yield ReadTimer()
+            if now_us >= deadline_us:
+                self._give_up()
+                self._set_up = None
+                return self._fail(Reason.CAMERA_TIMEOUT, "CameraTimeout")
+            yield Sleep(deadline_us)
+        place, self._pending = self._pending, None
+        if self._ended[0] is not FrameEnd.STORED:
+            self._set_up = None
+            return self._fail(Reason.CAMERA_FRAME, "CameraFrameError")
+        self.latest = place
+        self._state.frames += 1
+        return None
+
+    def image_us(self) -> int:
+        """Uptime at mid-exposure of the middle row of the picture that was taken last."""
+        assert self._ended is not None
+        clocks = ((ROWS - 1) / 2 + self._exposure_rows / 2) * ROW_CLOCKS + COLUMNS
+        return self._ended[1] - round(clocks * 1_000_000 / PIXEL_CLOCK_HZ)
+
+    def _frame_us(self) -> int:
+        rows = max(ROWS + BLANK_ROWS, self._exposure_rows + 1)
+        return -(-rows * ROW_CLOCKS * 1_000_000 // PIXEL_CLOCK_HZ)
+
+    # --- registers --------------------------------------------------------------------------------
+
+    def write(self, address: int, value: int) -> Routine[bool]:
+        """Write a register; False when the sensor does not acknowledge."""
+        data = bytes([address]) + value.to_bytes(2, "big")
+        return (yield CameraTransfer(data)) is not None
+
+    def read(self, name: str) -> Routine[int | None]:
+        """Value of the register ``name``; None when the sensor does not answer."""
+        answer: bytes | None = yield CameraTransfer(bytes([REGISTERS[name].address]), read=2)
+        return None if answer is None else int.from_bytes(answer, "big")
+
+    def forget_set_up(self) -> None:
+        """Registers were written by other means: set the sensor up again before a picture."""
+        self._set_up = None
+
+    def select(self, address: int) -> Routine[None]:
+        """Read any register into ``selected_register``."""
+        answer: bytes | None = yield CameraTransfer(bytes([address]), read=2)
+        self.selected_register = (
+            address,
+            None if answer is None else int.from_bytes(answer, "big"),
+        )
+        if answer is None:
+            self._state.raise_flag("CameraSilent")

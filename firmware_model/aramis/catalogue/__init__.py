@@ -1,0 +1,1 @@
+"""The star and triangle database in flash, and its error-correcting code."""

@@ -1,0 +1,207 @@
+"""What the flash holds for the star tracker: stars, triangles, k-vectors and faces, as bytes.
+
+AraMiS thesis, sections 5.5 (triangle database), 5.6 (k-vectors), 5.9 (faces) and 2.3.3 (all of it
+is copied to RAM, where the program works on it). The thesis sizes its database as a text file of
+doubles, 21.2 MB (section 2.3.2); ours is binary, little-endian, without gaps:
+
+- a header, `HEADER`: magic, version, counts, epoch, field and the bounds of both k-vectors;
+- the arrays of `LAYOUT` in order, whose lengths follow from the counts;
+- a CRC-32 of everything before it. Error-coding the image is the flash's task, not done here.
+
+Triangles are in the order of their area; a second list has the moments in rising order, each with
+its triangle. Stars of a triangle are indices into the star list, rising.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import Any, Self
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.geodesic import GeodesicSphere
+from cubestack.firmware_model.aramis.catalogue.kvector import KVector
+
+__all__ = ["Database", "DatabaseError"]
+
+MAGIC = b"ARAM"
+VERSION = 1
+
+HEADER = struct.Struct("<4sHHIIIIHH6f")
+"""Magic, version, 0; stars, triangles, bins of area and moment; faces, neighbours of a face;
+epoch, field in degrees, bounds of area and of moment."""
+
+#: Arrays of the image: name, type of an element, elements of an entry.
+LAYOUT = (
+    ("numbers", "<u4", 1),  # Hipparcos numbers, for the report
+    ("vectors", "<f4", 3),  # inertial unit vectors
+    ("v_mag", "<f4", 1),  # V magnitudes
+    ("stars", "<u2", 3),  # of each triangle
+    ("faces", "<u2", 1),  # of each triangle
+    ("areas", "<f4", 1),  # rising
+    ("moments", "<f4", 1),  # rising
+    ("moment_triangles", "<u4", 1),  # triangle of each entry of moments
+    ("area_starts", "<u4", 1),  # k-vector
+    ("moment_starts", "<u4", 1),  # k-vector
+    ("centres", "<f4", 3),  # of the faces
+    ("neighbours", "<u2", 12),  # of each face
+)
+
+MOST_STARS = 0xFFFF
+MOST_TRIANGLES = 1 << 24
+
+
+class DatabaseError(ValueError):
+    """Bytes or arrays that are no database; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Database:
+    """Onboard database for one field of view and epoch.
+
+    Attributes:
+        epoch: Julian year of the directions.
+        fov_deg: no side of a triangle is longer.
+        numbers: (n,) Hipparcos numbers, uint32.
+        vectors: (n, 3) inertial unit vectors, float32.
+        v_mag: (n,) V magnitudes, float32.
+        stars: (m, 3) star indices of each triangle, rising, uint16.
+        faces: (m,) face of each triangle's middle, uint16.
+        areas: (m,) rising, float32.
+        moments: (m,) rising, float32.
+        moment_triangles: (m,) triangle of each moment, uint32.
+        area_index, moment_index: k-vectors of both.
+        sphere: the faces.
+    """
+
+    epoch: float
+    fov_deg: float
+    numbers: NDArray[np.uint32]
+    vectors: NDArray[np.float32]
+    v_mag: NDArray[np.float32]
+    stars: NDArray[np.uint16]
+    faces: NDArray[np.uint16]
+    areas: NDArray[np.float32]
+    moments: NDArray[np.float32]
+    moment_triangles: NDArray[np.uint32]
+    area_index: KVector
+    moment_index: KVector
+    sphere: GeodesicSphere
+
+    def __len__(self) -> int:
+        """Number of triangles."""
+        return len(self.areas)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Bytes of each part of the image; their sum is the image's length."""
+        arrays = {name: self._array(name).nbytes for name, _, _ in LAYOUT}
+        return {"header": HEADER.size, **arrays, "checksum": 4}
+
+    def pack(self) -> bytes:
+        """The image."""
+        area, moment = self.area_index, self.moment_index
+        header = HEADER.pack(
+            MAGIC,
+            VERSION,
+            0,
+            len(self.numbers),
+            len(self),
+            area.bins,
+            moment.bins,
+            len(self.sphere),
+            self.sphere.neighbours.shape[1],
+            self.epoch,
+            self.fov_deg,
+            area.lowest,
+            area.highest,
+            moment.lowest,
+            moment.highest,
+        )
+        body = header + b"".join(
+            self._array(name).astype(kind).tobytes() for name, kind, _ in LAYOUT
+        )
+        return body + struct.pack("<I", crc32(body))
+
+    @classmethod
+    def unpack(cls, image: bytes | bytearray | memoryview) -> Self:
+        """Database of an image, whose bytes its arrays then share.
+
+        Raises:
+            DatabaseError: for a wrong magic, version, length or checksum, and for indices that
+                reach beyond their lists.
+        """
+        if len(image) < HEADER.size + 4:
+            raise DatabaseError(f"an image has at least {HEADER.size + 4} bytes, not {len(image)}")
+        magic, version, _, stars, triangles, areas, moments, faces, width, *numbers = (
+            HEADER.unpack_from(image)
+        )
+        if magic != MAGIC or version != VERSION:
+            raise DatabaseError(
+                f"an image starts with {MAGIC!r} version {VERSION}, not {magic!r} {version}"
+            )
+        if not (1 <= stars <= MOST_STARS and 1 <= triangles <= MOST_TRIANGLES and width == 12):
+            raise DatabaseError(
+                f"{stars} stars, {triangles} triangles and {width} neighbours of a face are not "
+                f"1 to {MOST_STARS}, 1 to {MOST_TRIANGLES} and 12"
+            )
+        counts = [stars] * 3 + [triangles] * 5 + [areas + 1, moments + 1] + [faces] * 2
+        length = (
+            HEADER.size
+            + 4
+            + sum(
+                count * width * np.dtype(kind).itemsize
+                for count, (_, kind, width) in zip(counts, LAYOUT, strict=True)
+            )
+        )
+        if len(image) != length:
+            raise DatabaseError(f"the image's counts need {length} bytes, not {len(image)}")
+        if crc32(image[:-4]) != struct.unpack("<I", image[-4:])[0]:
+            raise DatabaseError("the image's CRC-32 does not fit its bytes; load it again")
+        arrays: dict[str, NDArray[Any]] = {}
+        offset = HEADER.size
+        for count, (name, kind, width) in zip(counts, LAYOUT, strict=True):
+            flat: NDArray[Any] = np.frombuffer(image, kind, count * width, offset)
+            offset += flat.nbytes
+            arrays[name] = flat.reshape(count, width) if width > 1 else flat
+        _check(arrays, stars, triangles, faces)
+        epoch, fov_deg, *bounds = numbers
+        low_area, high_area, low_moment, high_moment = (np.float32(bound) for bound in bounds)
+        return cls(
+            epoch=epoch,
+            fov_deg=fov_deg,
+            area_index=KVector(low_area, high_area, arrays.pop("area_starts")),
+            moment_index=KVector(low_moment, high_moment, arrays.pop("moment_starts")),
+            sphere=GeodesicSphere(arrays.pop("centres"), arrays.pop("neighbours")),
+            **arrays,
+        )
+
+    def _array(self, name: str) -> NDArray[Any]:
+        parts: dict[str, NDArray[Any]] = {
+            "area_starts": self.area_index.starts,
+            "moment_starts": self.moment_index.starts,
+            "centres": self.sphere.centres,
+            "neighbours": self.sphere.neighbours,
+        }
+        return parts[name] if name in parts else np.asarray(getattr(self, name))
+
+
+def _check(arrays: dict[str, NDArray[Any]], stars: int, triangles: int, faces: int) -> None:
+    """A program must not read beyond its lists, whatever the image says."""
+    limits = {
+        "stars": stars,
+        "faces": faces,
+        "moment_triangles": triangles,
+        "area_starts": triangles + 1,
+        "moment_starts": triangles + 1,
+    }
+    for name, limit in limits.items():
+        if int(arrays[name].max()) >= limit:
+            raise DatabaseError(f"{name} of the image reach {arrays[name].max()}, not {limit - 1}")
+    for name in ("area_starts", "moment_starts"):
+        if (np.diff(arrays[name].astype(np.int64)) < 0).any():
+            raise DatabaseError(f"{name} of the image fall; they must rise")
+    for name in ("vectors", "areas", "moments", "centres"):
+        if not np.isfinite(arrays[name]).all():
+            raise DatabaseError(f"{name} of the image are not all finite")

@@ -1,0 +1,217 @@
+"""The catalogue: error-coded in flash, checked and corrected on its way to RAM, reloaded.
+
+AraMiS thesis, sections 2.1 (code against upsets in flash, periodic reloading into RAM) and 2.3.
+In flash, all in words of :mod:`hamming`: eight bytes (magic, length), then the image of
+:mod:`database`. In RAM it is not coded, so its checksum is computed before each use; a damaged copy
+is loaded anew. A reload that finds words beyond correction leaves the good copy in RAM alone.
+"""
+
+import struct
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
+from cubestack.firmware_model.aramis.catalogue.hamming import (
+    CODED_BYTES,
+    DATA_BYTES,
+    decode,
+    encode,
+)
+from cubestack.firmware_model.aramis.hardware import AramisHardware
+from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
+from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+
+__all__ = ["CatalogueStore", "flash_image"]
+
+HEADER = struct.Struct("<4sI")
+MAGIC = b"AFLS"
+
+SLICE_WORDS = 8192
+"""Coded words of one step of a load: 3 ms, after which the program looks around."""
+
+ERASE_US = 800_000
+PROGRAM_WORD_US = 10
+"""Erasing a sector and programming 16 bits of the M29W320D: typical values of its data sheet."""
+
+
+def flash_image(image: bytes) -> NDArray[np.uint8]:
+    """What the flash holds for a catalogue's ``image``.
+
+    Raises:
+        ValueError: when it is longer than the flash.
+    """
+    if len(image) > MOST_CATALOGUE_BYTES:
+        raise ValueError(
+            f"a catalogue has at most {MOST_CATALOGUE_BYTES} bytes, not {len(image)}; fewer stars "
+            f"per field make it shorter"
+        )
+    return np.concatenate([encode(HEADER.pack(MAGIC, len(image))), encode(image)])
+
+
+class CatalogueStore:
+    """Loads, checks and writes the catalogue.
+
+    Attributes:
+        database: what RAM holds; None when there is no good copy.
+        state: of the copy in RAM.
+        loads, failures: passes over the flash, and those without a good catalogue.
+        corrected, lost: words of the latest pass.
+        corrected_total: words corrected since power-up.
+        ram_errors: how often RAM was found damaged.
+        load_us: duration of the latest pass's steps.
+        loaded_us: when the latest pass ended; None before.
+    """
+
+    def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
+        """Nothing is loaded yet."""
+        self._hardware = hardware
+        self._meter = meter
+        self.database: Database | None = None
+        self.state = CatalogueState.NOT_LOADED
+        self.loads = self.failures = self.ram_errors = 0
+        self.corrected = self.lost = self.corrected_total = 0
+        self.load_us = 0
+        self.loaded_us: int | None = None
+        self._length = 0
+        self._checksum = 0
+        self._at = 0  # word of the image that the pass has come to
+        self._pass_length: int | None = None
+        self._pass_corrected = self._pass_lost = self._pass_us = 0
+
+    @property
+    def length(self) -> int:
+        """Bytes of the image in RAM; 0 without one."""
+        return self._length if self.database is not None else 0
+
+    @property
+    def loading(self) -> bool:
+        """Whether a pass has begun and not ended."""
+        return self._pass_length is not None
+
+    def forget(self) -> None:
+        """The copy in RAM is not wanted any longer."""
+        self.database, self.state = None, CatalogueState.NOT_LOADED
+        self._pass_length = None
+
+    def load(self) -> Routine[bool]:
+        """One whole pass from the start; whether RAM holds a good catalogue after it."""
+        self._pass_length = None
+        while not (yield from self.load_step()):
+            pass
+        return self.database is not None
+
+    def load_step(self) -> Routine[bool]:
+        """A slice of a pass over the flash; whether that ended it."""
+        started_us: int = yield ReadTimer()
+        if self._pass_length is None:
+            self._begin()
+        else:
+            self._slice(self._pass_length)
+        ended = self._pass_length is None or self._at * DATA_BYTES >= self._pass_length
+        if ended:
+            self._finish()
+        yield Pay()
+        now_us: int = yield ReadTimer()
+        self._pass_us += now_us - started_us
+        if ended:
+            self.load_us, self.loaded_us = self._pass_us, now_us
+        return ended
+
+    def ensure(self) -> Routine[bool]:
+        """Compare RAM with its checksum, load anew when it differs; whether it is good."""
+        if self.database is None:
+            return False
+        intact = self._ram_checksum() == self._checksum
+        yield Pay()
+        if intact:
+            return True
+        self.ram_errors += 1
+        self.forget()
+        return (yield from self.load())
+
+    def program(self, image: bytes) -> Routine[None]:
+        """Erase the flash as far as it is needed and write ``image`` to it, coded."""
+        coded = flash_image(image)
+        flash = self._hardware.catalogue_flash
+        self._meter.charge(coded_word=len(coded) // CODED_BYTES, loop=len(coded) // CODED_BYTES)
+        for start in range(0, len(coded), SECTOR_BYTES):
+            sector = coded[start : start + SECTOR_BYTES]
+            yield from self._wait(ERASE_US)
+            flash[start : start + SECTOR_BYTES] = 0xFF
+            yield from self._wait(PROGRAM_WORD_US * -(-len(sector) // 2))
+            flash[start : start + len(sector)] = sector
+
+    def refresh(self) -> Routine[bool]:
+        """Write the good copy of RAM to the flash; False when there is none."""
+        if not (yield from self.ensure()):
+            return False
+        yield from self.program(self._ram(self._length).tobytes())
+        return True
+
+    def _wait(self, duration_us: int) -> Routine[None]:
+        now_us: int = yield ReadTimer()
+        yield Sleep(now_us + duration_us, wakeable=False)
+
+    def _ram(self, length: int) -> NDArray[np.uint8]:
+        return self._hardware.sdram[CATALOGUE_AT : CATALOGUE_AT + length]
+
+    def _ram_checksum(self) -> int:
+        size = self._length
+        self._meter.charge(ram_read=-(-size // 4), table_byte=size, loop=size)
+        return crc32(self._ram(size).data)
+
+    def _begin(self) -> None:
+        """Read the header and start a pass; one without a header has ended at once."""
+        self._pass_corrected = self._pass_lost = self._pass_us = self._at = 0
+        coded = self._hardware.catalogue_flash[:CODED_BYTES]
+        header = decode(coded, self._meter)
+        self._pass_corrected += header.corrected
+        self._pass_lost += len(header.lost)
+        magic, length = HEADER.unpack(header.data.tobytes())
+        if not self._pass_lost and magic == MAGIC and 0 < length <= MOST_CATALOGUE_BYTES:
+            self._pass_length = length
+        elif (coded == 0xFF).all():
+            self._pass_lost = 0  # erased, which is no coded word
+
+    def _slice(self, length: int) -> None:
+        """Take the next words of the image to RAM; a good copy is spared words that are lost."""
+        words = min(SLICE_WORDS, -(-length // DATA_BYTES) - self._at)
+        start = CODED_BYTES * (1 + self._at)
+        coded = self._hardware.catalogue_flash[start : start + CODED_BYTES * words]
+        decoded = decode(coded, self._meter)
+        first = DATA_BYTES * self._at
+        if self.database is None or not len(decoded.lost):
+            stop = min(length, first + DATA_BYTES * words)
+            self._ram(length)[first:stop] = decoded.data[: stop - first]
+        self._pass_corrected += decoded.corrected
+        self._pass_lost += len(decoded.lost)
+        self._at += words
+
+    def _finish(self) -> None:
+        """Judge what the pass brought."""
+        length, self._pass_length = self._pass_length, None
+        self.loads += 1
+        self.corrected, self.lost = self._pass_corrected, self._pass_lost
+        self.corrected_total += self.corrected
+        if self.database is not None:
+            self.failures += bool(self.lost)
+            return
+        if length is None or self.lost:
+            self.failures += 1
+            self.state = CatalogueState.DAMAGED if self.lost else CatalogueState.MISSING
+            return
+        image = self._ram(length).data
+        self._meter.charge(ram_read=-(-length // 4), table_byte=length, loop=length)
+        try:
+            self.database = Database.unpack(image)
+        except DatabaseError:
+            self.failures += 1
+            self.state = CatalogueState.DAMAGED
+            return
+        self.state = CatalogueState.GOOD
+        self._length = length
+        self._checksum = crc32(image)

@@ -1,0 +1,100 @@
+"""The k-vector: a range of sorted values found without a search.
+
+AraMiS thesis, sections 5.6 and 7.1.2. A curve that resembles the sorted values maps a value to a
+bin, and the k-vector holds where each bin starts. The published curve is a parabola through the
+smallest and the largest value, with its vertex at the largest. The bins of the two bounds hold
+values outside the range too; those are compared away, so a range gives what comparing all values
+would. (The thesis is silent on that; its ground code takes whole bins.)
+
+The same single-precision arithmetic numbers the bins on ground and in flight. It never falls with
+a rising value, so rounding moves no value out of the range.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["VALUES_PER_BIN", "KVector", "Range"]
+
+VALUES_PER_BIN = 4
+"""Mean occupation of a bin: more saves memory, and costs comparisons (ours)."""
+
+_ZERO, _ONE = np.float32(0), np.float32(1)
+
+_NARROWEST = np.finfo(np.float32).tiny
+"""A list that spans less is one bin: the inverse of its span is no number."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Places `start` to `stop` (excluded) in the sorted values, and how many were looked at."""
+
+    start: int
+    stop: int
+    looked_at: int
+
+    def __len__(self) -> int:
+        """Number of values."""
+        return self.stop - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class KVector:
+    """The bins of one sorted list.
+
+    Attributes:
+        lowest, highest: smallest and largest value of the list.
+        starts: (bins + 1,) where each bin starts in the list, uint32; the last is its length.
+    """
+
+    lowest: np.float32
+    highest: np.float32
+    starts: NDArray[np.uint32]
+
+    @classmethod
+    def build(cls, rising: NDArray[np.float32], values_per_bin: int = VALUES_PER_BIN) -> Self:
+        """The k-vector of sorted values (n,), n at least 1."""
+        bins = max(1, len(rising) // values_per_bin)
+        vector = cls(rising[0], rising[-1], np.zeros(bins + 1, dtype=np.uint32))
+        occupied = np.bincount(vector._bin(rising), minlength=bins)
+        starts = np.concatenate([[0], np.cumsum(occupied)]).astype(np.uint32)
+        return cls(rising[0], rising[-1], starts)
+
+    @property
+    def bins(self) -> int:
+        """Number of bins."""
+        return len(self.starts) - 1
+
+    def find(
+        self, rising: NDArray[np.float32], low: np.float32, high: np.float32, meter: Meter
+    ) -> Range:
+        """Range of the values from `low` to `high`, both included; NaN finds nothing."""
+        meter.charge(f32_compare=3)
+        if not (low <= high and low <= self.highest and high >= self.lowest):
+            return Range(0, 0, 0)
+        first, last = self._bin(np.array([low, high], dtype=np.float32)).tolist()
+        start, stop = int(self.starts[first]), int(self.starts[last + 1])
+        meter.charge(f32_add=4, f32_mul=6, f32_compare=4, f32_convert=2, ram_read=2)
+        looked_at = stop - start
+        compared = 2
+        while start < stop and rising[start] < low:
+            start += 1
+            compared += 1
+        while start < stop and rising[stop - 1] > high:
+            stop -= 1
+            compared += 1
+        meter.charge(ram_read=compared, f32_compare=compared, loop=compared)
+        return Range(start, stop, looked_at)
+
+    def _bin(self, values: NDArray[np.float32]) -> NDArray[np.intp]:
+        """Bins of values of any shape: the parabola (top - y)^2 = (top - lowest)^2 (1 - x)."""
+        span = self.highest - self.lowest
+        scale = _ONE / span if span >= _NARROWEST else _ZERO
+        below = np.clip((self.highest - values) * scale, _ZERO, _ONE)
+        bins = len(self.starts) - 1
+        numbers: NDArray[np.float32] = (_ONE - below * below) * np.float32(bins - 1)
+        return numbers.astype(np.intp)

@@ -1,0 +1,85 @@
+"""Loading a catalogue by telecommand: blocks into spare RAM, checked, then written to flash.
+
+AraMiS thesis, section 2.2 (inputStarcatalogue). Nothing of the present catalogue is touched before
+the new one has been checked.
+"""
+
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
+from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.hardware import AramisHardware
+from cubestack.firmware_model.aramis.memory import UPLOAD_AT
+from cubestack.firmware_model.interface.aramis import BLOCK_BYTES
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, Routine
+
+__all__ = ["CatalogueUpload"]
+
+
+class CatalogueUpload:
+    """The catalogue that is being loaded."""
+
+    def __init__(self, hardware: AramisHardware, meter: Meter, store: CatalogueStore) -> None:
+        """Write to ``store`` in the end."""
+        self._hardware = hardware
+        self._meter = meter
+        self._store = store
+        self._length = 0
+        self._checksum = 0
+        self._received: NDArray[np.bool_] = np.zeros(0, bool)
+
+    @property
+    def blocks(self) -> int:
+        """Blocks that the image has; 0 when none is being loaded."""
+        return len(self._received)
+
+    @property
+    def received(self) -> int:
+        """Different blocks that came."""
+        return int(self._received.sum())
+
+    @property
+    def missing(self) -> int:
+        """First block that did not come; ``blocks`` when none is missing."""
+        return self.blocks if self._received.all() else int(np.argmin(self._received))
+
+    def begin(self, length: int, checksum: int) -> None:
+        """An image of ``length`` bytes with that CRC-32 will come."""
+        self._length, self._checksum = length, checksum
+        self._received = np.zeros(-(-length // BLOCK_BYTES), bool)
+
+    def put(self, number: int, data: bytes) -> bool:
+        """Take a block; False when it is beyond the image or none is being loaded."""
+        if number >= self.blocks:
+            return False
+        start = number * BLOCK_BYTES
+        self._image()[start : start + BLOCK_BYTES] = np.frombuffer(data, np.uint8)[
+            : self._length - start
+        ]
+        self._received[number] = True
+        self._meter.charge(ram_write=BLOCK_BYTES // 4, loop=BLOCK_BYTES // 4)
+        return True
+
+    def commit(self) -> Routine[bool]:
+        """Check the image and write it to flash; False when it is refused."""
+        length, image = self._length, self._image()
+        self._meter.charge(ram_read=-(-length // 4), table_byte=length, loop=length)
+        yield Pay()
+        if not self.blocks or not self._received.all() or crc32(image.data) != self._checksum:
+            return False
+        data = image.tobytes()
+        try:
+            Database.unpack(data)
+        except DatabaseError:
+            return False
+        self._store.forget()
+        yield from self._store.program(data)
+        self.begin(0, 0)
+        return True
+
+    def _image(self) -> NDArray[np.uint8]:
+        return self._hardware.sdram[UPLOAD_AT : UPLOAD_AT + self._length]

@@ -1,0 +1,1 @@
+"""From a picture to stars: background, spikes, regions, smear."""

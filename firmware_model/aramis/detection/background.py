@@ -1,0 +1,63 @@
+"""The threshold between sky and stars, from the last five pictures.
+
+AraMiS thesis, section 3.5: mean grey level of the last five pictures plus twice the noise. The
+noise is taken as the standard deviation over all pixels that the mean is taken of (the thesis does
+not say how it is measured); stars are in it, but they cover too few pixels to matter.
+"""
+
+from collections import deque
+from math import isqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["FRAMES", "Background"]
+
+FRAMES = 5
+
+
+class Background:
+    """Grey levels of the last pictures; what the program keeps from one picture to the next.
+
+    Attributes:
+        sums: (pixels, sum, sum of squares) of each picture, the newest last. The Blackfin's 40-bit
+            accumulator holds the squares of 1280 x 1024 pixels.
+    """
+
+    def __init__(self) -> None:
+        """No picture yet."""
+        self.sums: deque[tuple[int, int, int]] = deque(maxlen=FRAMES)
+
+    def add(self, picture: NDArray[np.uint8], field: Field, meter: Meter) -> None:
+        """Take a picture (rows, columns) into account; pixels outside the field do not count."""
+        levels = np.bincount(picture[field.mask], minlength=256).astype(np.int64)
+        values = np.arange(256)
+        pixels = field.pixels
+        self.sums.append((pixels, int(levels @ values), int(levels @ values**2)))
+        meter.charge(pixel_read=pixels, i32_add=2 * pixels, i32_mul=pixels, loop=pixels)
+
+    def mean(self, meter: Meter) -> int:
+        """Mean level, rounded; 0 without a picture."""
+        pixels, total, _ = self._totals()
+        meter.charge(i32_add=FRAMES, i32_div=1)
+        return (total + pixels // 2) // pixels if pixels else 0
+
+    def threshold(self, sigmas: float, meter: Meter) -> int:
+        """Level that a star's pixel is above: mean plus so many standard deviations."""
+        pixels, total, squares = self._totals()
+        meter.charge(i32_add=3 * FRAMES, i32_mul=2, i32_div=2, f32_convert=3, f32_sqrt=1)
+        meter.charge(f32_mul=1, f32_add=1, loop=FRAMES)
+        if not pixels:
+            return 0
+        # 1/16 grey level is far below the noise of the deviation.
+        deviation = np.float32(isqrt(256 * (squares * pixels - total * total)) / (16 * pixels))
+        return int(np.float32(total / pixels) + np.float32(sigmas) * deviation)
+
+    def _totals(self) -> tuple[int, int, int]:
+        pixels, total, squares = (
+            (sum(column) for column in zip(*self.sums, strict=True)) if (self.sums) else (0, 0, 0)
+        )
+        return pixels, total, squares

@@ -1,0 +1,183 @@
+"""How far the stars were drawn out while the picture was taken. Ours: the thesis has none.
+
+A star that moves during the exposure leaves a streak. Its second moments along and across differ by
+the square of the streak's length over twelve, as those of a line do, whatever the star's own width.
+A long streak of a faint star is lost among the noise of single pixels, and even of blocks of them;
+but as all streaks of a turn lie the same way, they show together: the blocks of the picture are
+alike to those some way off in that one direction. Stars at rest are alike to nothing.
+"""
+
+from math import cos, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.detection.regions import Regions
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["is_drawn_out", "smear_px"]
+
+LARGEST = 10
+"""Regions looked at."""
+
+UPPER_QUARTILE = 75
+"""Of the lengths: long streaks fall apart, and their pieces are shorter."""
+
+BLOCK = 8
+"""Pixels along a side of a block."""
+
+NEAREST, FARTHEST = 3, 8
+"""Blocks compared are so far apart: farther than a star at rest is wide, nearer than a streak is
+long that has to be found."""
+
+DIRECTIONS = 24
+"""Looked along, over half a turn."""
+
+CLIPPED_SIGMAS = 4.0
+"""A block counts as no brighter than that, so that no bright star outshines the streaks."""
+
+SURROUNDINGS = 6
+"""Blocks to either side that a block's brightness is taken against: light that is spread wider is
+no streak."""
+
+ALIKE_SIGMAS = 5.5
+"""Of what chance makes, above the median direction: stars at rest stay near 4, streaks of 95 px are
+above 7."""
+
+QUARTILES_APART = 1.349
+"""Between the quartiles of a normal distribution, in standard deviations."""
+
+_LEAST = 1e-3
+"""Taken as the quartiles' distance when there is no noise at all."""
+
+
+def _lags() -> tuple[tuple[frozenset[tuple[int, int]], ...], tuple[tuple[int, int], ...]]:
+    """Rows and columns between compared blocks: of each direction, and all without repetition."""
+    angles = [pi * number / DIRECTIONS for number in range(DIRECTIONS)]
+    directions = tuple(
+        frozenset(
+            (round(far * sin(angle)), round(far * cos(angle)))
+            for far in range(NEAREST, FARTHEST + 1)
+        )
+        for angle in angles
+    )
+    return directions, tuple(sorted(frozenset().union(*directions)))
+
+
+ALONG, LAGS = _lags()
+
+
+def smear_px(picture: NDArray[np.uint8], regions: Regions, floor: int, meter: Meter) -> float:
+    """Upper quartile of the lengths of the largest regions, weighed by grey levels above `floor`.
+
+    0 without regions.
+    """
+    grey = picture[regions.rows, regions.columns].astype(np.float32)
+    lengths = _lengths(regions, np.maximum(grey - np.float32(floor), 1), meter)
+    return float(np.percentile(lengths, UPPER_QUARTILE)) if lengths else 0.0
+
+
+def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool:
+    """Whether there are streaks of some 60 px or more, if too faint for single pixels.
+
+    Args:
+        picture: (rows, columns) grey levels.
+        field: the camera; blocks near the edge of its field do not count.
+        meter: charged.
+    """
+    inside: NDArray[np.bool_] = np.all(_blocks(field.mask), axis=(1, 3))
+    around = _box(inside.astype(np.float32))
+    inside &= around > (2 * SURROUNDINGS + 1) ** 2 - 0.5
+    count = int(inside.sum())
+    if count == 0:
+        return False
+    bright = _brightness(picture, inside, meter)
+    chance = float(np.square(bright).sum()) / sqrt(count)
+    rows, columns = bright.shape
+    alike = {}
+    for down, across in LAGS:
+        left, right = max(0, -across), columns - max(0, across)
+        here = bright[: rows - down, left:right]
+        there = bright[down:, left + across : right + across]
+        alike[down, across] = float(np.vdot(here, there))
+    steps = count * (1 + len(LAGS))
+    meter.charge(ram_read=2 * steps, i32_mul=steps, i32_add=steps, loop=steps)
+    meter.charge(f32_add=DIRECTIONS * FARTHEST, f32_div=DIRECTIONS, f32_compare=DIRECTIONS)
+    directions = [sum(alike[lag] for lag in lags) / sqrt(len(lags)) for lags in ALONG]
+    # Light that a glow leaves is alike in all directions.
+    return max(directions) - float(np.median(directions)) > ALIKE_SIGMAS * chance
+
+
+def _brightness(
+    picture: NDArray[np.uint8], inside: NDArray[np.bool_], meter: Meter
+) -> NDArray[np.float32]:
+    """How much brighter each block is than those around it, in sigmas; 0 outside."""
+    sums = _blocks(picture).sum(axis=(1, 3), dtype=np.int32)
+    clipped = _clipped(sums.astype(np.float32), inside)
+    level = _box(clipped) / np.float32((2 * SURROUNDINGS + 1) ** 2)
+    blocks = sums.size
+    # Quartiles are found by halving the range of 16 bits, twice; then the boxes.
+    steps = picture.size + (2 * 16 + 8) * blocks
+    meter.charge(pixel_read=picture.size, i32_add=steps, ram_write=4 * blocks, loop=steps)
+    meter.charge(i32_div=3 * blocks)
+    return np.where(inside, _clipped(clipped - level, inside), np.float32(0))
+
+
+def _clipped(values: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Values (rows, columns) less the median, in sigmas of those inside, clipped."""
+    low, middle, high = np.percentile(values[inside], (25, 50, 75))
+    sigma = max(high - low, _LEAST) / QUARTILES_APART
+    clipped: NDArray[np.float32] = ((values - middle) / sigma).astype(np.float32)
+    return np.clip(clipped, -CLIPPED_SIGMAS, CLIPPED_SIGMAS)
+
+
+def _box(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sum over the square of `SURROUNDINGS` to all sides of each value (rows, columns)."""
+    for axis in (0, 1):
+        size = values.shape[axis]
+        sums = np.cumsum(np.insert(values, 0, 0, axis=axis), axis=axis, dtype=np.float64)
+        places = np.arange(size)
+        last = np.minimum(places + SURROUNDINGS + 1, size)
+        first = np.maximum(places - SURROUNDINGS, 0)
+        values = (sums.take(last, axis) - sums.take(first, axis)).astype(np.float32)
+    return values
+
+
+def _blocks(pixels: NDArray[Any]) -> NDArray[Any]:
+    """View (rows, BLOCK, columns, BLOCK) without what is left over at the edges."""
+    rows, columns = (size // BLOCK for size in pixels.shape)
+    return pixels[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
+
+
+def _lengths(regions: Regions, weights: NDArray[np.float32], meter: Meter) -> list[float]:
+    """Of the largest regions."""
+    sizes = np.bincount(regions.labels, minlength=regions.count)
+    lengths = []
+    for region in np.argsort(-sizes, kind="stable")[:LARGEST]:
+        pixels = np.flatnonzero(regions.labels == region)
+        lengths.append(_length(regions.rows[pixels], regions.columns[pixels], weights[pixels]))
+        meter.charge(
+            ram_read=3 * len(pixels),
+            f32_convert=3 * len(pixels),
+            f32_mul=8 * len(pixels),
+            f32_add=6 * len(pixels),
+            f32_div=5,
+            f32_sqrt=2,
+            loop=len(pixels),
+        )
+    meter.charge(i32_add=len(regions.labels), loop=len(regions.labels) + LARGEST * regions.count)
+    return lengths
+
+
+def _length(
+    rows: NDArray[np.intp], columns: NDArray[np.intp], weights: NDArray[np.float32]
+) -> float:
+    """Length of the streak that pixels (n,) with weights make."""
+    y, x = (rows - rows[0]).astype(np.float32), (columns - columns[0]).astype(np.float32)
+    total = weights.sum()
+    x, y = x - (weights @ x) / total, y - (weights @ y) / total
+    across, down = weights @ (x * x) / total, weights @ (y * y) / total
+    mixed = weights @ (x * y) / total
+    return float(np.sqrt(12 * np.sqrt((across - down) ** 2 + 4 * mixed**2)))

@@ -1,0 +1,1 @@
+"""From stars to an attitude: planar triangles, pivots, verification."""

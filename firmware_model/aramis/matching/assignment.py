@@ -1,0 +1,93 @@
+"""Who is who: which star of the matched triangle each measured star is.
+
+AraMiS thesis, section 5.8 (tables 5.1 to 5.3). Two criteria put a score into a 3 x 3 matrix of
+measured against catalogue stars: the order of brightness, and the order of the sides. Each scores
+its coefficient of variation (standard deviation over mean of the three measured values), so the
+criterion whose values differ more decides where both disagree. A side stands for the star opposite
+to it. The thesis' appendix scores brightness star by star in another way; ours follows the text.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["Assignment", "assign"]
+
+#: Corner opposite to side a (1-2), b (2-3) and c (1-3).
+OPPOSITE = np.array([2, 0, 1])
+
+_THREE, _TWO = np.float32(3), np.float32(2)
+
+
+@dataclass(frozen=True, eq=False)
+class Assignment:
+    """Identities of three measured stars.
+
+    Attributes:
+        scores: (3, 3) measured stars down, stars of the catalogue's triangle across.
+        order: (3,) star of the catalogue's triangle for each measured one, by the higher score.
+        other: (3,) the same by the criterion that lost; equal to `order` when both agree.
+    """
+
+    scores: NDArray[np.float32]
+    order: NDArray[np.intp]
+    other: NDArray[np.intp]
+
+
+def assign(
+    brightness: NDArray[np.float32],
+    sides: NDArray[np.float32],
+    v_mag: NDArray[np.float32],
+    catalogue: NDArray[np.float32],
+    meter: Meter,
+) -> Assignment:
+    """Score the stars of a measured triangle against those of the catalogue's.
+
+    Args:
+        brightness: (3,) of the measured stars, in any linear unit.
+        sides: (3,) a, b, c of the measured triangle.
+        v_mag: (3,) magnitudes of the catalogue's stars.
+        catalogue: (3, 3) their unit vectors.
+        meter: charged.
+    """
+    first, second, third = catalogue.astype(np.float32)
+    expected = np.array(
+        [_chord2(first, second), _chord2(second, third), _chord2(first, third)], dtype=np.float32
+    )
+    meter.charge(f32_add=15, f32_mul=9, ram_read=9)
+    by_brightness = _correspond(-brightness, v_mag)
+    by_sides = np.empty(3, dtype=np.intp)
+    by_sides[OPPOSITE] = OPPOSITE[_correspond(sides, expected)]
+    weights = variation(brightness, meter), variation(sides, meter)
+    scores = np.zeros((3, 3), dtype=np.float32)
+    measured = np.arange(3)
+    scores[measured, by_brightness] += weights[0]
+    scores[measured, by_sides] += weights[1]
+    meter.charge(f32_compare=12 + 6, f32_add=6, ram_read=18, ram_write=24, loop=9)
+    if weights[0] > weights[1]:
+        return Assignment(scores, by_brightness, by_sides)
+    return Assignment(scores, by_sides, by_brightness)
+
+
+def variation(values: NDArray[np.float32], meter: Meter) -> np.float32:
+    """Coefficient of variation of three values: sample standard deviation over mean."""
+    x, y, z = values.astype(np.float32)
+    mean = (x + y + z) / _THREE
+    squares = (x - mean) ** 2 + (y - mean) ** 2 + (z - mean) ** 2
+    meter.charge(f32_add=7, f32_mul=3, f32_div=3, f32_sqrt=1, f32_compare=1)
+    return np.float32(np.sqrt(squares / _TWO) / mean) if mean > 0 else np.float32(0)
+
+
+def _correspond(measured: NDArray[np.float32], expected: NDArray[np.float32]) -> NDArray[np.intp]:
+    """For each measured value the expected one of the same rank."""
+    found = np.empty(3, dtype=np.intp)
+    found[np.argsort(measured, kind="stable")] = np.argsort(expected, kind="stable")
+    return found
+
+
+def _chord2(first: NDArray[np.float32], second: NDArray[np.float32]) -> np.float32:
+    x, y, z = first - second
+    return np.float32(x * x + y * y + z * z)

@@ -1,0 +1,304 @@
+"""From measured stars to an attitude: triples, pivots, identities, QUEST and the outcome.
+
+AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
+the main triangle, the next three the pivots, and a unique triangle is believed. A rough direction
+leaves the triangles around it; ours is that it also must be close to the boresight found, and that
+the sides must agree with the identities, of which the second choice will do.
+
+With verification (ours), an attitude must be confirmed by further stars. Then every candidate is
+tried, with both ways of telling its stars apart; pivots, which a false star would spoil, only serve
+to leave few enough; and further triples of stars follow when none is confirmed. The confirmed
+attitude is solved again with all stars that confirm it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.matching.assignment import assign
+from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
+from cubestack.firmware_model.aramis.matching.matching import Match, MatchEnd, match_triple
+from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
+from cubestack.firmware_model.aramis.matching.verification import confirm, sides_agree
+from cubestack.firmware_model.aramis.solution import (
+    NONE,
+    Outcome,
+    Profile,
+    Reason,
+    Solution,
+    StarList,
+    unsolved,
+)
+from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["identify"]
+
+
+def identify(
+    measured: StarList,
+    field: Field,
+    profile: Profile,
+    database: Database,
+    meter: Meter,
+    hint: NDArray[np.float32] | None = None,
+) -> Solution:
+    """Identify measured stars and solve the attitude.
+
+    Args:
+        measured: stars of the picture in the field, the brightest first.
+        field: the camera.
+        profile: settings.
+        database: stars and triangles.
+        meter: charged; phases `faces`, `triangles`, `search`, `pivoting`, `identities`, `attitude`
+            and `verification`.
+        hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
+    """
+    # As published, there is no such reason, and its spike removal cuts stars into long pieces.
+    smeared = profile.verify and measured.smear_px > profile.smear_px
+    if smeared and measured.skew_px > profile.skew_px:
+        return unsolved(Outcome.NONE, Reason.SMEAR, measured)
+    solution = _identify(measured, field, profile, database, meter, hint)
+    if smeared and solution.outcome is Outcome.NONE:
+        return replace(solution, reason=Reason.SMEAR)
+    return solution
+
+
+def _identify(
+    measured: StarList,
+    field: Field,
+    profile: Profile,
+    database: Database,
+    meter: Meter,
+    hint: NDArray[np.float32] | None,
+) -> Solution:
+    if len(measured) < 3:
+        return unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, measured)
+    vectors = field.directions(measured.centroids, meter)
+    faces = None
+    if hint is not None:
+        with meter.phase("faces"):
+            faces = database.sphere.around(hint, meter)
+    search = _Search(measured, vectors, field, profile, database, hint, faces, meter)
+    return search.verified() if profile.verify else search.published()
+
+
+@dataclass(frozen=True)
+class _Search:
+    """One picture's identification."""
+
+    measured: StarList
+    vectors: NDArray[np.float32]
+    field: Field
+    profile: Profile
+    database: Database
+    hint: NDArray[np.float32] | None
+    faces: NDArray[np.bool_] | None
+    meter: Meter
+
+    def published(self) -> Solution:
+        """The three brightest stars, and nothing that contradicts."""
+        main = (0, 1, 2)
+        match = self._match(main)
+        counts = {"candidates": len(match.candidates), "pivots": match.pivots, "triples": 1}
+        reason = Reason.of(match.end)
+        if match.end is MatchEnd.SEVERAL:
+            return unsolved(Outcome.AMBIGUOUS, reason, self.measured, **counts)
+        if match.end is not MatchEnd.UNIQUE:
+            return unsolved(Outcome.NONE, reason, self.measured, **counts)
+        choices = self._identities(main, match, int(match.candidates[0]))
+        if self.hint is not None:
+            choices = [choice for choice in choices if self._sides_agree(main, choice)]
+            if not choices:
+                return unsolved(Outcome.NONE, Reason.UNCONFIRMED, self.measured, **counts)
+        identities = choices[0]
+        quaternion = self._attitude(np.array(main), identities)
+        if quaternion is None:
+            return unsolved(Outcome.NONE, Reason.DEGENERATE, self.measured, **counts)
+        if self._far_from_hint(quaternion):
+            return unsolved(Outcome.NONE, Reason.FAR_FROM_HINT, self.measured, **counts)
+        return self._solution(reason, quaternion, np.array(main), identities, **counts)
+
+    def verified(self) -> Solution:
+        """Triples until the attitude of one is confirmed."""
+        hypotheses = triples = 0
+        reason = None
+        for main in self._triples():
+            triples += 1
+            match = self._match(main)
+            if len(match.candidates):
+                reason = Reason.UNCONFIRMED
+            reason = reason or Reason.of(match.end)
+            for triangle in match.candidates[: self.profile.candidates].tolist():
+                for identities in self._identities(main, match, triangle):
+                    if not self._sides_agree(main, identities):
+                        continue
+                    hypotheses += 1
+                    quaternion = self._attitude(np.array(main), identities)
+                    if quaternion is None or self._far_from_hint(quaternion):
+                        continue
+                    found = self._confirm(quaternion, hypotheses)
+                    if found is not None:
+                        quaternion, stars, identities, expected = found
+                        straight = self._at_middle_row(quaternion, stars, identities)
+                        if straight is None:
+                            return unsolved(Outcome.NONE, Reason.SMEAR, self.measured)
+                        return self._solution(
+                            Reason.CONFIRMED,
+                            straight,
+                            stars,
+                            identities,
+                            candidates=len(match.candidates),
+                            pivots=match.pivots,
+                            triples=triples,
+                            expected=expected,
+                        )
+        return unsolved(
+            Outcome.NONE, reason or Reason.TOO_FEW_STARS, self.measured, triples=triples
+        )
+
+    def _triples(self) -> Iterator[tuple[int, int, int]]:
+        """Triples of the brightest stars, by the sum of their ranks."""
+        count = min(len(self.measured), self.profile.triple_stars)
+        triples = sorted(combinations(range(count), 3), key=lambda triple: (sum(triple), triple))
+        yield from triples[: self.profile.triples]
+
+    def _match(self, main: tuple[int, int, int]) -> Match:
+        others = [star for star in range(len(self.measured)) if star not in main]
+        return match_triple(
+            self.vectors,
+            main,
+            others[: self.profile.pivots],
+            self.profile.sigma_rad,
+            self.database,
+            self.faces,
+            self.meter,
+            self.profile.candidates if self.profile.verify else 1,
+        )
+
+    def _identities(
+        self, main: tuple[int, int, int], match: Match, triangle: int
+    ) -> list[NDArray[np.intp]]:
+        """Star of the database for each of the three, by the score; then by the other criterion."""
+        assert match.main is not None
+        database, stars = self.database, self.database.stars[triangle].astype(np.intp)
+        with self.meter.phase("identities"):
+            found = assign(
+                self.measured.brightness[list(main)],
+                match.main.sides,
+                database.v_mag[stars],
+                database.vectors[stars],
+                self.meter,
+            )
+        orders = [found.order]
+        if (found.order != found.other).any():
+            orders.append(found.other)
+        return [stars[order] for order in orders]
+
+    def _sides_agree(self, main: tuple[int, int, int], identities: NDArray[np.intp]) -> bool:
+        with self.meter.phase("verification"):
+            return sides_agree(
+                self.vectors[list(main)],
+                self.database.vectors[identities],
+                self.profile.side_tolerance_rad,
+                self.meter,
+            )
+
+    def _attitude(
+        self, measured: NDArray[np.intp], identities: NDArray[np.intp]
+    ) -> NDArray[np.float32] | None:
+        weights = np.ones(len(measured), dtype=np.float32)
+        return self._quest(self.vectors[measured], self.database.vectors[identities], weights)
+
+    def _quest(
+        self,
+        vectors: NDArray[np.float32],
+        catalogue: NDArray[np.float32],
+        weights: NDArray[np.float32],
+    ) -> NDArray[np.float32] | None:
+        with self.meter.phase("attitude"):
+            try:
+                return quest(vectors, catalogue, weights, self.meter, eigenvalue=largest_eigenvalue)
+            except AttitudeError:
+                return None
+
+    def _far_from_hint(self, quaternion: NDArray[np.float32]) -> bool:
+        if self.hint is None:
+            return False
+        with self.meter.phase("faces"):
+            boresight = dcm(quaternion, self.meter)[2]
+            self.meter.charge(f32_mul=3, f32_add=2, f32_compare=1)
+        limit = np.cos(np.radians(self.profile.hint_tolerance_deg))
+        return not np.dot(boresight, self.hint.astype(np.float32)) >= np.float32(limit)
+
+    def _confirm(
+        self, quaternion: NDArray[np.float32], hypotheses: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.intp], NDArray[np.intp], int] | None:
+        """Confirmed attitude of all stars that agree, those stars, and how many were expected."""
+        for _ in range(2):
+            found = confirm(
+                quaternion,
+                self.vectors,
+                self.database,
+                self.field,
+                self.profile.tolerance_rad,
+                hypotheses,
+                self.meter,
+            )
+            if found.chance > self.profile.largest_chance:
+                return None
+            if found.spread_rad < self.profile.spread_rad:
+                return None
+            refined = self._attitude(found.measured, found.stars)
+            if refined is None:
+                return None
+            quaternion = refined
+        return quaternion, found.measured, found.stars, found.expected
+
+    def _at_middle_row(
+        self, quaternion: NDArray[np.float32], measured: NDArray[np.intp], stars: NDArray[np.intp]
+    ) -> NDArray[np.float32] | None:
+        """The attitude at one instant, when stars moved; None when it can't be told well enough."""
+        still = self.measured.smear_px <= self.profile.smear_px or self.measured.skew_px <= 0
+        if still or len(measured) < FEWEST:
+            return quaternion
+        catalogue = self.database.vectors[stars]
+        heights = self.measured.centroids[measured, 1] / np.float32(self.field.rows)
+        with self.meter.phase("attitude"):
+            predicted = catalogue @ dcm(quaternion, self.meter).T
+            self.meter.charge(f32_mul=9 * len(stars), f32_add=6 * len(stars), loop=len(stars))
+            straight, weights, sigma_rad = at_middle_row(
+                self.vectors[measured],
+                predicted,
+                heights - np.float32(0.5),
+                self.measured.skew_px * self.field.scale[1],
+                self.meter,
+            )
+        moved = self.measured.skew_px > self.profile.moved_px
+        if moved and sigma_rad > self.profile.motion_sigma_rad:
+            return None
+        return self._quest(straight, catalogue, weights)
+
+    def _solution(
+        self,
+        reason: Reason,
+        quaternion: NDArray[np.float32],
+        measured: NDArray[np.intp],
+        identities: NDArray[np.intp],
+        **counts: int,
+    ) -> Solution:
+        stars = np.full(len(self.measured), NONE, dtype=np.int32)
+        stars[measured] = identities
+        return Solution(
+            Outcome.CONCLUSIVE,
+            reason,
+            quaternion,
+            stars,
+            self.measured,
+            **counts,
+        )

@@ -1,0 +1,170 @@
+"""Which triangles of the database a measured one can be, and pivoting to leave only one.
+
+AraMiS thesis, sections 5.5 to 5.7 and 5.9. A triangle is a candidate when its area and its moment
+both lie within three standard deviations of the measured ones. When several are left, a pivot
+triangle is measured, which keeps two stars and takes a further one: candidates stay that share two
+stars with a candidate of the pivot. With stars 1, 2 and 3 as the main triangle, the pivots are
+1 2 4, 1 3 5 and 1 2 6: each brings a further star, so six stars allow three pivots (the pairs are
+those of appendix E). With a rough direction, only the face in which it falls and those around it
+are searched.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import ceil, log2
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["BOUND_SIGMAS", "Match", "MatchEnd", "find_triangles", "match_triple"]
+
+BOUND_SIGMAS = np.float32(3)
+
+#: Which two stars of the main triangle each pivot keeps.
+PIVOT_PAIRS = ((0, 1), (0, 2), (0, 1))
+
+#: The three pairs of a triangle's stars.
+_FIRST, _SECOND = [0, 0, 1], [1, 2, 2]
+
+
+class MatchEnd(Enum):
+    """How matching one main triangle ended."""
+
+    UNIQUE = "one triangle of the database was left"
+    SEVERAL = "several triangles of the database were left after the last pivot"
+    DEGENERATE = "the stars stand on a line"
+    NO_TRIANGLE = "no triangle of the database has that area and moment"
+    NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Result for one main triangle.
+
+    Attributes:
+        end: how it ended.
+        main: the main triangle; None when DEGENERATE.
+        candidates: triangles of the database that are left, uint32; empty when there is none.
+        pivots: pivot triangles that were used.
+    """
+
+    end: MatchEnd
+    main: Triangle | None
+    candidates: NDArray[np.uint32]
+    pivots: int
+
+
+_NOTHING = np.zeros(0, dtype=np.uint32)
+
+
+def find_triangles(
+    triangle: Triangle, database: Database, faces: NDArray[np.bool_] | None, meter: Meter
+) -> NDArray[np.uint32]:
+    """Triangles of the database within the bounds of a measured one, in the moments' order.
+
+    Args:
+        triangle: the measured one.
+        database: where to look.
+        faces: (f,) which faces count; None: all.
+        meter: charged.
+    """
+    reach = BOUND_SIGMAS * triangle.area_sigma
+    areas = database.area_index.find(
+        database.areas, triangle.area - reach, triangle.area + reach, meter
+    )
+    reach = BOUND_SIGMAS * triangle.moment_sigma
+    moments = database.moment_index.find(
+        database.moments, triangle.moment - reach, triangle.moment + reach, meter
+    )
+    meter.charge(f32_mul=2, f32_add=4)
+    # Triangles are in the order of their area, so the intersection is a comparison of indices.
+    found = database.moment_triangles[moments.start : moments.stop]
+    found = found[(found >= areas.start) & (found < areas.stop)]
+    meter.charge(ram_read=len(moments), i32_add=2 * len(moments), loop=len(moments))
+    if faces is not None:
+        meter.charge(ram_read=2 * len(found), loop=len(found))
+        found = found[faces[database.faces[found]]]
+    meter.charge(ram_write=len(found))
+    return found
+
+
+def match_triple(
+    vectors: NDArray[np.float32],
+    main: Sequence[int],
+    pivots: Sequence[int],
+    sigma_rad: float,
+    database: Database,
+    faces: NDArray[np.bool_] | None,
+    meter: Meter,
+    enough: int = 1,
+) -> Match:
+    """Match the triangle of three stars, with pivots as long as too many candidates are left.
+
+    Args:
+        vectors: (n, 3) unit vectors of the stars in camera axes.
+        main: the three stars of the main triangle, the brightest first.
+        pivots: further stars, at most three are used.
+        sigma_rad: noise of the directions per axis.
+        database: where to look.
+        faces: (f,) which faces count; None: all.
+        meter: charged; phases `triangles`, `search` and `pivoting`.
+        enough: no pivot is needed when so few candidates are left; 1 as published.
+    """
+    with meter.phase("triangles"):
+        triangle = measure_triangle(vectors[list(main)], sigma_rad, meter)
+    if triangle is None:
+        return Match(MatchEnd.DEGENERATE, None, _NOTHING, 0)
+    with meter.phase("search"):
+        left = find_triangles(triangle, database, faces, meter)
+    if len(left) == 0:
+        return Match(MatchEnd.NO_TRIANGLE, triangle, left, 0)
+    used = 0
+    for (first, second), star in zip(PIVOT_PAIRS, pivots, strict=False):
+        if len(left) <= enough:
+            break
+        used += 1
+        with meter.phase("triangles"):
+            pivot = measure_triangle(vectors[[main[first], main[second], star]], sigma_rad, meter)
+        if pivot is None:
+            continue
+        with meter.phase("search"):
+            others = find_triangles(pivot, database, faces, meter)
+        with meter.phase("pivoting"):
+            left = left[_share_pair(database.stars[left], database.stars[others], meter)]
+        if len(left) == 0:
+            return Match(MatchEnd.NO_SHARED_PAIR, triangle, left, used)
+    end = MatchEnd.UNIQUE if len(left) == 1 else MatchEnd.SEVERAL
+    return Match(end, triangle, left, used)
+
+
+def _share_pair(
+    triangles: NDArray[np.uint16], others: NDArray[np.uint16], meter: Meter
+) -> NDArray[np.bool_]:
+    """Which triangles (n,) of star triples (n, 3) share two stars with one of others (m, 3).
+
+    The pairs of the others are sorted as 32-bit words, and each pair of ours is searched there.
+    """
+    wanted, listed = _pairs(triangles), _pairs(others)
+    count = listed.size
+    depth = ceil(log2(count + 1))
+    steps = (count + wanted.size) * depth
+    meter.charge(
+        ram_read=listed.size + wanted.size + steps,
+        ram_write=listed.size + count * depth,
+        i32_add=2 * (listed.size + wanted.size) + steps,
+        loop=steps,
+    )
+    shared: NDArray[np.bool_] = np.isin(wanted, listed)
+    return shared[:, 0] | shared[:, 1] | shared[:, 2]
+
+
+def _pairs(triangles: NDArray[np.uint16]) -> NDArray[np.uint32]:
+    """Three words (n, 3) for the pairs of star triples (n, 3) in rising order."""
+    stars = triangles.astype(np.uint32)
+    words = (stars[:, _FIRST] << np.uint32(16)) | stars[:, _SECOND]
+    return words.astype(np.uint32)

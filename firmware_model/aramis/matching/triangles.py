@@ -1,0 +1,108 @@
+"""A planar triangle of three star directions: area, polar moment, and how well they are known.
+
+AraMiS thesis, section 5.5 (equations 5.7 to 5.21), in single precision. Side a joins stars 1 and 2,
+b joins 2 and 3, c joins 1 and 3; they are chords of the unit sphere, so they have no unit. Three
+printed slips are set right: the covariance of equation 5.13 is sigma squared times the projector,
+the derivative of the area by c is (u1 + u2 + u3 - u4) / 4A, and the three derivatives of equation
+5.19 are A a / 18, A b / 18 and A c / 18.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["Triangle", "measure_triangle"]
+
+_HALF, _FOUR = np.float32(0.5), np.float32(4)
+_EIGHTEEN, _THIRTY_SIX = np.float32(18), np.float32(36)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangle:
+    """A measured triangle.
+
+    Attributes:
+        sides: (3,) a, b, c.
+        area: by Heron's formula.
+        moment: polar moment of the area.
+        area_sigma, moment_sigma: standard deviations that the directions' noise gives.
+    """
+
+    sides: NDArray[np.float32]
+    area: np.float32
+    moment: np.float32
+    area_sigma: np.float32
+    moment_sigma: np.float32
+
+
+def measure_triangle(
+    vectors: NDArray[np.float32], sigma_rad: float, meter: Meter
+) -> Triangle | None:
+    """Measure the triangle of three unit vectors (3, 3); None when they lie on a line.
+
+    Args:
+        vectors: directions in camera axes.
+        sigma_rad: standard deviation of each across the line of sight, in rad per axis.
+        meter: charged.
+    """
+    b1, b2, b3 = vectors.astype(np.float32)
+    edges = (b1 - b2, b2 - b3, b1 - b3)
+    a, b, c = (_length(edge) for edge in edges)
+    meter.charge(f32_add=9 + 6, f32_mul=9, f32_sqrt=3, ram_read=9, call=1)
+    half = _HALF * (a + b + c)
+    sa, sb, sc = half - a, half - b, half - c
+    u1, u2, u3, u4 = sa * sb * sc, half * sb * sc, half * sa * sc, half * sa * sb
+    square = half * u1
+    meter.charge(f32_add=5, f32_mul=10, f32_compare=1)
+    if not square > 0 or min(a, b, c) <= 0:
+        return None
+    area = np.sqrt(square)
+    squares = a * a + b * b + c * c
+    moment = area * squares / _THIRTY_SIX
+    meter.charge(f32_sqrt=1, f32_add=2, f32_mul=4, f32_div=1)
+
+    # Derivatives by the sides, then by the directions (equations 5.14, 5.18 to 5.20).
+    by_side = (
+        (u1 - u2 + u3 + u4) / (_FOUR * area),
+        (u1 + u2 - u3 + u4) / (_FOUR * area),
+        (u1 + u2 + u3 - u4) / (_FOUR * area),
+    )
+    by_area = squares / _THIRTY_SIX
+    moment_by_side = tuple(
+        area * side / _EIGHTEEN + by_area * slope
+        for side, slope in zip((a, b, c), by_side, strict=True)
+    )
+    units = tuple(edge / side for edge, side in zip(edges, (a, b, c), strict=True))
+    meter.charge(f32_add=9 + 3, f32_mul=3 + 6, f32_div=3 + 1 + 3 + 9)
+    sigma = np.float32(sigma_rad)
+    return Triangle(
+        np.array([a, b, c], dtype=np.float32),
+        area,
+        moment,
+        sigma * _gain(by_side, units, (b1, b2, b3), meter),
+        sigma * _gain(moment_by_side, units, (b1, b2, b3), meter),
+    )
+
+
+def _length(vector: NDArray[np.float32]) -> np.float32:
+    x, y, z = vector
+    return np.float32(np.sqrt(x * x + y * y + z * z))
+
+
+def _gain(
+    slopes: tuple[np.float32, ...],
+    units: tuple[NDArray[np.float32], ...],
+    directions: tuple[NDArray[np.float32], ...],
+    meter: Meter,
+) -> np.float32:
+    """Square root of H R H^T for sigma 1: each R is a projector across its line of sight."""
+    da, db, dc = (slope * unit for slope, unit in zip(slopes, units, strict=True))
+    total = np.float32(0)
+    for h, direction in zip((da + dc, db - da, -db - dc), directions, strict=True):
+        along = h[0] * direction[0] + h[1] * direction[1] + h[2] * direction[2]
+        total += h[0] * h[0] + h[1] * h[1] + h[2] * h[2] - along * along
+    meter.charge(f32_mul=9 + 21 + 1, f32_add=9 + 18, f32_compare=1, f32_sqrt=1, loop=3)
+    return np.float32(np.sqrt(max(total, np.float32(0))))

@@ -1,0 +1,163 @@
+"""Checking an attitude against the stars that had no part in it. Ours: the thesis has none.
+
+The thesis believes every unique triangle, and many of its results are wrong (section 8.2). Here the
+three sides must first agree one by one, because area and moment leave one measure of a triangle
+free; so must its sense of rotation. Then every catalogue star that the attitude puts into the field
+is looked for among the measured ones. The attitude is believed when chance would place so many so
+seldom: hypotheses * C(n, k) * p^k, for k found of the n expected besides the triangle's, where p is
+the part of the field within reach of a measured star. In a cluster, such as the Pleiades, one right
+place makes others likely, so stars that are all close together confirm nothing.
+"""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.attitude.quest import dcm
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["Confirmation", "confirm", "sides_agree"]
+
+
+@dataclass(frozen=True, eq=False)
+class Confirmation:
+    """Stars that agree with an attitude.
+
+    Attributes:
+        measured: (k,) measured stars that a catalogue star was found for.
+        stars: (k,) those catalogue stars, indices into the database's list.
+        expected: catalogue stars that the attitude puts into the field.
+        chance: expected number of attitudes that chance confirms as well.
+        spread_rad: root mean square distance of the measured stars from their middle.
+    """
+
+    measured: NDArray[np.intp]
+    stars: NDArray[np.intp]
+    expected: int
+    chance: float
+    spread_rad: float
+
+
+def sides_agree(
+    vectors: NDArray[np.float32],
+    catalogue: NDArray[np.float32],
+    tolerance: float,
+    meter: Meter,
+) -> bool:
+    """Whether two triangles of unit vectors (3, 3) agree within `tolerance`.
+
+    Compared are the sides, and the volume of the three vectors, whose sign tells a triangle from
+    its mirror image: nothing else does when two sides are equal.
+    """
+    meter.charge(f32_add=33 + 11, f32_mul=18 + 18, f32_sqrt=6, f32_compare=4, loop=3)
+    for first, second in ((0, 1), (1, 2), (0, 2)):
+        measured = np.sqrt(np.sum((vectors[first] - vectors[second]) ** 2))
+        expected = np.sqrt(np.sum((catalogue[first] - catalogue[second]) ** 2))
+        if not abs(measured - expected) <= np.float32(tolerance):
+            return False
+    return bool(abs(_volume(vectors) - _volume(catalogue)) <= np.float32(tolerance))
+
+
+def _volume(vectors: NDArray[np.float32]) -> np.float32:
+    """Triple product of three vectors (3, 3)."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vectors
+    across = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return np.float32(across)
+
+
+def confirm(
+    quaternion: NDArray[np.float32],
+    vectors: NDArray[np.float32],
+    database: Database,
+    field: Field,
+    tolerance_rad: float,
+    hypotheses: int,
+    meter: Meter,
+) -> Confirmation:
+    """Find the catalogue stars that an attitude predicts among the measured ones.
+
+    Args:
+        quaternion: (4,) inertial to camera, scalar last.
+        vectors: (n, 3) unit vectors of all measured stars in camera axes.
+        database: its star list is used.
+        field: which directions the camera sees.
+        tolerance_rad: largest distance of a star from its predicted place, below 0.1 rad.
+        hypotheses: attitudes tried so far, this one included.
+        meter: charged; phase `verification`.
+    """
+    with meter.phase("verification"):
+        turn = dcm(quaternion, meter)
+        seen = _in_field(database.vectors, turn, field, meter)
+        predicted = _turned(database.vectors[seen], turn)
+        compared = len(seen) * len(vectors)
+        meter.charge(
+            ram_read=6 * len(seen) + 3 * compared,
+            f32_mul=3 * compared,
+            f32_add=5 * compared,
+            f32_compare=compared + len(seen),
+            loop=compared,
+        )
+        apart = vectors[None, :, :] - predicted[:, None, :]
+        chord2 = apart[..., 0] ** 2 + apart[..., 1] ** 2 + apart[..., 2] ** 2
+        measured, stars = _nearest(chord2, np.float32(tolerance_rad) ** 2)
+        reach = len(vectors) * np.pi * tolerance_rad**2 / field.solid_angle_sr
+        further, found = len(seen) - 3, len(measured) - 3
+        chance = float(hypotheses)
+        if found > 0:
+            chance *= comb(further, found) * reach**found
+            meter.charge(f32_mul=3 * found + 3, f32_div=found + 1)
+        spread = _spread(vectors[measured], meter)
+        return Confirmation(measured, seen[stars], len(seen), chance, spread)
+
+
+def _spread(vectors: NDArray[np.float32], meter: Meter) -> float:
+    """Root mean square distance of unit vectors (n, 3) from their mean, 0 without any."""
+    count = len(vectors)
+    if count == 0:
+        return 0.0
+    meter.charge(f32_add=8 * count, f32_mul=3 * count, f32_div=4, f32_sqrt=1, loop=2 * count)
+    apart = vectors - vectors.mean(axis=0)
+    return float(np.sqrt(np.sum(apart**2) / np.float32(count)))
+
+
+def _nearest(
+    chord2: NDArray[np.float32], limit: np.float32
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Measured stars and rows of `chord2` (stars, measured) that are nearest to each other."""
+    if chord2.size == 0:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    rows = np.arange(len(chord2))
+    nearest = chord2.argmin(axis=1)
+    mutual = chord2.argmin(axis=0)[nearest] == rows
+    kept = mutual & (chord2[rows, nearest] <= limit)
+    return nearest[kept], rows[kept]
+
+
+def _in_field(
+    stars: NDArray[np.float32], turn: NDArray[np.float32], field: Field, meter: Meter
+) -> NDArray[np.intp]:
+    """Stars (n, 3) that a direction cosine matrix puts into the field: those near the boresight
+    first, by one product each, then by their place in the picture."""
+    count = len(stars)
+    x, y, z = stars.T
+    along = x * turn[2, 0] + y * turn[2, 1] + z * turn[2, 2]
+    near = np.flatnonzero(along >= np.float32(field.smallest_cosine))
+    meter.charge(
+        ram_read=3 * count,
+        f32_mul=3 * count + 9 * len(near),
+        f32_add=2 * count + 6 * len(near),
+        f32_compare=count,
+        loop=count,
+    )
+    return near[field.contains(_turned(stars[near], turn), meter)]
+
+
+def _turned(vectors: NDArray[np.float32], turn: NDArray[np.float32]) -> NDArray[np.float32]:
+    turned: NDArray[np.float32] = (
+        vectors[:, :1] * turn[:, 0] + vectors[:, 1:2] * turn[:, 1] + vectors[:, 2:] * turn[:, 2]
+    )
+    return turned

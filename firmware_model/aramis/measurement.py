@@ -1,0 +1,223 @@
+"""One measurement: picture, catalogue, stars, identities, attitude, and the time of each step.
+
+AraMiS thesis, sections 2.2 (getStarAttitudeQuaternion) and 7.3; figure 8.1. The processing itself
+is :mod:`cubestack.firmware_model.aramis.pipeline`; this is the only place that calls it.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.camera import Camera
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
+from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.matching.identification import identify
+from cubestack.firmware_model.aramis.pipeline import (
+    VERIFIED,
+    Configuration,
+    Detection,
+    detect,
+    explain,
+)
+from cubestack.firmware_model.aramis.settings import Settings
+from cubestack.firmware_model.aramis.solution import Outcome, Solution, StarList, unsolved
+from cubestack.firmware_model.aramis.solution import Reason as Finding
+from cubestack.firmware_model.aramis.state import Measurement, State
+from cubestack.firmware_model.attitude.geometry import direction_of
+from cubestack.firmware_model.attitude.quest import dcm
+from cubestack.firmware_model.interface.aramis import (
+    PHASES,
+    CatalogueState,
+    MeasurementMode,
+    MeasurementOutcome,
+    Reason,
+    SensorState,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
+
+__all__ = ["Measuring", "configuration"]
+
+Direction = NDArray[np.float32]
+
+_OUTCOMES = {
+    Outcome.CONCLUSIVE: MeasurementOutcome.CONCLUSIVE,
+    Outcome.AMBIGUOUS: MeasurementOutcome.AMBIGUOUS,
+    Outcome.NONE: MeasurementOutcome.NONE,
+}
+
+
+@lru_cache(maxsize=4)
+def _lens(fov_deg: float, only_round: bool) -> Field:
+    """The lens; kept, because it holds the mask of its pixels."""
+    return Field(fov_deg=fov_deg, round=only_round)
+
+
+def configuration(settings: Settings) -> Configuration:
+    """Settings of the processing."""
+    search = settings.all("SetDetection")
+    matching = settings.all("SetIdentification")
+    lens = _lens(
+        float(settings.get("SetField", "FieldOfView")), bool(settings.get("SetField", "Round"))
+    )
+    detection = Detection(
+        sigmas=float(search["Sigmas"]),
+        spikes=SpikeRemoval(search["Spikes"]),
+        needed=int(search["Needed"]),
+        min_pixels=int(search["MinPixels"]),
+        max_pixels=int(search["MaxPixels"]),
+        max_stars=int(search["MaxStars"]),
+        subtract=bool(search["Subtract"]),
+    )
+    profile = replace(
+        VERIFIED.profile,
+        sigma_rad=float(matching["Noise"]) * lens.scale[1],
+        pivots=int(matching["Pivots"]),
+        verify=bool(matching["Verify"]),
+        hint_tolerance_deg=float(matching["HintTolerance"]),
+    )
+    return Configuration(lens, detection, profile)
+
+
+class Measuring:
+    """Measures, and keeps what one measurement leaves to the next."""
+
+    def __init__(
+        self, meter: Meter, state: State, camera: Camera, catalogue: CatalogueStore
+    ) -> None:
+        """Work with the given parts of the program."""
+        self._meter = meter
+        self._state = state
+        self._camera = camera
+        self._catalogue = catalogue
+        self._background = Background()
+
+    def restart(self) -> None:
+        """Pictures from now on have nothing to do with those before."""
+        self._background = Background()
+
+    def latest_boresight(self) -> Direction | None:
+        """Inertial unit vector (3,) of the latest measurement's boresight; None without one."""
+        if self._state.quaternion is None or not self._state.measurement.valid:
+            return None
+        boresight: Direction = dcm(self._state.quaternion, self._meter)[2]
+        return boresight
+
+    def direction(self, right_ascension: float, declination: float) -> Direction:
+        """Inertial unit vector (3,) of angles in rad."""
+        return direction_of(right_ascension, declination, self._meter)
+
+    def measure(self, hint: Direction | None, *, overlap: bool = False) -> Routine[None]:
+        """Measure once; the result is in ``State.measurement``.
+
+        Args:
+            hint: rough unit vector of the boresight; None: lost in space.
+            overlap: whether the next frame comes while this one is worked on.
+        """
+        state = self._state
+        mode = MeasurementMode.LOST_IN_SPACE if hint is None else MeasurementMode.AIDED
+        result = Measurement(mode=mode)
+        started_us: int = yield ReadTimer()
+        if not state.active:
+            state.raise_flag("NotActive")
+            failure: Reason | None = Reason.NOT_ACTIVE
+        else:
+            state.sensor = SensorState.MEASURING
+            failure = yield from self._picture(result, overlap=overlap)
+            if failure is None:
+                failure = yield from self._check(result)
+            if failure is None:
+                yield from self._process(result, hint)
+            state.sensor = SensorState.READY
+        if failure is not None:
+            result.outcome, result.reason = MeasurementOutcome.NONE, failure
+        result.times_us["Total"] = yield from self._since(started_us)
+        state.star = 0
+        state.measurement = result
+
+    def _since(self, started_us: int) -> Routine[int]:
+        yield Pay()
+        now_us: int = yield ReadTimer()
+        return now_us - started_us
+
+    def _picture(self, result: Measurement, *, overlap: bool) -> Routine[Reason | None]:
+        started_us: int = yield ReadTimer()
+        failure = yield from self._camera.start()
+        result.times_us["Setup"] = yield from self._since(started_us)
+        if failure is not None:
+            return failure
+        started_us = yield ReadTimer()
+        failure = yield from self._camera.take()
+        result.times_us["Capture"] = yield from self._since(started_us)
+        if failure is not None:
+            return failure
+        result.image_us = self._camera.image_us()
+        result.frame = self._state.frames
+        if overlap:
+            self._camera.expose()
+        return None
+
+    def _check(self, result: Measurement) -> Routine[Reason | None]:
+        """Make sure that RAM holds a good catalogue."""
+        errors = self._catalogue.ram_errors
+        started_us: int = yield ReadTimer()
+        good = yield from self._catalogue.ensure()
+        result.times_us["Check"] = yield from self._since(started_us)
+        if self._catalogue.ram_errors != errors:
+            self._state.raise_flag("RamError")
+        if good:
+            return None
+        if self._catalogue.state is CatalogueState.MISSING:
+            return Reason.NO_CATALOGUE
+        return Reason.CATALOGUE_DAMAGED
+
+    def _process(self, result: Measurement, hint: Direction | None) -> Routine[None]:
+        database, place = self._catalogue.database, self._camera.latest
+        assert database is not None
+        assert place is not None
+        with self._phases(result):
+            solution = self._solve(result, self._camera.picture(place), database, hint)
+        yield Pay()
+        result.solution = solution
+        result.outcome = _OUTCOMES[solution.outcome]
+        result.reason = Reason[solution.reason.name]
+        if solution.quaternion is not None:
+            self._state.quaternion = solution.quaternion
+            self._state.matched = int((solution.stars >= 0).sum())
+
+    def _solve(
+        self,
+        result: Measurement,
+        picture: NDArray[np.uint8],
+        database: Database,
+        hint: Direction | None,
+    ) -> Solution:
+        settings = configuration(self._state.settings)
+        stars = detect(picture, self._background, settings.field, settings.detection, self._meter)
+        result.mean = self._background.mean(self._meter)
+        result.threshold = self._background.threshold(settings.detection.sigmas, self._meter)
+        result.pictures = len(self._background.sums)
+        if stars is None:
+            nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
+            return unsolved(Outcome.NONE, Finding.TOO_MANY_PIXELS, nothing)
+        exposure = int(self._state.settings.get("SetExposure", "Rows"))
+        stars = replace(stars, skew_px=stars.smear_px * settings.field.rows / exposure)
+        found = identify(stars, settings.field, settings.profile, database, self._meter, hint)
+        return explain(found, picture, settings, self._meter)
+
+    @contextmanager
+    def _phases(self, result: Measurement) -> Iterator[None]:
+        """Book the cycles of each phase that the block charges."""
+        before = dict(self._meter.phases)
+        yield
+        for name in PHASES:
+            spent = self._meter.phases.get(name.lower(), 0) - before.get(name.lower(), 0)
+            if spent:
+                result.times_us[name] = 1_000_000 * spent // self._meter.table.clock_hz

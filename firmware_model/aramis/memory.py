@@ -1,0 +1,39 @@
+"""Where everything lies: the SDRAM, and the flash chips of the catalogue.
+
+AraMiS thesis, sections 2.3.2 and 2.3.3 and appendix A: 32 MB of SDRAM (MT48LC16M16), flash parts of
+4 MB (M29W320D), of which three hold the coded catalogue (assumed: its size decides). RAM holds the
+picture, a second one that comes while the first is worked on, and the catalogue.
+"""
+
+from cubestack.firmware_model.aramis.catalogue.hamming import coded_size
+from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, MOST_CATALOGUE_BYTES
+
+__all__ = [
+    "CATALOGUE_AT",
+    "FLASH_BYTES",
+    "PICTURES_AT",
+    "SDRAM_BYTES",
+    "SECTOR_BYTES",
+    "UPLOAD_AT",
+]
+
+MB = 1 << 20
+
+SDRAM_BYTES = 32 * MB
+FLASH_BYTES = 12 * MB
+
+SECTOR_BYTES = 1 << 16
+"""Smallest part of the flash that can be erased."""
+
+PICTURES_AT = (0, 2 * MB)
+CATALOGUE_AT = 4 * MB
+UPLOAD_AT = 16 * MB
+
+_ENDS = (
+    (PICTURES_AT[0] + IMAGE_BYTES, PICTURES_AT[1]),
+    (PICTURES_AT[1] + IMAGE_BYTES, CATALOGUE_AT),
+    (CATALOGUE_AT + MOST_CATALOGUE_BYTES, UPLOAD_AT),
+    (UPLOAD_AT + MOST_CATALOGUE_BYTES, SDRAM_BYTES),
+    (coded_size(8) + coded_size(MOST_CATALOGUE_BYTES), FLASH_BYTES),
+)
+assert all(end <= limit for end, limit in _ENDS)

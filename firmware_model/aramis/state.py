@@ -1,0 +1,120 @@
+"""What the program remembers in RAM: flags, counters, the clock, the latest result."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.settings import Settings
+from cubestack.firmware_model.aramis.solution import Solution
+from cubestack.firmware_model.interface.aramis import (
+    MS_PER_DAY,
+    PHASES,
+    MeasurementMode,
+    MeasurementOutcome,
+    Reason,
+    SensorState,
+)
+from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
+from cubestack.firmware_model.mcu.requests import FlashStore
+
+__all__ = ["Clock", "Measurement", "State"]
+
+
+class Clock:
+    """Julian date, counted on from the instant that a host set it (thesis, section 2.2)."""
+
+    def __init__(self) -> None:
+        """Start unset."""
+        self._zero_ms: int | None = None
+
+    @property
+    def is_set(self) -> bool:
+        """Whether a host has set it."""
+        return self._zero_ms is not None
+
+    def set(self, day: int, millisecond: int, uptime_us: int) -> None:
+        """It is ``millisecond`` after the noon that begins Julian ``day`` at ``uptime_us``."""
+        self._zero_ms = day * MS_PER_DAY + millisecond - uptime_us // 1000
+
+    def at(self, uptime_us: int) -> tuple[int, int]:
+        """Julian day and milliseconds since its noon; both 0 while unset."""
+        if self._zero_ms is None:
+            return 0, 0
+        return divmod(max(0, self._zero_ms + uptime_us // 1000), MS_PER_DAY)
+
+
+@dataclass
+class Measurement:
+    """The latest measurement.
+
+    Attributes:
+        outcome, reason, mode: how it ended.
+        image_us: uptime at mid-exposure of the middle row.
+        frame: number of its picture.
+        solution: what became of the picture; None without a picture or catalogue.
+        mean, threshold, pictures: levels of the last pictures, and how many.
+        times_us: duration of each step.
+    """
+
+    outcome: MeasurementOutcome = MeasurementOutcome.NOT_MEASURED
+    reason: Reason = Reason.NOT_MEASURED
+    mode: MeasurementMode = MeasurementMode.LOST_IN_SPACE
+    image_us: int = 0
+    frame: int = 0
+    solution: Solution | None = None
+    mean: int = 0
+    threshold: int = 0
+    pictures: int = 0
+    times_us: dict[str, int] = field(default_factory=lambda: dict.fromkeys(PHASES, 0))
+
+    @property
+    def valid(self) -> bool:
+        """Whether it gave an attitude."""
+        return self.outcome is MeasurementOutcome.CONCLUSIVE
+
+
+class State:
+    """RAM of the program.
+
+    Attributes:
+        settings: parameters of the setting telecommands.
+        clock: Julian date.
+        flags: names of the raised error flags.
+        sensor: what the star tracker does.
+        measurement: the latest one.
+        quaternion: (4,) the latest attitude, inertial to camera, scalar last; None without any.
+        matched: stars that it rests on.
+        frames: pictures since power-up.
+        looping, loop_due_us, iterations, late: the loop.
+        telecommands, telemetry: counters.
+        star: number of the star that telemetry StarDetails shows next.
+    """
+
+    def __init__(self, flash: FlashStore) -> None:
+        """Start with the settings in ``flash``."""
+        self.settings = Settings(flash)
+        self.clock = Clock()
+        self.flags: set[str] = set()
+        self.sensor = SensorState.INACTIVE
+        self.measurement = Measurement()
+        self.quaternion: NDArray[np.float32] | None = None
+        self.matched = 0
+        self.frames = 0
+        self.looping = False
+        self.loop_due_us = self.iterations = self.late = 0
+        self.telecommands = self.telemetry = 0
+        self.star = 0
+        if self.settings.damaged:
+            self.raise_flag("ConfigError")
+
+    @property
+    def active(self) -> bool:
+        """Whether measurements can be asked for."""
+        return self.sensor in (SensorState.READY, SensorState.MEASURING, SensorState.PROGRAMMING)
+
+    def raise_flag(self, name: str) -> None:
+        """Raise an error flag; a name that the table lacks is a programming error."""
+        if name not in FLAG_NAMES:
+            raise KeyError(f"telemetry ErrorFlags declares no flag {name!r}")
+        self.flags.add(name)

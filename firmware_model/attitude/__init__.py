@@ -1,0 +1,1 @@
+"""Attitude from vectors, in single precision: what both star trackers share."""

@@ -1,0 +1,190 @@
+"""QUEST: the attitude that best turns the catalogue's vectors into the measured ones.
+
+CubeStar thesis, section 4.4 (equations 4.4.8 to 4.4.10) and section 5.3.5 (Gaussian elimination,
+equation 5.3.1), in single precision and in the order of operations of the C program.
+
+The thesis reads its quaternion as one that turns the axes. Ours is the conjugate, which turns the
+vectors: v_camera = q v_inertial q*.
+
+The Rodrigues vector grows without bound near rotations of 180 deg. The method of sequential
+rotations avoids that: turning the reference axes by 180 deg about x, y or z only changes signs of
+the columns of the profile matrix. The determinant of equation 4.4.9 grows with the square of the
+quaternion's scalar part, so the one of the four choices with the largest determinant is solved.
+(The trace would not do: in a narrow field it hardly depends on the rotation about the boresight.)
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.mcu.costs import Meter
+
+#: Largest eigenvalue of Davenport's matrix from the profile (3, 3) of weights that add up to 1.
+Eigenvalue = Callable[[NDArray[np.float32], Meter], np.float32]
+
+#: Smallest determinant for weights that add up to 1. Two vectors an angle apart give half its
+#: square, so this is 0.1 deg; below, rounding in single precision would decide the roll angle.
+_SMALLEST_DETERMINANT = np.float32(2e-6)
+
+#: Signs of the reference axes: unchanged, or turned by 180 deg about x, y or z.
+_TURNS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float32)
+
+
+class AttitudeError(ValueError):
+    """The vectors do not determine an attitude."""
+
+
+def quest(
+    measured: NDArray[np.float32],
+    reference: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    meter: Meter,
+    *,
+    eigenvalue: Eigenvalue | None = None,
+) -> NDArray[np.float32]:
+    """Quaternion (4,), scalar last and not negative, of the rotation reference to measured.
+
+    Args:
+        measured: (n, 3) unit vectors in camera axes, n at least 2.
+        reference: (n, 3) unit vectors of the same stars in inertial axes.
+        weights: (n,) not negative, not all zero; verification votes on CubeStar.
+        meter: charged with every operation.
+        eigenvalue: finds the largest eigenvalue; None takes 1, as CubeStar does.
+
+    Raises:
+        AttitudeError: for fewer than two vectors, weights without weight, or vectors that all point
+            the same way.
+    """
+    if len(measured) < 2:
+        raise AttitudeError(f"an attitude needs at least 2 vectors, not {len(measured)}")
+    profile = _profile(measured, reference, weights, meter)
+    total = np.float32(0)
+    for weight in weights.astype(np.float32):
+        total += weight
+    if total <= 0:
+        raise AttitudeError("the weights of the vectors add up to 0")
+    profile /= total
+    largest = np.float32(1) if eigenvalue is None else eigenvalue(profile, meter)
+    choices = [_system(profile * signs, largest, meter) for signs in _TURNS]
+    determinants = [_determinant(matrix, meter) for matrix, _ in choices]
+    turn = int(np.argmax(determinants))
+    meter.charge(f32_add=len(weights), f32_div=9, f32_compare=5, loop=len(weights))
+    if determinants[turn] < _SMALLEST_DETERMINANT:
+        raise AttitudeError("the vectors all point the same way: no rotation about it")
+    rodrigues = _eliminate(*choices[turn], meter)
+    squares = np.float32(1)
+    for component in rodrigues:
+        squares += component * component
+    scale = np.float32(1) / np.sqrt(squares)
+    quaternion = np.append(rodrigues * scale, scale)
+    meter.charge(f32_mul=6, f32_add=3, f32_sqrt=1, f32_div=1)
+    quaternion = _turn_back(quaternion, turn)
+    quaternion[:3] = -quaternion[:3]
+    meter.charge(f32_compare=1, i32_add=11)
+    return -quaternion if quaternion[3] < 0 else quaternion
+
+
+def dcm(quaternion: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
+    """Direction cosine matrix (3, 3), inertial to camera (equation 5.3.1 of the conjugate)."""
+    x, y, z, w = quaternion.astype(np.float32)
+    two = np.float32(2)
+    diagonal = w * w - (x * x + y * y + z * z)
+    xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
+    meter.charge(f32_mul=4 + 6 + 3 + 6, f32_add=3 + 3 + 6)
+    return np.array([
+        [diagonal + two * x * x, two * (xy - wz), two * (xz + wy)],
+        [two * (xy + wz), diagonal + two * y * y, two * (yz - wx)],
+        [two * (xz - wy), two * (yz + wx), diagonal + two * z * z],
+    ], dtype=np.float32)  # fmt: skip
+
+
+def _profile(
+    measured: NDArray[np.float32],
+    reference: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    meter: Meter,
+) -> NDArray[np.float32]:
+    """B = sum of w * measured * reference^T, (3, 3), added up star by star."""
+    profile = np.zeros((3, 3), dtype=np.float32)
+    for body, inertial, weight in zip(
+        measured.astype(np.float32),
+        reference.astype(np.float32),
+        weights.astype(np.float32),
+        strict=True,
+    ):
+        profile += np.outer(weight * body, inertial)
+    count = len(weights)
+    meter.charge(f32_mul=12 * count, f32_add=9 * count, ram_read=7 * count, loop=13 * count)
+    return profile
+
+
+def _system(
+    profile: NDArray[np.float32], eigenvalue: np.float32, meter: Meter
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Matrix (3, 3) and right side (3,) of equation 4.4.9, for weights that add up to 1."""
+    sigma = profile[0, 0] + profile[1, 1] + profile[2, 2]
+    matrix = (eigenvalue + sigma) * np.eye(3, dtype=np.float32) - (profile + profile.T)
+    right = np.array(
+        [
+            profile[1, 2] - profile[2, 1],
+            profile[2, 0] - profile[0, 2],
+            profile[0, 1] - profile[1, 0],
+        ],
+        dtype=np.float32,
+    )
+    meter.charge(f32_add=2 + 1 + 6 + 3 + 3, ram_read=9, ram_write=12)
+    return matrix, right
+
+
+def _determinant(m: NDArray[np.float32], meter: Meter) -> np.float32:
+    """Determinant of a 3 x 3 matrix, along its first row."""
+    meter.charge(f32_mul=9, f32_add=5, ram_read=9)
+    return np.float32(
+        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
+        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
+        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
+    )
+
+
+def _eliminate(
+    matrix: NDArray[np.float32], right: NDArray[np.float32], meter: Meter
+) -> NDArray[np.float32]:
+    """Solve a regular 3 x 3 system by Gaussian elimination with row exchange."""
+    rows = np.column_stack([matrix, right]).astype(np.float32)
+    for column in range(3):
+        pivot = column + int(np.argmax(np.abs(rows[column:, column])))
+        rows[[column, pivot]] = rows[[pivot, column]]
+        for row in range(column + 1, 3):
+            factor = rows[row, column] / rows[column, column]
+            rows[row, column:] -= factor * rows[column, column:]
+    solution = np.zeros(3, dtype=np.float32)
+    for row in (2, 1, 0):
+        rest = rows[row, 3]
+        for column in range(row + 1, 3):
+            rest -= rows[row, column] * solution[column]
+        solution[row] = rest / rows[row, row]
+    meter.charge(
+        f32_div=3 + 3,
+        f32_mul=11 + 3,
+        f32_add=11 + 3,
+        f32_compare=6,
+        loop=30,
+        ram_read=60,
+        ram_write=30,
+    )
+    return solution
+
+
+def _turn_back(quaternion: NDArray[np.float32], turn: int) -> NDArray[np.float32]:
+    """Undo the 180 deg turn of the reference axes: a permutation of components with signs."""
+    x, y, z, w = quaternion
+    if turn == 1:
+        components = [w, -z, y, -x]
+    elif turn == 2:
+        components = [z, w, -x, -y]
+    elif turn == 3:
+        components = [-y, x, w, -z]
+    else:
+        components = [x, y, z, w]
+    return np.array(components, dtype=np.float32)

@@ -1,0 +1,139 @@
+"""Circles through edges, in the part's single precision.
+
+CubeSense thesis, sections 4.4.1.2 (three points, equations 4.4.4 to 4.4.10; equation 4.4.7 prints
+x_2 - x_2 for x_3 - x_2), 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by
+the inverse's first rows). Ours are the radius, which needs the third row too, and leaving one point
+out of the sums again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubesense.vision.arithmetic import sequential_sum
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["Circle", "LeastSquaresCircle", "three_point_circle"]
+
+Values = NDArray[np.float32]
+
+FEWEST = 3
+"""Points that a circle needs."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle in the unit of its points.
+
+    Attributes:
+        x, y: centre.
+        radius: radius.
+    """
+
+    x: np.float32
+    y: np.float32
+    radius: np.float32
+
+    @property
+    def power(self) -> np.float32:
+        """Power of the origin: squared distance of the centre less squared radius."""
+        return self.x * self.x + self.y * self.y - self.radius * self.radius
+
+    def residuals(self, points: Values, meter: Meter) -> Values:
+        """How far outside of the circle points (n, 2) lie, to first order: (d^2 - R^2) / 2R."""
+        dx, dy = points[:, 0] - self.x, points[:, 1] - self.y
+        square = self.radius * self.radius
+        count = len(points)
+        meter.charge(f32_add=4 * count, f32_mul=3 * count + 2, f32_div=1, loop=count)
+        return np.asarray((dx * dx + dy * dy - square) * (np.float32(0.5) / self.radius))
+
+
+class LeastSquaresCircle:
+    """The normal equations, filled with points once."""
+
+    def __init__(self, points: Values, meter: Meter) -> None:
+        """Sum up points (n, 2)."""
+        self._meter = meter
+        self._count = len(points)
+        self._sums = sequential_sum(self._terms(points))
+
+    def remove(self, point: Values) -> None:
+        """Take one point (2,) out again."""
+        self._sums = self._sums - self._terms(point[None])[0]
+        self._count -= 1
+
+    def _terms(self, points: Values) -> Values:
+        """What each point adds (n, 8): the published program sums all 12 elements."""
+        x, y = points.astype(np.float32).T
+        z = x * x + y * y
+        self._meter.charge(f32_mul=14 * len(points), f32_add=13 * len(points), loop=len(points))
+        two = np.float32(2)
+        return np.stack([two * x * x, two * x * y, two * y * y, x, y, z * x, z * y, z], axis=1)
+
+    def solve(self) -> Circle | None:
+        """The circle; None when there are too few points, or they lie on a line."""
+        if self._count < FEWEST:
+            return None
+        xx, xy, yy, sx, sy, zx, zy, z = self._sums
+        n = np.float32(self._count)
+        matrix = ((xx, xy, sx), (xy, yy, sy), (np.float32(2) * sx, np.float32(2) * sy, n))
+        right = (zx, zy, z)
+        # Cofactors of each column's elements are the rows of the inverse, times the determinant.
+        inverse = [
+            [_cofactor(matrix, row, column) for row in range(FEWEST)] for column in range(FEWEST)
+        ]
+        determinant = sum(
+            (a * b for a, b in zip(matrix[0], (row[0] for row in inverse), strict=True)),
+            np.float32(0),
+        )
+        self._meter.charge(f32_mul=18 + 3 + 9, f32_add=9 + 2 + 6, f32_compare=1)
+        # A determinant this small by its largest product is rounding alone.
+        if abs(determinant) <= np.float32(1e-5) * abs(xx * yy * n):
+            return None
+        # The thesis' unknowns are the negative centre, and its right side is negative too.
+        x, y, c = (
+            sum((a * b for a, b in zip(row, right, strict=True)), np.float32(0)) / determinant
+            for row in inverse
+        )
+        square = x * x + y * y + c
+        self._meter.charge(f32_div=3, f32_mul=2, f32_add=2, f32_compare=1, f32_sqrt=1)
+        if not square > 0:
+            return None
+        return Circle(x, y, np.sqrt(square))
+
+
+def three_point_circle(points: Values, meter: Meter) -> Circle | None:
+    """The circle through three points (3, 2); None when they lie on a line.
+
+    The gradients of both chords must be finite and one of them not 0, so the points are tried in
+    turn, as the text proposes.
+    """
+    for first in range(FEWEST):
+        (x1, y1), (x2, y2), (x3, y3) = np.roll(points.astype(np.float32), -first, axis=0)
+        meter.charge(f32_compare=2, loop=1)
+        if x1 == x2 or x2 == x3:
+            continue
+        slope_a, slope_b = (y2 - y1) / (x2 - x1), (y3 - y2) / (x3 - x2)
+        meter.charge(f32_add=5, f32_div=2, f32_compare=2)
+        if slope_a == slope_b:
+            return None
+        x = slope_a * slope_b * (y1 - y3) + slope_b * (x1 + x2) - slope_a * (x2 + x3)
+        x = x / (2 * (slope_b - slope_a))
+        # Equation 4.4.8 or 4.4.9, of the chord that is the steeper one.
+        steep_a = abs(slope_a) > abs(slope_b)
+        slope, xa, ya, xb, yb = (slope_a, x1, y1, x2, y2) if steep_a else (slope_b, x2, y2, x3, y3)
+        y = -(x - (xa + xb) / 2) / slope + (ya + yb) / 2
+        radius = np.sqrt((x1 - x) * (x1 - x) + (y1 - y) * (y1 - y))
+        meter.charge(f32_mul=10, f32_add=13, f32_div=2, f32_compare=1, f32_sqrt=1)
+        return Circle(x, y, radius)
+    return None
+
+
+def _cofactor(
+    matrix: tuple[tuple[np.float32, np.float32, np.float32], ...], row: int, column: int
+) -> np.float32:
+    """Signed minor of a 3 x 3 matrix; cyclic indices give the sign."""
+    r, s = (row + 1) % FEWEST, (row + 2) % FEWEST
+    c, d = (column + 1) % FEWEST, (column + 2) % FEWEST
+    return matrix[r][c] * matrix[s][d] - matrix[r][d] * matrix[s][c]

@@ -1,0 +1,292 @@
+"""Edges of the Earth in the lines that the nadir FPGA scans, as their pixels come over the pins.
+
+CubeSense thesis, sections 4.2.2, 6.5.1, 6.5.2 and appendix C.3. Every 64th pixel of a line is a
+sample. Between two samples on different sides of the threshold, a binary search in the buffer finds
+the first bright pixel. An edge at or beyond the rim of the field of view is false.
+
+What we settle: the pixel before a line is dark, and the previous sample is a bound of the search,
+so that it has 64 positions and exactly 6 steps (in the listing the first buffered pixel is a bound,
+and an edge there is found one pixel late). Boresight: table 5.1.
+
+Ours, with ``sub_pixel``: the edge lies between the two pixels that the search ends with, where a
+straight line through their values meets the threshold. The published edge is the centre of the
+bright one, up to a pixel inside, which also lets parts of the lens' rim pass for edges.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubesense.vision.distortion import RIM_PX
+from cubestack.firmware_model.cubesense.vision.masks import Mask, masked
+from cubestack.firmware_model.interface.cubesense.codes import EDGE_UNIT, EDGES_PER_FRAME
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = [
+    "MAX_EDGES",
+    "Crossing",
+    "EdgeConfig",
+    "EdgeList",
+    "NadirLines",
+    "answered",
+    "bisect",
+]
+
+MAX_EDGES = 2 * EDGES_PER_FRAME
+"""Edges that the part keeps: ours. The widest Earth has 28, the rest is for false ones."""
+
+Asked = TypeVar("Asked")
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True)
+class EdgeConfig:
+    """Settings of the search.
+
+    Attributes:
+        threshold: a pixel at or above it is bright.
+        boresight: (x, y) in px.
+        rim_px: an edge so far from the boresight is false.
+        masks: areas whose edges are dropped.
+        sub_pixel: interpolate between the pixels of an edge.
+    """
+
+    threshold: int = 70
+    boresight: tuple[float, float] = (371.0, 236.0)
+    rim_px: float = RIM_PX
+    masks: Sequence[Mask] = ()
+    sub_pixel: bool = True
+
+
+class EdgeList:
+    """Edges in the order in which they were found.
+
+    Attributes:
+        false: edges dropped at the rim or in a mask.
+        full: whether there were more than the part keeps.
+    """
+
+    def __init__(self, config: EdgeConfig, meter: Meter) -> None:
+        """Start with none."""
+        self._config = config
+        self._meter = meter
+        self._points: list[tuple[int, int]] = []
+        self.false = 0
+        self.full = False
+
+    def __len__(self) -> int:
+        """Number of edges kept."""
+        return len(self._points)
+
+    @property
+    def points(self) -> NDArray[np.int16]:
+        """Coordinates (n, 2), x and y in 1/32 px."""
+        return np.array(self._points, np.int16).reshape(-1, 2)
+
+    def offsets(self) -> NDArray[np.float32]:
+        """Coordinates (n, 2) from the boresight in px; charges the conversion."""
+        count = len(self)
+        self._meter.charge(f32_convert=2 * count, f32_add=2 * count)
+        if self._config.sub_pixel:
+            self._meter.charge(f32_mul=2 * count)
+        return self._from_boresight(self.points)
+
+    def add(self, line: int, vertical: bool, crossing: "Crossing") -> None:
+        """Judge and keep an edge on scanned row, or column, ``line``."""
+        along = EDGE_UNIT * crossing.bright
+        if self._config.sub_pixel:
+            share = (crossing.bright_value - self._config.threshold) * EDGE_UNIT
+            share //= crossing.bright_value - crossing.dark_value
+            along += share if crossing.dark > crossing.bright else -share
+            self._meter.charge(i16_div=1, i16_add=4)
+        point = (EDGE_UNIT * line, along) if vertical else (along, EDGE_UNIT * line)
+        if self._outside(point) or self._masked(line, vertical, crossing):
+            self.false += 1
+        elif len(self) == MAX_EDGES:
+            self.full = True
+        else:
+            self._points.append(point)
+
+    def _from_boresight(self, points: NDArray[np.int16]) -> NDArray[np.float32]:
+        """1/32 px (..., 2) to px from the boresight."""
+        unit = np.float32(1 / EDGE_UNIT)
+        return points.astype(np.float32) * unit - np.array(self._config.boresight, np.float32)
+
+    def _outside(self, point: tuple[int, int]) -> bool:
+        """Equation 6.5.1 against the rim; the listing converts each factor anew."""
+        x, y = self._from_boresight(np.array(point, np.int16))
+        self._meter.charge(
+            i16_add=8, f32_convert=4, f32_mul=2, f32_add=1, f32_sqrt=1, f32_compare=1
+        )
+        if self._config.sub_pixel:
+            self._meter.charge(f32_mul=2, f32_add=2)
+        return bool(np.sqrt(x * x + y * y) >= np.float32(self._config.rim_px))
+
+    def _masked(self, line: int, vertical: bool, crossing: "Crossing") -> bool:
+        pixel = (line, crossing.bright) if vertical else (crossing.bright, line)
+        x, y = (np.array([value]) for value in pixel)
+        return bool(masked(x, y, self._config.masks, self._meter)[0])
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Two neighbouring pixels of a line on different sides of the threshold.
+
+    Attributes:
+        bright, dark: their positions on the line.
+        bright_value, dark_value: their values.
+    """
+
+    bright: int
+    dark: int
+    bright_value: int
+    dark_value: int
+
+
+def bisect(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, int, Crossing]:
+    """Narrow a wide crossing down to neighbours: asks for the values of positions on the line."""
+    bright, dark = crossing.bright, crossing.dark
+    bright_value, dark_value = crossing.bright_value, crossing.dark_value
+    meter.charge(call=1)
+    while abs(bright - dark) > 1:
+        middle = (bright + dark) >> 1
+        value = yield middle
+        meter.charge(i8=6, array_byte=1, loop=1)
+        if value >= threshold:
+            bright, bright_value = middle, value
+        else:
+            dark, dark_value = middle, value
+    return Crossing(bright, dark, bright_value, dark_value)
+
+
+def answered(search: Generator[Asked, int, Answer], read: Callable[[Asked], int]) -> Answer:
+    """Run a search whose questions ``read`` answers at once."""
+    try:
+        asked = next(search)
+        while True:
+            asked = search.send(read(asked))
+    except StopIteration as end:
+        answer: Answer = end.value
+        return answer
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """What fills the buffer once: part of a line, or a preset's byte (no line)."""
+
+    size: int
+    line: int | None = None
+    vertical: bool = False
+    start: int = 0
+
+
+class NadirLines:
+    """Consumer of the nadir scan: feed it the byte of every clock, in pieces of any size.
+
+    The bytes' own cost (``scan_byte`` each) is left to whoever clocks them in.
+
+    Attributes:
+        edges: found so far.
+    """
+
+    def __init__(
+        self,
+        config: EdgeConfig,
+        meter: Meter,
+        read_out: ReadOut = FULL_SIZE,
+        buffer: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Wait for the first clock of a scan that ``read_out`` describes.
+
+        ``buffer`` is what the part buffers pixels in, (scan_step,); None makes one.
+        """
+        self.edges = EdgeList(config, meter)
+        self._threshold = config.threshold
+        self._meter = meter
+        self._pieces = iter(_pieces(read_out))
+        self._piece: _Piece | None = next(self._pieces)
+        self._buffer = np.zeros(read_out.scan_step, np.uint8) if buffer is None else buffer
+        self._filled = 0
+        self._previous = 0
+
+    @property
+    def wanted(self) -> int:
+        """Bytes until the buffer is full and the part looks into it; 0 after the last one."""
+        return 0 if self._piece is None else self._piece.size - self._filled
+
+    @property
+    def space(self) -> NDArray[np.uint8]:
+        """Where the next `wanted` bytes go; `filled` says that they are there."""
+        return self._buffer[self._filled : self._filled + self.wanted]
+
+    def filled(self) -> None:
+        """`space` is full: look into it."""
+        self._take(self.wanted)
+
+    def feed(self, data: NDArray[np.uint8]) -> None:
+        """Take the next bytes (n,).
+
+        Raises:
+            ValueError: when there are more than the scan has.
+        """
+        while len(data):
+            wanted = self.wanted
+            if not wanted:
+                raise ValueError(f"the scan is through; {len(data)} bytes are too many")
+            taken, data = data[:wanted], data[wanted:]
+            self.space[: len(taken)] = taken
+            self._take(len(taken))
+
+    def _take(self, count: int) -> None:
+        self._filled += count
+        if not self.wanted:
+            self._examine()
+            self._piece, self._filled = next(self._pieces, None), 0
+
+    def _examine(self) -> None:
+        """The buffer is full: compare its last pixel, the sample, with the one before."""
+        piece = self._piece
+        assert piece is not None
+        if piece.line is None:
+            return
+        before = self._previous if piece.start else 0
+        sample = int(self._buffer[piece.size - 1])
+        self._previous = sample
+        self._meter.charge(array_byte=2, i8=3, loop16=1)
+        if (sample >= self._threshold) == (before >= self._threshold):
+            return
+        first, last = piece.start - 1, piece.start + piece.size - 1
+        wide = (
+            Crossing(last, first, sample, before)
+            if sample >= self._threshold
+            else Crossing(first, last, before, sample)
+        )
+        start = piece.start
+        found = answered(
+            bisect(wide, self._threshold, self._meter),
+            lambda position: int(self._buffer[position - start]),
+        )
+        self.edges.add(piece.line, piece.vertical, found)
+
+
+def _pieces(read_out: ReadOut) -> list[_Piece]:
+    """The scan in the order of its clocks, cut into what the buffer takes."""
+    step = read_out.scan_step
+
+    def cut(line: int, vertical: bool, length: int) -> list[_Piece]:
+        return [
+            _Piece(min(step, length - start), line, vertical, start)
+            for start in range(0, length, step)
+        ]
+
+    pieces = [_Piece(1)]
+    for row in read_out.scan_rows:
+        pieces += cut(row, False, read_out.columns)
+    pieces.append(_Piece(1))
+    for column in read_out.scan_columns:
+        pieces += cut(column, True, read_out.rows)
+    return pieces

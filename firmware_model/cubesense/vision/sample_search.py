@@ -1,0 +1,96 @@
+"""Edges of the Earth around a grid of samples, by addresses that the microcontroller chooses.
+
+CubeSense thesis, section 9.2.2 (wished for, not built): each sample is compared with its neighbours
+to the left and above, and only between unlike ones are pixels looked at. The text leaves open
+how; both ways are here. The grid is that of the scanned rows and columns; what lies before it is
+dark. Edges of the Earth beyond the last row or column of the grid are not found, but no edge within
+the rim of the field of view lies there.
+"""
+
+from collections.abc import Generator
+from enum import Enum
+
+import numpy as np
+
+from cubestack.firmware_model.cubesense.vision.edges import Crossing, EdgeConfig, EdgeList, bisect
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["Between", "around_samples"]
+
+Pixel = tuple[int, int]
+
+
+class Between(Enum):
+    """How the edge between two unlike samples is found."""
+
+    SEQUENTIAL = "one pixel after the other, away from the dark sample"
+    BINARY = "by halves"
+
+
+def around_samples(
+    config: EdgeConfig,
+    meter: Meter,
+    between: Between = Between.BINARY,
+    read_out: ReadOut = FULL_SIZE,
+) -> Generator[Pixel, int, EdgeList]:
+    """Find the edges: asks for the value of one pixel (x, y) after the other.
+
+    The cost of reading one (``address_byte``) is left to whoever does so. The part keeps the values
+    of one row of the grid.
+    """
+    edges = EdgeList(config, meter)
+    columns = read_out.scan_columns
+    above = np.zeros(len(columns), np.uint8)
+    for y in read_out.scan_rows:
+        left = 0
+        for index, x in enumerate(columns):
+            sample = yield x, y
+            meter.charge(array_byte=2, i8=6, loop=1)
+            for vertical, before, end, line in (
+                (False, left, x, y),
+                (True, int(above[index]), y, x),
+            ):
+                if (sample >= config.threshold) == (before >= config.threshold):
+                    continue
+                first = max(end - read_out.scan_step, -1)
+                wide = (
+                    Crossing(end, first, sample, before)
+                    if sample >= config.threshold
+                    else Crossing(first, end, before, sample)
+                )
+                search = bisect if between is Between.BINARY else _walk
+                steps = search(wide, config.threshold, meter)
+                found = yield from _on_line(steps, line, vertical)
+                edges.add(line, vertical, found)
+            left = sample
+            above[index] = sample
+    return edges
+
+
+def _walk(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, int, Crossing]:
+    """From the dark end to the first bright pixel."""
+    step = 1 if crossing.bright > crossing.dark else -1
+    dark, dark_value = crossing.dark, crossing.dark_value
+    meter.charge(call=1)
+    for position in range(crossing.dark + step, crossing.bright, step):
+        value = yield position
+        meter.charge(i8=4, loop=1)
+        if value >= threshold:
+            return Crossing(position, dark, value, dark_value)
+        dark, dark_value = position, value
+    return Crossing(crossing.bright, dark, crossing.bright_value, dark_value)
+
+
+def _on_line(
+    steps: Generator[int, int, Crossing], line: int, vertical: bool
+) -> Generator[Pixel, int, Crossing]:
+    """Ask for pixels where ``steps`` asks for positions on a line."""
+    try:
+        position = next(steps)
+        while True:
+            value = yield (line, position) if vertical else (position, line)
+            position = steps.send(value)
+    except StopIteration as end:
+        found: Crossing = end.value
+        return found

@@ -1,0 +1,170 @@
+"""The Sun's centre from the 15 x 15 window that the sun FPGA hands out.
+
+CubeSense thesis, sections 4.4.2, 6.6.2, 6.6.3, appendix C.6 and table 5.1: mean of the coordinates
+of all pixels that reach the threshold, weighted by value, plus the window's origin, less the
+boresight; then undistorted.
+
+Ours, with ``whole_chords``: a Sun that overflows the window is cut, mostly at the bottom, and its
+mean moves. A row that reaches the window's left or right border is then left out of the mean of x,
+a column that reaches the upper or lower one out of the mean of y. When nothing would remain, all
+count.
+
+The Sun is not found when the FPGA saw no run of bright pixels, when fewer pixels reach the
+threshold than `SunConfig.min_pixels`, or when their centre lies outside of the field of view, where
+the lens shows nothing and an int of 1/100 px may overflow; the criteria are ours. Four pixels are
+one more than the FPGA's run, so that one row of stuck pixels is no Sun.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubesense.vision.arithmetic import sequential_sum
+from cubestack.firmware_model.cubesense.vision.distortion import RIM_PX, RadiusTable
+from cubestack.firmware_model.cubesense.vision.masks import Mask, masked
+from cubestack.firmware_model.cubesense.vision.nadir import angle_of
+from cubestack.firmware_model.interface.cubesense.codes import LARGEST_ANGLE_DEG, DetectResult
+from cubestack.firmware_model.interface.cubesense.fpga import (
+    FULL_SIZE,
+    SUN_NOT_FOUND,
+    SUN_RUN,
+    ReadOut,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = ["COORDINATE_BYTES", "SunConfig", "SunResult", "find_sun", "window_bytes"]
+
+COORDINATE_BYTES = 4
+"""x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
+
+_LARGEST_ANGLE = LARGEST_ANGLE_DEG * 100
+"""In 1/100 deg; only a lens that is not ours images anything beyond."""
+
+
+@dataclass(frozen=True, eq=False)
+class SunConfig:
+    """How the window becomes a direction.
+
+    Attributes:
+        table: undistorts the centre; an equidistant one.
+        threshold: a pixel at or above it belongs to the Sun.
+        boresight: (x, y) in px.
+        masks: areas whose pixels do not count.
+        min_pixels: fewer are no Sun.
+        whole_chords: leave cut rows and columns out.
+    """
+
+    table: RadiusTable
+    threshold: int = 225
+    boresight: tuple[float, float] = (369.0, 250.0)
+    masks: Sequence[Mask] = ()
+    min_pixels: int = SUN_RUN + 1
+    whole_chords: bool = True
+
+
+@dataclass(frozen=True)
+class SunResult:
+    """What became of a detection.
+
+    Attributes:
+        detect: its result code.
+        x, y: centre from the boresight, 1/100 px, undistorted; 0 without success.
+        alpha, beta: the same, 1/100 deg.
+        pixels: that reached the threshold.
+    """
+
+    detect: DetectResult
+    x: int = 0
+    y: int = 0
+    alpha: int = 0
+    beta: int = 0
+    pixels: int = 0
+
+
+def window_bytes(read_out: ReadOut = FULL_SIZE) -> int:
+    """Bytes that the FPGA hands out: coordinates and window."""
+    return COORDINATE_BYTES + read_out.window**2
+
+
+def find_sun(
+    data: NDArray[np.uint8], config: SunConfig, meter: Meter, read_out: ReadOut = FULL_SIZE
+) -> SunResult:
+    """Measure in the bytes of one window read-out; phases: `centroid` and `undistort`.
+
+    The bytes' own cost (``strobe_byte`` each) is left to whoever clocks them in. The published
+    program works on each byte as it comes; no step depends on a later one.
+
+    Raises:
+        ValueError: when the bytes are not as many as `window_bytes`.
+    """
+    if data.shape != (window_bytes(read_out),):
+        raise ValueError(f"a window has {window_bytes(read_out)} bytes, not {data.shape}")
+    first = (int(data[0]) + 256 * int(data[1]), int(data[2]) + 256 * int(data[3]))
+    origin = read_out.window_origin(*first)
+    window = data[COORDINATE_BYTES:].reshape(read_out.window, read_out.window)
+    with meter.phase("centroid"):
+        meter.charge(i16_add=8)
+        if first == SUN_NOT_FOUND:
+            return SunResult(DetectResult.SUN_NOT_FOUND)
+        meter.charge(i8=window.size, loop16=read_out.window)
+        rows, columns = np.nonzero(window >= config.threshold)
+        kept = ~masked(columns + origin[0], rows + origin[1], config.masks, meter)
+        rows, columns = rows[kept], columns[kept]
+        pixels = len(rows)
+        meter.charge(i8=1)
+        if pixels < config.min_pixels:
+            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
+        _charge_sums(pixels, meter)
+        values = window[rows, columns]
+        mean = np.array(
+            [
+                _mean(columns, rows, values, read_out.window, config, meter),
+                _mean(rows, columns, values, read_out.window, config, meter),
+            ],
+            np.float32,
+        )
+        offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
+        meter.charge(f32_add=4, f32_div=2, f32_convert=4)
+        # In whole pixels, because the processor multiplies bytes by itself.
+        meter.charge(f32_convert=2, i16_add=6)
+        across, down = (int(value) for value in offset)
+        if across * across + down * down > RIM_PX * RIM_PX:
+            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
+    with meter.phase("undistort"):
+        centre = config.table.correct(offset[None], meter)[0]
+        angle = angle_of(centre, meter)
+        meter.charge(i16_add=4)
+        if np.abs(angle).max() > _LARGEST_ANGLE:
+            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
+    x, y, alpha, beta = (int(value) for value in (*centre, *angle))
+    return SunResult(DetectResult.SUCCESS, x, y, alpha, beta, pixels)
+
+
+def _charge_sums(pixels: int, meter: Meter) -> None:
+    """What the listing does for each Sun pixel, every factor converted anew."""
+    meter.charge(f32_convert=4 * pixels, f32_mul=2 * pixels, f32_add=2 * pixels, i16_add=pixels)
+
+
+def _mean(
+    along: NDArray[np.int64],
+    chord: NDArray[np.int64],
+    values: NDArray[np.uint8],
+    side: int,
+    config: SunConfig,
+    meter: Meter,
+) -> np.float32:
+    """Weighted mean of the coordinate ``along``, chords (rows of x, columns of y) cut left out."""
+    if config.whole_chords:
+        # Each chord's sums are kept, and added up at its end unless it was cut.
+        meter.charge(i8=2 * len(values), f32_add=side, i16_add=side)
+        cut = np.unique(chord[(along == 0) | (along == side - 1)])
+        whole = ~np.isin(chord, cut)
+        if whole.any():
+            along, values = along[whole], values[whole]
+    weight = values.astype(np.float32)
+    moment = sequential_sum(along.astype(np.float32) * weight)
+    # A sum of 225 pixels of 255 stays within an int of 16 bits.
+    total = np.float32(values.sum(dtype=np.uint16))
+    return np.float32(moment / total)

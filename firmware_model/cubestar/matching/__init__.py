@@ -1,0 +1,1 @@
+"""Identities of centroids: geometric voting, assisted matching, tracking."""

@@ -1,0 +1,158 @@
+"""What every matching mode returns, and the verification that they share.
+
+CubeStar thesis, section 4.3.3 (verification round, stars within one vote of the maximum) and
+section 5.3.4 (the weights are the verification votes). The text leaves open what happens when the
+kept stars contradict each other; here they are thinned until every pair of them agrees. Two
+centroids never share an identity: they count as a contradiction, however close they are.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.mcu.costs import Meter
+
+#: Mark of a centroid without identity.
+NONE = -1
+
+
+class Outcome(Enum):
+    """How an identification ended."""
+
+    IDENTIFIED = "enough stars were identified"
+    TOO_FEW_CENTROIDS = "there were fewer centroids than an attitude needs"
+    TOO_FEW_MATCHED = "fewer stars agreed with each other than an attitude needs"
+    MIRRORED = "the stars agree with the mirror image of the sky only"
+    CHANCE = "so few stars among so many centroids agree by chance too often"
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Identities of the centroids of one picture.
+
+    Attributes:
+        stars: (n,) index into the star list for each centroid, -1 for none. All are -1 unless the
+            outcome is IDENTIFIED.
+        votes: (n,) verification votes of each centroid: other centroids that confirmed the
+            identity which it was given before the final selection.
+        outcome: how it ended.
+    """
+
+    stars: NDArray[np.int32]
+    votes: NDArray[np.uint8]
+    outcome: Outcome
+
+    @property
+    def matched(self) -> NDArray[np.intp]:
+        """Centroids that have an identity, rising."""
+        return np.flatnonzero(self.stars != NONE)
+
+    @property
+    def confidence(self) -> NDArray[np.float32]:
+        """(n,) votes as a part of the most that so many centroids could give, 0 to 1; 0 for a
+        centroid without identity."""
+        most = max(len(self.stars) - 1, 1)
+        part = self.votes.astype(np.float32) / np.float32(most)
+        return np.where(self.stars != NONE, part, np.float32(0))
+
+
+def unidentified(count: int, outcome: Outcome) -> Identification:
+    """Identification of `count` centroids that gave nothing."""
+    return Identification(
+        np.full(count, NONE, dtype=np.int32), np.zeros(count, dtype=np.uint8), outcome
+    )
+
+
+def angles_between(
+    a: NDArray[np.float32], b: NDArray[np.float32], meter: Meter
+) -> NDArray[np.float32]:
+    """Angles in rad between unit vectors (n, 3) row by row: equation 4.3.1 in single precision."""
+    cosine = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+    count = len(a)
+    meter.charge(f32_mul=3 * count, f32_add=2 * count, f32_compare=count, f32_acos=count)
+    angles: NDArray[np.float32] = np.arccos(np.clip(cosine, np.float32(-1), np.float32(1)))
+    return angles
+
+
+@dataclass(frozen=True, eq=False)
+class CentroidPairs:
+    """Every pair of centroids and the angle between them, computed once.
+
+    Attributes:
+        count: number of centroids.
+        first, second: (p,) the pairs, first below second.
+        angle: (p,) in rad.
+    """
+
+    count: int
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    angle: NDArray[np.float32]
+
+    @classmethod
+    def measure(cls, directions: NDArray[np.float32], meter: Meter) -> Self:
+        """Pairs of the unit vectors (n, 3) of a picture."""
+        first, second = np.triu_indices(len(directions), k=1)
+        angle = angles_between(directions[first], directions[second], meter)
+        meter.charge(loop=len(first), ram_read=6 * len(first), ram_write=len(first))
+        return cls(len(directions), first, second, angle)
+
+
+def verify(
+    pairs: CentroidPairs,
+    identities: NDArray[np.int32],
+    vectors: NDArray[np.float32],
+    margin_rad: float,
+    meter: Meter,
+) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+    """Let every pair of centroids vote for its identities, and keep those that all agree.
+
+    Args:
+        pairs: the picture's pairs.
+        identities: (n,) star of each centroid or -1.
+        vectors: (stars, 3) the star list.
+        margin_rad: largest difference between a measured and a catalogue angle.
+        meter: charged with every step.
+
+    Returns:
+        Votes (n,) of the verification round, and the identities with -1 for what was not kept:
+        votes below one less than the maximum, or a contradiction with the other kept stars.
+    """
+    named = (identities[pairs.first] != NONE) & (identities[pairs.second] != NONE)
+    first, second = pairs.first[named], pairs.second[named]
+    catalogue = angles_between(vectors[identities[first]], vectors[identities[second]], meter)
+    agree = np.abs(catalogue - pairs.angle[named]) <= np.float32(margin_rad)
+    agree &= identities[first] != identities[second]
+    agreement = np.zeros((pairs.count, pairs.count), dtype=bool)
+    agreement[first[agree], second[agree]] = True
+    agreement |= agreement.T
+    votes = agreement.sum(axis=1).astype(np.uint8)
+    meter.charge(
+        loop=len(named),
+        flash_read=6 * len(first),
+        f32_add=len(first),
+        f32_compare=len(first),
+        i32_add=len(first) + 2 * int(agree.sum()),
+        ram_write=3 * int(agree.sum()),
+    )
+    kept = (votes > 0) & (votes + 1 >= votes.max(initial=0))
+    return votes, np.where(_consistent(agreement, kept, meter), identities, NONE).astype(np.int32)
+
+
+def _consistent(
+    agreement: NDArray[np.bool_], kept: NDArray[np.bool_], meter: Meter
+) -> NDArray[np.bool_]:
+    """Drop the star with the fewest agreements until all kept stars (n,) agree pairwise."""
+    kept = kept.copy()
+    while True:
+        members = np.flatnonzero(kept)
+        inside = agreement[np.ix_(members, members)].sum(axis=1)
+        meter.charge(
+            table_byte=len(members) ** 2, i32_add=len(members) ** 2, loop=len(members) ** 2
+        )
+        if len(members) == 0 or inside.min() == len(members) - 1:
+            return kept
+        kept[members[np.argmin(inside)]] = False

@@ -1,0 +1,104 @@
+"""Tracking: centroids are the stars that the last attitude predicts nearest to them.
+
+CubeStar thesis, section 4.5. No voting: the stars near the last boresight are turned into camera
+axes with the last attitude, and a centroid within 0.3 deg of one takes its identity, so the camera
+may turn up to 0.3 deg in an iteration and two stars are enough. Ours: the nearest star is taken
+when several are in reach, and the verification round drops what contradicts the other stars, as
+when a star fainter than the catalogue stands near the predicted place of another.
+"""
+
+from math import radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
+from cubestack.firmware_model.cubestar.matching.identification import (
+    NONE,
+    CentroidPairs,
+    Identification,
+    Outcome,
+    unidentified,
+    verify,
+)
+from cubestack.firmware_model.cubestar.matching.voting import DEFAULT_MARGIN_RAD
+from cubestack.firmware_model.mcu.costs import Meter
+
+#: Largest angle between a centroid and its star's predicted direction, in degrees.
+REACH_DEG = 0.3
+
+#: Stars that a solution needs when the attitude is known roughly.
+FEWEST_STARS = 2
+
+
+def track(
+    directions: NDArray[np.float32],
+    catalogue: StarCatalogue,
+    attitude: NDArray[np.float32],
+    meter: Meter,
+    *,
+    margin_rad: float = DEFAULT_MARGIN_RAD,
+    reach_deg: float = REACH_DEG,
+    radius_deg: float = CUT_RADIUS_DEG,
+) -> Identification:
+    """Identify centroids from the attitude of the iteration before.
+
+    Args:
+        directions: (n, 3) unit vectors of the centroids in camera axes.
+        catalogue: its star list is used.
+        attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
+        meter: charged; phases `reduction`, `prediction`, `distances`, `verification`.
+        margin_rad: largest difference between a measured and a catalogue angle, in rad.
+        reach_deg: largest angle between a centroid and the predicted direction of its star.
+        radius_deg: radius around the last boresight in which stars are predicted.
+    """
+    count = len(directions)
+    if count < FEWEST_STARS:
+        return unidentified(count, Outcome.TOO_FEW_CENTROIDS)
+    with meter.phase("reduction"):
+        stars = catalogue.near(attitude[2], radius_deg, meter)
+    with meter.phase("prediction"):
+        identities = _nearest(directions, catalogue.vectors, stars, attitude, reach_deg, meter)
+    with meter.phase("distances"):
+        pairs = CentroidPairs.measure(directions, meter)
+    with meter.phase("verification"):
+        votes, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
+    if np.count_nonzero(kept != NONE) < FEWEST_STARS:
+        return Identification(np.full(count, NONE, dtype=np.int32), votes, Outcome.TOO_FEW_MATCHED)
+    return Identification(kept, votes, Outcome.IDENTIFIED)
+
+
+def _nearest(
+    directions: NDArray[np.float32],
+    vectors: NDArray[np.float32],
+    stars: NDArray[np.uint16],
+    attitude: NDArray[np.float32],
+    reach_deg: float,
+    meter: Meter,
+) -> NDArray[np.int32]:
+    """Star among `stars` (k,) predicted nearest to each centroid (n, 3), -1 when out of reach.
+
+    Compared by the square of the chord, which single precision resolves better than a cosine.
+    """
+    count, candidates = len(directions), len(stars)
+    compared = count * candidates
+    meter.charge(
+        flash_read=3 * candidates,
+        f32_mul=9 * candidates + 3 * compared,
+        f32_add=6 * candidates + 5 * compared,
+        f32_compare=compared,
+        loop=candidates + compared,
+    )
+    if candidates == 0:
+        return np.full(count, NONE, dtype=np.int32)
+    inertial, turn = vectors[stars], attitude.astype(np.float32)
+    predicted = (
+        inertial[:, :1] * turn[:, 0] + inertial[:, 1:2] * turn[:, 1] + inertial[:, 2:] * turn[:, 2]
+    )
+    apart = directions[:, None, :] - predicted[None, :, :]
+    chord2 = apart[..., 0] ** 2 + apart[..., 1] ** 2 + apart[..., 2] ** 2
+    nearest = np.argmin(chord2, axis=1)
+    reach2 = np.float32((2 * sin(radians(reach_deg) / 2)) ** 2)
+    in_reach = chord2[np.arange(count), nearest] <= reach2
+    return np.where(in_reach, stars[nearest].astype(np.int32), np.int32(NONE))

@@ -1,0 +1,252 @@
+"""Geometric voting: identities of centroids from the angles between them.
+
+CubeStar thesis, section 4.3 (Algorithm 2, after Kolomenkin 2008) and section 5.3.4 (binary search,
+angles computed once, preassigned arrays). For each pair of centroids the pair list is searched for
+pairs of stars as far apart, and both centroids get a vote from both stars; the star with the most
+votes becomes a centroid's identity; a verification round and a selection follow.
+
+What the text leaves open, or leaves to chance, is completed here:
+
+- Between the first round and the identities the voting is repeated over the same entries, and a
+  vote then counts only between identities that are still standing, that is, that had a fixed part
+  of the most votes anywhere in the round before. False identities back each other less and less,
+  true ones go on. This decides most ties and finds the stars among many false ones.
+- A centroid whose best identities still tie gets none. Three lone stars may fit two places in the
+  sky, and any rule that picked one of them would be arbitrary.
+- Stars whose three-dimensional order is that of the mirror image are refused.
+- So few stars may agree that mere chance explains them. The number of entries that were looked
+  up, the density of the catalogue and the margin give the number of such coincidences to be
+  expected in a picture; above `LARGEST_CHANCE` the result is refused.
+"""
+
+from math import comb, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubestar.catalogue import PairList, StarCatalogue
+from cubestack.firmware_model.cubestar.matching.identification import (
+    NONE,
+    CentroidPairs,
+    Identification,
+    Outcome,
+    unidentified,
+    verify,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+
+__all__ = [
+    "DEFAULT_MARGIN_RAD",
+    "LARGEST_CHANCE",
+    "Identification",
+    "Outcome",
+    "identify",
+    "identify_among",
+]
+
+#: Search tolerance of section 4.3.5, about one pixel.
+DEFAULT_MARGIN_RAD = 0.001
+
+#: Coincidences per picture above which a result is refused; ours, see the test of false stars.
+LARGEST_CHANCE = 0.05
+
+#: Stars that a solution needs without other knowledge (section 4.3.5).
+FEWEST_STARS = 3
+
+#: Tenths of the most votes that an identity needs to stand, one for each round; ours.
+_STANDING_TENTHS = (4, 4, 5, 6, 7, 8)
+
+
+def identify(
+    directions: NDArray[np.float32],
+    catalogue: StarCatalogue,
+    meter: Meter,
+    *,
+    margin_rad: float = DEFAULT_MARGIN_RAD,
+) -> Identification:
+    """Identify centroids with the whole catalogue: lost in space.
+
+    Args:
+        directions: (n, 3) unit vectors of the centroids in camera axes.
+        catalogue: star list and pair list.
+        meter: charged; phases `distances`, `votes`, `identities`, `verification`, `selection`.
+        margin_rad: largest difference between a measured and a catalogue angle, in rad.
+    """
+    density = len(catalogue) / (4 * pi)
+    return identify_among(
+        directions, catalogue.vectors, catalogue.pairs, density, meter, margin_rad=margin_rad
+    )
+
+
+def identify_among(
+    directions: NDArray[np.float32],
+    vectors: NDArray[np.float32],
+    catalogue_pairs: PairList,
+    stars_per_sr: float,
+    meter: Meter,
+    *,
+    margin_rad: float = DEFAULT_MARGIN_RAD,
+) -> Identification:
+    """Identify centroids with a given pair list, whose indices count in `vectors` (stars, 3).
+
+    `stars_per_sr` is the density of the stars that the pair list draws on.
+    """
+    count = len(directions)
+    if count < FEWEST_STARS:
+        return unidentified(count, Outcome.TOO_FEW_CENTROIDS)
+    with meter.phase("distances"):
+        pairs = CentroidPairs.measure(directions, meter)
+    with meter.phase("votes"):
+        entries = _Entries(pairs, catalogue_pairs, len(vectors), margin_rad, meter)
+        votes = entries.vote(meter)
+    with meter.phase("identities"):
+        identities = _best(votes, meter)
+    with meter.phase("verification"):
+        confirmed, kept = verify(pairs, identities, vectors, margin_rad, meter)
+    with meter.phase("selection"):
+        outcome = _judge(
+            kept, directions, vectors, entries.looked_up, stars_per_sr, margin_rad, meter
+        )
+    if outcome is not Outcome.IDENTIFIED:
+        return Identification(np.full(count, NONE, dtype=np.int32), confirmed, outcome)
+    return Identification(kept, confirmed, outcome)
+
+
+class _Entries:
+    """The entries of the pair list within the margin of each pair of centroids.
+
+    A hypothesis is a centroid with an identity, numbered centroid x stars + star. Each entry ties
+    two pairs of hypotheses together, for either centroid may be either star.
+
+    Attributes:
+        looked_up: number of entries.
+    """
+
+    def __init__(
+        self,
+        pairs: CentroidPairs,
+        listed: PairList,
+        stars: int,
+        margin_rad: float,
+        meter: Meter,
+    ) -> None:
+        margin = np.float32(margin_rad)
+        start = _search(listed.angle, pairs.angle - margin, meter)
+        # The walk from the start ends at the first entry beyond the margin.
+        end = np.searchsorted(listed.angle, pairs.angle + margin, side="right")
+        lengths = np.maximum(end - start, 0)
+        self.looked_up = int(lengths.sum())
+        walked = self.looked_up + len(start)
+        meter.charge(flash_read=walked, f32_compare=walked, loop=walked, f32_add=2 * len(start))
+        pair = np.repeat(np.arange(len(start)), lengths)
+        skipped = np.cumsum(lengths) - lengths
+        entry = np.arange(self.looked_up) - skipped[pair] + start[pair]
+        one, other = pairs.first[pair] * stars, pairs.second[pair] * stars
+        star, partner = listed.first[entry], listed.second[entry]
+        self._left = np.concatenate([one + star, one + partner])
+        self._right = np.concatenate([other + partner, other + star])
+        self._shape = (pairs.count, stars)
+
+    def vote(self, meter: Meter) -> NDArray[np.intp]:
+        """Votes (centroids, stars) of the last round; 0 for what no longer stands."""
+        size = self._shape[0] * self._shape[1]
+        left, right = self._left, self._right
+        votes = np.zeros(size, dtype=np.intp)
+        for round_number, tenths in enumerate(_STANDING_TENTHS):
+            if round_number > 0:
+                first_stands = votes[self._left] > 0
+                both_stand = first_stands & (votes[self._right] > 0)
+                left, right = self._left[both_stand], self._right[both_stand]
+                tests = len(self._left) + int(first_stands.sum())
+                meter.charge(table_byte=tests, i32_add=tests, loop=self.looked_up)
+            votes = np.bincount(left, minlength=size) + np.bincount(right, minlength=size)
+            # Two 16-bit counters a vote, the largest kept; the table is cleared word by word.
+            meter.charge(
+                flash_read=2 * self.looked_up,
+                table_byte=2 * len(left),
+                i32_add=4 * len(left),
+                ram_write=2 * len(left) + size // 2,
+                loop=size // 2,
+            )
+            votes[10 * votes < tenths * votes.max()] = 0
+        return votes.reshape(self._shape)
+
+
+def _search(
+    rising: NDArray[np.float32], wanted: NDArray[np.float32], meter: Meter
+) -> NDArray[np.intp]:
+    """Binary search: for each wanted value the first index whose value is not below it."""
+    low = np.zeros(len(wanted), dtype=np.intp)
+    high = np.full(len(wanted), len(rising), dtype=np.intp)
+    steps = 0
+    while np.any(open_ := low < high):
+        steps += int(open_.sum())
+        middle = (low + high) // 2
+        below = np.zeros(len(wanted), dtype=bool)
+        below[open_] = rising[middle[open_]] < wanted[open_]
+        low = np.where(open_ & below, middle + 1, low)
+        high = np.where(open_ & ~below, middle, high)
+    meter.charge(flash_read=steps, f32_compare=steps, i32_add=3 * steps, loop=steps)
+    return low
+
+
+def _best(votes: NDArray[np.intp], meter: Meter) -> NDArray[np.int32]:
+    """Star with the most votes for each centroid, -1 for a tie or without votes."""
+    meter.charge(table_byte=votes.size, i32_add=2 * votes.size, loop=votes.size)
+    most = votes.max(axis=1)
+    unique = (votes == most[:, None]).sum(axis=1) == 1
+    return np.where((most > 0) & unique, votes.argmax(axis=1), NONE).astype(np.int32)
+
+
+def _judge(
+    kept: NDArray[np.int32],
+    directions: NDArray[np.float32],
+    vectors: NDArray[np.float32],
+    looked_up: int,
+    stars_per_sr: float,
+    margin_rad: float,
+    meter: Meter,
+) -> Outcome:
+    """Decide whether the kept identities can be believed."""
+    matched = np.flatnonzero(kept != NONE)
+    if len(matched) < FEWEST_STARS:
+        return Outcome.TOO_FEW_MATCHED
+    if _mirrored(directions[matched], vectors[kept[matched]], meter):
+        return Outcome.MIRRORED
+    chance = expected_coincidences(len(kept), len(matched), looked_up, stars_per_sr, margin_rad)
+    meter.charge(f32_mul=2 * len(matched) + 6, f32_div=len(matched), f32_compare=1)
+    return Outcome.CHANCE if chance > LARGEST_CHANCE else Outcome.IDENTIFIED
+
+
+def expected_coincidences(
+    centroids: int, matched: int, looked_up: int, stars_per_sr: float, margin_rad: float
+) -> float:
+    """How many sets of so many agreeing stars chance gives in one picture.
+
+    Each entry fixes an attitude in two ways. A further centroid then agrees when a catalogue star
+    happens to lie where two rings of width 2 e cross, an area of 4 e^2 divided by the sine of the
+    angle of crossing (2/pi on average). Each set is met once for each of its pairs.
+    """
+    hit = stars_per_sr * 2 * pi * margin_rad**2
+    further = matched - 2
+    return 2 * looked_up * comb(centroids - 2, further) * hit**further / comb(matched, 2)
+
+
+def _mirrored(measured: NDArray[np.float32], catalogue: NDArray[np.float32], meter: Meter) -> bool:
+    """Whether the triple products of measured and catalogue vectors (m, 3) have opposite signs.
+
+    The base of all triples is the widest pair, found by the smallest cosine.
+    """
+    cosines = np.sum(measured[:, None, :] * measured[None, :, :], axis=2)
+    a, b = np.unravel_index(int(np.argmin(cosines)), cosines.shape)
+    triples = np.sum(measured * np.cross(measured[a], measured[b]), axis=1)
+    catalogue_triples = np.sum(catalogue * np.cross(catalogue[a], catalogue[b]), axis=1)
+    count = len(measured)
+    pairs = count * (count - 1) // 2
+    meter.charge(
+        f32_mul=3 * pairs + 12 + 7 * count,
+        f32_add=2 * pairs + 6 + 5 * count,
+        f32_compare=pairs + 1,
+        loop=pairs + count,
+    )
+    return bool(np.sum(triples * catalogue_triples) < 0)

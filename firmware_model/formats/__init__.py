@@ -1,0 +1,1 @@
+"""File and socket formats that emulator and host both speak."""

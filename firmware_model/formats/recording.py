@@ -1,0 +1,259 @@
+"""Recordings of a device's ports, as lines of JSON; docs/recording.md has the format for readers.
+
+The first line is the header: ``{"recording": 1, "device": ..., "lines": {port: baud}, "setup"}``,
+the last member as in ``recording_setup``, or left out. Each further line is one event, in any
+order; "ps" is virtual time:
+
+- ``{"ps", "port", "from": "host" or "device", "data": hex, "byte_ps"}``: bytes on a serial line.
+  The first one begins at "ps", each next one "byte_ps" later; both times are of the wire.
+- ``{"ps", "port", "error": "framing"}``: a character that the device dropped.
+- ``{"ps", "port", "end_ps", "messages": [...], "errno"}``: a transfer on an I2C bus. A message is
+  ``{"address", "write": hex}`` or ``{"address", "read": hex}``; "errno" is there when it failed.
+- ``{"ps", "control": [word, ...], "text"}``: what was done to the device from outside of its ports,
+  as typed in the shell; "text" is that of a file that was named.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import IO, Any, Literal
+
+from cubestack.firmware_model.formats.setup import Setup
+
+__all__ = [
+    "BusMessage",
+    "BusTransfer",
+    "Control",
+    "LineBytes",
+    "LineError",
+    "Recording",
+    "RecordingError",
+    "RecordingWriter",
+    "Side",
+    "load_recording",
+]
+
+VERSION = 1
+
+Side = Literal["host", "device"]
+"""Who sent bytes."""
+
+
+class RecordingError(ValueError):
+    """A file is no recording; the text is one line and names it."""
+
+
+@dataclass(frozen=True)
+class LineBytes:
+    """Bytes on a serial line; byte i begins at ``time_ps + i * byte_ps``."""
+
+    time_ps: int
+    port: str
+    side: Side
+    data: bytes
+    byte_ps: int
+
+    def to_json(self) -> dict[str, object]:
+        """See the module's text."""
+        return {
+            "ps": self.time_ps,
+            "port": self.port,
+            "from": self.side,
+            "data": self.data.hex(),
+            "byte_ps": self.byte_ps,
+        }
+
+
+@dataclass(frozen=True)
+class LineError:
+    """A character that the device dropped."""
+
+    time_ps: int
+    port: str
+
+    def to_json(self) -> dict[str, object]:
+        """See the module's text."""
+        return {"ps": self.time_ps, "port": self.port, "error": "framing"}
+
+
+@dataclass(frozen=True)
+class BusMessage:
+    """A message of a transfer: bytes written, or read."""
+
+    address: int
+    data: bytes
+    read: bool
+
+
+@dataclass(frozen=True)
+class BusTransfer:
+    """A transfer on an I2C bus; ``errno`` is 0 when it succeeded."""
+
+    time_ps: int
+    port: str
+    end_ps: int
+    messages: tuple[BusMessage, ...]
+    errno: int = 0
+
+    def to_json(self) -> dict[str, object]:
+        """See the module's text."""
+        messages = [
+            {"address": m.address, "read" if m.read else "write": m.data.hex()}
+            for m in self.messages
+        ]
+        event = {"ps": self.time_ps, "port": self.port, "end_ps": self.end_ps, "messages": messages}
+        return event | ({"errno": self.errno} if self.errno else {})
+
+
+@dataclass(frozen=True)
+class Control:
+    """Something was done to an emulated device: a fault, another scene, a switch.
+
+    Attributes:
+        time_ps: when.
+        words: the shell's command.
+        text: of the file that it names, if it names one.
+    """
+
+    time_ps: int
+    words: tuple[str, ...]
+    text: str = ""
+
+    def to_json(self) -> dict[str, object]:
+        """See the module's text."""
+        event: dict[str, object] = {"ps": self.time_ps, "control": list(self.words)}
+        return event | ({"text": self.text} if self.text else {})
+
+
+Event = LineBytes | LineError | BusTransfer | Control
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A whole recording.
+
+    Attributes:
+        name: of the file.
+        device: name of the device, as the command line has it.
+        bauds: of each serial line, by port.
+        events: in the order of time.
+        setup: how the device was made; None where that was not written down.
+    """
+
+    name: str
+    device: str
+    bauds: dict[str, int] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+    setup: Setup | None = None
+
+    def line(self, port: str) -> Iterator[LineBytes]:
+        """What went over a serial line."""
+        return (e for e in self.events if isinstance(e, LineBytes) and e.port == port)
+
+    def sent(self, port: str, side: Side) -> tuple[bytes, list[int]]:
+        """All bytes that one side sent on a line, and when each began."""
+        blocks = [block for block in self.line(port) if block.side == side]
+        times = [b.time_ps + i * b.byte_ps for b in blocks for i in range(len(b.data))]
+        return b"".join(block.data for block in blocks), times
+
+    @property
+    def transfers(self) -> list[BusTransfer]:
+        """All transfers on I2C buses."""
+        return [event for event in self.events if isinstance(event, BusTransfer)]
+
+    @property
+    def controls(self) -> list[Control]:
+        """All that was done from outside of the ports."""
+        return [event for event in self.events if isinstance(event, Control)]
+
+    @property
+    def end_ps(self) -> int:
+        """When the last event has ended; 0 without any."""
+        return max((_end_ps(event) for event in self.events), default=0)
+
+
+class RecordingWriter:
+    """Writes a recording line by line, so that an interrupted run leaves a whole one."""
+
+    def __init__(
+        self, stream: IO[str], device: str, bauds: dict[str, int], setup: Setup | None = None
+    ) -> None:
+        """Write the header to ``stream``, which stays its owner's."""
+        self._stream = stream
+        header: dict[str, object] = {"recording": VERSION, "device": device, "lines": bauds}
+        self._line(header | ({} if setup is None else {"setup": setup.to_json()}))
+
+    def write(self, event: Event) -> None:
+        """Write an event."""
+        self._line(event.to_json())
+
+    def _line(self, content: dict[str, object]) -> None:
+        self._stream.write(json.dumps(content, separators=(",", ":")) + "\n")
+
+
+def load_recording(path: Path) -> Recording:
+    """Read a recording; raises RecordingError, or OSError when there is no such file."""
+    header: Recording | None = None
+    events: list[Event] = []
+    with path.open(encoding="utf-8", errors="replace") as stream:
+        for number, text in enumerate(stream, 1):
+            try:
+                content = json.loads(text)
+                if header is None:
+                    header = _header(path, content)
+                else:
+                    events.append(_event(content))
+            except (ValueError, KeyError, TypeError) as error:
+                reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+                raise RecordingError(
+                    f"{path} is no recording of version {VERSION}: line {number}: {reason}"
+                ) from None
+    if header is None:
+        raise RecordingError(f"{path} is no recording: it is empty")
+    ordered = tuple(sorted(events, key=lambda event: event.time_ps))
+    return replace(header, events=ordered)
+
+
+def _header(path: Path, content: Any) -> Recording:
+    if not isinstance(content, dict) or content.get("recording") != VERSION:
+        raise ValueError("the header is not there")
+    lines = content["lines"]
+    if not isinstance(content["device"], str) or not isinstance(lines, dict):
+        raise ValueError('"device" must be a text and "lines" an object')
+    setup = Setup.from_json(content["setup"]) if "setup" in content else None
+    return Recording(str(path), content["device"], lines, setup=setup)
+
+
+def _event(content: Any) -> Event:
+    time_ps = int(content["ps"])
+    if "control" in content:
+        words = tuple(str(word) for word in content["control"])
+        return Control(time_ps, words, str(content.get("text", "")))
+    port = str(content["port"])
+    if "messages" in content:
+        messages = tuple(_message(message) for message in content["messages"])
+        errno = int(content.get("errno", 0))
+        return BusTransfer(time_ps, port, int(content["end_ps"]), messages, errno)
+    if "error" in content:
+        return LineError(time_ps, port)
+    side = content["from"]
+    if side not in ("host", "device"):
+        raise ValueError(f'"from" must be "host" or "device", not {side!r}')
+    return LineBytes(time_ps, port, side, bytes.fromhex(content["data"]), int(content["byte_ps"]))
+
+
+def _message(content: Any) -> BusMessage:
+    read = "read" in content
+    data = bytes.fromhex(content["read" if read else "write"])
+    return BusMessage(int(content["address"]), data, read)
+
+
+def _end_ps(event: Event) -> int:
+    match event:
+        case LineBytes():
+            return event.time_ps + len(event.data) * event.byte_ps
+        case BusTransfer():
+            return event.end_ps
+        case LineError() | Control():
+            return event.time_ps

@@ -1,0 +1,136 @@
+"""Names for bytes in a recording: which message a byte belongs to, and which field.
+
+A device answers one request at a time, so its bytes belong to the last whole request before them.
+"""
+
+from bisect import bisect_right
+
+from cubestack.firmware_model.formats.recording import BusTransfer, Recording
+from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.frames import ESCAPE, START, FrameDecoder, FrameEvent
+from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+
+__all__ = ["name_answer_byte", "name_bus_byte", "name_request_byte", "payload_offset"]
+
+LONGEST_PAYLOAD = 4096
+
+
+def name_answer_byte(interface: Interface, recording: Recording, port: str, index: int) -> str:
+    """Name of byte ``index`` (or the one missing there) that the device sent on a serial line."""
+    requests, request_times = recording.sent(port, "host")
+    answers, answer_times = recording.sent(port, "device")
+    if index < len(answers):
+        known = requests[: bisect_right(request_times, answer_times[index])]
+    else:
+        known = requests
+    place = f"{port}: byte {index} from the device"
+    if interface.bench is not None and port.startswith("bench"):
+        letter = interface.bench.find(known[-1]) if known else None
+        return place if letter is None else f"{place}, answer to letter {letter.letter!r}"
+    payload = _last_frame(known)
+    if not payload:
+        return f"{place}, before any request"
+    message = interface.find(payload[0])
+    if message is None:
+        return f"{place}, answer to unknown ID {payload[0]}"
+    offset = payload_offset(answers, index)
+    if message.kind is Kind.TELECOMMAND:
+        what = "error code" if offset == 0 else _framing(offset, 1)
+        return f"{place}, acknowledge of telecommand {message.name}, {what}"
+    return f"{place}, telemetry {message.name}, {_part(message, offset)}"
+
+
+def name_request_byte(interface: Interface, written: bytes, index: int, port: str) -> str:
+    """Name of byte ``index`` of all that the host wrote on a serial line."""
+    place = f"{port}: byte {index} from the host"
+    if interface.bench is not None and port.startswith("bench"):
+        return place
+    offset = payload_offset(written, index)
+    if offset is None:
+        return f"{place}, outside of a frame's payload"
+    if offset == 0:
+        return f"{place}, the ID"
+    identifier = (_walk(written[:index])[0] or b"\0")[0]
+    message = interface.find(identifier)
+    if message is None:
+        return f"{place}, behind unknown ID {identifier}"
+    return f"{place}, {message.kind.value} {message.name}, {_part(message, offset - 1)}"
+
+
+def name_bus_byte(interface: Interface, transfer: BusTransfer, message: int, index: int) -> str:
+    """Name of a byte of one of a transfer's messages."""
+    found = transfer.messages[message]
+    kind = "read" if found.read else "written"
+    place = f"{transfer.port}: byte {index} {kind} at address {found.address:#04x}"
+    pointer = next((m.data[0] for m in transfer.messages if not m.read and m.data), None)
+    if pointer is None or (not found.read and index == 0):
+        return place
+    offset = index if found.read else index - 1
+    registers = interface.registers
+    if registers is not None and found.address == registers.i2c_address:
+        register = registers.at(pointer)
+        return place if register is None else f"{place}, register {register.name}"
+    declared = interface.find(pointer)
+    if declared is None:
+        return f"{place}, unknown ID {pointer}"
+    return f"{place}, {declared.kind.value} {declared.name}, {_part(declared, offset)}"
+
+
+def payload_offset(wire: bytes, index: int) -> int | None:
+    """Where in its frame's payload wire byte ``index`` is; None outside of one.
+
+    Both bytes of an escaped pair count as the byte that they carry.
+    """
+    payload, escaped = _walk(wire[:index])
+    if payload is None:
+        return None
+    here, following = wire[index : index + 1], wire[index + 1 : index + 2]
+    escape = bytes([ESCAPE])
+    if escaped:
+        return len(payload) if here == escape else None
+    if here == escape and following not in (b"", escape):
+        return None
+    return len(payload)
+
+
+def _walk(wire: bytes) -> tuple[bytes | None, bool]:
+    """Payload of the frame that is open at the end, None outside; and whether an escape is."""
+    payload: bytearray | None = None
+    escaped = False
+    for byte in wire:
+        if not escaped and byte == ESCAPE:
+            escaped = True
+            continue
+        if escaped and byte == START:
+            payload = bytearray()
+        elif escaped and byte != ESCAPE:
+            payload = None
+        elif payload is not None:
+            payload.append(byte)
+        escaped = False
+    return None if payload is None else bytes(payload), escaped
+
+
+def _last_frame(wire: bytes) -> bytes:
+    decoder, payload = FrameDecoder(LONGEST_PAYLOAD), b""
+    for byte in wire:
+        if decoder.feed(byte) is FrameEvent.FRAME:
+            payload = decoder.payload
+    return payload
+
+
+def _part(message: Message, offset: int | None) -> str:
+    if offset is None or not 0 <= offset < message.length:
+        return _framing(offset, message.length)
+    fields = [f.name for f in message.fields if _covers(f, offset)]
+    names = ", ".join(fields) if fields else "no field"
+    return f"{'field' if len(fields) <= 1 else 'fields'} {names}"
+
+
+def _covers(field: Field, offset: int) -> bool:
+    first, last = field.bit_offset // 8, (field.bit_offset + field.bits - 1) // 8
+    return first <= offset <= last
+
+
+def _framing(offset: int | None, length: int) -> str:
+    return "framing" if offset is None else f"byte {offset} of {length}"

@@ -1,0 +1,56 @@
+"""The whole interface of AraMiS' star tracker: telecommands, telemetry, numbers with names.
+
+AraMiS thesis, section 2.2, gives use cases and no bytes. Frames and buses are those of the
+CubeSpace family's nodes; I2C address, baud rate, IDs and layouts are ours.
+"""
+
+from cubestack.firmware_model.interface.aramis.codes import (
+    AckError,
+    CatalogueState,
+    LatchUpStep,
+    MeasurementMode,
+    MeasurementOutcome,
+    OnOff,
+    Reason,
+    ResetCause,
+    SensorState,
+    SpikeMethod,
+)
+from cubestack.firmware_model.interface.aramis.telecommands import (
+    BLOCK_BYTES,
+    IMAGE_BYTES,
+    MOST_CATALOGUE_BYTES,
+    MS_PER_DAY,
+    TELECOMMANDS,
+)
+from cubestack.firmware_model.interface.aramis.telemetry import PHASES, TELEMETRY
+from cubestack.firmware_model.interface.codec.message import Interface
+
+__all__ = [
+    "BLOCK_BYTES",
+    "IMAGE_BYTES",
+    "INTERFACE",
+    "MOST_CATALOGUE_BYTES",
+    "MS_PER_DAY",
+    "PHASES",
+    "AckError",
+    "CatalogueState",
+    "LatchUpStep",
+    "MeasurementMode",
+    "MeasurementOutcome",
+    "OnOff",
+    "Reason",
+    "ResetCause",
+    "SensorState",
+    "SpikeMethod",
+]
+
+INTERFACE = Interface(
+    name="AraMiS",
+    version=1,
+    i2c_address=0x1D,
+    baud=57_600,
+    telecommands=TELECOMMANDS,
+    telemetries=TELEMETRY,
+    ack_errors=AckError,
+)

@@ -1,0 +1,43 @@
+"""AraMiS' error flags, all ours: one declaration for telemetry ErrorFlags."""
+
+from cubestack.firmware_model.interface.codec.field import Field
+
+__all__ = ["FLAG_BYTES", "FLAG_NAMES", "flag_fields"]
+
+FLAG_BYTES = 4
+
+#: Name to bit and cause.
+_FLAGS = {
+    "UartProtocolError": (0, "byte outside of a frame, or an unknown escape"),
+    "UartIncomplete": (1, "frame that never ended"),
+    "UartTimeout": (2, "silence inside a frame"),
+    "I2cReadWithoutId": (3, "read with no telemetry ID written before"),
+    "TcmdBufferOverflow": (4, "telecommand while the command buffer was full"),
+    "TcmdIdError": (5, "unknown telecommand ID"),
+    "TcmdLengthError": (6, "telecommand with too few or too many parameter bytes"),
+    "TlmIdError": (7, "unknown telemetry ID"),
+    "ParameterError": (8, "parameter out of range that has no flag of its own"),
+    "DirectionError": (9, "rough direction out of range, or no unit vector"),
+    "RotationError": (10, "body rotation whose length is not 1"),
+    "NotActive": (11, "measurement asked for while the star tracker is not active"),
+    "TimingError": (12, "an iteration of the loop began late"),
+    "CameraSilent": (16, "the camera did not acknowledge on its control bus"),
+    "CameraTimeout": (17, "no whole frame came in time"),
+    "CameraFrameError": (18, "a frame or its lines were longer or shorter than programmed"),
+    "CameraOff": (19, "a picture was wanted while the camera's supply was off"),
+    "CatalogueMissing": (24, "the flash holds no catalogue"),
+    "CatalogueDamaged": (25, "a word of the catalogue had more than one wrong bit"),
+    "CatalogueCorrected": (26, "words of the catalogue were corrected on loading"),
+    "RamError": (27, "the catalogue in RAM was found damaged and loaded anew"),
+    "UploadError": (28, "catalogue with a wrong length, checksum or contents, or a stray block"),
+    "ConfigError": (29, "settings in flash were damaged; reset values are in use"),
+}
+
+FLAG_NAMES = frozenset(_FLAGS)
+
+
+def flag_fields() -> tuple[Field, ...]:
+    """Fields of telemetry ErrorFlags."""
+    return tuple(
+        Field(name, "bool1", bit, cause, flag=name) for name, (bit, cause) in _FLAGS.items()
+    )

@@ -1,0 +1,1 @@
+"""Control registers and frame timing of the image sensors."""

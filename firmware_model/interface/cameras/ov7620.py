@@ -1,0 +1,277 @@
+"""Control registers and frame timing of the OV7620 image sensor, as far as CubeSense needs them.
+
+OV7620 product specifications, revision 1.3: addresses and bits; CubeSense thesis, section 3.2 and
+appendix A. Registers are written over SCCB, an I2C dialect, with one address byte; writes to other
+addresses are ignored. Reset values and what the model leaves out are said in each register.
+"""
+
+from cubestack.firmware_model.interface.cameras.registers import (
+    BitField,
+    CameraRegister,
+    CameraRegisterMap,
+    RegisterAccess,
+)
+
+__all__ = [
+    "CLOCKS_PER_LINE",
+    "EXPOSURE_LINES",
+    "LINES_PER_FRAME",
+    "PIXEL_CLOCK_HZ",
+    "REGISTERS",
+    "window_column",
+    "window_row",
+]
+
+PIXEL_CLOCK_HZ = 13_500_000
+
+#: Pixel clocks of a line, with its blanking.
+CLOCKS_PER_LINE = 858
+
+#: Lines of a frame, with its blanking: 33.37 ms a frame (CCIR-601).
+LINES_PER_FRAME = 525
+
+#: Line times of one count of EXPOSURE: 127 us.
+EXPOSURE_LINES = 2
+
+_WINDOW_LEFT, _COLUMNS_A_COUNT = 0x2F, 4
+_WINDOW_TOP, _ROWS_A_COUNT = 0x05, 2
+
+
+def window_column(column: int) -> int:
+    """Value of HSTART or HSTOP for the window's edge at ``column``, 0 to 640, rounded down to 4."""
+    return _WINDOW_LEFT + column // _COLUMNS_A_COUNT
+
+
+def window_row(row: int) -> int:
+    """Value of VSTART or VSTOP for the window's edge at ``row``, 0 to 480, rounded down to 2."""
+    return _WINDOW_TOP + row // _ROWS_A_COUNT
+
+
+_RW = RegisterAccess.READ_WRITE
+_PICTURE = "reset value; the Y output of the model has no such processing"
+
+REGISTERS = CameraRegisterMap(
+    camera="OV7620",
+    i2c_address=0x21,  # SCCB 0x42 to write, 0x43 to read
+    address_bytes=1,
+    registers=(
+        CameraRegister(
+            0x00,
+            "GAIN",
+            1,
+            _RW,
+            0x00,
+            "amplification of all pixels",
+            fields=(
+                BitField("FINE", 0, 4, "gain (1 + FINE / 16), times the two others"),
+                BitField("DOUBLE", 4, 1, "1 doubles the gain"),
+                BitField("DOUBLE_AGAIN", 5, 1, "1 doubles it again"),
+            ),
+        ),
+        CameraRegister(
+            0x01,
+            "BLUE_GAIN",
+            1,
+            _RW,
+            0x80,
+            "gain of the blue channel",
+            modelled=False,
+            assumed="a monochrome picture does not depend on it",
+        ),
+        CameraRegister(
+            0x02,
+            "RED_GAIN",
+            1,
+            _RW,
+            0x80,
+            "gain of the red channel",
+            modelled=False,
+            assumed="a monochrome picture does not depend on it",
+        ),
+        CameraRegister(
+            0x03,
+            "SATURATION",
+            1,
+            _RW,
+            0x80,
+            "saturation of colours",
+            modelled=False,
+            assumed="reset value",
+        ),
+        CameraRegister(
+            0x06, "BRIGHTNESS", 1, _RW, 0x80, "brightness", modelled=False, assumed=_PICTURE
+        ),
+        CameraRegister(
+            0x07,
+            "SHARPNESS",
+            1,
+            _RW,
+            0xC6,
+            "enhancement of edges",
+            modelled=False,
+            assumed=_PICTURE,
+        ),
+        CameraRegister(
+            0x0C,
+            "BLUE_BIAS",
+            1,
+            _RW,
+            0x24,
+            "bias of the white balance, blue",
+            modelled=False,
+            assumed="reset value",
+        ),
+        CameraRegister(
+            0x0D,
+            "RED_BIAS",
+            1,
+            _RW,
+            0x24,
+            "bias of the white balance, red",
+            modelled=False,
+            assumed="reset value",
+        ),
+        CameraRegister(
+            0x10,
+            "EXPOSURE",
+            1,
+            _RW,
+            0x7F,
+            "exposure in two line times",
+            assumed="reset value; that 0 counts as 1",
+        ),
+        CameraRegister(
+            0x11,
+            "CLOCK_DIVIDER",
+            1,
+            _RW,
+            0x00,
+            "divides the pixel clock",
+            fields=(
+                BitField("PRESCALER", 0, 6, "pixel clock / (PRESCALER + 1)", modelled=False),
+                BitField("SYNC_POLARITY", 6, 2, "polarity of the sync outputs", modelled=False),
+            ),
+            modelled=False,
+            assumed="the model's clock is fixed",
+        ),
+        CameraRegister(
+            0x12,
+            "COMMON_A",
+            1,
+            _RW,
+            0x24,
+            "reset, mirror, automatic functions",
+            fields=(
+                BitField("AUTO_WHITE_BALANCE", 2, 1, "1 adjusts the colours", modelled=False),
+                BitField("AUTO_GAIN", 5, 1, "1 adjusts GAIN, if AUTO_ADJUST is set"),
+                BitField("MIRROR", 6, 1, "1 sends every line from its right end"),
+                BitField("RESET", 7, 1, "1 resets all registers, and itself"),
+            ),
+        ),
+        CameraRegister(
+            0x13,
+            "COMMON_B",
+            1,
+            _RW,
+            0x01,
+            "automatic functions as a whole",
+            fields=(BitField("AUTO_ADJUST", 0, 1, "1 lets the automatic functions act"),),
+        ),
+        CameraRegister(
+            0x14,
+            "COMMON_C",
+            1,
+            _RW,
+            0x04,
+            "size of the picture",
+            fields=(BitField("QVGA", 5, 1, "1 sends 320 x 240 pixels", modelled=False),),
+            modelled=False,
+            assumed="the model always sends full size",
+        ),
+        CameraRegister(
+            0x17,
+            "HSTART",
+            1,
+            _RW,
+            window_column(0),
+            "first column of the window",
+        ),
+        CameraRegister(
+            0x18,
+            "HSTOP",
+            1,
+            _RW,
+            window_column(640),
+            "column behind the window",
+        ),
+        CameraRegister(
+            0x19,
+            "VSTART",
+            1,
+            _RW,
+            window_row(0),
+            "first row of the window",
+            assumed="reset value: the whole picture",
+        ),
+        CameraRegister(
+            0x1A,
+            "VSTOP",
+            1,
+            _RW,
+            window_row(480),
+            "row behind the window",
+        ),
+        CameraRegister(
+            0x28,
+            "COMMON_H",
+            1,
+            _RW,
+            0x20,
+            "scan and black-and-white mode",
+            fields=(
+                BitField("PROGRESSIVE", 5, 1, "1 scans all rows, 0 interlaces", modelled=False),
+                BitField("BLACK_AND_WHITE", 6, 1, "1 sends brightness only"),
+            ),
+            assumed="position of BLACK_AND_WHITE; the model always scans all rows",
+        ),
+        CameraRegister(
+            0x29,
+            "COMMON_I",
+            1,
+            _RW,
+            0x00,
+            "control of the exposure",
+            fields=(BitField("MANUAL_EXPOSURE", 7, 1, "1 takes EXPOSURE as it is written"),),
+        ),
+        CameraRegister(
+            0x2A,
+            "FRAME_RATE_HIGH",
+            1,
+            _RW,
+            0x00,
+            "adjustment of the frame rate",
+            modelled=False,
+            assumed="the model's frame has 525 lines of 858 clocks",
+        ),
+        CameraRegister(
+            0x2B,
+            "FRAME_RATE_LOW",
+            1,
+            _RW,
+            0x00,
+            "adjustment of the frame rate, low byte",
+            modelled=False,
+            assumed="the model's frame has 525 lines of 858 clocks",
+        ),
+        CameraRegister(
+            0x2D,
+            "COMMON_J",
+            1,
+            _RW,
+            0x81,
+            "band filter against the flicker of lamps",
+            modelled=False,
+            assumed="reset value",
+        ),
+    ),
+)

@@ -1,0 +1,1 @@
+"""What interface tables are made of: fields, messages, frames, registers."""

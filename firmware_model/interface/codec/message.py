@@ -1,0 +1,247 @@
+"""Messages and interfaces as data: what telecommands and telemetry frames exist, and their fields.
+
+Frame layouts of the CubeSpace family of nodes: an ID below 128 is a telecommand, from 128 on a
+telemetry frame; both have a fixed length. Firmware decodes with these declarations, hosts encode
+with them, and documentation is generated from them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from functools import cached_property
+from itertools import pairwise
+
+from cubestack.firmware_model.interface.codec.field import (
+    Choices,
+    Field,
+    InterfaceError,
+    Value,
+    suggestion,
+)
+from cubestack.firmware_model.interface.codec.letters import BenchProtocol
+from cubestack.firmware_model.interface.codec.register_pointer import PointerMap
+
+__all__ = [
+    "TELEMETRY_BIT",
+    "Confidence",
+    "Field",
+    "Interface",
+    "InterfaceError",
+    "Kind",
+    "Message",
+    "Value",
+]
+
+#: Set in the IDs of telemetry, clear in those of telecommands.
+TELEMETRY_BIT = 0x80
+
+
+class Kind(Enum):
+    """Direction of a message."""
+
+    TELECOMMAND = "telecommand"
+    TELEMETRY = "telemetry"
+
+
+class Confidence(Enum):
+    """How well the layout of a message is known."""
+
+    HIGH = "layout seen working with a real host"
+    MEDIUM = "layout read in a real host"
+    LOW = "layout only declared somewhere"
+
+
+@dataclass(frozen=True)
+class Message:
+    """A telecommand or telemetry frame.
+
+    Attributes:
+        id: ID byte on the wire; its bit 7 tells the kind.
+        name: printed name.
+        length: bytes of parameters or data.
+        meaning: one phrase for a reader.
+        fields: in order of their offsets.
+        ordered: pairs of field names of which the first must not exceed the second.
+        ours: an extension of this project.
+        steps: each read returns the next of several records, and wraps.
+        supported: False when the node treats the ID as unknown.
+        confidence: how well the layout is known; None when it is printed, or ours.
+    """
+
+    id: int
+    name: str
+    length: int
+    meaning: str
+    fields: tuple[Field, ...] = ()
+    ordered: tuple[tuple[str, str], ...] = ()
+    ours: bool = False
+    steps: bool = False
+    supported: bool = True
+    confidence: Confidence | None = None
+
+    def __post_init__(self) -> None:
+        """Check the declaration; raises InterfaceError."""
+        if not 0 <= self.id <= 255:
+            raise InterfaceError(f"message {self.name}: ID {self.id} is not a byte")
+        taken = 0
+        for field in self.fields:
+            mask = ((1 << field.bits) - 1) << field.bit_offset
+            if mask >> (8 * self.length):
+                raise InterfaceError(
+                    f"message {self.name}: field {field.name} exceeds its {self.length} bytes"
+                )
+            if taken & mask:
+                raise InterfaceError(f"message {self.name}: field {field.name} overlaps another")
+            taken |= mask
+        names = [field.name for field in self.fields]
+        if len(set(names)) != len(names):
+            raise InterfaceError(f"message {self.name}: two fields of one name")
+        related = [name for pair in self.ordered for name in pair]
+        related += [field.maximum_by[0] for field in self.fields if field.maximum_by]
+        for name in related:
+            self.field(name)
+        if self.kind is Kind.TELECOMMAND:
+            wrong = self.violations(self.reset_values())
+            if wrong:
+                raise InterfaceError(
+                    f"message {self.name}: the reset value of {wrong[0][0].name} is out of range"
+                )
+
+    @property
+    def kind(self) -> Kind:
+        """Telecommand or telemetry."""
+        return Kind.TELEMETRY if self.id & TELEMETRY_BIT else Kind.TELECOMMAND
+
+    def field(self, name: str) -> Field:
+        """The field called ``name``, in any case; else InterfaceError."""
+        for field in self.fields:
+            if field.name.lower() == name.lower():
+                return field
+        raise InterfaceError(f"{self.name} has no field {name!r}; {self._field_hint(name)}")
+
+    def reset_values(self) -> dict[str, Value]:
+        """Every field's value after power-up."""
+        return {f.name: f.decode(f.encode(f.reset, saturate=False)) for f in self.fields}
+
+    def pack(self, **values: object) -> bytes:
+        """``length`` bytes that carry ``values``, one for each field.
+
+        Telemetry saturates; a telecommand's value that does not fit its type, and an unknown or
+        missing field, raise InterfaceError. Limits are the node's to check (``violations``).
+        """
+        for name in values:
+            if all(field.name != name for field in self.fields):
+                raise InterfaceError(f"{self.name} has no field {name!r}; {self._field_hint(name)}")
+        missing = [field.name for field in self.fields if field.name not in values]
+        if missing:
+            raise InterfaceError(f"{self.name} needs a value for {', '.join(missing)}")
+        saturate = self.kind is Kind.TELEMETRY
+        whole = 0
+        for field in self.fields:
+            try:
+                whole |= field.encode(values[field.name], saturate=saturate) << field.bit_offset
+            except InterfaceError as error:
+                raise InterfaceError(f"{self.name}: {error}") from None
+        return whole.to_bytes(self.length, "little")
+
+    def unpack(self, data: bytes) -> dict[str, Value]:
+        """Every field's value in ``data``; another length than declared raises InterfaceError."""
+        if len(data) != self.length:
+            raise InterfaceError(f"{self.name} has {self.length} bytes, not {len(data)}")
+        whole = int.from_bytes(data, "little")
+        return {
+            field.name: field.decode((whole >> field.bit_offset) & ((1 << field.bits) - 1))
+            for field in self.fields
+        }
+
+    def violations(self, values: Mapping[str, Value]) -> list[tuple[Field, str]]:
+        """Fields whose decoded value is not allowed, each with the error flag it raises or ""."""
+        wrong = [field for field in self.fields if not field.allows(values[field.name], values)]
+        for low, high in self.ordered:
+            below, above = values[low], values[high]
+            if not isinstance(below, bytes) and not isinstance(above, bytes) and below > above:
+                wrong.append(self.field(low))
+        return [(field, field.range_flag) for field in wrong]
+
+    def _field_hint(self, name: str) -> str:
+        known = [field.name for field in self.fields]
+        return suggestion(name, known) if known else "it has no fields"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All messages of a node, and what else the device speaks.
+
+    Attributes:
+        name: name of the device.
+        version: interface version that the node reports.
+        i2c_address: default 7-bit address.
+        baud: default baud rate of its serial line.
+        telecommands: by ascending ID.
+        telemetries: by ascending ID.
+        ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
+        registers: registers behind another I2C address, or None.
+        bench: one-letter protocol on another serial port, or None.
+    """
+
+    name: str
+    version: int
+    i2c_address: int
+    baud: int
+    telecommands: tuple[Message, ...]
+    telemetries: tuple[Message, ...]
+    ack_errors: type[IntEnum]
+    registers: PointerMap | None = None
+    bench: BenchProtocol | None = None
+
+    def __post_init__(self) -> None:
+        """Check the declaration; raises InterfaceError."""
+        for messages, kind in (
+            (self.telecommands, Kind.TELECOMMAND),
+            (self.telemetries, Kind.TELEMETRY),
+        ):
+            for message in messages:
+                if message.kind is not kind:
+                    raise InterfaceError(f"{message.name}: ID {message.id} is no {kind.value}'s")
+            for one, two in pairwise(messages):
+                if one.id >= two.id:
+                    raise InterfaceError(f"{two.name}: ID {two.id} is taken or out of order")
+            if len({message.name.lower() for message in messages}) != len(messages):
+                raise InterfaceError(f"{self.name}: two {kind.value}s of one name")
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """Telecommands, then telemetry."""
+        return self.telecommands + self.telemetries
+
+    @property
+    def choices(self) -> tuple[Choices, ...]:
+        """The sets of named numbers that fields use beside ``ack_errors``, by their first use."""
+        fields = [field for message in self.messages for field in message.fields]
+        if self.registers is not None:
+            fields += [register.field for register in self.registers]
+        used = dict.fromkeys(field.choices for field in fields)
+        return tuple(choices for choices in used if choices not in (None, self.ack_errors))
+
+    def telecommand(self, key: str | int) -> Message:
+        """The telecommand of this name (in any case) or ID; else InterfaceError."""
+        return self._lookup(self.telecommands, "telecommand", key)
+
+    def telemetry(self, key: str | int) -> Message:
+        """The telemetry frame of this name (in any case) or ID; else InterfaceError."""
+        return self._lookup(self.telemetries, "telemetry frame", key)
+
+    def find(self, identifier: int) -> Message | None:
+        """The message with this ID byte as the node knows it; None for an invalid ID."""
+        return self._supported.get(identifier)
+
+    @cached_property
+    def _supported(self) -> dict[int, Message]:
+        return {message.id: message for message in self.messages if message.supported}
+
+    def _lookup(self, messages: tuple[Message, ...], kind: str, key: str | int) -> Message:
+        for message in messages:
+            if key == message.id or (isinstance(key, str) and key.lower() == message.name.lower()):
+                return message
+        hint = suggestion(str(key), [message.name for message in messages])
+        raise InterfaceError(f"{self.name} has no {kind} {key!r}; {hint}")

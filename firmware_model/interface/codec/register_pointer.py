@@ -1,0 +1,139 @@
+"""Registers behind a register pointer on I2C, as data.
+
+A host writes the address of a register, then either one data byte in the same transfer, or it reads
+the value after a repeated start or in a transfer of its own (CubeSense thesis, section 6.4.3).
+Values of two bytes are signed. What is ours, because the text leaves it open:
+
+- The most significant byte comes first.
+- Writing the address latches the value, so that both bytes belong together; the pointer stays, and
+  a read continues where the one before it stopped, because a bus driver limits the length of one
+  read. Writing the address again begins anew.
+- A read beyond the end of a value, or of an address without a register, gives ``FILL`` bytes.
+- A slave can not refuse: a write to an address without a register, to one that can not be written,
+  or of a value that is not allowed, is ignored.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
+from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value, suggestion
+
+__all__ = ["FILL", "PointerMap", "PointerRegister"]
+
+#: What a read gives where there is nothing.
+FILL = 0xFF
+
+
+@dataclass(frozen=True)
+class PointerRegister:
+    """One register.
+
+    Attributes:
+        address: the pointer's value.
+        access: what the host may do.
+        field: name, type, meaning, unit, scale and limits; its offset is 0. A ``bytesN`` is a
+            stream, anything else a number.
+    """
+
+    address: int
+    access: RegisterAccess
+    field: Field
+
+    def __post_init__(self) -> None:
+        """Check the declaration; raises InterfaceError."""
+        if not 0 <= self.address <= 255:
+            raise InterfaceError(f"register {self.name}: address {self.address} is not a byte")
+        if self.field.bit_offset or self.field.bits % 8:
+            raise InterfaceError(f"register {self.name}: must be whole bytes at offset 0")
+        if self.writable and self.length != 1:
+            raise InterfaceError(f"register {self.name}: a host writes one byte, not {self.length}")
+
+    @property
+    def name(self) -> str:
+        """The field's name."""
+        return self.field.name
+
+    @property
+    def length(self) -> int:
+        """Bytes of the value."""
+        return self.field.bits // 8
+
+    @property
+    def writable(self) -> bool:
+        """Whether a host may write it."""
+        return self.access is not RegisterAccess.READ_ONLY
+
+    @property
+    def readable(self) -> bool:
+        """Whether a read gives its value."""
+        return self.access is not RegisterAccess.WRITE_ONLY
+
+    @property
+    def streams(self) -> bool:
+        """Whether it is a stream of bytes and no number."""
+        return self.field.type.startswith("bytes")
+
+    def allows(self, value: Value) -> bool:
+        """Whether a decoded ``value`` may be written."""
+        return self.writable and self.field.allows(value, {})
+
+    def encode(self, value: object, *, saturate: bool = True) -> bytes:
+        """The bytes of a number, most significant first; see ``Field.encode`` for the errors."""
+        if self.streams:
+            raise InterfaceError(f"register {self.name} is a stream and carries no number")
+        return self.field.encode(value, saturate=saturate).to_bytes(self.length, "big")
+
+    def decode(self, data: bytes) -> Value:
+        """The number, or stream, that ``data`` carries; another length raises InterfaceError."""
+        if len(data) != self.length:
+            raise InterfaceError(f"register {self.name} has {self.length} bytes, not {len(data)}")
+        return data if self.streams else self.field.decode(int.from_bytes(data, "big"))
+
+
+class PointerMap:
+    """All registers behind one I2C address.
+
+    Attributes:
+        i2c_address: default 7-bit address.
+        note: one sentence for a reader, on the map as a whole.
+    """
+
+    def __init__(
+        self, i2c_address: int, registers: tuple[PointerRegister, ...], note: str = ""
+    ) -> None:
+        """Make the map; InterfaceError when registers share a name or an address."""
+        self.i2c_address = i2c_address
+        self.note = note
+        self._by_address: dict[int, PointerRegister] = {}
+        self._by_name: dict[str, PointerRegister] = {}
+        for register in sorted(registers, key=lambda r: r.address):
+            if register.address in self._by_address:
+                other = self._by_address[register.address].name
+                raise InterfaceError(
+                    f"registers {other} and {register.name} both have address "
+                    f"{register.address:#04x}"
+                )
+            if register.name.lower() in self._by_name:
+                raise InterfaceError(f"two registers are called {register.name}")
+            self._by_address[register.address] = register
+            self._by_name[register.name.lower()] = register
+
+    def at(self, address: int) -> PointerRegister | None:
+        """The register at ``address``, or None."""
+        return self._by_address.get(address)
+
+    def __getitem__(self, name: str) -> PointerRegister:
+        """The register ``name``, in any case; InterfaceError when there is none."""
+        if name.lower() not in self._by_name:
+            hint = suggestion(name, [register.name for register in self])
+            raise InterfaceError(f"no register {name!r}; {hint}")
+        return self._by_name[name.lower()]
+
+    def __iter__(self) -> Iterator[PointerRegister]:
+        """Registers in the order of their addresses."""
+        return iter(self._by_address.values())
+
+    def __len__(self) -> int:
+        """Number of registers."""
+        return len(self._by_address)

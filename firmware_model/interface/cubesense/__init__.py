@@ -1,0 +1,28 @@
+"""CubeSense's whole interface: node protocol, register-pointer protocol and bench protocol.
+
+Node protocol: CubeSpace family with two cameras, interface generation 2, node dialect on the UART.
+The register-pointer and the bench protocol are those of the CubeSense thesis, section 6.4.3 and
+appendix E. Ours where nothing is published: both I2C addresses, the register addresses,
+telecommands from 100 and telemetry from 220 on.
+"""
+
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense.bench import BENCH
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
+from cubestack.firmware_model.interface.cubesense.telemetry import TELEMETRIES
+
+__all__ = ["INTERFACE"]
+
+INTERFACE = Interface(
+    name="CubeSense",
+    version=2,
+    i2c_address=0x1B,
+    baud=57_600,
+    telecommands=TELECOMMANDS,
+    telemetries=TELEMETRIES,
+    ack_errors=AckError,
+    registers=REGISTERS,
+    bench=BENCH,
+)

@@ -1,0 +1,31 @@
+"""CubeSense's one-letter bench protocol.
+
+CubeSense thesis, appendix E: 115200 baud, 8N1. Ours, because nothing is said of it: a capture that
+fails is not answered, and the download reads the memory of the camera's own.
+"""
+
+from cubestack.firmware_model.interface.codec.letters import BenchProtocol, Letter
+from cubestack.firmware_model.interface.cubesense.codes import IMAGE_BYTES, Camera, Sram
+
+__all__ = ["BENCH", "CAPTURES", "DOWNLOADS"]
+
+_STORED = b"Y"
+
+
+def _capture(letter: str, camera: Camera) -> Letter:
+    meaning = f"take a picture with the {camera.name} camera"
+    return Letter(letter, f"TAKE_{camera.name}", meaning, len(_STORED), _STORED)
+
+
+def _download(letter: str, camera: Camera) -> Letter:
+    meaning = f"send the picture in {Sram(camera).name}, row after row"
+    return Letter(letter, f"SEND_{camera.name}", meaning, IMAGE_BYTES)
+
+
+#: Letter that takes a camera's picture.
+CAPTURES = {Camera.NADIR: _capture("a", Camera.NADIR), Camera.SUN: _capture("q", Camera.SUN)}
+
+#: Letter that sends the picture in a camera's own memory.
+DOWNLOADS = {Camera.NADIR: _download("s", Camera.NADIR), Camera.SUN: _download("w", Camera.SUN)}
+
+BENCH = BenchProtocol(115_200, (*CAPTURES.values(), *DOWNLOADS.values()))

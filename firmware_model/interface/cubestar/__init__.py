@@ -1,0 +1,63 @@
+"""CubeStar's whole interface: telecommands, telemetry, and the numbers with names.
+
+CubeSpace family of nodes, interface version 3, node dialect on the UART. Ours where nothing is
+published: the I2C address, 57600 baud, telecommands 100-127 and telemetry 200-255. Telecommands
+13 and 14 and telemetry 142 belong to a later image sensor and reach the registers of this one
+through a page (SetCameraRegisterPage); telemetry 138 is answered as an unknown ID.
+"""
+
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.cubestar.codes import (
+    AckError,
+    GridSize,
+    IdMode,
+    ImageBlockSize,
+    MatchMode,
+    MemoryTest,
+    ResetCause,
+    SwitchState,
+    TaskStatus,
+    TestPattern,
+)
+from cubestack.firmware_model.interface.cubestar.extensions import (
+    EXTENSION_TELECOMMANDS,
+    EXTENSION_TELEMETRY,
+    UPLOAD_BLOCK_BYTES,
+)
+from cubestack.firmware_model.interface.cubestar.processing_telecommands import (
+    PROCESSING_TELECOMMANDS,
+)
+from cubestack.firmware_model.interface.cubestar.star_telemetry import STAR_TELEMETRY
+from cubestack.firmware_model.interface.cubestar.telecommands import (
+    DEVICE_TELECOMMANDS,
+    IMAGE_BYTES,
+)
+from cubestack.firmware_model.interface.cubestar.telemetry import NODE_TELEMETRY
+
+__all__ = [
+    "IMAGE_BYTES",
+    "INTERFACE",
+    "UPLOAD_BLOCK_BYTES",
+    "AckError",
+    "GridSize",
+    "IdMode",
+    "ImageBlockSize",
+    "MatchMode",
+    "MemoryTest",
+    "ResetCause",
+    "SwitchState",
+    "TaskStatus",
+    "TestPattern",
+]
+
+INTERFACE = Interface(
+    name="CubeStar",
+    version=3,
+    i2c_address=0x1A,
+    baud=57_600,
+    telecommands=DEVICE_TELECOMMANDS + PROCESSING_TELECOMMANDS + EXTENSION_TELECOMMANDS,
+    telemetries=tuple(
+        sorted(NODE_TELEMETRY + STAR_TELEMETRY + EXTENSION_TELEMETRY, key=lambda m: m.id)
+    ),
+    ack_errors=AckError,
+)

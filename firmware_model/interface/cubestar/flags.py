@@ -1,0 +1,141 @@
+"""CubeStar's error flags: one declaration for telemetry ErrorFlags and LogStatus.
+
+CubeSpace family of nodes, interface version 3. The two frames show the same ten bytes of flags; a
+few names are printed differently in the second. The causes are ours to word: the published tables
+give names only. Some belong to hardware that this node does not have, or that does not fail here.
+"""
+
+from dataclasses import dataclass
+
+from cubestack.firmware_model.interface.codec.field import Field
+
+__all__ = ["FLAG_BYTES", "NEVER_RAISED", "ErrorFlag", "flag_fields"]
+
+#: Length of the block of flags.
+FLAG_BYTES = 10
+
+
+@dataclass(frozen=True)
+class ErrorFlag:
+    """An error flag.
+
+    Attributes:
+        bit: position in the block.
+        name: printed name.
+        cause: what raises it.
+        log_name: name in LogStatus, if other.
+        never: why this node does not raise it; empty when it does.
+    """
+
+    bit: int
+    name: str
+    cause: str
+    log_name: str = ""
+    never: str = ""
+
+
+_FLAGS = (
+    ErrorFlag(0, "OverCurrent", "a supply current was above its limit and the switch was opened"),
+    ErrorFlag(1, "UnderCurrent", "a switched-on supply drew next to no current"),
+    ErrorFlag(8, "UART_ProtocolError", "byte outside of a frame, or an unknown escape"),
+    ErrorFlag(9, "UART_TcmdBufOfError", "telecommand while the command buffer was full"),
+    ErrorFlag(10, "UART_Tcmd_TooManyParm", "telecommand with too many parameter bytes"),
+    ErrorFlag(11, "UART_Tcmd_TooFewParm", "telecommand with too few parameter bytes"),
+    ErrorFlag(12, "UART_MsgIncomplete", "frame that never ended"),
+    ErrorFlag(13, "UART_RXTimeout", "silence inside a frame"),
+    ErrorFlag(16, "I2C_WaitForIDReadRequestError", "read with no telemetry ID written before"),
+    ErrorFlag(17, "I2C_TcmdBufOFError", "telecommand while the command buffer was full"),
+    ErrorFlag(18, "I2C_TCMD_TooFewParm", "telecommand with too few parameter bytes"),
+    ErrorFlag(19, "I2C_TCMD_TooManyparm", "telecommand with too many parameter bytes"),
+    ErrorFlag(24, "SPICommsError", "error on an SPI bus", never="there is no SPI bus"),
+    ErrorFlag(25, "StatusError", "a step was asked for whose input does not exist yet"),
+    ErrorFlag(
+        26,
+        "ISSetupError",
+        "the image sensor did not acknowledge its set-up or a register access",
+        "ISsetupError",
+    ),
+    ErrorFlag(27, "TestPatternConfigError", "unknown test pattern", "TestpatternConfigError"),
+    ErrorFlag(28, "ImageCaptureError", "no whole picture arrived in time"),
+    ErrorFlag(29, "ISDisableError", "the image sensor did not acknowledge being disabled"),
+    ErrorFlag(30, "ConfigChangeError", "the image sensor did not acknowledge a new setting"),
+    ErrorFlag(31, "ISEnableError", "the image sensor did not acknowledge being enabled"),
+    ErrorFlag(32, "FocalLengthRangeError", "focal length out of range"),
+    ErrorFlag(
+        33, "PrincipalPointRangeError", "principal point out of range", "BoresightRangeError"
+    ),
+    ErrorFlag(40, "ImageBlockSizeError", "unknown block size, or block beyond the picture"),
+    ErrorFlag(41, "TimingError", "the main loop took longer than its second", "MainLoopTimeError"),
+    ErrorFlag(42, "TcmdIDError", "unknown telecommand ID"),
+    ErrorFlag(43, "TlmIDError", "unknown telemetry ID"),
+    ErrorFlag(44, "TriggerAlreadySet", "trigger while the loop was triggered already"),
+    ErrorFlag(45, "TimerAlreadyRunning", "trigger while the delay timer was running"),
+    ErrorFlag(46, "DelayTimeSetToLong", "delay time out of range", "TimerTimeSetToLong"),
+    ErrorFlag(
+        48, "StarPixSetError", "pixel limits out of range or in the wrong order", "PixSetError"
+    ),
+    ErrorFlag(49, "MaxStarsSetError", "star limit out of range"),
+    ErrorFlag(50, "MaxStarsDetection", "detection stopped at the limit of stars"),
+    ErrorFlag(51, "MaxInvalidStarsDetectionError", "detection stopped at the limit of large areas"),
+    ErrorFlag(52, "CentroidingGridSizeSetError", "unknown centroiding window"),
+    ErrorFlag(53, "ValidImageRangeSetError", "detection region out of range or in the wrong order"),
+    ErrorFlag(54, "MaxNoiseSetError", "noise limit out of range"),
+    ErrorFlag(55, "MaxNoiseDetected", "detection stopped at the limit of small areas"),
+    ErrorFlag(56, "SetIDModeError", "unknown identification mode"),
+    ErrorFlag(57, "IDModeError", "tracking asked for, but there is neither an attitude nor a hint"),
+    ErrorFlag(58, "ReducedIDListSizeError", "no catalogue star near the rough boresight"),
+    ErrorFlag(
+        59,
+        "LessThanThreeStarsInFoV",
+        "fewer than three catalogue stars near the expected boresight",
+    ),
+    ErrorFlag(60, "LessThanThreeStarsDetected", "fewer than three stars detected"),
+    ErrorFlag(61, "LessThanThreeStarsID", "fewer than three stars identified"),
+    ErrorFlag(62, "IDError", "identification found no consistent set of stars"),
+    ErrorFlag(63, "IDSearchError", "no two detected stars confirmed each other's identity"),
+    ErrorFlag(64, "DeclinationSetError", "declination out of range"),
+    ErrorFlag(65, "RightAscensionSetError", "right ascension out of range"),
+    ErrorFlag(66, "QuestindexError", "attitude asked for with too few identified stars"),
+    ErrorFlag(67, "RateExceeded", "tracking lost the stars: they moved further than its radius"),
+    ErrorFlag(
+        72,
+        "FlashInvalidAreaError",
+        "flash access outside of its area",
+        never="the pages have fixed places",
+    ),
+    ErrorFlag(
+        73,
+        "FlashLockedError",
+        "flash write while it was locked",
+        never="the program never locks it",
+    ),
+    ErrorFlag(
+        74,
+        "FlashTimeoutError",
+        "flash write did not end in time",
+        never="the modelled flash does not fail",
+    ),
+    ErrorFlag(
+        75,
+        "FlashUnalignedError",
+        "flash write at an unaligned address",
+        never="whole pages are written",
+    ),
+)
+
+#: Flags that this node does not raise, and why.
+NEVER_RAISED = {flag.name: flag.never for flag in _FLAGS if flag.never}
+
+
+def flag_fields(first_bit: int = 0, *, log_names: bool = False) -> tuple[Field, ...]:
+    """Fields of the block of flags from bit ``first_bit`` on, with LogStatus' names if asked."""
+    return tuple(
+        Field(
+            (flag.log_name or flag.name) if log_names else flag.name,
+            "bool1",
+            first_bit + flag.bit,
+            f"{flag.cause} (not on this node: {flag.never})" if flag.never else flag.cause,
+            flag=flag.name,
+        )
+        for flag in _FLAGS
+    )

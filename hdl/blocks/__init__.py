@@ -1,0 +1,1 @@
+"""Blocks that several FPGA designs share: counters, frame writer and reader, bus port."""

@@ -1,0 +1,45 @@
+"""SRAM to microcontroller: presents the stored frame byte by byte.
+
+CubeStar thesis, section 5.2.2 and appendix C. The microcontroller makes the clock, so it alone
+sets the rate, and reading works when the camera gives no pixel clock.
+"""
+
+from amaranth.hdl import Module
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+
+__all__ = ["FrameReader"]
+
+
+class FrameReader(Component):
+    """Presents the next byte at each rising edge of its domain's clock, the data clock.
+
+    In reset the address is that of the first pixel, so the SRAM already offers it when the first
+    edge comes. Past the last pixel comes the first one again.
+
+    Ports:
+        address: SRAM address of the byte that the next edge will present.
+        memory: what the SRAM offers at that address.
+        data: the byte presented to the microcontroller; 0 in reset.
+    """
+
+    def __init__(self, columns: int, rows: int, *, domain: str = "dclk") -> None:
+        """Make a reader for frames of ``columns`` x ``rows`` pixels."""
+        self._counter = MatrixCounter(columns, rows, domain=domain)
+        self._domain = domain
+        super().__init__(
+            {
+                "address": Out(MatrixCounter.address_width(columns, rows)),
+                "memory": In(8),
+                "data": Out(8),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the counter and the output register."""
+        m = Module()
+        m.submodules.counter = counter = self._counter
+        m.d.comb += [counter.next_column.eq(1), self.address.eq(counter.address)]
+        m.d[self._domain] += self.data.eq(self.memory)
+        return m

@@ -1,0 +1,97 @@
+"""Camera to SRAM: stores one whole frame, then raises ACK.
+
+CubeStar thesis, section 5.2.2 and appendix C. One pixel is taken at each rising edge of the pixel
+clock inside a line, and written during the low half of that clock period: the address, the data
+and ``store`` change after a rising edge only, so they are stable for the whole write pulse.
+"""
+
+from amaranth.hdl import Module, Signal
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+
+__all__ = ["FrameWriter"]
+
+
+class FrameWriter(Component):
+    """Stores the first whole frame after its domain leaves reset.
+
+    All camera inputs are synchronous to the domain's clock, which is the camera's pixel clock.
+    Being in reset is being idle: nothing is stored and ``ack`` is low.
+
+    - Storing starts at a line's start only: a low HSync must have been seen first.
+    - A low VSync goes back to the first row, so a frame that was joined in the middle is dropped.
+    - Pixels beyond the last column, and lines beyond the last row, are not stored. A line that is
+      too short leaves the rest of its row as it was; a frame whose last row is too short is not
+      acknowledged, and the next one is stored in its place.
+    - ``ack`` rises when the write pulse of the last pixel is over. It stays, and nothing more is
+      stored, until the next reset; VSync does not clear it.
+
+    Ports:
+        pixel: pixel data.
+        hsync: low between lines.
+        vsync: low between frames.
+        address: SRAM address of the pixel in ``data``.
+        data: pixel to be written.
+        store: high for the clock period in which ``data`` is to be written.
+        ack: a whole frame is stored.
+    """
+
+    def __init__(self, columns: int, rows: int, *, domain: str = "pix") -> None:
+        """Make a writer for frames of ``columns`` x ``rows`` pixels."""
+        self._counter = MatrixCounter(columns, rows, domain=domain)
+        self._domain = domain
+        super().__init__(
+            {
+                "pixel": In(8),
+                "hsync": In(1),
+                "vsync": In(1),
+                "address": Out(MatrixCounter.address_width(columns, rows)),
+                "data": Out(8),
+                "store": Out(1),
+                "ack": Out(1),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the line and frame tracking around the position counter."""
+        m = Module()
+        m.submodules.counter = counter = self._counter
+        sync = m.d[self._domain]
+
+        between_lines_seen = Signal()  # since reset or VSync: a line's start can be recognised
+        line_open = Signal()  # at least one pixel of this line was taken
+        line_full = Signal()  # the row is complete; surplus pixels are ignored
+        frame_full = Signal()  # the last row is over, complete or not
+
+        storing_last_column = Signal()
+        line_ends_short = Signal()
+        accept = Signal()
+        m.d.comb += [
+            storing_last_column.eq(self.store & counter.last_column),
+            line_ends_short.eq(~self.hsync & line_open & ~line_full & ~storing_last_column),
+            accept.eq(
+                self.hsync
+                & self.vsync
+                & between_lines_seen
+                & ~line_full
+                & ~storing_last_column
+                & ~frame_full
+                & ~self.ack
+            ),
+            counter.next_column.eq(self.store),
+            counter.next_row.eq(line_ends_short),
+            counter.clear.eq(~self.vsync),
+            self.address.eq(counter.address),
+        ]
+
+        sync += [
+            self.data.eq(self.pixel),
+            self.store.eq(accept),
+            between_lines_seen.eq(~self.hsync | (between_lines_seen & self.vsync)),
+            line_open.eq(self.hsync & self.vsync & (line_open | accept)),
+            line_full.eq(self.hsync & (line_full | storing_last_column)),
+            frame_full.eq(self.vsync & (frame_full | (line_ends_short & counter.last_row))),
+            self.ack.eq(self.ack | (storing_last_column & counter.last_row)),
+        ]
+        return m

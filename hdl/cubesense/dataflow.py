@@ -1,0 +1,124 @@
+"""Dataflow control: what one of CubeSense's FPGAs does at the levels of the control lines.
+
+CubeSense thesis, section 6.4.2 and table 6.4. The rows are those of the command table in
+:mod:`cubestack.firmware_model.interface.cubesense.fpga`; every other one is standby. The rows of
+its second table are an option.
+"""
+
+from dataclasses import replace
+from typing import Literal
+
+from amaranth.hdl import Cat, Module, Value
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.firmware_model.interface.cubesense.fpga import (
+    ADDRESSING_COMMANDS,
+    COMMANDS,
+    Action,
+    Command,
+    actions,
+    link_shows_enables,
+)
+
+__all__ = ["DataflowControl", "Side"]
+
+Side = Literal["sun", "nadir"]
+
+
+class DataflowControl(Component):
+    """Decodes the control lines; no clock.
+
+    Ports:
+        en_n: own enable, low active.
+        other_en_n: the other FPGA's, as the link shows it; not looked at when the link can not.
+        rnw, edge, shift: the other control lines.
+        store, read, edge_data, send_picture, store_other, send_edge, pass_edge: one is high, the
+            one with the name of the action to be taken (``edge_data`` is EDGE); none in standby.
+        take_address, read_from: the same, with ``mcu_addressing`` only.
+        addressing: one of these two, without a glitch while SHIFT moves from one to the other.
+    """
+
+    def __init__(self, side: Side, *, mcu_addressing: bool = False) -> None:
+        """Make the control of the sun sensor's or the nadir sensor's FPGA."""
+        self._side = side
+        self._mcu_addressing = mcu_addressing
+        names = ("take_address", "read_from", "addressing") * mcu_addressing
+        super().__init__(
+            {
+                "en_n": In(1),
+                "other_en_n": In(1),
+                "rnw": In(1),
+                "edge": In(1),
+                "shift": In(1),
+                "store": Out(1),
+                "read": Out(1),
+                "edge_data": Out(1),
+                "send_picture": Out(1),
+                "store_other": Out(1),
+                "send_edge": Out(1),
+                "pass_edge": Out(1),
+                **dict.fromkeys(names, Out(1)),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build one condition for each row that this FPGA acts on."""
+        m = Module()
+        outputs = {
+            Action.STORE: self.store,
+            Action.READ: self.read,
+            Action.EDGE: self.edge_data,
+            Action.SEND_PICTURE: self.send_picture,
+            Action.STORE_OTHER: self.store_other,
+            Action.SEND_EDGE: self.send_edge,
+            Action.PASS_EDGE: self.pass_edge,
+        }
+        commands: tuple[Command, ...] = COMMANDS
+        if self._mcu_addressing:
+            commands += ADDRESSING_COMMANDS
+            outputs[Action.TAKE_ADDRESS] = self.take_address
+            outputs[Action.READ_FROM] = self.read_from
+            m.d.comb += self.addressing.eq(self._addressing())
+        for command in commands:
+            action = getattr(command.actions, self._side)
+            if action is not Action.STANDBY:
+                with m.If(self._fits(command)):
+                    m.d.comb += outputs[action].eq(1)
+        return m
+
+    def _fits(self, command: Command) -> Value:
+        """Whether the lines are at the levels of a row.
+
+        The other enable is no input at all where it makes no difference, so that it can not disturb
+        a picture that is being stored, nor where the link can not show it: there the line itself
+        depends on the result.
+        """
+        own, other = command.sunen, command.naden
+        if self._side == "nadir":
+            own, other = other, own
+        levels = [
+            (self.shift, command.shift),
+            (self.edge, command.edge),
+            (self.rnw, command.rnw),
+            (self.en_n, own),
+        ]
+        if self._other_matters(command):
+            levels.append((self.other_en_n, other))
+        return Cat(line == level for line, level in levels if level is not None).all()
+
+    def _addressing(self) -> Value:
+        """The rows of address control with SHIFT left out, which makes one condition of them."""
+        rows = [replace(command, shift=None) for command in ADDRESSING_COMMANDS]
+        own = [row for row in rows if getattr(row.actions, self._side) is not Action.STANDBY]
+        return Cat(self._fits(row) for row in own).any()
+
+    def _other_matters(self, command: Command) -> bool:
+        """Whether this FPGA sees the other enable, and would act otherwise at its other level."""
+        shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
+        enables = [command.sunen, command.naden]
+        enables[1 if self._side == "sun" else 0] ^= 1
+        flipped = actions(shift, edge, rnw, *enables, mcu_addressing=self._mcu_addressing)
+        changed = getattr(flipped, self._side)
+        return link_shows_enables(shift, edge) and changed is not getattr(
+            command.actions, self._side
+        )

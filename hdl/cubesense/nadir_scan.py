@@ -1,0 +1,80 @@
+"""Nadir scan: the addresses of every 64th row, then of every 64th column.
+
+CubeSense thesis, section 6.5.1 and figure 6.7. The published listing is off by one or two pixels
+here and there; this one presents the k-th pixel of a line at the line's k-th clock.
+"""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.lib.wiring import Component, Out
+from amaranth.utils import ceil_log2
+
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+
+__all__ = ["NadirScan"]
+
+
+class NadirScan(Component):
+    """Steps at each rising edge of its domain's clock, through figure 6.7's states.
+
+    In reset, and in the two states that preset (the default one and B), the address is 0; the clock
+    that leaves such a state presents the byte there, which is no part of a line. States A (rows)
+    and C (columns) give the address that the next clock presents. C starts again when it is
+    through.
+
+    Ports:
+        address: row : column.
+    """
+
+    def __init__(self, read_out: ReadOut, *, domain: str = "scan") -> None:
+        """Make the scan that ``read_out`` describes."""
+        self._read_out = read_out
+        self._domain = domain
+        super().__init__(
+            {"address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows))}
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build one counter along the line and one of lines, which swap roles for the columns."""
+        m = Module()
+        sync = m.d[self._domain]
+        size = self._read_out
+        column_bits, row_bits = ceil_log2(size.columns), ceil_log2(size.rows)
+        step_bits = ceil_log2(size.scan_step)
+
+        on_a_line = Signal()  # state A or C; else the default one or B
+        vertical = Signal()  # state B or C
+        along = Signal(max(column_bits, row_bits))  # position on the line
+        line = Signal(range(max(len(size.scan_rows), len(size.scan_columns), 2)))
+
+        line_ends = Signal()
+        last_line = Signal()
+        m.d.comb += [
+            line_ends.eq(along == Mux(vertical, size.rows - 1, size.columns - 1)),
+            last_line.eq(
+                line == Mux(vertical, len(size.scan_columns) - 1, len(size.scan_rows) - 1)
+            ),
+        ]
+        with m.If(~on_a_line):
+            sync += on_a_line.eq(1)
+        with m.Elif(~line_ends):
+            sync += along.eq(along + 1)
+        with m.Else():
+            sync += along.eq(0)
+            with m.If(~last_line):
+                sync += line.eq(line + 1)
+            with m.Else():
+                sync += [line.eq(0), vertical.eq(1), on_a_line.eq(vertical)]
+
+        # Where along and line are 0, so is the address but for the first line's offset.
+        scanned_row = Cat(Const(size.first_row, step_bits) & on_a_line.replicate(step_bits), line)
+        scanned_column = Cat(
+            Const(size.first_column, step_bits) & on_a_line.replicate(step_bits), line
+        )
+        m.d.comb += self.address.eq(
+            Cat(
+                Mux(vertical, scanned_column, along)[:column_bits],
+                Mux(vertical, along, scanned_row)[:row_bits],
+            )
+        )
+        return m

@@ -1,0 +1,97 @@
+"""SRAM to microcontroller: the whole picture, the nadir scan or the Sun window, byte by byte.
+
+CubeSense thesis, section 6.4.2 (microcontroller, edge and address control) and figures 6.7 and
+6.16; section 9.2.2 (address control from the microcontroller). The microcontroller makes the clock,
+so it alone sets the rate, and reading works when no camera gives a clock.
+"""
+
+from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Mux, ResetSignal
+from amaranth.lib.wiring import Component, In, Out
+from amaranth.utils import ceil_log2
+
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.cubesense.nadir_scan import NadirScan
+from cubestack.hdl.cubesense.sun_window import SunWindow
+
+__all__ = ["CubeSenseReader"]
+
+
+class CubeSenseReader(Component):
+    """Presents the next byte at each rising edge of ``clk``, in one of three orders.
+
+    At most one of the three requests is high. Each is the other end of its order's reset: while it
+    is low the order stands at its first byte, and while all are low ``address`` and ``data`` are 0.
+
+    Ports:
+        clk: data clock.
+        picture: row by row without end; past the last pixel comes the first one.
+        scan: the nadir scan.
+        window: the Sun window.
+        sun_x, sun_y: first Sun pixel, for the window.
+        address: SRAM address of the byte that the next edge presents.
+        memory: what the SRAM offers at that address.
+        data: the byte presented.
+        addressing: a fourth request, with ``mcu_addressing`` only: the picture, but while
+            ``take_address`` is high each edge shifts a byte into the address instead, from below,
+            and ``data`` is 0.
+        take_address, read_from: which of the two it is; neither without ``addressing``.
+        address_byte: from the microcontroller.
+    """
+
+    def __init__(self, read_out: ReadOut, *, mcu_addressing: bool = False) -> None:
+        """Make a reader of ``read_out``."""
+        self._read_out = read_out
+        self._mcu_addressing = mcu_addressing
+        addressing = {
+            "addressing": In(1),
+            "take_address": In(1),
+            "read_from": In(1),
+            "address_byte": In(8),
+        }
+        super().__init__(
+            {
+                "clk": In(1),
+                "picture": In(1),
+                "scan": In(1),
+                "window": In(1),
+                "sun_x": In(ceil_log2(read_out.columns)),
+                "sun_y": In(ceil_log2(read_out.rows)),
+                "address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "memory": In(8),
+                "data": Out(8),
+                **(addressing if mcu_addressing else {}),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the three orders, each with a reset of its own, and the output register."""
+        m = Module()
+        size = self._read_out
+        picture_wanted = output_wanted = self.picture
+        if self._mcu_addressing:
+            picture_wanted = self.picture | self.addressing
+            output_wanted = self.picture | self.read_from
+        requests = {"picture": picture_wanted, "scan": self.scan, "window": self.window}
+        domains = {**requests, "output": output_wanted | self.scan | self.window}
+        for name, wanted in domains.items():
+            m.domains += ClockDomain(name, async_reset=True, local=True)
+            m.d.comb += [ClockSignal(name).eq(self.clk), ResetSignal(name).eq(~wanted)]
+
+        m.submodules.picture = picture = MatrixCounter(
+            size.columns, size.rows, domain="picture", loadable=self._mcu_addressing
+        )
+        m.submodules.scan = scan = NadirScan(size, domain="scan")
+        m.submodules.window = window = SunWindow(size, domain="window")
+        m.d.comb += [
+            picture.next_column.eq(1),
+            window.x.eq(self.sun_x),
+            window.y.eq(self.sun_y),
+            # In reset the address of each is 0.
+            self.address.eq(picture.address | scan.address | window.address),
+        ]
+        if self._mcu_addressing:
+            shifted = Cat(self.address_byte, picture.address)[: len(picture.address)]
+            m.d.comb += [picture.load.eq(self.take_address), picture.position.eq(shifted)]
+        m.d.output += self.data.eq(Mux(self.window & window.coordinate, window.byte, self.memory))
+        return m

@@ -1,0 +1,85 @@
+"""First Sun pixel: found while the picture is being stored.
+
+CubeSense thesis, section 6.6.1 and figure 6.15. A lone bright pixel may be a damaged one, so the
+first of three bright pixels side by side counts. The published search also counts across the end
+of a line; this one does not, because pixels there are not side by side.
+"""
+
+from amaranth.hdl import Module, Signal
+from amaranth.lib.wiring import Component, In, Out
+from amaranth.utils import ceil_log2
+
+from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, ReadOut
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+
+__all__ = ["SunSearch"]
+
+
+class SunSearch(Component):
+    """Looks at each pixel in the clock period in which it is written.
+
+    ``x`` and ``y`` keep their values in reset, and are of no meaning before the first frame. They
+    become all ones, "not found", with the second clock after reset and in each gap between frames,
+    and the first Sun pixel's once the third bright pixel is written. What comes after it in the
+    same frame is ignored.
+
+    Ports:
+        start: between frames; the search begins again with the next one.
+        store: ``pixel`` is being written.
+        pixel: its value.
+        address: its address, row : column.
+        x, y: column and row of the first Sun pixel.
+    """
+
+    def __init__(self, read_out: ReadOut, *, domain: str = "pix") -> None:
+        """Make a search in pictures of ``read_out``'s size."""
+        self._columns = read_out.columns
+        self._domain = domain
+        super().__init__(
+            {
+                "start": In(1),
+                "store": In(1),
+                "pixel": In(8),
+                "address": In(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "x": Out(ceil_log2(read_out.columns)),
+                "y": Out(ceil_log2(read_out.rows)),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the count of bright pixels and the retained coordinates."""
+        m = Module()
+        sync = m.d[self._domain]
+        column_bits = ceil_log2(self._columns)
+        # Reset does not reach these two, and while it lasts nothing is searched.
+        x = Signal.like(self.x, reset_less=True)
+        y = Signal.like(self.y, reset_less=True)
+        m.d.comb += [self.x.eq(x), self.y.eq(y)]
+
+        awake = Signal()  # out of reset, so the coordinates may change
+        searching = Signal()
+        run = Signal(range(SUN_RUN))
+        bright = Signal()
+        found = Signal()
+        m.d.comb += [
+            bright.eq(self.store & (self.pixel >= SUN_THRESHOLD)),
+            found.eq(searching & bright & (run == SUN_RUN - 1)),
+        ]
+        sync += awake.eq(1)
+        with m.If(self.start):
+            sync += [searching.eq(1), run.eq(0)]
+        with m.Elif(found):
+            sync += searching.eq(0)
+        with m.Elif(bright):
+            sync += run.eq(run + 1)
+        with m.Else():
+            sync += run.eq(0)
+
+        with m.If(awake & self.start):
+            sync += [x.eq(-1), y.eq(-1)]
+        with m.Elif(found):
+            sync += [
+                x.eq(self.address[:column_bits] - (SUN_RUN - 1)),
+                y.eq(self.address[column_bits:]),
+            ]
+        return m

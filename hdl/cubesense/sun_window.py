@@ -1,0 +1,90 @@
+"""Sun window: the first Sun pixel's coordinates, then the square of pixels around the Sun.
+
+CubeSense thesis, section 6.6.2 and figure 6.16. What happens at the picture's border is not
+published: here the whole window is moved inside of the picture.
+"""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.lib.wiring import Component, In, Out
+from amaranth.utils import ceil_log2
+
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+
+__all__ = ["SunWindow"]
+
+
+class SunWindow(Component):
+    """Steps at each rising edge of its domain's clock, through figure 6.16's states.
+
+    States A to D offer the coordinates in ``byte``, one after the other, and hold the address at
+    0. State E gives the address of one pixel of the window after the other, row by row, and after
+    the last one the first again.
+
+    Ports:
+        x, y: first Sun pixel; must stand still while the domain is out of reset.
+        address: row : column of the pixel that the next clock is to present.
+        coordinate: state A, B, C or D: the next clock is to present ``byte`` instead.
+        byte: x low, x high, y low or y high.
+    """
+
+    def __init__(self, read_out: ReadOut, *, domain: str = "window") -> None:
+        """Make the window that ``read_out`` describes."""
+        self._read_out = read_out
+        self._domain = domain
+        super().__init__(
+            {
+                "x": In(ceil_log2(read_out.columns)),
+                "y": In(ceil_log2(read_out.rows)),
+                "address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "coordinate": Out(1),
+                "byte": Out(8),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Build the states, the position in the window and the window's origin."""
+        m = Module()
+        size = self._read_out
+
+        state = Signal(range(4))  # A, B, C, D
+        in_window = Signal()  # state E
+        right, last_column = self._position(m, size.window_left, in_window)
+        down, _ = self._position(m, size.window_above, in_window & last_column)
+        x = self._clamped(m, self.x, size.window_left, size.columns, in_window)
+        y = self._clamped(m, self.y, size.window_above, size.rows, in_window)
+
+        m.d[self._domain] += [state.eq(state + 1), in_window.eq(in_window | (state == 3))]
+        pair = Mux(state[1], self.y, self.x)
+        m.d.comb += [
+            self.coordinate.eq(~in_window),
+            self.byte.eq(Mux(state[0], pair[8:], pair[:8])),
+            self.address.eq(Cat((x + right)[: len(x)], (y + down)[: len(y)])),
+        ]
+        return m
+
+    def _position(self, m: Module, before: int, step: Value) -> tuple[Signal, Value]:
+        """Column or row in the window, from ``-before`` on, and whether it is the last one."""
+        size = self._read_out.window
+        position = Signal(range(-before, size - before), init=-before)
+        last = position == size - before - 1
+        with m.If(step):
+            m.d[self._domain] += position.eq(Mux(last, -before, position + 1))
+        return position, last
+
+    def _clamped(
+        self, m: Module, sun: Signal, before: int, length: int, in_window: Signal
+    ) -> Signal:
+        """The pixel that the window is placed around: ``sun``, unless the border is too near.
+
+        Outside of state E it is the nearest to 0, so that the address is 0 then.
+        """
+        furthest = length - self._read_out.window + before
+        clamped = Signal.like(sun, name=f"clamped_{sun.name}")
+        with m.If(~in_window | (sun < before)):
+            m.d.comb += clamped.eq(before)
+        with m.Elif(sun > furthest):
+            m.d.comb += clamped.eq(furthest)
+        with m.Else():
+            m.d.comb += clamped.eq(sun)
+        return clamped

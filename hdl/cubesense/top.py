@@ -1,0 +1,198 @@
+"""One of CubeSense's two FPGAs: an AGLN030 between camera, SRAM, microcontroller and its twin.
+
+CubeSense thesis, tables 3.4, 6.3 and 6.4, sections 6.4 to 6.6 and figure 6.5; section 9.2.2.
+
+How each asynchronous input is brought in:
+
+- Y and HREF change with PCLK and are used in its domain only; what comes over the link, in the
+  domain of the clock that comes with it. Each stores by a writer of its own, so no clock is ever
+  switched, and a camera without a clock stops nothing but its own picture.
+- The control lines come from the microcontroller. For both pixel clocks, "not storing" is the
+  domain's reset: asserted at once, without a clock, released through two flip-flops. For the data
+  clock, "not reading" is reset without a synchroniser, because the same microcontroller makes
+  control lines and CLK one after the other. Picture, scan and window have one such reset each, so
+  each starts from its first byte however it was reached.
+- DATA_I, where there is one, is used with CLK only: the microcontroller makes both.
+- The other FPGA's enable comes over the link and is used like the own one.
+
+The coordinates of the first Sun pixel outlive the reset: they are written by a pixel clock while a
+Sun picture is stored and stand still whenever a data clock looks at them.
+"""
+
+from typing import NamedTuple
+
+from amaranth.hdl import Cat, Module, ResetSignal
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.cubesense.dataflow import DataflowControl, Side
+from cubestack.hdl.cubesense.reader import CubeSenseReader
+from cubestack.hdl.cubesense.sun_search import SunSearch
+from cubestack.hdl.cubesense.writer import add_writer
+
+__all__ = ["ADDRESSING_PINS", "PINS", "CubeSenseFpga", "FpgaPins"]
+
+
+class FpgaPins(NamedTuple):
+    """Pins of one purpose."""
+
+    number: int
+    ports: tuple[str, ...]
+    meaning: str
+
+
+#: Table 3.4: 64 pins. Ports ending in _I, _O and _OE are three sides of the same pins.
+PINS = (
+    FpgaPins(19, ("SRAM_A",), "SRAM address, row : column"),
+    FpgaPins(8, ("SRAM_D_I", "SRAM_D_O", "SRAM_D_OE"), "SRAM data"),
+    FpgaPins(1, ("SRAM_CE_N",), "SRAM chip enable, low active"),
+    FpgaPins(1, ("SRAM_OE_N",), "SRAM output enable, low active"),
+    FpgaPins(1, ("SRAM_WE_N",), "SRAM write enable, low active"),
+    FpgaPins(8, ("Y",), "pixel data from the camera"),
+    FpgaPins(1, ("HREF",), "high while a line's pixels are sent"),
+    FpgaPins(1, ("PCLK",), "pixel clock"),
+    FpgaPins(8, ("DATA_O", "DATA_OE"), "bytes to the microcontroller, on a bus for both FPGAs"),
+    FpgaPins(1, ("EN",), "own enable, low active: SUNEN or NADEN"),
+    FpgaPins(1, ("RNW",), "read, not write; with SHIFT the direction across the link"),
+    FpgaPins(1, ("CLK",), "data clock"),
+    FpgaPins(1, ("EDGE",), "edge data instead of the picture"),
+    FpgaPins(1, ("SHIFT",), "across the link"),
+    FpgaPins(1, ("ACK",), "a whole picture is stored: SUNACK or NADACK"),
+    FpgaPins(8, ("LINK_D_I", "LINK_D_O", "LINK_D_OE"), "data between the FPGAs"),
+    FpgaPins(
+        2,
+        ("LINK_C_I", "LINK_C_O", "LINK_C_OE"),
+        "bit 0: sun's enable or PCLK; bit 1: nadir's enable or HREF; pulled up",
+    ),
+)
+
+#: What is other with address control from the microcontroller: 64 pins too.
+ADDRESSING_PINS = FpgaPins(
+    8,
+    ("DATA_I", "DATA_O", "DATA_OE"),
+    "bytes to the microcontroller and addresses from it, on a bus for both FPGAs",
+)
+
+
+class CubeSenseFpga(Component):
+    """The sun sensor's or the nadir sensor's FPGA with the pins of table 3.4.
+
+    Bidirectional pins are i / o / oe triples. LINK_C_OE has one bit for each of its two lines.
+    With EN high every output is at its reset value, all drivers off, whatever the other pins do.
+
+    ``mcu_addressing`` makes the microcontroller's data bus bidirectional and adds the rows in which
+    it sets the address. No FPGA drives the bus while SHIFT and RNW are both low, so that is when
+    the microcontroller may.
+    """
+
+    def __init__(
+        self, side: Side, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False
+    ) -> None:
+        """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
+        if side not in ("sun", "nadir"):
+            raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
+        self.side = side
+        self.read_out = read_out
+        self.mcu_addressing = mcu_addressing
+        super().__init__(
+            {
+                "Y": In(8),
+                "HREF": In(1),
+                "PCLK": In(1),
+                "EN": In(1, init=1),
+                "RNW": In(1),
+                "CLK": In(1),
+                "EDGE": In(1),
+                "SHIFT": In(1),
+                "ACK": Out(1),
+                "DATA_O": Out(8),
+                "DATA_OE": Out(1),
+                "LINK_D_I": In(8),
+                "LINK_D_O": Out(8),
+                "LINK_D_OE": Out(1),
+                "LINK_C_I": In(2, init=0b11),
+                "LINK_C_O": Out(2),
+                "LINK_C_OE": Out(2),
+                "SRAM_A": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "SRAM_D_I": In(8),
+                "SRAM_D_O": Out(8),
+                "SRAM_D_OE": Out(1),
+                "SRAM_CE_N": Out(1, init=1),
+                "SRAM_OE_N": Out(1, init=1),
+                "SRAM_WE_N": Out(1, init=1),
+                **({"DATA_I": In(8)} if mcu_addressing else {}),
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        """Wire the blocks to the pins."""
+        m = Module()
+        is_sun = self.side == "sun"
+        addressing = self.mcu_addressing
+        m.submodules.dataflow = mode = DataflowControl(self.side, mcu_addressing=addressing)
+        m.submodules.reader = reader = CubeSenseReader(self.read_out, mcu_addressing=addressing)
+        own_writer = add_writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y, self.read_out)
+        link_clock, link_href = self.LINK_C_I[0], self.LINK_C_I[1]
+        link_writer = add_writer(
+            m, "link", mode.store_other, link_clock, link_href, self.LINK_D_I, self.read_out
+        )
+        # The Sun is looked for in the sun camera's picture, whichever memory it goes to.
+        m.submodules.search = search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
+        sun_writer = own_writer if is_sun else link_writer
+
+        own_line, other_line = (0, 1) if is_sun else (1, 0)
+        orders = (reader.window, reader.scan)
+        own_edge, other_edge = orders if is_sun else orders[::-1]
+        presenting = mode.read | mode.edge_data
+        if addressing:
+            presenting |= mode.read_from
+            m.d.comb += [
+                reader.addressing.eq(mode.addressing),
+                reader.take_address.eq(mode.take_address),
+                reader.read_from.eq(mode.read_from),
+                reader.address_byte.eq(self.DATA_I),
+            ]
+        reading = presenting | mode.send_edge
+        storing = ~ResetSignal("pix") | ~ResetSignal("link")
+        shows_enable = ~self.EN & (self.EDGE | ~self.SHIFT)
+        m.d.comb += [
+            mode.en_n.eq(self.EN),
+            mode.other_en_n.eq(self.LINK_C_I[other_line]),
+            mode.rnw.eq(self.RNW),
+            mode.edge.eq(self.EDGE),
+            mode.shift.eq(self.SHIFT),
+            # The gap after a complete picture starts no new search.
+            search.start.eq(~sun_writer.vsync & ~sun_writer.ack),
+            search.store.eq(sun_writer.store),
+            search.pixel.eq(sun_writer.data),
+            search.address.eq(sun_writer.address),
+            reader.clk.eq(self.CLK),
+            reader.picture.eq(mode.read),
+            own_edge.eq(mode.edge_data),
+            other_edge.eq(mode.send_edge),
+            reader.sun_x.eq(search.x),
+            reader.sun_y.eq(search.y),
+            reader.memory.eq(self.SRAM_D_I),
+            self.ACK.eq(own_writer.ack | link_writer.ack),
+            self.DATA_O.eq(reader.data | (self.LINK_D_I & mode.pass_edge.replicate(8))),
+            self.DATA_OE.eq(presenting | mode.pass_edge),
+            self.LINK_D_O.eq(reader.data | (self.Y & mode.send_picture.replicate(8))),
+            self.LINK_D_OE.eq(mode.send_picture | mode.send_edge),
+            # An enable is shown by pulling the line low, so an FPGA without power shows none.
+            self.LINK_C_O.eq(Cat(self.PCLK, self.HREF) & mode.send_picture.replicate(2)),
+            self.LINK_C_OE[own_line].eq(mode.send_picture | shows_enable),
+            self.LINK_C_OE[other_line].eq(mode.send_picture),
+            # At most one of the three is out of reset, and in reset an address is 0.
+            self.SRAM_A.eq(own_writer.address | link_writer.address | reader.address),
+            self.SRAM_D_O.eq(own_writer.data | link_writer.data),
+            self.SRAM_D_OE.eq(own_writer.store | link_writer.store),
+            self.SRAM_CE_N.eq(~(reading | storing)),
+            self.SRAM_OE_N.eq(~reading),
+            # The pulse ends with the clock's rising edge itself, ahead of the address that the
+            # same edge moves on.
+            self.SRAM_WE_N.eq(
+                ~((own_writer.store & ~self.PCLK) | (link_writer.store & ~self.LINK_C_I[0]))
+            ),
+        ]
+        return m

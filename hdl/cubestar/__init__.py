@@ -1,0 +1,1 @@
+"""CubeStar's FPGA designs: the published top and its successors."""

@@ -1,0 +1,1 @@
+"""From a design to what tools take: tops by name, Verilog, C++, area."""

@@ -1,0 +1,178 @@
+"""Area of all designs in one table, and against the tracked file.
+
+``area.json`` beside this module holds what the designs took when they were last looked at. The
+iCE40 stands there as a public yardstick: other designs are known in its 4-input tables. The clock
+rates are those of one placement on its HX8K, not the AGLN030's.
+"""
+
+import json
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from amaranth.lib.wiring import Component
+
+from cubestack.hdl.flow.area import AGLN030_TILES, TileCount, count_tiles
+from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.flow.tools import run_nextpnr_ice40, run_yosys
+from cubestack.hdl.flow.tops import BLOCKS, TOPS
+
+__all__ = [
+    "AREA_FILE",
+    "GROWTH",
+    "Area",
+    "Ice40Count",
+    "area_json",
+    "area_table",
+    "areas",
+    "count_ice40",
+    "designs",
+    "grown",
+    "ice40_fmax",
+]
+
+AREA_FILE = Path(__file__).parent / "area.json"
+
+#: A design may grow by this part of what AREA_FILE says.
+GROWTH = 0.05
+
+
+class Ice40Count(NamedTuple):
+    """Cells of an iCE40, before placement."""
+
+    lut4: int
+    flip_flops: int
+    carries: int
+
+
+class Area(NamedTuple):
+    """What a design takes; ``top`` tells a whole FPGA from a block; ``fmax`` in MHz by clock."""
+
+    name: str
+    top: bool
+    tiles: TileCount
+    ice40: Ice40Count | None = None
+    fmax: dict[str, float] | None = None
+
+
+def count_ice40(component: Component) -> Ice40Count:
+    """Cells that Yosys' ``synth_ice40`` maps ``component`` to; needs the extra ``hdl``."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "design.il").write_text(rtlil_text(component), encoding="utf-8")
+        script = "read_rtlil design.il\nsynth_ice40 -top top\nwrite_json design.json\n"
+        run_yosys(script, folder)
+        netlist = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    cells = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
+    return Ice40Count(
+        cells["SB_LUT4"],
+        sum(count for name, count in cells.items() if name.startswith("SB_DFF")),
+        cells["SB_CARRY"],
+    )
+
+
+def ice40_fmax(component: Component) -> dict[str, float]:
+    """Highest rate in MHz of each clock, placed and routed once; needs the extra ``place``."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "design.il").write_text(rtlil_text(component), encoding="utf-8")
+        run_yosys("read_rtlil design.il\nsynth_ice40 -top top -json design.json\n", folder)
+        _name_clocks_by_ports(folder / "design.json")
+        arguments = "--hx8k --package ct256 --seed 1 --json design.json --report report.json"
+        run_nextpnr_ice40(["-q", *arguments.split()], folder)
+        report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    rates = {
+        name.partition("$")[0].replace("_I[", "["): rate["achieved"]
+        for name, rate in report["fmax"].items()
+    }
+    return {name: round(rates[name], 1) for name in sorted(rates)}
+
+
+def _name_clocks_by_ports(netlist: Path) -> None:
+    """Leave an input pin's net no other name, so that the placer speaks of the pin."""
+    content = json.loads(netlist.read_text(encoding="utf-8"))
+    top = content["modules"]["top"]
+    ports = top["ports"]
+    inputs = {bit for p in ports.values() if p["direction"] == "input" for bit in p["bits"]}
+    top["netnames"] = {
+        name: net
+        for name, net in top["netnames"].items()
+        if name in ports or not inputs & {*net["bits"]}
+    }
+    netlist.write_text(json.dumps(content), encoding="utf-8")
+
+
+def designs() -> dict[str, Callable[[], Component]]:
+    """Each top that is one FPGA, then each block."""
+    return {name: top.make for name, top in TOPS.items() if top.parts == 1} | BLOCKS
+
+
+def areas(names: Iterable[str], ice40: bool = False, fmax: bool = False) -> Iterator[Area]:
+    """Of these of :func:`designs`; ``ice40`` takes some seconds more for each.
+
+    ``fmax`` takes some ten seconds more for each top; blocks have none, being no whole design.
+    """
+    makes = designs()
+    for name in names:
+        make, top = makes[name], name in TOPS
+        yield Area(
+            name,
+            top,
+            count_tiles(make()),
+            count_ice40(make()) if ice40 else None,
+            ice40_fmax(make()) if fmax and top else None,
+        )
+
+
+def area_table(rows: Iterable[Area]) -> Iterator[str]:
+    """Lines of text."""
+    rows = list(rows)
+    width = max(len(row.name) for row in rows)
+    ice40 = any(row.ice40 for row in rows)
+    yield f"{'':{width}}  tables  flip-flops  tiles  of {AGLN030_TILES}" + (
+        "   iCE40: LUT4  flip-flops  carries" if ice40 else ""
+    )
+    for row in rows:
+        tables, flip_flops = row.tiles
+        total = row.tiles.total
+        part = f"{total / AGLN030_TILES:6.1%}" if row.top else ""
+        line = f"{row.name:{width}}  {tables:6}  {flip_flops:10}  {total:5}  {part:>6}"
+        if row.ice40:
+            line += f"   {row.ice40.lut4:11}  {row.ice40.flip_flops:10}  {row.ice40.carries:7}"
+        if row.fmax:
+            line += "   MHz: " + ", ".join(f"{name} {rate:.0f}" for name, rate in row.fmax.items())
+        yield line.rstrip()
+
+
+def area_json(rows: Iterable[Area]) -> str:
+    """The same as JSON; with the iCE40's counts, the content of AREA_FILE."""
+    counts: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        counts[row.name] = {
+            "kind": "top" if row.top else "block",
+            **row.tiles._asdict(),
+            "tiles": row.tiles.total,
+        }
+        if row.ice40:
+            counts[row.name]["ice40"] = row.ice40._asdict()
+        if row.fmax:
+            counts[row.name]["ice40_fmax_mhz"] = row.fmax
+    part = {"part": "AGLN030", "part_tiles": AGLN030_TILES}
+    return json.dumps({**part, "designs": counts}, indent=1)
+
+
+def grown(row: Area) -> list[str]:
+    """What of a design is over GROWTH more than in AREA_FILE, in sentences."""
+    known = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"].get(row.name)
+    if known is None:
+        return [f"{row.name} is not in {AREA_FILE.name}"]
+    pairs = [("tiles", known["tiles"], row.tiles.total)]
+    if row.ice40:
+        pairs.append(("iCE40 LUT4s", known["ice40"]["lut4"], row.ice40.lut4))
+    return [
+        f"{row.name} grew from {before} to {now} {unit}, by more than {GROWTH:.0%}"
+        for unit, before, now in pairs
+        if now > before * (1 + GROWTH)
+    ]

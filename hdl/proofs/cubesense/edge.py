@@ -1,0 +1,203 @@
+"""What is proved of CubeSense's edge data: nadir scan, Sun window and first Sun pixel."""
+
+from functools import partial
+from types import SimpleNamespace
+
+from amaranth.hdl import Array, Assert, Module, Mux, Signal, Value
+
+from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD
+from cubestack.hdl.cubesense.dataflow import Side
+from cubestack.hdl.proofs.cubesense.tops import column_row, fpga
+from cubestack.hdl.proofs.properties import domain, starts_in, writer_wires
+from cubestack.hdl.proofs.prover import Fault, Proof
+
+__all__ = ["edge_proofs"]
+
+# The scan visits exactly the declared addresses in order.
+
+_SCAN = {
+    "scan": "reader.scan",
+    "on_a_line": "reader.scan.on_a_line",
+    "vertical": "reader.scan.vertical",
+    "along": "reader.scan.along",
+    "line": "reader.scan.line",
+}
+
+
+def _scans(m: Module, d: SimpleNamespace) -> None:
+    """The order of ``ReadOut.scan`` as three nested counts: row or column, line, pixel."""
+    size = d.size
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.CLK, ~d.scan)
+    preset = Signal(init=1)
+    columns = Signal()  # of the lines, else rows
+    line = Signal(range(max(len(size.scan_rows), len(size.scan_columns))))
+    pixel = Signal(range(max(size.columns, size.rows)))
+    lines = Mux(columns, len(size.scan_columns), len(size.scan_rows))
+    length = Mux(columns, size.rows, size.columns)
+    with m.If(preset):
+        sync += preset.eq(0)
+    with m.Elif(pixel != length - 1):
+        sync += pixel.eq(pixel + 1)
+    with m.Elif(line != lines - 1):
+        sync += [pixel.eq(0), line.eq(line + 1)]
+    with m.Else():
+        # The preset between rows and columns comes once: columns follow columns.
+        sync += [pixel.eq(0), line.eq(0), columns.eq(1), preset.eq(~columns)]
+    x = Mux(columns, Array(size.scan_columns)[line], pixel)
+    y = Mux(columns, pixel, Array(size.scan_rows)[line])
+    column, row = column_row(d)
+    at_pixel = (column == x) & (row == y)
+    m.d.comb += [
+        Assert(~d.scan | Mux(preset, d.SRAM_A == 0, at_pixel)),
+        # What makes this inductive.
+        Assert((pixel < length) & (line < lines)),
+        Assert((d.on_a_line == ~preset) & (d.vertical == columns)),
+        Assert((d.along == pixel) & (d.line == line)),
+        Assert(~preset | ((pixel == 0) & (line == 0))),
+    ]
+
+
+# The Sun window is inside of the picture, around the first Sun pixel.
+
+_WINDOW = {
+    "window": "reader.window",
+    "x": "reader.sun_x",
+    "y": "reader.sun_y",
+    "in_window": "reader.window.in_window",
+    "state": "reader.window.state",
+    "right": "reader.window.position",
+    "down": "reader.window.position$4",
+}
+
+
+def _windows(m: Module, d: SimpleNamespace) -> None:
+    """``ReadOut.window_origin`` for any coordinates at all, those of no Sun too."""
+    size = d.size
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.CLK, ~d.window)
+    clocks = Signal(range(5))  # of the four coordinates
+    i, j = Signal(range(size.window)), Signal(range(size.window))
+    inside = clocks == 4
+    with m.If(~inside):
+        sync += clocks.eq(clocks + 1)
+    with m.Elif(i != size.window - 1):
+        sync += i.eq(i + 1)
+    with m.Else():
+        sync += [i.eq(0), j.eq(Mux(j == size.window - 1, 0, j + 1))]
+
+    def origin(sun: Value, before: int, length: int) -> Value:
+        furthest = length - size.window
+        wanted = Mux(sun < before, 0, (sun - before)[: len(sun)])
+        return Mux(wanted > furthest, furthest, wanted)
+
+    left = origin(d.x, size.window_left, size.columns)
+    top = origin(d.y, size.window_above, size.rows)
+    column, row = column_row(d)
+    m.d.comb += [
+        Assert((left + size.window <= size.columns) & (top + size.window <= size.rows)),
+        Assert(~d.window | inside | (d.SRAM_A == 0)),
+        Assert(~d.window | ~inside | ((column == left + i) & (row == top + j))),
+        # What makes these inductive.
+        Assert(clocks <= 4),
+        Assert((i < size.window) & (j < size.window)),
+        Assert((d.in_window == inside) & (inside | (d.state == clocks))),
+        Assert(inside | ((i == 0) & (j == 0))),
+        Assert(d.right.as_signed() == i - size.window_left),
+        Assert(d.down.as_signed() == j - size.window_above),
+    ]
+
+
+# The first Sun pixel is the first of three bright ones side by side.
+
+_SEARCH = {
+    "x": "search.x",
+    "y": "search.y",
+    "awake": "search.awake",
+    "searching": "search.searching",
+    "run": "search.run",
+    "pixel": "search.pixel",
+}
+
+
+def _searching(side: Side) -> dict[str, str]:
+    """The sun camera's writer is the own one, or the link's."""
+    writer, domain_name = ("pix_writer", "pix") if side == "sun" else ("link_writer", "link")
+    wires = writer_wires("writer", domain_name, below=writer)
+    return wires | _SEARCH | {"line_seen": f"{writer}.between_lines_seen"}
+
+
+def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
+    """By addresses: bright pixels are side by side when their columns follow in one row."""
+    size = d.size
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.PCLK if side == "sun" else d.LINK_C_I[0], d.writer_rst)
+    column, row, store = d.writer_column, d.writer_row, d.writer_store
+    awake = Signal()
+    began, found = Signal(), Signal()  # a search since reset; its Sun
+    sun_x, sun_y = Signal.like(column), Signal.like(row)
+    count = Signal(range(SUN_RUN + 1))  # bright pixels side by side that end with the last one
+    last_x, last_y = Signal.like(column), Signal.like(row)
+
+    start = ~d.writer_vsync & ~d.writer_ack
+    bright = d.pixel >= SUN_THRESHOLD
+    follows = (count != 0) & (column == last_x + 1) & (row == last_y)
+    length = Mux(bright, Mux(follows, Mux(count == SUN_RUN, SUN_RUN, count + 1), 1), 0)
+    sync += awake.eq(1)
+    with m.If(start):
+        sync += [count.eq(0), found.eq(0), began.eq(1)]
+    with m.Elif(store):
+        sync += [count.eq(length), last_x.eq(column), last_y.eq(row)]
+        with m.If((length == SUN_RUN) & began & ~found):
+            sync += [found.eq(1), sun_x.eq(column - (SUN_RUN - 1)), sun_y.eq(row)]
+    shown = (d.x == sun_x) & (d.y == sun_y)
+    none = d.x.all() & d.y.all()
+    said_none = Signal()  # the first clock of reset's end leaves the coordinates as they were
+    with m.If(start & awake):
+        sync += said_none.eq(1)
+    m.d.comb += [
+        Assert(~found | shown),
+        Assert(~found | ((sun_x + SUN_RUN <= size.columns) & (sun_y < size.rows))),
+        Assert(~said_none | found | none),
+        # What makes these inductive.
+        Assert((column < size.columns) & (row < size.rows)),
+        Assert(store | (column == 0)),
+        Assert(~store | (d.writer_line_open & ~d.writer_line_full & d.line_seen)),
+        Assert(~store | (~d.writer_frame_full & ~d.writer_ack)),
+        Assert((d.awake == awake) & (awake | ~began) & (began | (~found & ~said_none))),
+        Assert(d.searching == (began & ~found)),
+        Assert(~d.searching | (d.run < SUN_RUN)),
+        Assert(~d.searching | ~store | (column == 0) | (d.run == count)),
+        Assert(~d.searching | ~store | (column != 0) | (d.run == 0)),
+        Assert(~store | (column == 0) | (count == 0) | ((last_x + 1 == column) & (last_y == row))),
+        Assert(~store | (column == 0) | (count <= column)),
+    ]
+
+
+def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:
+    """What is proved of one of the two FPGAs."""
+    make = fpga(side, mcu_addressing)
+    option = "-addressing" * mcu_addressing
+    return {
+        f"{side}-scan{option}": Proof(
+            "The nadir scan visits exactly the declared addresses in order",
+            make,
+            _SCAN,
+            _scans,
+            Fault("reader.scan.line_ends", 0),
+        ),
+        f"{side}-window{option}": Proof(
+            "The Sun window lies inside of the picture, around the first Sun pixel",
+            make,
+            _WINDOW,
+            _windows,
+            Fault("reader.window.clamped_y", 3),
+        ),
+        f"{side}-first-pixel{option}": Proof(
+            "The first Sun pixel is the first of three bright ones side by side",
+            make,
+            _searching(side),
+            partial(_first_sun_pixel, side),
+            Fault("search.bright", 1),
+        ),
+    }

@@ -1,0 +1,231 @@
+"""What is proved of CubeSense's FPGAs."""
+
+from functools import partial
+from itertools import product
+from types import SimpleNamespace
+
+from amaranth.hdl import (
+    Assert,
+    Cat,
+    Const,
+    Module,
+    Mux,
+    Signal,
+)
+from amaranth.lib.wiring import Component
+
+from cubestack.firmware_model.interface.cubesense.fpga import (
+    ADDRESS_BYTES,
+    FULL_SIZE,
+    Action,
+    ReadOut,
+    actions,
+    link_shows_enables,
+)
+from cubestack.hdl.cubesense.dataflow import Side
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.proofs.cubesense.edge import edge_proofs
+from cubestack.hdl.proofs.cubesense.tops import SMALL, column_row, fpga
+from cubestack.hdl.proofs.properties import (
+    acknowledges_all_rows,
+    domain,
+    idle_is_reset,
+    starts_in,
+    writer_wires,
+)
+from cubestack.hdl.proofs.prover import Fault, Proof
+
+__all__ = ["PROOFS"]
+
+# The address never leaves the picture.
+
+_POSITIONS = {
+    "own_column": "pix_writer.counter.column",
+    "own_row": "pix_writer.counter.row",
+    "link_column": "link_writer.counter.column",
+    "link_row": "link_writer.counter.row",
+    "picture_column": "reader.picture.column",
+    "picture_row": "reader.picture.row",
+    "along": "reader.scan.along",
+    "line": "reader.scan.line",
+    "vertical": "reader.scan.vertical",
+    "right": "reader.window.position",
+    "down": "reader.window.position$4",
+}
+
+
+def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
+    size = d.size
+    starts_in(m, d.EN)
+    for source in ("own", "link", "picture"):
+        m.d.comb += [
+            Assert(getattr(d, f"{source}_column") < size.columns),
+            Assert(getattr(d, f"{source}_row") < size.rows),
+        ]
+    m.d.comb += [
+        Assert(d.along < Mux(d.vertical, size.rows, size.columns)),
+        Assert(d.line < Mux(d.vertical, len(size.scan_columns), len(size.scan_rows))),
+    ]
+    for position, before in ((d.right, size.window_left), (d.down, size.window_above)):
+        m.d.comb += [
+            Assert(position.as_signed() >= -before),
+            Assert(position.as_signed() < size.window - before),
+        ]
+    column, row = column_row(d)
+    m.d.comb += [Assert(column < size.columns), Assert(row < size.rows)]
+
+
+# Idle is reset.
+
+
+def _idle(m: Module, d: SimpleNamespace) -> None:
+    for name in ("ACK", "DATA_O", "DATA_OE", "LINK_D_O", "LINK_D_OE", "LINK_C_O", "LINK_C_OE"):
+        m.d.comb += Assert(~d.EN | (getattr(d, name) == 0))
+    for name in ("SRAM_A", "SRAM_D_O", "SRAM_D_OE"):
+        m.d.comb += Assert(~d.EN | (getattr(d, name) == 0))
+    for name in ("SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"):
+        m.d.comb += Assert(~d.EN | getattr(d, name))
+    idle_is_reset(m, d, d.EN, {"search.x", "search.y"})
+
+
+# ACK exactly when all rows are stored.
+
+_WRITERS = writer_wires("pix_writer", "pix") | writer_wires("link_writer", "link")
+
+
+def _acknowledges(m: Module, d: SimpleNamespace) -> None:
+    starts_in(m, d.EN)
+    size = d.size.columns, d.size.rows
+    own = acknowledges_all_rows(m, d, "pix_writer", d.PCLK, *size)
+    other = acknowledges_all_rows(m, d, "link_writer", d.LINK_C_I[0], *size)
+    m.d.comb += Assert(own | other == d.ACK)
+
+
+# No two drivers on in any settled state.
+
+_DRIVES_DATA = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
+_DRIVES_LINK = {Action.SEND_PICTURE, Action.SEND_EDGE}
+
+_DRIVERS = {
+    f"{side}_{port}": f"{side}.{port}"
+    for side in ("sun", "nadir")
+    for port in ("DATA_OE", "LINK_D_OE", "LINK_C_OE")
+}
+
+
+def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
+    m.d.comb += Assert(d.CONTENTION == 0)
+    for prefix in ("SUN", "NAD"):
+        drives, chip = getattr(d, f"{prefix}_SRAM_D_OE"), getattr(d, f"{prefix}_SRAM_OE_N")
+        m.d.comb += Assert(~drives | chip)
+    # Each row of the table, listed or not, where the wires can tell it from the others.
+    lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
+    for levels in product((0, 1), repeat=5):
+        shift, edge, _, sunen, naden = levels
+        if sunen != naden and not link_shows_enables(shift, edge):
+            continue
+        here = lines == Cat(Const(level, 1) for level in levels)
+        for side, action in actions(*levels, mcu_addressing=mcu_addressing)._asdict().items():
+            data = getattr(d, f"{side}_DATA_OE") == (action in _DRIVES_DATA)
+            link = getattr(d, f"{side}_LINK_D_OE") == (action in _DRIVES_LINK)
+            m.d.comb += Assert(~here | (data & link))
+    if mcu_addressing:
+        microcontroller_may = (~d.SHIFT & ~d.RNW) | (d.SUNEN & d.NADEN)
+        m.d.comb += Assert(~microcontroller_may | ~d.DATA_OE)
+
+
+def _pair(mcu_addressing: bool, small: bool) -> tuple[Component, ReadOut]:
+    size = SMALL if small else FULL_SIZE
+    return CubeSensePair(size, mcu_addressing), size
+
+
+# The microcontroller's address is the one that is read.
+
+_TAKEN = {
+    "addressing": "dataflow.addressing",
+    "take": "dataflow.take_address",
+    "read_from": "dataflow.read_from",
+}
+
+
+def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
+    """Three clocks make the address, whatever it was before; SHIFT alone never changes it."""
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.CLK, ~d.addressing)
+    taken = Signal(8 * ADDRESS_BYTES)
+    count = Signal(range(ADDRESS_BYTES + 1))  # bytes since the last read or reset, at most all
+    with m.If(d.take):
+        sync += taken.eq(Cat(d.DATA_I, taken))
+        sync += count.eq(Mux(count == ADDRESS_BYTES, count, count + 1))
+    with m.Else():
+        sync += count.eq(0)
+    bits = len(d.SRAM_A)
+    same = Const(1)
+    for known in range(1, ADDRESS_BYTES + 1):
+        width = min(8 * known, bits)
+        same &= (count != known) | (d.SRAM_A[:width] == taken[:width])
+    m.d.comb += [
+        Assert(~d.addressing | same),
+        Assert(d.addressing == (d.take | d.read_from)),
+        Assert(~d.take | (d.SRAM_CE_N & ~d.DATA_OE)),
+        Assert(count <= ADDRESS_BYTES),
+    ]
+
+
+def _proofs(side: Side) -> dict[str, Proof]:
+    """What is proved of one of the two FPGAs."""
+    return {
+        f"{side}-address": Proof(
+            "The SRAM address never leaves the picture",
+            fpga(side),
+            _POSITIONS,
+            _address_stays_inside,
+            Fault("reader.window.clamped_x", 7),
+        ),
+        **{
+            f"{side}-ack{'-addressing' * mcu_addressing}": Proof(
+                "ACK is high exactly from when all rows of a frame are stored",
+                fpga(side, mcu_addressing),
+                _WRITERS,
+                _acknowledges,
+                Fault("pix_writer.counter.last_row", 1),
+            )
+            for mcu_addressing in (False, True)
+        },
+        **{
+            f"{side}-idle{'-addressing' * mcu_addressing}": Proof(
+                "With EN high every register but the Sun's coordinates is reset, and they rest",
+                fpga(side, mcu_addressing),
+                {},
+                _idle,
+                Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
+            )
+            for mcu_addressing in (False, True)
+        },
+        **edge_proofs(side),
+        **edge_proofs(side, mcu_addressing=True),
+        f"{side}-taken-address": Proof(
+            "What is read first is at the address that the microcontroller gave",
+            fpga(side, mcu_addressing=True),
+            _TAKEN,
+            _takes_addresses,
+            Fault("dataflow.take_address", 1),
+        ),
+    }
+
+
+#: By name.
+PROOFS = {
+    **{
+        f"pair-drivers{'-addressing' * mcu_addressing}": Proof(
+            "No wire of the two FPGAs has two drivers in any settled state",
+            partial(_pair, mcu_addressing),
+            _DRIVERS,
+            partial(_drivers, mcu_addressing),
+            Fault("nadir.dataflow.pass_edge", 1),
+        )
+        for mcu_addressing in (False, True)
+    },
+    **_proofs("sun"),
+    **_proofs("nadir"),
+}

@@ -1,0 +1,1 @@
+"""Formal properties of CubeStar's tops."""

@@ -1,0 +1,1 @@
+"""Clients of the nodes: any bus, and one class for each sensor."""

@@ -1,0 +1,280 @@
+"""AraMiS' star tracker as a program uses it: the thesis' use cases through any client.
+
+AraMiS thesis, section 2.2. Axes: x right, y down, z out of the lens. Quaternions are scalar last
+and turn inertial vectors into camera vectors, v_camera = q v_inertial q*; pixel coordinates count
+from the middle of the first pixel.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cubestack.firmware_model.interface.aramis import (
+    BLOCK_BYTES,
+    IMAGE_BYTES,
+    AckError,
+    CatalogueState,
+    LatchUpStep,
+    MeasurementMode,
+    MeasurementOutcome,
+    Reason,
+    SensorState,
+)
+from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.codec.message import Value
+from cubestack.host.clients.contract import Client, Progress
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+
+__all__ = ["Aramis", "Attitude", "Star"]
+
+STEP_TIMEOUT_S = 10.0
+"""Longer than three of the longest frames, loading the catalogue, and the processing."""
+
+PROGRAM_TIMEOUT_S = 300.0
+"""Longer than erasing and writing all of the catalogue's flash."""
+
+_MS_PER_DAY = 86_400_000
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """The latest attitude, and how the latest measurement ended.
+
+    Attributes:
+        quaternion: float64 (4,), unit length; None before the first attitude.
+        valid: the latest measurement gave it; else it is an older one.
+        outcome, reason, mode: of the latest measurement.
+        matched: stars that the quaternion rests on.
+        detected: stars in the latest picture.
+        frame: number of that picture.
+        image_uptime_s: its mid-exposure, since power-up.
+        julian_date: the same as Julian date, in days; None while the clock is not set.
+    """
+
+    quaternion: NDArray[np.float64] | None
+    valid: bool
+    outcome: MeasurementOutcome
+    reason: Reason
+    mode: MeasurementMode
+    matched: int
+    detected: int
+    frame: int
+    image_uptime_s: float
+    julian_date: float | None
+
+
+@dataclass(frozen=True)
+class Star:
+    """A star of the latest picture.
+
+    Attributes:
+        number: from 0, the brightest first.
+        x_px, y_px: centroid.
+        brightness: sum of its grey levels.
+        hipparcos: Hipparcos number; None when it is not identified.
+    """
+
+    number: int
+    x_px: float
+    y_px: float
+    brightness: float
+    hipparcos: int | None
+
+
+class Aramis:
+    """A star tracker behind a client. Errors are those of the client, and the ones named here."""
+
+    def __init__(self, client: Client) -> None:
+        """Use ``client``, whose interface must be AraMiS'."""
+        self.client = client
+
+    # --- use cases --------------------------------------------------------------------------------
+
+    def activate(self) -> CatalogueState:
+        """Start camera and catalogue; returns the catalogue's state, which may be a bad one.
+
+        Raises StepFailedError when the star tracker does not get ready.
+        """
+        self._perform("Activate")
+        status = self.client.telemetry("SensorStatus")
+        state = SensorState(int(status["State"]))
+        if state is not SensorState.READY:
+            raise StepFailedError(f"the star tracker is not ready after Activate: {state.name}")
+        return CatalogueState(int(status["Catalogue"]))
+
+    def deactivate(self) -> None:
+        """Stop camera and loop."""
+        self._perform("Deactivate")
+
+    def set_time(self, julian_date: float) -> None:
+        """Set the clock to a Julian date in days; a float holds it to 0.05 ms."""
+        day, part = divmod(julian_date, 1)
+        whole, millisecond = divmod(round(part * _MS_PER_DAY), _MS_PER_DAY)
+        self._send("SetSystemTime", JulianDay=int(day) + whole, Millisecond=millisecond)
+
+    def julian_date(self) -> float | None:
+        """The star tracker's clock, in days; None while it is not set."""
+        return _julian_date(self.client.telemetry("SystemTime"))
+
+    def measure(
+        self, near: ArrayLike | None = None, *, near_rad: tuple[float, float] | None = None
+    ) -> Attitude:
+        """Measure once and wait for the result.
+
+        Args:
+            near: rough inertial unit vector (3,) of the boresight.
+            near_rad: the same as right ascension and declination in rad.
+
+        With neither, the star tracker is lost in space; both raise ValueError.
+        """
+        if near is not None and near_rad is not None:
+            raise ValueError("a rough direction is a vector or two angles: give one of them")
+        if near is not None:
+            x, y, z = (float(part) for part in np.asarray(near, np.float64))
+            self._perform("GetAttitudeNearVector", X=x, Y=y, Z=z)
+        elif near_rad is not None:
+            ascension, declination = near_rad
+            self._perform("GetAttitudeNearPoint", RightAscension=ascension, Declination=declination)
+        else:
+            self._perform("GetAttitude")
+        return self.attitude()
+
+    def attitude(self) -> Attitude:
+        """The latest attitude; raises BadAnswerError when it is no rotation."""
+        values = self.client.telemetry("Attitude")
+        parts = np.array([float(values[f"Q{index}"]) for index in range(4)])
+        return Attitude(
+            quaternion=_unit(parts),
+            valid=bool(values["Valid"]),
+            outcome=MeasurementOutcome(int(values["Outcome"])),
+            reason=Reason(int(values["Reason"])),
+            mode=MeasurementMode(int(values["Mode"])),
+            matched=int(values["Matched"]),
+            detected=int(values["Detected"]),
+            frame=int(values["FrameCounter"]),
+            image_uptime_s=int(values["ImageUptime"]) / 1000,
+            julian_date=_julian_date(values),
+        )
+
+    def body_quaternion(self) -> NDArray[np.float64] | None:
+        """The latest attitude of the spacecraft (4,), inertial to body; None before the first."""
+        values = self.client.telemetry("BodyAttitude")
+        return _unit(np.array([float(values[f"Q{index}"]) for index in range(4)]))
+
+    def set_body_rotation(self, quaternion: Sequence[float]) -> None:
+        """Set the rotation (4,) from the star tracker's axes to the spacecraft's."""
+        x, y, z, w = (float(part) for part in quaternion)
+        self._perform("SetBodyRotation", Q0=x, Q1=y, Q2=z, Q3=w)
+
+    def latch_up_action(self, off_s: float = 0.1) -> None:
+        """Turn the camera unit off, wait, and turn it on again."""
+        self._send("LatchUpAction", Step=LatchUpStep.OFF)
+        self.client.pause(off_s)
+        self._perform("LatchUpAction", Step=LatchUpStep.ON)
+
+    def load_catalogue(self, image: bytes, progress: Progress | None = None) -> CatalogueState:
+        """Load a catalogue's ``image``, write it to flash and use it; returns its state.
+
+        Raises StepFailedError when blocks are missing or the star tracker refuses the contents.
+        """
+        blocks = -(-len(image) // BLOCK_BYTES)
+        self._send("BeginCatalogue", Length=len(image), Checksum=crc32(image))
+        for number in range(blocks):
+            block = image[number * BLOCK_BYTES : (number + 1) * BLOCK_BYTES]
+            self._send("CatalogueBlock", BlockNumber=number, Data=block.ljust(BLOCK_BYTES, b"\0"))
+            if progress is not None:
+                progress(number + 1, blocks)
+        self.client.wait_processed(STEP_TIMEOUT_S)
+        received = int(self.client.telemetry("UploadStatus")["BlocksReceived"])
+        if received != blocks:
+            raise StepFailedError(f"catalogue: {received} blocks arrived of {blocks}")
+        self._send("ClearErrorFlags")
+        self._send("CommitCatalogue")
+        self.client.wait_processed(PROGRAM_TIMEOUT_S)
+        if self.client.telemetry("ErrorFlags")["UploadError"]:
+            raise StepFailedError("catalogue refused: its checksum or its contents are wrong")
+        return CatalogueState(int(self.client.telemetry("CatalogueStatus")["State"]))
+
+    # --- reports ----------------------------------------------------------------------------------
+
+    def stars(self) -> list[Star]:
+        """The stars of the latest picture, the brightest first; stop the loop before.
+
+        Raises BadAnswerError when the records do not make a whole list.
+        """
+        detected = int(self.client.telemetry("DetectionSummary")["Detected"])
+        records: dict[int, dict[str, Value]] = {}
+        for _ in range(2 * detected):  # one round, and another for lost answers
+            if len(records) == detected:
+                break
+            values = self.client.telemetry("StarDetails")
+            records[int(values["StarNumber"])] = values
+        if len(records) != detected:
+            raise BadAnswerError(f"telemetry StarDetails: {len(records)} stars came of {detected}")
+        return [
+            Star(
+                number=number,
+                x_px=float(record["X"]),
+                y_px=float(record["Y"]),
+                brightness=float(record["Brightness"]),
+                hipparcos=int(record["Hipparcos"]) if record["Identified"] else None,
+            )
+            for number, record in sorted(records.items())
+        ]
+
+    def phase_times(self) -> dict[str, float]:
+        """Time of each step of the latest measurement in ms, by its name in small letters."""
+        values = self.client.telemetry("PhaseTimes")
+        return {name.lower(): int(value) / 1000 for name, value in values.items()}
+
+    def image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
+        """The latest picture, (1024, 1280), as one stream of blocks: over a UART only.
+
+        A lost block can not be asked for again; raises BadAnswerError or NoAnswerError then.
+        """
+        if not isinstance(self.client, NodeClient):
+            raise TypeError("a picture can be streamed over a UART only")
+        blocks = []
+        count = IMAGE_BYTES // BLOCK_BYTES
+        for block in self.client.stream("StreamDownImage", count):
+            if len(block) != BLOCK_BYTES:
+                raise BadAnswerError(f"picture stream: a block of {len(block)} bytes")
+            blocks.append(block)
+            if progress is not None:
+                progress(len(blocks), count)
+        return np.frombuffer(b"".join(blocks), np.uint8).reshape(ROWS, COLUMNS)
+
+    def _perform(self, name: str, **parameters: object) -> None:
+        """Send a telecommand and wait until it is done."""
+        self._send(name, **parameters)
+        self.client.wait_processed(STEP_TIMEOUT_S)
+
+    def _send(self, name: str, **parameters: object) -> None:
+        """Send a telecommand; when the buffer is full, wait and send it once more."""
+        try:
+            self.client.command(name, **parameters)
+        except CommandRefusedError as refusal:
+            if refusal.code != AckError.BUFFER_FULL:
+                raise
+            self.client.wait_processed(STEP_TIMEOUT_S)
+            self.client.command(name, **parameters)
+
+
+def _julian_date(values: dict[str, Value]) -> float | None:
+    day, millisecond = int(values["JulianDay"]), int(values["Millisecond"])
+    return day + millisecond / _MS_PER_DAY if day else None
+
+
+def _unit(parts: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """A quaternion of length 1; None for one of zeros."""
+    norm = math.hypot(*parts)
+    if norm == 0:
+        return None
+    if not abs(norm - 1) < 0.01:
+        raise BadAnswerError(f"the star tracker's quaternion has length {norm:.4g}, not 1")
+    return parts / norm

@@ -1,0 +1,258 @@
+"""CubeSense as a program uses it: Sun and nadir directions, settings, supply; through any client.
+
+CubeSpace family with two cameras, interface generation 2, with this project's extensions. Axes of
+each camera: x right, y down, z out of the lens. Pixel coordinates count from the middle of the
+first pixel.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.codec.message import Value
+from cubestack.firmware_model.interface.cubesense.codes import (
+    EDGES_PER_FRAME,
+    MASK_AREAS,
+    Camera,
+    CaptureResult,
+    DetectResult,
+    ImageLocation,
+    ResetTarget,
+    Sram,
+    SramSelection,
+    split_coefficient,
+)
+from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
+from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
+from cubestack.host.clients.contract import Client
+from cubestack.host.clients.cubesense.values import (
+    CameraSettings,
+    Mask,
+    Measurement,
+    Power,
+    direction,
+)
+from cubestack.host.errors import BadAnswerError, NoAnswerError
+
+__all__ = [
+    "CameraSettings",
+    "CubeSense",
+    "Mask",
+    "Measurement",
+    "Power",
+    "direction",
+]
+
+#: Time between two polls of a result.
+POLL_PERIOD_S = 0.04
+
+#: What hosts give a capture.
+CAPTURE_TIMEOUT_S = 1.0
+
+#: What we give a detection after its capture; assumed, a good ten times the published 245 ms.
+DETECT_TIMEOUT_S = 3.0
+
+#: What an area without a mask reads as.
+_NO_MASK = Mask(0, 0, 0, 0)
+
+
+class CubeSense:
+    """A CubeSense behind a client. Errors are those of the client, and the ones named here."""
+
+    def __init__(self, client: Client) -> None:
+        """Use ``client``, whose interface must be CubeSense's."""
+        self.client = client
+
+    def capture_and_detect(self, camera: Camera, sram: Sram | None = None) -> Measurement:
+        """Take a picture into ``sram`` (default: the camera's own) and measure in it.
+
+        Returns what became of it, which may be a failure. Raises NoAnswerError when the result
+        stays pending.
+        """
+        self.client.command("CaptureAndDetect", Camera=camera, Sram=_own(camera, sram))
+        return self.wait_measured(camera)
+
+    def capture(self, camera: Camera, sram: Sram | None = None) -> CaptureResult:
+        """Take a picture into ``sram`` (default: the camera's own); returns what became of it."""
+        self.client.command(
+            "CaptureOnly", Camera=camera, Sram=_own(camera, sram), Location=ImageLocation.TOP
+        )
+        return self._wait_captured(camera).capture
+
+    def result(self, camera: Camera) -> Measurement:
+        """A camera's latest measurement."""
+        return self._measurement(camera, RESULTS[camera])
+
+    def result_then_schedule(self, camera: Camera, sram: Sram | None = None) -> Measurement:
+        """A camera's latest measurement; reading it starts the next one, into ``sram``."""
+        wanted = (camera, _own(camera, sram))
+        identifier = next(key for key, target in SCHEDULES.items() if target == wanted)
+        return self._measurement(camera, identifier)
+
+    def wait_measured(self, camera: Camera) -> Measurement:
+        """Poll until a camera's measurement is no longer pending; NoAnswerError when it stays so.
+
+        A measurement that is under way may follow a result that has been read to schedule it.
+        """
+        found = self._wait_captured(camera)
+        for _ in range(math.ceil(DETECT_TIMEOUT_S / POLL_PERIOD_S)):
+            if not found.pending:
+                return found
+            self.client.pause(POLL_PERIOD_S)
+            found = self.result(camera)
+        raise NoAnswerError(
+            f"detection of the {camera.name} camera still pending after {DETECT_TIMEOUT_S:g} s"
+        )
+
+    def set_threshold(self, camera: Camera, threshold: int) -> None:
+        """Set a camera's detection threshold in DN."""
+        self.client.command(f"DetectionThreshold{camera + 1}", Threshold=threshold)
+
+    def set_auto_adjust(self, camera: Camera, enabled: bool) -> None:
+        """Let a camera adjust its exposure and gain, or not."""
+        self.client.command(f"AutoAdjust{camera + 1}", Enabled=int(enabled))
+
+    def set_camera(self, camera: Camera, settings: CameraSettings) -> None:
+        """Set a camera's exposure and gains."""
+        self.client.command(
+            f"CameraSettings{camera + 1}",
+            Exposure=settings.exposure,
+            Gain=settings.gain,
+            BlueGain=settings.blue_gain,
+            RedGain=settings.red_gain,
+        )
+
+    def set_boresight(self, camera: Camera, x_px: float, y_px: float) -> None:
+        """Set the pixel of a camera's optical axis."""
+        self.client.command(f"Boresight{camera + 1}", X=x_px, Y=y_px)
+
+    def set_distortion(self, camera: Camera, factors: Sequence[float]) -> None:
+        """Set r_d = sum of factors[k] r_u^k, radii in px; the factors carry about 4 digits.
+
+        Raises ValueError for another number of factors, or one beyond +-32767.
+        """
+        if len(factors) != DISTORTION_TERMS:
+            raise ValueError(f"a distortion has {DISTORTION_TERMS} factors, not {len(factors)}")
+        parameters: dict[str, int] = {}
+        for power, factor in enumerate(factors):
+            mantissa, exponent = split_coefficient(factor)
+            parameters |= {f"Mantissa{power}": mantissa, f"Exponent{power}": exponent}
+        self.client.command(f"Distortion{camera + 1}", **parameters)
+
+    def set_mask(self, camera: Camera, area: int, mask: Mask | None) -> None:
+        """Let detection ignore ``mask`` as area 1 to 5 of a camera; None takes the area away."""
+        limits = mask or _NO_MASK
+        self.client.command(
+            f"Mask{camera + 1}",
+            Area=area,
+            XMin=limits.x_min,
+            XMax=limits.x_max,
+            YMin=limits.y_min,
+            YMax=limits.y_max,
+        )
+
+    def masks(self, camera: Camera) -> list[Mask | None]:
+        """A camera's five areas; None where there is no mask."""
+        values = self.client.telemetry(f"Masks{camera + 1}")
+        areas = [
+            Mask(*(int(values[f"{name}{area}"]) for name in ("XMin", "XMax", "YMin", "YMax")))
+            for area in range(1, MASK_AREAS + 1)
+        ]
+        return [None if area == _NO_MASK else area for area in areas]
+
+    def threshold(self, camera: Camera) -> int:
+        """A camera's detection threshold in DN."""
+        return int(self.client.telemetry("Configuration")[f"Threshold{camera + 1}"])
+
+    def auto_adjust(self, camera: Camera) -> bool:
+        """Whether a camera adjusts its exposure and gain."""
+        return bool(self.client.telemetry("Configuration")[f"AutoAdjust{camera + 1}"])
+
+    def camera(self, camera: Camera) -> CameraSettings:
+        """A camera's exposure and gains, as they were set."""
+        values = self.client.telemetry("Configuration")
+        names = ("Exposure", "Gain", "BlueGain", "RedGain")
+        return CameraSettings(*(int(values[f"{name}{camera + 1}"]) for name in names))
+
+    def power(self) -> Power:
+        """Supply currents and over-current flags."""
+        values = self.client.telemetry("Power")
+        return Power(
+            current_3v3_ma=float(values["Current3V3"]),
+            current_sram_ma=(float(values["CurrentSram1"]), float(values["CurrentSram2"])),
+            current_5v_ma=float(values["Current5V"]),
+            over_current=(bool(values["OverCurrent1"]), bool(values["OverCurrent2"])),
+        )
+
+    def clear_over_current(self, selection: SramSelection = SramSelection.BOTH) -> None:
+        """Clear over-current flags, so that the node switches those memories on again."""
+        self.client.command("ClearOverCurrent", Selection=selection)
+
+    def reset(self, target: ResetTarget) -> None:
+        """Restart a part of the node."""
+        self.client.command("Reset", Target=target)
+
+    def uptime_s(self) -> float:
+        """Time since the node started; it wraps after 65536 s."""
+        values = self.client.telemetry("Identification")
+        return int(values["RuntimeSeconds"]) + int(values["RuntimeMilliseconds"]) / 1000.0
+
+    def serial_number(self) -> str:
+        """The node's serial number; raises BadAnswerError when it is no ASCII text."""
+        value = self.client.telemetry("SerialNumber")["SerialNumber"]
+        assert isinstance(value, bytes)
+        try:
+            return value.rstrip(b"\0").decode("ascii")
+        except UnicodeDecodeError:
+            raise BadAnswerError(
+                f"telemetry SerialNumber: {value.hex()} is no ASCII text"
+            ) from None
+
+    def phase_times(self, camera: Camera) -> dict[str, float]:
+        """Times of a camera's latest measurement in ms: wait, store, search, centroid, total."""
+        values = self.client.telemetry(f"PhaseTimes{camera + 1}")
+        return {name.lower(): int(value) / 1000.0 for name, value in values.items()}
+
+    def details(self, camera: Camera) -> dict[str, Value]:
+        """What a camera's latest measurement rests on: the fields of our telemetry Details."""
+        return self.client.telemetry(f"Details{camera + 1}")
+
+    def edges(self) -> NDArray[np.float64]:
+        """Pixels (n, 2), column and row, of the edges that the latest nadir search found.
+
+        Raises BadAnswerError when there are more than both frames hold.
+        """
+        parts = [self.client.telemetry(f"NadirEdges{part}") for part in (1, 2)]
+        count, most = int(parts[0]["Count"]), len(parts) * EDGES_PER_FRAME
+        if count > most:
+            raise BadAnswerError(f"telemetry NadirEdges1: {count} edges, where {most} have room")
+        values = {name: value for part in parts for name, value in part.items()}
+        found = [[float(values[f"{axis}{n}"]) for axis in "XY"] for n in range(1, count + 1)]
+        return np.array(found, np.float64).reshape(-1, 2)
+
+    def _measurement(self, camera: Camera, identifier: int) -> Measurement:
+        message = self.client.interface.telemetry(identifier)
+        values = self.client.telemetry(message.name)
+        try:
+            capture = CaptureResult(int(values["Capture"]))
+            detect = DetectResult(int(values["Detect"]))
+        except ValueError as error:
+            raise BadAnswerError(f"telemetry {message.name}: {error}") from None
+        return Measurement(camera, float(values["Alpha"]), float(values["Beta"]), capture, detect)
+
+    def _wait_captured(self, camera: Camera) -> Measurement:
+        for _ in range(math.ceil(CAPTURE_TIMEOUT_S / POLL_PERIOD_S)):
+            found = self.result(camera)
+            if found.capture is not CaptureResult.PENDING:
+                return found
+            self.client.pause(POLL_PERIOD_S)
+        raise NoAnswerError(
+            f"capture of the {camera.name} camera still pending after {CAPTURE_TIMEOUT_S:g} s"
+        )
+
+
+def _own(camera: Camera, sram: Sram | None) -> Sram:
+    """``sram``, or the camera's own."""
+    return Sram(camera) if sram is None else sram

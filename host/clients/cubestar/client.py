@@ -1,0 +1,278 @@
+"""CubeStar as a program uses it: pictures, attitude, stars and times through any client.
+
+Interface of the CubeSpace family, version 3, with this project's extensions. Axes: x right, y
+down, z out of the lens. Quaternions are scalar last and turn inertial vectors into camera vectors,
+v_camera = q v_inertial q*; pixel coordinates count from the middle of the first pixel.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.codec.message import Value
+from cubestack.firmware_model.interface.cubestar import (
+    IMAGE_BYTES,
+    UPLOAD_BLOCK_BYTES,
+    AckError,
+    ImageBlockSize,
+    MatchMode,
+    TaskStatus,
+)
+from cubestack.host.clients.contract import Client, Progress
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+
+__all__ = ["Attitude", "CubeStar", "Star"]
+
+#: Longer than two frames at the lowest frame rate, a transfer and the processing.
+STEP_TIMEOUT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """An attitude as the node reports it.
+
+    Attributes:
+        quaternion: float64 (4,), unit length.
+        valid: the latest picture gave it; else it is an older one, or none at all.
+        matched: stars that it rests on.
+        mode: mode that identified them.
+        frame: number of the picture since power-up.
+        image_time_s: uptime at mid-exposure.
+    """
+
+    quaternion: NDArray[np.float64]
+    valid: bool
+    matched: int
+    mode: MatchMode
+    frame: int
+    image_time_s: float
+
+    @property
+    def boresight(self) -> NDArray[np.float64]:
+        """Inertial unit vector (3,) of the direction that the camera looks in."""
+        x, y, z, w = self.quaternion
+        return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z])
+
+    @property
+    def ra_deg(self) -> float:
+        """Right ascension of the boresight, 0 to 360."""
+        x, y, _ = self.boresight
+        return math.degrees(math.atan2(y, x)) % 360.0
+
+    @property
+    def dec_deg(self) -> float:
+        """Declination of the boresight."""
+        x, y, z = self.boresight
+        return math.degrees(math.atan2(z, math.hypot(x, y)))
+
+
+@dataclass(frozen=True)
+class Star:
+    """A detected star.
+
+    Attributes:
+        number: from 0, in order of detection.
+        x_px, y_px: measured centroid.
+        x_undistorted_px, y_undistorted_px: the same without distortion.
+        pixels: pixels of its area.
+        intensity: sum over the centroiding window in DN.
+        hipparcos: Hipparcos number; None when it is not identified.
+    """
+
+    number: int
+    x_px: float
+    y_px: float
+    x_undistorted_px: float
+    y_undistorted_px: float
+    pixels: int
+    intensity: int
+    hipparcos: int | None
+
+
+class CubeStar:
+    """A CubeStar behind a client. Errors are those of the client, and the ones named here."""
+
+    def __init__(self, client: Client) -> None:
+        """Use ``client``, whose interface must be CubeStar's."""
+        self.client = client
+
+    def configure(self, settings: Mapping[str, Mapping[str, object]]) -> None:
+        """Send telecommands, name to parameters, as ``Calibration.settings`` has them."""
+        for name, parameters in settings.items():
+            self._perform(name, **parameters)
+
+    def capture(self) -> None:
+        """Capture a picture; raises StepFailedError when none arrived."""
+        self._perform("CaptureImage")
+        status = self.task_status()
+        if status is not TaskStatus.CAPTURED:
+            raise StepFailedError(f"no picture captured: task status {status.name}")
+
+    def capture_and_process(self) -> TaskStatus:
+        """Capture a picture, detect, identify and estimate; returns how far it came."""
+        self._perform("CaptureAndProcess")
+        return self.task_status()
+
+    def process_image(self) -> TaskStatus:
+        """Detect, identify and estimate with the picture in memory; returns how far it came."""
+        self._perform("ProcessImage")
+        return self.task_status()
+
+    def task_status(self) -> TaskStatus:
+        """What the node last did; raises BadAnswerError for an unknown status."""
+        value = int(self.client.telemetry("TaskStatus")["taskStatus"])
+        try:
+            return TaskStatus(value)
+        except ValueError:
+            raise BadAnswerError(f"telemetry TaskStatus: unknown status {value}") from None
+
+    def download_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
+        """The picture in memory, (512, 1024) with the first row on top.
+
+        In blocks of 128 bytes: as one read carries one block, a lost answer can be asked for
+        again, which blocks of 256 bytes with their two reads would not allow.
+        """
+        size = ImageBlockSize.BYTES_128
+        image = np.empty((IMAGE_BYTES // size.length, size.length), np.uint8)
+        for number in range(len(image)):
+            self._perform("ImageBlockSet", BlockNumber=number, BlockSize=size)
+            block = self.client.telemetry("ImageBlock")["Block"]
+            assert isinstance(block, bytes)
+            image[number] = np.frombuffer(block, np.uint8)
+            if progress is not None:
+                progress(number + 1, len(image))
+        return image.reshape(ROWS, COLUMNS)
+
+    def stream_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
+        """The picture in memory, (512, 1024), as one stream of blocks: quicker, over a UART only.
+
+        A lost block can not be asked for again; raises BadAnswerError or NoAnswerError then.
+        """
+        if not isinstance(self.client, NodeClient):
+            raise TypeError("a picture can be streamed over a UART only: use download_image")
+        length = ImageBlockSize.BYTES_128.length
+        blocks = []
+        for block in self.client.stream("StreamDownImage", IMAGE_BYTES // length):
+            if len(block) != length:
+                raise BadAnswerError(f"picture stream: block of {len(block)} bytes, not {length}")
+            blocks.append(block)
+            if progress is not None:
+                progress(len(blocks), IMAGE_BYTES // length)
+        return np.frombuffer(b"".join(blocks), np.uint8).reshape(ROWS, COLUMNS)
+
+    def upload_image(self, image: NDArray[np.uint8], progress: Progress | None = None) -> None:
+        """Put ``image``, uint8 (512, 1024), in the picture memory.
+
+        Black blocks are not sent: the upload begins with a cleared memory. Raises ValueError for
+        another shape or type, StepFailedError when the node received another number of blocks.
+        """
+        if image.shape != (ROWS, COLUMNS) or image.dtype != np.uint8:
+            raise ValueError(
+                f"an uploaded picture is uint8 {(ROWS, COLUMNS)}, not {image.dtype} {image.shape}"
+            )
+        self._perform("UploadImage")
+        blocks = image.reshape(-1, UPLOAD_BLOCK_BYTES)
+        lit = np.flatnonzero(blocks.any(axis=1))
+        for done, number in enumerate(lit, start=1):
+            self._send("UploadBlock", BlockNumber=int(number), Data=blocks[number].tobytes())
+            if progress is not None:
+                progress(done, len(lit))
+        self.client.wait_processed(STEP_TIMEOUT_S)
+        received = int(self.client.telemetry("UploadStatus")["BlocksReceived"])
+        if received != len(lit):
+            raise StepFailedError(f"upload: {received} blocks arrived of {len(lit)}")
+
+    def attitude(self) -> Attitude:
+        """The latest attitude in full precision; raises BadAnswerError when it is no rotation."""
+        values = self.client.telemetry("AttitudeQuaternion")
+        return Attitude(
+            quaternion=_unit_quaternion([values[f"Q{index}"] for index in range(4)]),
+            valid=bool(values["Valid"]),
+            matched=int(values["Matched"]),
+            mode=MatchMode(int(values["Mode"])),
+            frame=int(values["FrameCounter"]),
+            image_time_s=int(values["ImageTime"]) / 1000.0,
+        )
+
+    def coarse_quaternion(self) -> NDArray[np.float64]:
+        """The latest quaternion (4,) of published telemetry, in steps of 1e-4.
+
+        For a node without this project's extensions.
+        """
+        values = self.client.telemetry("AttitudeData")
+        return _unit_quaternion([values[f"Qbar{index}"] for index in range(4)])
+
+    def stars(self) -> list[Star]:
+        """The stars of the latest picture, in order of detection; stop the loop before.
+
+        Raises BadAnswerError when the records do not make a whole list.
+        """
+        detected = int(self.client.telemetry("DetectionSummary")["NumStarsDetected"])
+        identified = int(self.client.telemetry("NumIdStars")["numIdStars"])
+        positions = self._records("StarPositions", detected)
+        names = self._records("HipparcosNumber", identified)
+        return [
+            Star(
+                number=number,
+                x_px=float(record["X_Coordinate"]),
+                y_px=float(record["Y_Coordinate"]),
+                x_undistorted_px=float(record["X_CorrectedCoordinate"]),
+                y_undistorted_px=float(record["Y_CorrectedCoordinate"]),
+                pixels=int(record["Size"]),
+                intensity=int(record["Intensity"]),
+                hipparcos=int(names[number]["Hipparcos"]) if number in names else None,
+            )
+            for number, record in sorted(positions.items())
+        ]
+
+    def phase_times(self) -> dict[str, float]:
+        """Latest time of each phase in ms.
+
+        Keys: idle, discard, capture, transfer, detect, match, attitude, loop_total.
+        """
+        values = self.client.telemetry("PhaseTimes")
+        names = {name: name.lower() for name in values} | {"LoopTotal": "loop_total"}
+        return {names[name]: int(value) / 1000.0 for name, value in values.items()}
+
+    def _records(self, frame: str, count: int) -> dict[int, dict[str, Value]]:
+        """All ``count`` records of a telemetry frame that steps, by star number."""
+        records: dict[int, dict[str, Value]] = {}
+        reads = 2 * count  # one round, and another for records whose answer was lost
+        for _ in range(reads):
+            if len(records) == count:
+                break
+            values = self.client.telemetry(frame)
+            records[int(values["StarNumber"])] = values
+        if len(records) != count:
+            raise BadAnswerError(
+                f"telemetry {frame}: {len(records)} stars of {count} came in {reads} reads"
+            )
+        return records
+
+    def _perform(self, name: str, **parameters: object) -> None:
+        """Send a telecommand and wait until it is done."""
+        self._send(name, **parameters)
+        self.client.wait_processed(STEP_TIMEOUT_S)
+
+    def _send(self, name: str, **parameters: object) -> None:
+        """Send a telecommand; when the node's buffer is full, wait and send it once more."""
+        try:
+            self.client.command(name, **parameters)
+        except CommandRefusedError as refusal:
+            if refusal.code != AckError.BUFFER_FULL:
+                raise
+            self.client.wait_processed(STEP_TIMEOUT_S)
+            self.client.command(name, **parameters)
+
+
+def _unit_quaternion(components: list[Value]) -> NDArray[np.float64]:
+    quaternion = np.array([float(value) for value in components])
+    norm = float(np.linalg.norm(quaternion))
+    if not abs(norm - 1.0) < 0.01:
+        raise BadAnswerError(f"the node's quaternion has length {norm:.4g}, not 1")
+    return quaternion / norm

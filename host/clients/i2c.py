@@ -1,0 +1,102 @@
+"""Client of a node on I2C, through any object with smbus2's ``i2c_rdwr``.
+
+Telemetry is one transfer: write the ID, repeated start, read the data. A telecommand is one write;
+there is no error byte on this bus, so a node's refusal shows in telemetry only: in TcmdProcessed
+where that has an error code, else in ErrorFlags. What the tables forbid is therefore refused here,
+before it is sent.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from smbus2 import i2c_msg
+
+from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
+from cubestack.host.clients.contract import Client
+from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
+
+__all__ = ["I2cBus", "I2cClient"]
+
+RETRY_PERIOD_S = 0.01
+
+
+class I2cBus(Protocol):
+    """The part of smbus2's SMBus that carries any transfer."""
+
+    def i2c_rdwr(self, *i2c_msgs: Any) -> None:
+        """One combined transfer; raises OSError when a message is not acknowledged."""
+
+
+class I2cClient(Client):
+    """Client on an I2C bus."""
+
+    def __init__(
+        self,
+        bus: I2cBus,
+        interface: Interface,
+        address: int | None = None,
+        *,
+        wait: Callable[[float], None] = time.sleep,
+        processing_timeout_s: float = 10.0,
+        retries: int = 2,
+    ) -> None:
+        """Talk to the node at 7-bit ``address`` (default: the interface's).
+
+        ``wait`` lets seconds pass between polls; a telecommand may take ``processing_timeout_s``.
+        Telemetry that is not acknowledged is asked for again up to ``retries`` times.
+        """
+        self.interface = interface
+        self._bus = bus
+        self._address = interface.i2c_address if address is None else address
+        self._wait = wait
+        self._processing_timeout_s = processing_timeout_s
+        self._retries = retries
+
+    def command(self, name: str, **parameters: object) -> None:
+        """See Client; returns once the node has processed the telecommand."""
+        message = self.interface.telecommand(name)
+        data = message.pack(**parameters)
+        self._check(message, data)
+        try:
+            self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([message.id]) + data))
+        except TransportError:
+            raise
+        except OSError as error:
+            raise NoAnswerError(
+                f"telecommand {message.name} not acknowledged at I2C address {self._address:#04x}"
+            ) from error
+        values = self.wait_processed(self._processing_timeout_s)
+        self._check_error(message, int(values.get("Error", 0)))
+
+    def telemetry(self, name: str) -> dict[str, Value]:
+        """See Client. A frame that steps may skip a record when a transfer broke off."""
+        message = self.interface.telemetry(name)
+        for attempt in range(1 + self._retries):
+            if attempt:
+                self._wait(RETRY_PERIOD_S)
+            answer = i2c_msg.read(self._address, message.length)
+            try:
+                self._bus.i2c_rdwr(i2c_msg.write(self._address, [message.id]), answer)
+            except TransportError:
+                raise
+            except OSError:
+                continue
+            return message.unpack(bytes(answer))
+        raise NoAnswerError(
+            f"telemetry {message.name} not acknowledged at I2C address {self._address:#04x} "
+            f"in {1 + self._retries} attempts"
+        )
+
+    def pause(self, seconds: float) -> None:
+        """See Client."""
+        self._wait(seconds)
+
+    def close(self) -> None:
+        """Leave the bus to its owner, who opened it."""
+
+    def _check(self, message: Message, data: bytes) -> None:
+        wrong = message.violations(message.unpack(data))
+        if wrong:
+            code = self.interface.ack_errors["BAD_PARAMETER"]
+            raise CommandRefusedError(message.name, code, f", {wrong[0][0].name} is out of range")

@@ -1,0 +1,130 @@
+"""Client of a node on a UART, node dialect of the CubeSpace family.
+
+A telemetry answer is data alone, with no ID; a telecommand is answered by one error byte. So an
+answer belongs to the request before it, and only one request is under way at a time.
+"""
+
+from collections.abc import Iterator
+
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.message import Interface, Value
+from cubestack.host.clients.contract import Client
+from cubestack.host.errors import BadAnswerError, NoAnswerError
+from cubestack.host.transport.streams import Transport
+
+__all__ = ["NodeClient"]
+
+READ_BYTES = 4096
+
+#: Reads without a whole frame after which a babbling line counts as no answer.
+MAX_READS = 1000
+
+
+class NodeClient(Client):
+    """Client on a byte transport."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        interface: Interface,
+        *,
+        timeout_s: float = 1.0,
+        retries: int = 2,
+    ) -> None:
+        """Talk to the node of ``interface`` over ``transport``.
+
+        ``timeout_s`` is the longest silence before or within an answer. Telemetry is asked for
+        again up to ``retries`` times; a telecommand never is, as it may have been executed.
+        """
+        self.interface = interface
+        self._transport = transport
+        self._timeout_s = timeout_s
+        self._retries = retries
+        longest = max(message.length for message in interface.telemetries)
+        self._decoder = FrameDecoder(longest)
+        self._unread: Iterator[int] = iter(b"")
+
+    def command(self, name: str, **parameters: object) -> None:
+        """See Client."""
+        message = self.interface.telecommand(name)
+        answer = self.request(bytes([message.id]) + message.pack(**parameters))
+        if answer is None:
+            raise NoAnswerError(
+                f"no acknowledge of telecommand {message.name} within {self._timeout_s:g} s"
+            )
+        if len(answer) != 1:
+            raise BadAnswerError(
+                f"acknowledge of telecommand {message.name} has {len(answer)} bytes, not 1"
+            )
+        self._check_error(message, answer[0])
+
+    def telemetry(self, name: str) -> dict[str, Value]:
+        """See Client. A frame that steps may skip a record when an answer was lost."""
+        message = self.interface.telemetry(name)
+        answer = None
+        for _ in range(1 + self._retries):
+            answer = self.request(bytes([message.id]))
+            if answer is not None and len(answer) == message.length:
+                return message.unpack(answer)
+        attempts = f"in {1 + self._retries} attempts"
+        if answer is None:
+            raise NoAnswerError(
+                f"no answer to telemetry {message.name} within {self._timeout_s:g} s {attempts}"
+            )
+        raise BadAnswerError(
+            f"telemetry {message.name} has {len(answer)} bytes, not {message.length}, {attempts}"
+        )
+
+    def request(self, payload: bytes) -> bytes | None:
+        """Send a frame with any ``payload``; returns the next frame's payload, None without one.
+
+        What came before is dropped, so a late answer is not taken for this one's.
+        """
+        return self.exchange(encode_frame(payload))
+
+    def exchange(self, wire: bytes, rest: bytes = b"") -> bytes | None:
+        """Send bytes as they are, ``rest`` in a piece of its own; returns as ``request`` does."""
+        self._drop_input()
+        self._transport.write(wire)
+        if rest:
+            self._transport.write(rest)
+        return self._next_frame()
+
+    def stream(self, name: str, count: int) -> Iterator[bytes]:
+        """Send telecommand ``name``, then yield the payloads of ``count`` frames without requests.
+
+        Raises NoAnswerError when the stream ends early.
+        """
+        self.command(name)
+        for number in range(count):
+            payload = self._next_frame()
+            if payload is None:
+                raise NoAnswerError(f"{name}: the stream ended after {number} of {count} frames")
+            yield payload
+
+    def _next_frame(self) -> bytes | None:
+        """Payload of the next whole frame; None when the line stays silent."""
+        for _ in range(MAX_READS):
+            for byte in self._unread:
+                if self._decoder.feed(byte) is FrameEvent.FRAME:
+                    return self._decoder.payload
+            data = self._transport.read(READ_BYTES, self._timeout_s)
+            if not data:
+                return None
+            self._unread = iter(data)
+        return None
+
+    def pause(self, seconds: float) -> None:
+        """See Client. Ends early when the node sends something."""
+        self._transport.read(READ_BYTES, seconds)
+
+    def close(self) -> None:
+        """See Client."""
+        self._transport.close()
+
+    def _drop_input(self) -> None:
+        self._decoder.reset()
+        self._unread = iter(b"")
+        for _ in range(MAX_READS):
+            if not self._transport.read(READ_BYTES, 0.0):
+                return

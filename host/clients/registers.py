@@ -1,0 +1,127 @@
+"""Client of a register-pointer protocol on I2C, through any object with smbus2's ``i2c_rdwr``.
+
+Registers come from a map (CubeSense thesis, section 6.4.3). The slave can not refuse anything, so
+what the map forbids is refused here, before it is sent.
+"""
+
+import time
+from collections.abc import Callable
+
+from smbus2 import i2c_msg
+
+from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
+from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
+from cubestack.host.clients.contract import Progress
+from cubestack.host.clients.i2c import RETRY_PERIOD_S, I2cBus
+from cubestack.host.errors import NoAnswerError, TransportError
+
+__all__ = ["RegisterClient"]
+
+#: Longest read that the Linux kernel's I2C_RDWR takes.
+CHUNK_BYTES = 8192
+
+
+class RegisterClient:
+    """Reads and writes registers by name. The bus stays its owner's."""
+
+    def __init__(
+        self,
+        bus: I2cBus,
+        registers: PointerMap,
+        address: int | None = None,
+        *,
+        wait: Callable[[float], None] = time.sleep,
+        retries: int = 2,
+    ) -> None:
+        """Talk to the slave at 7-bit ``address`` (default: the map's).
+
+        A transfer that is not acknowledged is repeated up to ``retries`` times, ``wait`` lets
+        seconds pass between; only a write is never repeated, as it may have been executed.
+        """
+        self.registers = registers
+        self._bus = bus
+        self._address = registers.i2c_address if address is None else address
+        self._wait = wait
+        self._retries = retries
+
+    def read(self, name: str) -> Value:
+        """The value of a register, in the map's unit.
+
+        Raises InterfaceError for a name that the map lacks or can not be read, NoAnswerError.
+        """
+        register = self._readable(name)
+        return register.decode(self._attempt(register, None))
+
+    def read_stream(self, name: str, progress: Progress | None = None) -> bytes:
+        """All bytes of a streaming register, in reads of at most 8192 bytes.
+
+        ``progress`` is called with (bytes done, bytes in all). Raises as ``read`` does.
+        """
+        return self._attempt(self._readable(name), progress)
+
+    def write(self, name: str, value: object) -> None:
+        """Write a register: a number, or the name of a choice.
+
+        Raises InterfaceError for a name or value that the map does not allow, NoAnswerError.
+        """
+        register = self.registers[name]
+        if not register.writable:
+            raise InterfaceError(f"register {register.name} is read-only")
+        data = register.encode(value, saturate=False)
+        if not register.allows(register.decode(data)):
+            raise InterfaceError(f"register {register.name}: {value!r} is out of range")
+        try:
+            self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([register.address]) + data))
+        except TransportError:
+            raise
+        except OSError as error:
+            raise self._silence(register, 1) from error
+
+    def read_raw(self, address: int, count: int) -> bytes:
+        """Bytes behind any address, declared or not, in one transfer; raises OSError."""
+        answer = i2c_msg.read(self._address, count)
+        self._bus.i2c_rdwr(i2c_msg.write(self._address, [address]), answer)
+        return bytes(answer)
+
+    def write_raw(self, address: int, data: bytes) -> None:
+        """Write bytes to any address, allowed or not, in one transfer; raises OSError."""
+        self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([address]) + data))
+
+    def _readable(self, name: str) -> PointerRegister:
+        register = self.registers[name]
+        if not register.readable:
+            raise InterfaceError(f"register {register.name} is write-only")
+        return register
+
+    def _attempt(self, register: PointerRegister, progress: Progress | None) -> bytes:
+        """All bytes of a register, from the beginning again when a transfer breaks off."""
+        for attempt in range(1 + self._retries):
+            if attempt:
+                self._wait(RETRY_PERIOD_S)
+            try:
+                return self._fetch(register, progress)
+            except TransportError:
+                raise
+            except OSError:
+                continue
+        raise self._silence(register, 1 + self._retries)
+
+    def _fetch(self, register: PointerRegister, progress: Progress | None) -> bytes:
+        data = bytearray()
+        while len(data) < register.length:
+            answer = i2c_msg.read(self._address, min(CHUNK_BYTES, register.length - len(data)))
+            if data:  # without the pointer, a read goes on where the last one stopped
+                self._bus.i2c_rdwr(answer)
+            else:
+                self._bus.i2c_rdwr(i2c_msg.write(self._address, [register.address]), answer)
+            data += bytes(answer)
+            if progress is not None:
+                progress(len(data), register.length)
+        return bytes(data)
+
+    def _silence(self, register: PointerRegister, attempts: int) -> NoAnswerError:
+        times = "1 attempt" if attempts == 1 else f"{attempts} attempts"
+        return NoAnswerError(
+            f"register {register.name} not acknowledged at I2C address {self._address:#04x} "
+            f"in {times}"
+        )

@@ -1,0 +1,1 @@
+"""The protocol suite: what a device answers beside what its tables declare."""

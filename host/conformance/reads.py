@@ -1,0 +1,130 @@
+"""Checks that change nothing but counters and error flags: telemetry, framing, registers, times."""
+
+from statistics import median
+
+from cubestack.firmware_model.interface.codec.frames import END, ESCAPE, START
+from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message
+from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.conformance.suite import (
+    LATE_S,
+    FailedError,
+    PassedError,
+    SkippedError,
+    Suite,
+    show_values,
+)
+from cubestack.host.shell.names import SCHEDULING
+
+__all__ = ["check_reads"]
+
+UNKNOWN_SAMPLES = 3
+"""Unknown telemetry IDs that are tried: each costs a time-out."""
+
+
+def check_reads(suite: Suite) -> None:
+    """Run them all."""
+    for message in suite.target.interface.telemetries:
+        if message.supported:
+            _check_telemetry(suite, message)
+    _check_unknown(suite)
+    _check_framing(suite)
+    registers = suite.target.interface.registers
+    if registers is not None:
+        _check_registers(suite, registers)
+    _check_times(suite)
+
+
+def _check_telemetry(suite: Suite, message: Message) -> None:
+    name = f"telemetry {message.name}"
+    if message.name in SCHEDULING and not suite.may_write(name):
+        return
+    with suite.check(name) as seen:
+        values = suite.telemetry(message)  # of the declared length, else it raises
+        seen += show_values(message, values)
+        wrong = message.violations(values)
+        if wrong:
+            field = wrong[0][0]
+            raise FailedError(
+                f"field {field.name} is {field.label(values[field.name])}: not allowed"
+            )
+        version = suite.target.interface.version
+        if values.get("InterfaceVersion", version) != version:
+            found = message.field("InterfaceVersion").label(values["InterfaceVersion"])
+            raise FailedError(f"InterfaceVersion is {found}, declared {version}")
+
+
+def _check_unknown(suite: Suite) -> None:
+    declared = {message.id for message in suite.target.interface.messages if message.supported}
+    unknown = [i for i in range(TELEMETRY_BIT, 256) if i not in declared]
+    step = max(1, len(unknown) // UNKNOWN_SAMPLES)
+    for identifier in unknown[::step][:UNKNOWN_SAMPLES]:
+        with suite.check(f"unknown telemetry ID {identifier}") as seen:
+            answer = suite.request(bytes([identifier]))
+            if answer is not None:
+                raise FailedError(f"answered with {answer.hex() or 'nothing in a frame'}")
+            seen.append("no answer")
+
+
+def _check_framing(suite: Suite) -> None:
+    message = suite.target.interface.telemetries[0]
+    whole = bytes([ESCAPE, START, message.id, ESCAPE, END])
+    cases = {
+        "noise before a frame": bytes([0x00, 0x55, 0xAA]) + whole,
+        "start within a frame": bytes([ESCAPE, START, 0x01]) + whole,
+        "escape that means nothing": bytes([ESCAPE, START, ESCAPE, 0x01]) + whole,
+        "end without a start": bytes([ESCAPE, END]) + whole,
+    }
+    for name, wire in cases.items():
+        with suite.check(f"framing: {name}") as seen:
+            _expect(suite, wire, message)
+            seen.append("found again")
+    with suite.check("framing: frame in two pieces") as seen:
+        _expect(suite, whole[:3], message, whole[3:])
+        seen.append("answered")
+
+
+def _expect(suite: Suite, wire: bytes, message: Message, rest: bytes = b"") -> None:
+    """The node answers the request in ``wire``, ``rest`` following separately."""
+    node, line = suite.target.node, suite.target.line
+    if line is None or not isinstance(node, NodeClient):
+        raise SkippedError("needs a serial line")
+    answer = node.exchange(wire, rest)
+    if answer is None or len(answer) != message.length:
+        found = "no answer" if answer is None else f"an answer of {len(answer)} bytes"
+        raise FailedError(f"{found} to telemetry {message.name}")
+
+
+def _check_registers(suite: Suite, registers: PointerMap) -> None:
+    client = suite.target.registers
+    for register in registers:
+        if not register.readable or register.streams:
+            continue
+        with suite.check(f"register {register.name}") as seen:
+            if client is None:
+                raise SkippedError("no I2C bus within reach")
+            value = client.read(register.name)
+            seen.append(register.field.label(value))
+            if not register.field.allows(value, {}):
+                raise FailedError(f"{register.field.label(value)} is not allowed")
+    unused = next(address for address in range(255, -1, -1) if registers.at(address) is None)
+    with suite.check(f"register address {unused:#04x} without a register") as seen:
+        if client is None:
+            raise SkippedError("no I2C bus within reach")
+        data = client.read_raw(unused, 2)
+        seen.append(data.hex())
+        if data != bytes([FILL, FILL]):
+            raise FailedError(f"read {data.hex()}, declared {FILL:#04x} in each byte")
+
+
+def _check_times(suite: Suite) -> None:
+    with suite.check("times of answers"):
+        if not suite.latencies_s:
+            raise SkippedError("no telemetry was answered")
+        slowest = max(suite.latencies_s, key=lambda name: suite.latencies_s[name])
+        worst_ms = 1000 * suite.latencies_s[slowest]
+        middle_ms = 1000 * median(suite.latencies_s.values())
+        text = f"median {middle_ms:.1f} ms, {slowest} {worst_ms:.1f} ms beside the wire"
+        if worst_ms > 1000 * LATE_S:
+            raise FailedError(f"{text}: more than {1000 * LATE_S:g} ms")
+        raise PassedError(text)

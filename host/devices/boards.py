@@ -1,0 +1,187 @@
+"""Emulated devices as the commands that serve them see them: any device, its serial lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubesense.bench import BENCH
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+
+if TYPE_CHECKING:
+    from cubestack.emulator.bus.i2c import I2cBus
+    from cubestack.emulator.bus.uart import Uart
+    from cubestack.emulator.faults.injector import Faults
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.emulator.scene.sky import Scene
+    from cubestack.emulator.sim.virtual_time import Kernel
+    from cubestack.host.cli.session import Engine
+
+__all__ = [
+    "DEVICES",
+    "Board",
+    "Opened",
+    "SerialLine",
+    "cubesense_scene",
+    "cubestar_scene",
+    "open_board",
+]
+
+DEFAULT_POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+DEFAULT_MAG_LIMIT = 3.8
+"""Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
+
+DEFAULT_ANGLES_DEG = {"sun": (20.0, 10.0), "nadir": (-8.0, 12.0)}
+
+
+class Board(Protocol):
+    """What every emulated device has."""
+
+    kernel: Kernel
+    i2c_bus: I2cBus
+
+    @property
+    def faults(self) -> Faults:
+        """Injects faults into it."""
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+
+    def close(self) -> None:
+        """Release what the device holds."""
+
+
+@dataclass(frozen=True)
+class SerialLine:
+    """A serial port of a device.
+
+    Attributes:
+        name: what it speaks.
+        suffix: behind the name of the first line's link.
+        uart: the device's end.
+        baud: of the line.
+    """
+
+    name: str
+    suffix: str
+    uart: Uart
+    baud: int
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A device that has been powered up."""
+
+    title: str
+    board: Board
+    lines: tuple[SerialLine, ...]
+
+
+def open_board(
+    device: str,
+    scene: Path | None,
+    *,
+    seed: int,
+    engine: Engine,
+    baud: int | None,
+    mcu_addressing: bool = False,
+    layout: Layout = Layout.COPIED,
+) -> Opened:
+    """Power up ``device`` (a name of ``DEVICES``); ``scene`` None is its default scene.
+
+    ``baud`` is of the node protocol's line, None for the published one. ``mcu_addressing`` is an
+    option of CubeSense's FPGAs, ``layout`` one of CubeStar; ValueError for another device.
+    """
+    if layout is not Layout.COPIED:
+        if device != "cubestar":
+            raise ValueError(f"--layout is an option of cubestar, not of {device}")
+        return _cubestar(scene, seed, engine, baud, layout=layout)
+    if mcu_addressing:
+        if device != "cubesense":
+            raise ValueError(f"--mcu-addressing is an option of cubesense, not of {device}")
+        return _cubesense(scene, seed, engine, baud, mcu_addressing=True)
+    return DEVICES[device](scene, seed, engine, baud)
+
+
+def cubestar_scene(path: Path | None) -> Scene:
+    """The scene in ``path``; None is Orion's belt."""
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.sky import SkyScene, load_scene
+
+    if path is not None:
+        return load_scene(path)
+    return SkyScene(quaternion_from_pointing(*DEFAULT_POINTING_DEG), mag_limit=DEFAULT_MAG_LIMIT)
+
+
+def cubesense_scene(path: Path | None) -> EarthSunScene:
+    """The scene in ``path``; None has Sun and Earth in view."""
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+
+    if path is not None:
+        return load_earth_sun_scene(path)
+    angles = DEFAULT_ANGLES_DEG
+    return EarthSunScene.facing(sun_deg=angles["sun"], nadir_deg=angles["nadir"])
+
+
+def _cubestar(
+    path: Path | None,
+    seed: int,
+    engine: Engine,
+    baud: int | None,
+    *,
+    layout: Layout = Layout.COPIED,
+) -> Opened:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+
+    baud = baud or CUBESTAR.baud
+    scene = cubestar_scene(path)
+    board = CubeStarBoard(
+        scene, onboard_catalogue(), seed=seed, engine=engine, baud=baud, layout=layout
+    )
+    return Opened("CubeStar", board, (SerialLine("node protocol", "", board.uart, baud),))
+
+
+def _cubesense(
+    path: Path | None,
+    seed: int,
+    engine: Engine,
+    baud: int | None,
+    *,
+    mcu_addressing: bool = False,
+) -> Opened:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+
+    baud = baud or CUBESENSE.baud
+    board = CubeSenseBoard(
+        cubesense_scene(path), seed=seed, engine=engine, baud=baud, mcu_addressing=mcu_addressing
+    )
+    lines = (
+        SerialLine("node protocol", "", board.uart, baud),
+        SerialLine("bench protocol", ".bench", board.bench_uart, BENCH.baud),
+    )
+    return Opened("CubeSense", board, lines)
+
+
+def _aramis(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+    from cubestack.host.cli.aramis_session import aramis_board
+
+    if engine != "auto":
+        raise ValueError(f"aramis has no FPGA: leave --engine {engine} out")
+    baud = baud or ARAMIS.baud
+    board = aramis_board(path, seed=seed, baud=baud)
+    return Opened("AraMiS", board, (SerialLine("node protocol", "", board.uart, baud),))
+
+
+#: Devices that can be emulated, by the names of the command line.
+DEVICES: dict[str, Callable[[Path | None, int, Engine, int | None], Opened]] = {
+    "cubestar": _cubestar,
+    "cubesense": _cubesense,
+    "aramis": _aramis,
+}

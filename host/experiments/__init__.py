@@ -1,0 +1,1 @@
+"""Measurements end to end: scene in, result beside truth out."""

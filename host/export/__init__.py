@@ -1,0 +1,1 @@
+"""An interface for readers and other programs: text, Markdown, JSON, C header."""

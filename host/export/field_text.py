@@ -1,0 +1,60 @@
+"""One field of an interface as text for readers, and as data for other programs."""
+
+from cubestack.firmware_model.interface.codec.field import Choices, Field
+
+__all__ = ["choice_rows", "field_details", "field_json", "field_type"]
+
+
+def field_type(field: Field) -> str:
+    """Type, and what a raw count is divided by."""
+    return field.type if field.scale == 1 else f"{field.type} / {field.scale:g}"
+
+
+def field_details(field: Field) -> str:
+    """Meaning, unit, allowed values, reset value and error flag."""
+    parts = [field.meaning + (f" [{field.unit}]" if field.unit else "")]
+    if field.choices is not None:
+        parts.append(f"see {field.choices.__name__}")
+    if field.maximum_by is not None:
+        other, limits = field.maximum_by
+        listed = ", ".join(f"{limit:g} for {int(value)}" for value, limit in limits.items())
+        parts.append(f"at most, by {other}, {listed}")
+    elif field.minimum is not None and field.maximum is not None:
+        parts.append(f"{field.minimum:g} to {field.maximum:g}")
+    elif field.minimum is not None:
+        parts.append(f"at least {field.minimum:g}")
+    elif field.maximum is not None:
+        parts.append(f"at most {field.maximum:g}")
+    if field.reset and not isinstance(field.reset, bytes):
+        parts.append(f"reset {field.label(field.reset)}")
+    if field.range_flag:
+        parts.append(f"else {field.range_flag}")
+    if field.flag and field.flag != field.name:
+        parts.append(f"shows {field.flag}")
+    return "; ".join(parts)
+
+
+def choice_rows(choices: Choices) -> list[str]:
+    """Markdown table of named numbers."""
+    rows = [f"| {int(choice)} | {choice.name} |" for choice in choices]
+    return ["| value | name |", "|-|-|", *rows]
+
+
+def field_json(field: Field) -> dict[str, object]:
+    """Every attribute of a field."""
+    choices = field.choices
+    return {
+        "name": field.name,
+        "type": field.type,
+        "bit_offset": field.bit_offset,
+        "meaning": field.meaning,
+        "unit": field.unit,
+        "scale": field.scale,
+        "choices": None if choices is None else {choice.name: int(choice) for choice in choices},
+        "minimum": field.minimum,
+        "maximum": field.maximum,
+        "maximum_by": field.maximum_by,
+        "range_flag": field.range_flag,
+        "flag": field.flag,
+        "reset": field.reset.hex() if isinstance(field.reset, bytes) else field.reset,
+    }

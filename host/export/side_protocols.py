@@ -1,0 +1,139 @@
+"""What a device speaks beside its node protocol, for readers and programs.
+
+Registers behind a pointer on I2C and one-letter requests on a serial line, both from the interface
+tables; nothing for a device that has none.
+"""
+
+from collections.abc import Iterator
+
+from cubestack.firmware_model.interface.codec.letters import BenchProtocol, Letter
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
+from cubestack.host.export.field_text import field_details, field_json, field_type
+
+__all__ = ["side_c", "side_json", "side_markdown", "side_table"]
+
+
+def side_table(interface: Interface) -> Iterator[str]:
+    """Plain text, one line for each register and letter."""
+    if interface.registers is not None:
+        yield from ("", f"REGISTERS at {_address(interface.registers)}  (address, access, type)")
+        if interface.registers.note:
+            yield f"  {interface.registers.note}"
+        for register in interface.registers:
+            yield (
+                f"  {register.address:#04x} {register.access.value} "
+                f"{field_type(register.field):<13} {register.name:<20} "
+                f"{field_details(register.field)}"
+            )
+    if interface.bench is not None:
+        yield from ("", f"BENCH LETTERS at {_line(interface.bench)}")
+        for letter in interface.bench.letters:
+            yield f"  {letter.letter} {letter.name:<14} {letter.meaning}; answer: {_answer(letter)}"
+
+
+def side_markdown(interface: Interface) -> Iterator[str]:
+    """A section for the registers and one for the letters."""
+    if interface.registers is not None:
+        yield from (
+            "",
+            "## Registers",
+            "",
+            f"At {_address(interface.registers)}. Write a register's address and either one data "
+            "byte, or read the value behind a repeated start or in a transfer of its own. Two "
+            "bytes are signed, the most significant first. Writing the address latches the value; "
+            "a read without it continues where the last one stopped. Where there is nothing, "
+            f"{FILL:#04x} is read. What can not or must not be written is ignored. "
+            f"{interface.registers.note}",
+            "",
+            "| address | access | type | register | meaning |",
+            "|-|-|-|-|-|",
+        )
+        for register in interface.registers:
+            yield (
+                f"| {register.address:#04x} | {register.access.value} | "
+                f"{field_type(register.field)} | {register.name} | "
+                f"{field_details(register.field)} |"
+            )
+    if interface.bench is not None:
+        yield from (
+            "",
+            "## Bench letters",
+            "",
+            f"At {_line(interface.bench)}. One byte is a request; others get no answer.",
+            "",
+            "| letter | name | meaning | answer |",
+            "|-|-|-|-|",
+        )
+        for letter in interface.bench.letters:
+            yield f"| {letter.letter} | {letter.name} | {letter.meaning} | {_answer(letter)} |"
+
+
+def side_json(interface: Interface) -> dict[str, object]:
+    """The members of a JSON object."""
+    content: dict[str, object] = {}
+    if interface.registers is not None:
+        content["registers"] = {
+            "i2c_address": interface.registers.i2c_address,
+            "note": interface.registers.note,
+            "registers": [
+                {
+                    "address": register.address,
+                    "access": register.access.value,
+                    "length": register.length,
+                    "field": field_json(register.field),
+                }
+                for register in interface.registers
+            ],
+        }
+    if interface.bench is not None:
+        content["bench"] = {
+            "baud": interface.bench.baud,
+            "letters": [
+                {
+                    "letter": letter.letter,
+                    "name": letter.name,
+                    "meaning": letter.meaning,
+                    "length": letter.length,
+                    "answer": None if letter.answer is None else letter.answer.hex(),
+                }
+                for letter in interface.bench.letters
+            ],
+        }
+    return content
+
+
+def side_c(interface: Interface) -> Iterator[str]:
+    """Lines of a C header."""
+    upper = interface.name.upper()
+    if interface.registers is not None:
+        yield from ("", "/* Registers; two bytes are signed, the most significant first. */")
+        yield f"#define {upper}_REGISTER_I2C_ADDRESS 0x{interface.registers.i2c_address:02X}"
+        for register in interface.registers:
+            name, field = f"{upper}_REGISTER_{register.name}", register.field
+            unit = f" [{field.unit}]" if field.unit else ""
+            yield f"#define {name} 0x{register.address:02X} /* {field.meaning}{unit} */"
+            yield f"#define {name}_LENGTH {register.length}"
+            if field.scale != 1:
+                yield f"#define {name}_SCALE {field.scale:g}"
+    if interface.bench is not None:
+        yield from ("", "/* Letters on the bench's serial line. */")
+        yield f"#define {upper}_BENCH_BAUD {interface.bench.baud}"
+        for letter in interface.bench.letters:
+            name = f"{upper}_BENCH_{letter.name}"
+            yield f"#define {name} '{letter.letter}' /* {letter.meaning} */"
+            yield f"#define {name}_LENGTH {letter.length}"
+
+
+def _address(registers: PointerMap) -> str:
+    return f"I2C address {registers.i2c_address:#04x} (7 bits)"
+
+
+def _line(bench: BenchProtocol) -> str:
+    return f"{bench.baud} baud 8N1"
+
+
+def _answer(letter: Letter) -> str:
+    if letter.answer is None:
+        return f"{letter.length} bytes"
+    return f"'{letter.answer.decode('ascii')}'"

@@ -1,0 +1,1 @@
+"""Recordings from the host's side: made, played back, and how a device was set up."""

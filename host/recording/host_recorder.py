@@ -1,0 +1,116 @@
+"""Records a host's own view of a real device: what it wrote and what came, with wall time.
+
+For devices that are not emulated here; an emulated one is recorded at its pins, by
+``emulator.recording.recorder``. Times are those at which bytes were handed over, so they say less
+than a wire would: a replay to an emulated device shows differences in time. As a target of host
+tools (``recorded:FILE``) such a recording is as good.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import IO, Any
+
+from cubestack.firmware_model.formats.recording import (
+    BusMessage,
+    BusTransfer,
+    LineBytes,
+    RecordingWriter,
+    Side,
+)
+from cubestack.firmware_model.formats.setup import Setup
+from cubestack.host.clients.i2c import I2cBus
+from cubestack.host.transport.streams import Transport
+
+__all__ = ["Tape"]
+
+PS_PER_NS = 1000
+PS_PER_S = 10**12
+BITS_PER_BYTE = 10
+I2C_M_RD = 0x0001
+
+
+class Tape:
+    """Stands between a host tool and its lines and bus."""
+
+    def __init__(
+        self,
+        stream: IO[str],
+        setup: Setup | None = None,
+        *,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        """Write to ``stream``, which stays its owner's; ``clock_ns`` never runs back.
+
+        ``setup`` says what is recorded.
+        """
+        self._stream = stream
+        self._setup = setup
+        self._clock_ns = clock_ns
+        self._start_ns = clock_ns()
+        self._writer: RecordingWriter | None = None
+
+    def begin(self, device: str, bauds: Mapping[str, int]) -> None:
+        """Write the header: name of the device, baud rate by port."""
+        self._writer = RecordingWriter(self._stream, device, dict(bauds), self._setup)
+
+    def line(self, transport: Transport, port: str, baud: int) -> Transport:
+        """``transport``, with its bytes on the tape."""
+        return _TapedLine(self, transport, port, BITS_PER_BYTE * PS_PER_S // baud)
+
+    def bus(self, bus: I2cBus) -> I2cBus:
+        """``bus``, with its transfers on the tape."""
+        return _TapedBus(self, bus)
+
+    def now_ps(self) -> int:
+        """Time since the beginning."""
+        return (self._clock_ns() - self._start_ns) * PS_PER_NS
+
+    def write(self, event: LineBytes | BusTransfer) -> None:
+        """Put an event on the tape."""
+        assert self._writer is not None
+        self._writer.write(event)
+
+
+class _TapedLine:
+    def __init__(self, tape: Tape, transport: Transport, port: str, byte_ps: int) -> None:
+        self._tape = tape
+        self._transport = transport
+        self._port = port
+        self._byte_ps = byte_ps
+        self._last_ps = 0
+
+    def write(self, data: bytes) -> None:
+        self._put("host", data, self._tape.now_ps())
+        self._transport.write(data)
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        data = self._transport.read(max_bytes, timeout_s)
+        self._put("device", data, self._tape.now_ps())
+        return data
+
+    def close(self) -> None:
+        self._transport.close()
+
+    def _put(self, side: Side, data: bytes, now_ps: int) -> None:
+        """In the order of the calls: what was read was there before what is written next."""
+        if data:
+            first_ps = max(self._last_ps, now_ps - (side == "device") * len(data) * self._byte_ps)
+            self._tape.write(LineBytes(first_ps, self._port, side, data, self._byte_ps))
+            self._last_ps = first_ps + len(data) * self._byte_ps
+
+
+class _TapedBus:
+    def __init__(self, tape: Tape, bus: I2cBus) -> None:
+        self._tape = tape
+        self._bus = bus
+
+    def i2c_rdwr(self, *messages: Any) -> None:
+        start_ps, errno = self._tape.now_ps(), 0
+        try:
+            self._bus.i2c_rdwr(*messages)
+        except OSError as error:
+            errno = error.errno or 0
+            raise
+        finally:
+            found = tuple(BusMessage(m.addr, bytes(m), bool(m.flags & I2C_M_RD)) for m in messages)
+            self._tape.write(BusTransfer(start_ps, "i2c", self._tape.now_ps(), found, errno))

@@ -1,0 +1,1 @@
+"""The register shell: read, write and watch by the tables' names."""

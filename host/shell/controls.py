@@ -1,0 +1,77 @@
+"""The shell's commands on an emulated device past its ports: scene, fault, power, time."""
+
+from pathlib import Path
+
+from cubestack.host.devices.targets import Controls, Target
+from cubestack.host.shell.result import Command, Result, ShellError, check_count, to_number
+
+__all__ = ["LOG", "ON_OFF", "ControlCommands"]
+
+ON_OFF = ("on", "off")
+
+SCENE = "scene FILE"
+FAULT = "fault [KIND [TARGET] [PARAMETER=VALUE ...] [for_s=SECONDS]]"
+LOG = "log"
+"""What follows ``fault`` to see what faults have done."""
+POWER = "power [CHANNEL on|off]"
+TIME = "time [SECONDS]"
+
+
+class ControlCommands:
+    """The commands on one target."""
+
+    def __init__(self, target: Target) -> None:
+        """Use ``target``, which stays its owner's."""
+        self._target = target
+
+    def commands(self) -> list[Command]:
+        """What they are called."""
+        return [
+            Command(SCENE, "show another scene", self._scene, True),
+            Command(
+                FAULT,
+                "let something break; fault clear, fault log",
+                self._fault,
+                True,
+            ),
+            Command(POWER, "supply currents, load switches", self._power, True),
+            Command(TIME, "virtual time; let it pass", self._time, True),
+        ]
+
+    def _scene(self, words: list[str]) -> Result:
+        check_count(SCENE, words, 1, 1)
+        self._controls.scene(Path(words[0]))
+        return Result([("", f"scene {words[0]}")], {"scene": words[0]})
+
+    def _fault(self, words: list[str]) -> Result:
+        controls = self._controls
+        if not words:
+            return Result([("", fault) for fault in controls.faults], {"faults": controls.faults})
+        if words == [LOG]:
+            log = controls.fault_log()
+            return Result([("", line) for line in log], {"log": log})
+        controls.fault(words)
+        return Result([("", f"fault: {' '.join(words)}")], {"fault": " ".join(words)})
+
+    def _power(self, words: list[str]) -> Result:
+        controls = self._controls
+        if words:
+            if len(words) != 2 or words[1] not in ON_OFF:
+                raise ShellError(f"usage: {POWER}")
+            controls.switch(words[0], words[1] == "on")
+        currents = controls.currents()
+        rows = [(name, f"{current:.1f} mA") for name, current in currents.items()]
+        return Result(rows, {"currents_ma": currents})
+
+    def _time(self, words: list[str]) -> Result:
+        check_count(TIME, words, 0, 1)
+        controls = self._controls
+        if words:
+            controls.advance(to_number("time", words[0], 0))
+        now_s = controls.time_s()
+        return Result([("time", f"{now_s:.6f} s")], {"time_s": now_s})
+
+    @property
+    def _controls(self) -> Controls:
+        assert self._target.controls is not None  # else the shell has refused
+        return self._target.controls

@@ -1,0 +1,95 @@
+"""The shell's commands on pictures, bench letters and raw bytes: image, bench, raw."""
+
+from pathlib import Path
+
+from cubestack.host.devices.targets import Target
+from cubestack.host.shell.picture import download
+from cubestack.host.shell.result import Command, Result, ShellError, check_count
+from cubestack.host.transport.streams import Transport
+
+__all__ = ["LineCommands"]
+
+RAW_TIMEOUT_S = 0.3
+"""Silence after which the answer to raw bytes is over."""
+
+BENCH_TIMEOUT_S = 10.0
+READ_BYTES = 4096
+SHORT_ANSWER = 8
+"""Longest answer to a bench letter that is shown."""
+
+IMAGE = "image FILE.png [SOURCE]"
+BENCH = "bench LETTER"
+RAW = "raw HEX ..."
+
+
+class LineCommands:
+    """The commands on one target."""
+
+    def __init__(self, target: Target) -> None:
+        """Use ``target``, which stays its owner's."""
+        self._target = target
+
+    def commands(self) -> list[Command]:
+        """What they are called."""
+        return [
+            Command(IMAGE, "download the picture", self._image),
+            Command(BENCH, "a letter of the bench protocol", self._bench),
+            Command(RAW, "send bytes, show what comes", self._raw),
+        ]
+
+    def _image(self, words: list[str]) -> Result:
+        check_count(IMAGE, words, 1, 2)
+        path = Path(words[0])
+        if path.suffix.lower() != ".png":
+            raise ShellError(f"image: {path} must end in .png")
+        rows, columns = download(self._target, path, words[1] if len(words) > 1 else None)
+        return Result(
+            [("", f"{path}: {columns} x {rows}")],
+            {"file": str(path), "columns": columns, "rows": rows},
+        )
+
+    def _bench(self, words: list[str]) -> Result:
+        check_count(BENCH, words, 1, 1)
+        protocol, line = self._target.interface.bench, self._target.bench
+        if protocol is None:
+            raise ShellError(f"bench: {self._target.interface.name} has no bench protocol")
+        if line is None:
+            raise ShellError("bench: no line with the bench protocol is open: give --bench TARGET")
+        wanted = words[0].encode("utf-8")
+        letter = protocol.find(wanted[0]) if len(wanted) == 1 else None
+        if letter is None:
+            known = ", ".join(f"{known.letter} ({known.name})" for known in protocol.letters)
+            raise ShellError(f"bench: no letter {words[0]!r}; known: {known}")
+        line.write(letter.request)
+        answer = _read(line, letter.length)
+        whole = len(answer) == letter.length
+        shown = whole and len(answer) <= SHORT_ANSWER
+        text = repr(answer.decode("latin-1")) if shown else f"{len(answer)} bytes"
+        note = "" if whole else f" of {letter.length}"
+        return Result(
+            [(letter.name, text + note)], {"letter": letter.letter, "answer": answer.hex()}
+        )
+
+    def _raw(self, words: list[str]) -> Result:
+        line = self._target.line
+        if line is None:
+            raise ShellError(f"raw: {self._target.name} is no serial line")
+        try:
+            data = bytes.fromhex("".join(words))
+        except ValueError:
+            raise ShellError(f"raw: {' '.join(words)!r} is not hexadecimal bytes") from None
+        if not data:
+            raise ShellError(f"usage: {RAW}")
+        line.write(data)
+        answer = bytearray()
+        while more := line.read(READ_BYTES, RAW_TIMEOUT_S):
+            answer += more
+        return Result([("", answer.hex(" ") or "(nothing)")], {"answer": answer.hex()})
+
+
+def _read(line: Transport, length: int) -> bytearray:
+    """What comes, until it is ``length`` bytes or the line is silent."""
+    answer = bytearray()
+    while len(answer) < length and (data := line.read(READ_BYTES, BENCH_TIMEOUT_S)):
+        answer += data
+    return answer

@@ -1,0 +1,136 @@
+"""What a target has, by what a user calls it: a name in any case, a message's number, an address.
+
+A number (``128``, ``0x80``) is that of a message, ``@0x05`` the address of a register.
+"""
+
+from difflib import get_close_matches
+
+from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.message import Kind, Message
+from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
+from cubestack.host.devices.targets import Target
+from cubestack.host.shell.result import ShellError
+
+__all__ = ["SCHEDULING", "Names", "has_side_effect", "number_of"]
+
+SCHEDULING = {CUBESENSE.telemetry(identifier).name for identifier in SCHEDULES}
+"""Telemetry that starts a measurement when it is read."""
+
+ADDRESS = "@"
+NEAR = 3
+"""How many names or numbers a refusal suggests."""
+
+CUTOFF = 0.55
+"""Least likeness of a name that is suggested."""
+
+Found = Message | PointerRegister
+
+
+def has_side_effect(message: Message) -> bool:
+    """Whether reading a telemetry frame changes something in the node."""
+    return message.steps or message.name in SCHEDULING
+
+
+def number_of(found: Found) -> str:
+    """What may stand for its name on a line."""
+    return str(found.id) if isinstance(found, Message) else f"{ADDRESS}{found.address:#04x}"
+
+
+class Names:
+    """Messages and registers within reach of one target."""
+
+    def __init__(self, target: Target) -> None:
+        """Look at ``target``, which stays its owner's."""
+        self._target = target
+
+    def of(self, command: str) -> list[str]:
+        """All names that ``command`` (read, watch, write or list) takes, in the tables' order."""
+        return [found.name for found in self.all_of(command)]
+
+    def all_of(self, command: str) -> list[Found]:
+        """What those names mean."""
+        interface = self._target.interface
+        found: list[Found] = []
+        if command != "write":
+            found += [message for message in interface.telemetries if message.supported]
+        if command in ("write", "list"):
+            found += [message for message in interface.telecommands if message.supported]
+        for register in self.registers:
+            wanted = register.writable if command == "write" else register.readable
+            found += [register] if wanted or command == "list" else []
+        return found
+
+    @property
+    def registers(self) -> list[PointerRegister]:
+        """Registers in the order of their addresses; none where they are not within reach."""
+        registers = self._target.registers
+        return [] if registers is None else list(registers.registers)
+
+    def find(self, word: str, *kinds: Kind) -> Found | None:
+        """The message of one of ``kinds``, or the register, that ``word`` means."""
+        if word.startswith(ADDRESS):
+            address = _integer(word.removeprefix(ADDRESS))
+            return next((found for found in self.registers if found.address == address), None)
+        number = _integer(word)
+        for message in self._target.interface.messages:
+            if message.kind in kinds and (
+                message.id == number or message.name.lower() == word.lower()
+            ):
+                return message
+        for register in self.registers:
+            if register.name.lower() == word.lower():
+                return register
+        return None
+
+    def need(self, command: str, word: str, *kinds: Kind) -> Found:
+        """As ``find``; ShellError, which suggests what is near, when there is nothing."""
+        found = self.find(word, *kinds)
+        if found is not None:
+            return found
+        if word.startswith(ADDRESS):
+            raise ShellError(f"{command}: no register at {word!r}; {self._near_addresses(word)}")
+        number = _integer(word)
+        if number is not None:
+            kind = " or ".join(kind.value for kind in kinds)
+            near = self._near_numbers(number, *kinds)
+            raise ShellError(f"{command}: no {kind} has number {word}; {near}")
+        near = _near_names(word, self.of(command))
+        raise ShellError(f"{command}: nothing is called {word!r}; {near}")
+
+    def fields(self, word: str, kind: Kind) -> tuple[Field, ...]:
+        """Fields of what ``word`` means; none when it means nothing."""
+        found = self.find(word, kind)
+        if found is None:
+            return ()
+        return found.fields if isinstance(found, Message) else (found.field,)
+
+    def _near_numbers(self, number: int, *kinds: Kind) -> str:
+        known = [m for m in self._target.interface.messages if m.kind in kinds and m.supported]
+        nearest = sorted(known, key=lambda message: abs(message.id - number))[:NEAR]
+        return "near: " + ", ".join(f"{number_of(m)} ({m.name})" for m in nearest)
+
+    def _near_addresses(self, word: str) -> str:
+        address = _integer(word.removeprefix(ADDRESS))
+        if not self.registers or address is None:
+            return "registers are @ADDRESS, over I2C" if not self.registers else "as in @0x05"
+        nearest = sorted(self.registers, key=lambda found: abs(found.address - address))[:NEAR]
+        return "near: " + ", ".join(f"{number_of(r)} ({r.name})" for r in nearest)
+
+
+def _near_names(word: str, known: list[str]) -> str:
+    lower = {name.lower(): name for name in known}
+    close = get_close_matches(word.lower(), lower, n=NEAR, cutoff=CUTOFF)
+    close += [name for name in lower if word.lower() in name and name not in close]
+    if not close:
+        return "list shows what there is"
+    *others, last = [lower[name] for name in close[:NEAR]]
+    return f"did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
+
+
+def _integer(word: str) -> int | None:
+    try:
+        return int(word, 0)
+    except ValueError:
+        return None

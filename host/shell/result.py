@@ -1,0 +1,66 @@
+"""What the shell's commands have in common: what they give, how they are described and refused."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from cubestack.firmware_model.interface.codec.field import Value
+
+__all__ = ["Command", "Result", "ShellError", "check_count", "plain", "to_number"]
+
+GREATEST = 1e9
+"""Of a number on a line."""
+
+
+class ShellError(ValueError):
+    """A line makes no sense; the text is one line and says what would."""
+
+
+@dataclass
+class Result:
+    """What a command found.
+
+    Attributes:
+        rows: (name, value for a reader); a name may be empty.
+        data: the same for a program, as JSON takes it.
+    """
+
+    rows: list[tuple[str, str]] = field(default_factory=list)
+    data: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of the shell: how it is called, what it does, and what it needs."""
+
+    usage: str
+    meaning: str
+    run: Callable[[list[str]], Result]
+    emulated_only: bool = False
+
+    @property
+    def name(self) -> str:
+        """The word that calls it."""
+        return self.usage.split()[0]
+
+
+def check_count(usage: str, words: Sequence[str], least: int, most: int) -> None:
+    """Raise ShellError unless there are ``least`` to ``most`` words behind a command's name."""
+    if not least <= len(words) <= most:
+        raise ShellError(f"{usage.split()[0]}: {len(words)} words; usage: {usage}")
+
+
+def to_number(command: str, text: str, least: float) -> float:
+    """A number of at least ``least``; ShellError for anything else."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = least - 1
+    if not least <= value < GREATEST:
+        raise ShellError(f"{command}: {text!r} is not a number of at least {least:g}")
+    return value
+
+
+def plain(value: Value) -> object:
+    """A value as JSON takes it: bytes in hexadecimal."""
+    return value.hex() if isinstance(value, bytes) else value

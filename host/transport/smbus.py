@@ -1,0 +1,317 @@
+"""smbus2's SMBus on an emulated bus, for Python programs that are not started by ``cubestack run``.
+
+::
+
+    from cubestack.host.transport.smbus import CubeSMBus
+
+    with CubeSMBus(7) as bus:                    # the bus that `cubestack emulate` serves
+        print(bus.read_byte_data(0x1A, 0x83))
+
+It has every method of SMBus and raises what that raises: OSError with the errno of Linux's driver.
+"""
+
+import os
+import socket
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+from smbus2 import SMBus
+from smbus2.smbus2 import I2cFunc
+
+from cubestack.firmware_model.formats.linux_i2c import (
+    LENGTH,
+    MAX_BLOCK_BYTES,
+    SMBUS_DATA_BYTES,
+    Call,
+    Ioctl,
+    MessageFlag,
+    RdwrMessage,
+    SmbusCall,
+    SmbusSize,
+    pack_ioctl,
+    pack_rdwr,
+    pack_smbus,
+    request,
+    socket_path,
+    split_rdwr,
+    split_reply,
+)
+from cubestack.host.errors import PortClosedError, PortOpenError
+
+__all__ = ["BusLink", "CubeSMBus"]
+
+READ, WRITE = 1, 0
+DEVICE = "/dev/i2c-"
+
+
+class BusLink(Protocol):
+    """A device file of an emulated bus."""
+
+    def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
+        """Do a call and wait for its end; result (0 or more, or a negative errno) and data."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+class CubeSMBus(SMBus):
+    """An SMBus whose bus is emulated, by another process or in this one."""
+
+    def __init__(
+        self,
+        bus: int | str | None = None,
+        force: bool = False,
+        *,
+        link: BusLink | None = None,
+    ) -> None:
+        """Open ``bus``: a number, ``/dev/i2c-N``, or the path of the socket that serves it.
+
+        ``link`` takes its place when the board is in this process: ``board.i2c()``. Without either,
+        call ``open``. Raises PortOpenError when nobody serves it.
+        """
+        self._link = link
+        self._addressed: tuple[int, bool] | None = None
+        super().__init__(None, force)
+        if link is not None:
+            self.funcs = self._get_funcs()
+        elif bus is not None:
+            self.open(bus)
+
+    def open(self, bus: int | str) -> None:
+        """See SMBus, and above."""
+        if not isinstance(bus, int | str):
+            raise TypeError(f"a bus is a number or a path, not {bus!r}")
+        link = _SocketLink(_find_socket(bus))
+        self._link = link
+        self.fd = link.fileno
+        self.funcs = self._get_funcs()
+
+    def close(self) -> None:
+        """See SMBus."""
+        if self._link is not None:
+            self._link.close()
+        self._link = self.fd = self.address = self._addressed = None
+        self._pec = 0
+
+    def __enter__(self) -> Self:
+        """See SMBus."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """See SMBus."""
+        self.close()
+
+    def enable_pec(self, enable: bool = True) -> None:
+        """See SMBus."""
+        self._ioctl(Ioctl.PEC, int(enable))
+        self._pec = int(enable)
+
+    pec = property(lambda self: self._pec, enable_pec)
+
+    # --- transactions -------------------------------------------------------------------------
+
+    def write_quick(self, i2c_addr: int, force: bool | None = None) -> None:
+        """See SMBus."""
+        self._transact(i2c_addr, force, WRITE, 0, SmbusSize.QUICK)
+
+    def read_byte(self, i2c_addr: int, force: bool | None = None) -> int:
+        """See SMBus."""
+        return self._transact(i2c_addr, force, READ, 0, SmbusSize.BYTE)[0]
+
+    def write_byte(self, i2c_addr: int, value: int, force: bool | None = None) -> None:
+        """See SMBus."""
+        self._transact(i2c_addr, force, WRITE, value, SmbusSize.BYTE)
+
+    def read_byte_data(self, i2c_addr: int, register: int, force: bool | None = None) -> int:
+        """See SMBus."""
+        return self._transact(i2c_addr, force, READ, register, SmbusSize.BYTE_DATA)[0]
+
+    def write_byte_data(
+        self, i2c_addr: int, register: int, value: int, force: bool | None = None
+    ) -> None:
+        """See SMBus."""
+        data = bytes([value & 0xFF])
+        self._transact(i2c_addr, force, WRITE, register, SmbusSize.BYTE_DATA, data)
+
+    def read_word_data(self, i2c_addr: int, register: int, force: bool | None = None) -> int:
+        """See SMBus."""
+        return _word(self._transact(i2c_addr, force, READ, register, SmbusSize.WORD_DATA))
+
+    def write_word_data(
+        self, i2c_addr: int, register: int, value: int, force: bool | None = None
+    ) -> None:
+        """See SMBus."""
+        self._transact(i2c_addr, force, WRITE, register, SmbusSize.WORD_DATA, _bytes(value))
+
+    def process_call(
+        self, i2c_addr: int, register: int, value: int, force: bool | None = None
+    ) -> int:
+        """See SMBus."""
+        size = SmbusSize.PROCESS_CALL
+        return _word(self._transact(i2c_addr, force, WRITE, register, size, _bytes(value)))
+
+    def read_block_data(self, i2c_addr: int, register: int, force: bool | None = None) -> list[int]:
+        """See SMBus."""
+        return _block(self._transact(i2c_addr, force, READ, register, SmbusSize.BLOCK_DATA))
+
+    def write_block_data(
+        self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
+    ) -> None:
+        """See SMBus."""
+        self._transact(i2c_addr, force, WRITE, register, SmbusSize.BLOCK_DATA, _counted(data))
+
+    def block_process_call(
+        self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
+    ) -> list[int]:
+        """See SMBus."""
+        size = SmbusSize.BLOCK_PROCESS_CALL
+        return _block(self._transact(i2c_addr, force, WRITE, register, size, _counted(data)))
+
+    def read_i2c_block_data(
+        self, i2c_addr: int, register: int, length: int, force: bool | None = None
+    ) -> list[int]:
+        """See SMBus."""
+        if length > MAX_BLOCK_BYTES:
+            raise ValueError(f"a block has at most {MAX_BLOCK_BYTES} bytes, not {length}")
+        size = SmbusSize.I2C_BLOCK_DATA
+        data = self._transact(i2c_addr, force, READ, register, size, bytes([length]))
+        return _block(data)
+
+    def write_i2c_block_data(
+        self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
+    ) -> None:
+        """See SMBus."""
+        self._transact(i2c_addr, force, WRITE, register, SmbusSize.I2C_BLOCK_DATA, _counted(data))
+
+    def i2c_rdwr(self, *i2c_msgs: Any) -> None:
+        """See SMBus."""
+        messages = [_plain(message) for message in i2c_msgs]
+        data = self._call(Call.RDWR, pack_rdwr(messages))
+        for message, part in zip(i2c_msgs, split_rdwr(messages, data), strict=True):
+            for index, byte in enumerate(part):
+                message.buf[index] = bytes([byte])
+            if message.flags & MessageFlag.RECEIVE_LENGTH:
+                message.len = len(part)
+
+    # --- the device file ----------------------------------------------------------------------
+
+    def _transact(
+        self,
+        address: int,
+        force: bool | None,
+        direction: int,
+        command: int,
+        size: SmbusSize,
+        data: bytes = b"",
+    ) -> bytes:
+        self._set_address(address, force)
+        filled = data.ljust(SMBUS_DATA_BYTES, b"\0")
+        return self._call(
+            Call.SMBUS, pack_smbus(SmbusCall(direction, command & 0xFF, size, filled))
+        )
+
+    def _set_address(self, address: int, force: bool | None = None) -> None:
+        force = self.force if force is None else force
+        addressed = (address, force)
+        if addressed != self._addressed:
+            self._ioctl(Ioctl.SLAVE_FORCE if force else Ioctl.SLAVE, address)
+            self.address, self._addressed = address, addressed
+
+    def _get_funcs(self) -> I2cFunc:
+        (value,) = struct.unpack("=Q", self._ioctl(Ioctl.FUNCS, 0))
+        return I2cFunc(value)
+
+    def _ioctl(self, number: Ioctl, argument: int) -> bytes:
+        return self._call(Call.IOCTL, pack_ioctl(number, argument & 0xFFFF_FFFF_FFFF_FFFF))
+
+    def _call(self, call: Call, body: bytes) -> bytes:
+        if self._link is None:
+            raise PortClosedError("the I2C bus is not open: call open() first")
+        result, data = self._link.call(call, body)
+        if result < 0:
+            raise OSError(-result, os.strerror(-result))
+        return data
+
+
+class _SocketLink:
+    """A device file in the process that serves the bus."""
+
+    def __init__(self, path: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._socket.connect(str(path))
+        except OSError as error:
+            self._socket.close()
+            raise PortOpenError(
+                f"no emulation serves {path} ({error.strerror}); start one with cubestack emulate"
+            ) from error
+
+    @property
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
+        data = request(0, call, body)
+        try:
+            self._socket.sendall(LENGTH.pack(len(data)) + data)
+            (length,) = LENGTH.unpack(self._receive(LENGTH.size))
+            return split_reply(self._receive(length))
+        except OSError as error:
+            raise PortClosedError("the emulation has gone") from error
+
+    def _receive(self, count: int) -> bytes:
+        data = b""
+        while len(data) < count:
+            part = self._socket.recv(count - len(data))
+            if not part:
+                raise ConnectionResetError
+            data += part
+        return data
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _find_socket(bus: int | str) -> Path:
+    """The socket of a bus: that of `cubestack run` around this program, else of `emulate`."""
+    text = str(bus).removeprefix(DEVICE)
+    if not text.isdecimal():
+        return Path(text)
+    path = os.environ.get("CUBESTACK_I2C_SOCKET")
+    if path and os.environ.get("CUBESTACK_I2C_BUS") == text:
+        return Path(path)
+    return socket_path(int(text))
+
+
+def _plain(message: Any) -> RdwrMessage:
+    """A message of smbus2; of a read whose length comes from the device, the first byte counts."""
+    content = bytes(message)
+    if message.flags & MessageFlag.READ:
+        content = content[:1] if message.flags & MessageFlag.RECEIVE_LENGTH else b""
+    return RdwrMessage(message.addr, message.flags, message.len, content)
+
+
+def _bytes(word: int) -> bytes:
+    return struct.pack("<H", word & 0xFFFF)
+
+
+def _word(data: bytes) -> int:
+    return int.from_bytes(data[:2], "little")
+
+
+def _counted(data: Sequence[int]) -> bytes:
+    if len(data) > MAX_BLOCK_BYTES:
+        raise ValueError(f"a block has at most {MAX_BLOCK_BYTES} bytes, not {len(data)}")
+    return bytes([len(data), *data])
+
+
+def _block(data: bytes) -> list[int]:
+    return list(data[1 : 1 + data[0]])

@@ -1,0 +1,182 @@
+"""The ground tool: selection, triangles and cache, against slow and plain ways to the same."""
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.aramis import catalogue as aramis_catalogue
+from cubestack.emulator.boards.aramis.catalogue import (
+    PUBLISHED,
+    CatalogueParameters,
+    build_database,
+    cached_database,
+    select_stars,
+)
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.firmware_model.aramis.catalogue.database import Database
+
+SMALL = CatalogueParameters(fov_deg=20, stars_per_field=3, mag_limit=3, step_deg=5)
+
+
+@pytest.fixture(scope="module")
+def small() -> Database:
+    return build_database(SMALL)
+
+
+@pytest.fixture(scope="module")
+def published() -> Database:
+    return build_database(CatalogueParameters(epoch=2000))
+
+
+def test_counts_are_close_to_the_published_ones(published: Database) -> None:
+    """Within 1 %: another catalogue has other magnitudes (see the module)."""
+    assert len(published.numbers) == 1324
+    assert len(published) == 267_128
+    assert len(published.numbers) == pytest.approx(PUBLISHED["stars"], rel=0.01)
+    assert len(published) == pytest.approx(PUBLISHED["triangles"], rel=0.01)
+
+
+def test_proper_motion_moves_stars() -> None:
+    first = build_database(CatalogueParameters(fov_deg=20, stars_per_field=3, epoch=2000))
+    second = build_database(CatalogueParameters(fov_deg=20, stars_per_field=3, epoch=2026))
+    shared, at_first, at_second = np.intersect1d(first.numbers, second.numbers, return_indices=True)
+    assert len(shared) > 0.99 * len(first.numbers)
+    moved = np.linalg.norm(first.vectors[at_first] - second.vectors[at_second], axis=1)
+    alpha_centauri = 71683
+    assert np.degrees(moved[shared == alpha_centauri][0]) * 3600 == pytest.approx(
+        26 * 3.7, rel=0.02
+    )
+
+
+def test_each_field_keeps_its_brightest() -> None:
+    sky = load_sky(SMALL.epoch)
+    bright = np.flatnonzero(sky.v_mag <= SMALL.mag_limit)
+    expected = set()
+    for declination in range(-90, 91, 5):
+        for ascension in range(0, 360, 5):
+            ra, dec = np.radians([ascension, declination])
+            middle = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
+            angles = np.degrees(np.arccos(np.clip(sky.vectors[bright] @ middle, -1, 1)))
+            inside = bright[angles <= SMALL.fov_deg / 2]
+            expected |= set(inside[np.argsort(sky.v_mag[inside])][:3].tolist())
+    assert set(select_stars(sky, SMALL).tolist()) == expected
+
+
+def test_every_triangle_that_fits_is_there(small: Database) -> None:
+    vectors = small.vectors.astype(np.float64)
+    near = np.degrees(np.arccos(np.clip(vectors @ vectors.T, -1, 1))) < SMALL.fov_deg
+    expected = {
+        triple
+        for triple in combinations(range(len(vectors)), 3)
+        if all(near[a, b] for a, b in combinations(triple, 2))
+    }
+    assert set(map(tuple, small.stars.tolist())) == expected
+    assert len(small) == len(expected)
+
+
+def test_areas_moments_and_their_order(small: Database) -> None:
+    corners = small.vectors.astype(np.float64)[small.stars]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = np.linalg.norm(np.cross(first, second), axis=1) / 2
+    spread = corners - corners.mean(axis=1, keepdims=True)
+    moments = areas * np.sum(spread**2, axis=(1, 2)) / 12
+    np.testing.assert_allclose(small.areas, areas, rtol=2e-3)
+    np.testing.assert_allclose(small.moments, moments[small.moment_triangles], rtol=2e-3)
+    assert (np.diff(small.areas) >= 0).all()
+    assert (np.diff(small.moments) >= 0).all()
+    assert sorted(small.moment_triangles.tolist()) == list(range(len(small)))
+
+
+def test_faces_are_those_of_the_middles(small: Database) -> None:
+    middles = small.vectors[small.stars].mean(axis=1)
+    distances = np.linalg.norm(
+        middles[:, None] / np.linalg.norm(middles, axis=1)[:, None, None] - small.sphere.centres,
+        axis=2,
+    )
+    chosen = distances[np.arange(len(small)), small.faces]
+    np.testing.assert_allclose(chosen, distances.min(axis=1), atol=1e-5)
+
+
+def test_a_shorter_side_leaves_fewer_triangles(small: Database) -> None:
+    fewer = build_database(
+        CatalogueParameters(
+            fov_deg=20, stars_per_field=3, mag_limit=3, step_deg=5, longest_side_deg=15
+        )
+    )
+    assert 0 < len(fewer) < len(small)
+    assert len(fewer.numbers) == len(small.numbers)
+
+
+def test_the_cache_gives_the_same_database(
+    tmp_path: Path, small: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = cached_database(SMALL, folder=tmp_path / "new")
+    (file,) = (tmp_path / "new").iterdir()
+    assert first.pack() == small.pack() == file.read_bytes()
+    monkeypatch.setattr(aramis_catalogue, "build_database", None)
+    assert cached_database(SMALL, folder=tmp_path / "new").pack() == small.pack()
+
+
+def test_other_parameters_are_other_files(tmp_path: Path) -> None:
+    cached_database(SMALL, folder=tmp_path)
+    cached_database(
+        CatalogueParameters(fov_deg=20, stars_per_field=3, mag_limit=2.9), folder=tmp_path
+    )
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_damaged_file_is_built_anew(tmp_path: Path, small: Database) -> None:
+    cached_database(SMALL, folder=tmp_path)
+    (file,) = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:-1] + b"?")
+    assert cached_database(SMALL, folder=tmp_path).pack() == small.pack()
+    assert file.read_bytes() == small.pack()
+
+
+def test_a_folder_that_can_not_be_made_costs_nothing_else(tmp_path: Path, small: Database) -> None:
+    (tmp_path / "file").write_text("in the way")
+    assert cached_database(SMALL, folder=tmp_path / "file" / "x").pack() == small.pack()
+
+
+def test_progress_is_told() -> None:
+    seen: dict[str, int] = {}
+
+    def watch(items: object, total: int, label: str) -> list[int]:
+        numbers = list(items)  # type: ignore[call-overload]
+        assert len(numbers) == total
+        seen[label] = total
+        return numbers
+
+    built = build_database(SMALL, watch)
+    assert seen == {"scanning the sky": 37, "listing triangles": len(built.numbers)}
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"fov_deg": 0.0}, "fov_deg must be 1 to 60, not 0.0"),
+        ({"fov_deg": float("nan")}, "fov_deg must be 1 to 60, not nan"),
+        ({"stars_per_field": 2}, "stars_per_field must be 3 to 50, not 2"),
+        ({"mag_limit": 8.0}, "mag_limit must be 0 to 7.5, not 8.0"),
+        ({"step_deg": 0.1}, "step_deg must be 0.25 to 10, not 0.1"),
+        ({"epoch": 3000.0}, "epoch must be 1800 to 2200, not 3000.0"),
+        ({"longest_side_deg": 90.0}, "longest_side_deg must be 1 to 60, not 90.0"),
+    ],
+)
+def test_parameters_out_of_range_are_refused(setting: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        CatalogueParameters(**setting)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        (CatalogueParameters(fov_deg=1, mag_limit=1, step_deg=10), "stars give no triangle"),
+        (CatalogueParameters(fov_deg=60, stars_per_field=50, step_deg=10), "more than 1400000"),
+    ],
+)
+def test_parameters_that_give_no_database(parameters: CatalogueParameters, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        build_database(parameters)

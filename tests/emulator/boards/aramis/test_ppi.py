@@ -1,0 +1,153 @@
+"""The interface on a camera of eight lines, and on the real one's timing."""
+
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.aramis.ppi import Ppi
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
+from cubestack.firmware_model.aramis.hardware import FrameEnd
+
+LINE, COLUMNS, ROWS, PERIOD = 12, 8, 6, 1000
+BLANK = 50
+FRAME = ROWS * LINE + BLANK
+
+
+class Lines:
+    """Frames of six lines, the number of the frame in every pixel; rows cut from ``short`` on."""
+
+    line_clocks, active_columns = LINE, COLUMNS
+    period = Fraction(PERIOD)
+
+    def __init__(self, phase: int = 0) -> None:
+        self.on_change: Callable[[], None] = lambda: None
+        self.alive = True
+        self.rows = ROWS
+        self.phase = phase
+
+    def segment_at(self, time_ps: int) -> StreamSegment | None:
+        if not self.alive:
+            return None
+        frame, clock = divmod(time_ps // PERIOD + self.phase, FRAME)
+        start = (frame * FRAME - self.phase) * PERIOD
+        valid = self.rows * LINE
+        if clock < valid:
+            pixels = np.full((self.rows, COLUMNS), frame, np.uint8)
+            return StreamSegment(start, valid, 1, self.rows, lambda: pixels)
+        return StreamSegment(start + valid * PERIOD, FRAME - valid, 0, 0, None)
+
+    def frame_from(self, time_ps: int) -> RollingShutter | None:
+        return RollingShutter(time_ps, Fraction(LINE * PERIOD), 1, 1)
+
+
+class Bench:
+    def __init__(self, phase: int = 0) -> None:
+        self.kernel = Kernel()
+        self.lines = Lines(phase)
+        self.ppi = Ppi(self.kernel, self.lines)
+        self.ends: list[tuple[int, FrameEnd]] = []
+        self.ppi.on_end = lambda end: self.ends.append((self.kernel.now, end))
+        self.target = np.full((ROWS, COLUMNS), 99, np.uint8)
+
+    def run(self, clocks: int) -> list[tuple[int, FrameEnd]]:
+        self.kernel.advance_to(self.kernel.now + clocks * PERIOD)
+        return self.ends
+
+
+def test_the_frame_under_way_is_skipped_and_the_next_one_stored_at_its_last_pixel() -> None:
+    bench = Bench(phase=5)
+    bench.ppi.start(bench.target)
+    assert bench.ppi.busy
+    assert bench.run(2 * FRAME) == [
+        ((FRAME - 5 + (ROWS - 1) * LINE + COLUMNS) * PERIOD, FrameEnd.STORED)
+    ]
+    assert (bench.target == 1).all()
+    assert not bench.ppi.busy
+    assert bench.ppi.stored is not None
+    assert bench.ppi.stored.readout_ps == (FRAME - 5) * PERIOD
+
+
+def test_only_the_lines_wanted_are_taken() -> None:
+    bench = Bench(phase=ROWS * LINE)
+    target = np.zeros((2, COLUMNS), np.uint8)
+    bench.ppi.start(target)
+    assert bench.run(FRAME) == [((BLANK + LINE + COLUMNS) * PERIOD, FrameEnd.STORED)]
+    assert (target == 1).all()
+
+
+def test_a_short_frame_and_wrong_lines_are_reported() -> None:
+    bench = Bench(phase=ROWS * LINE)
+    bench.lines.rows = ROWS - 2
+    bench.ppi.start(bench.target)
+    assert [end for _, end in bench.run(2 * FRAME)] == [FrameEnd.TOO_SHORT]
+    assert (bench.target == 99).all()
+    wide = np.full((ROWS, COLUMNS + 3), 99, np.uint8)
+    bench.lines.rows = ROWS
+    bench.ppi.start(wide)
+    assert bench.run(3 * FRAME)[-1][1] is FrameEnd.WRONG_LINES
+    assert (wide[:, :COLUMNS] != 99).all()
+    assert (wide[:, COLUMNS:] == 99).all()
+
+
+def test_a_dead_camera_never_ends_a_frame_and_stopping_helps() -> None:
+    bench = Bench(phase=ROWS * LINE)
+    bench.ppi.start(bench.target)
+    bench.run(BLANK + 2 * LINE)
+    bench.lines.alive = False
+    bench.lines.on_change()
+    assert bench.run(10 * FRAME) == []
+    assert bench.ppi.busy
+    bench.ppi.stop()
+    assert not bench.ppi.busy
+    bench.lines.alive = True
+    bench.lines.on_change()
+    assert bench.run(10 * FRAME) == []
+
+
+def test_starting_again_gives_up_the_frame_before() -> None:
+    bench = Bench(phase=ROWS * LINE)
+    other = np.zeros((ROWS, COLUMNS), np.uint8)
+    bench.ppi.start(bench.target)
+    bench.run(BLANK + 2 * LINE)
+    bench.ppi.start(other)
+    assert [end for _, end in bench.run(3 * FRAME)] == [FrameEnd.STORED]
+    assert (bench.target == 99).all()
+    assert (other == 2).all()
+
+
+def test_a_change_that_leaves_the_frame_alone_does_not_disturb_it() -> None:
+    bench = Bench(phase=ROWS * LINE)
+    bench.ppi.start(bench.target)
+    for _ in range(9):
+        bench.run(17)
+        bench.lines.on_change()
+    assert [end for _, end in bench.run(FRAME)] == [FrameEnd.STORED]
+    assert (bench.target == 1).all()
+
+
+@pytest.mark.parametrize("start_ms", [0, 40, 66])
+def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> None:
+    kernel = Kernel()
+    sky = SkyScene([0, 0, 0, 1], optics=aramis_lens(), noise=False, mag_limit=3.0)
+    camera = Mt9m001(sky)
+    ppi = Ppi(kernel, camera)
+    ends: list[tuple[int, FrameEnd]] = []
+    ppi.on_end = lambda end: ends.append((kernel.now, end))
+    target = np.zeros((1024, 1280), np.uint8)
+    kernel.advance_to(start_ms * PS_PER_MS)
+    ppi.start(target)
+    kernel.advance_to(200 * PS_PER_MS)
+    row_s = 1524 / 48e6
+    number = 1 if start_ms < 33 else 2
+    expected = number * 1050 * row_s + (242 + 1023 * 1524 + 1280) / 48e6
+    assert ends == [(pytest.approx(expected * PS_PER_S, abs=2), FrameEnd.STORED)]
+    assert ppi.stored is not None
+    assert ppi.stored.readout_ps == pytest.approx((number * 1050 * row_s + 242 / 48e6) * PS_PER_S)
+    assert target.min() > 0

@@ -1,0 +1,241 @@
+"""Camera, loop, buses and clocks of the whole star tracker."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.aramis.board import ARAMIS_POWER, AramisBoard
+from cubestack.emulator.scene.attitude import attitude_error_deg
+from cubestack.emulator.sim.virtual_time import PS_PER_MS
+from cubestack.firmware_model.interface.aramis import (
+    INTERFACE,
+    CatalogueState,
+    MeasurementMode,
+    Reason,
+)
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import CommandRefusedError
+
+from .desk import Desk, catalogue, scene
+
+
+def test_a_dead_camera_is_reported(active: Desk) -> None:
+    active.board.camera.power(False, active.board.kernel.now)
+    found = active.aramis.measure()
+    assert (found.valid, found.reason) == (False, Reason.CAMERA_TIMEOUT)
+    assert active.aramis.measure().reason is Reason.CAMERA_SILENT  # it is set up anew, in vain
+    assert active.flags() == {"CameraTimeout", "CameraSilent"}
+    active.board.camera.power(True, active.board.kernel.now)
+    assert active.aramis.measure().valid
+
+
+def test_a_window_that_the_program_did_not_set_is_noticed_and_repaired(active: Desk) -> None:
+    def write(address: int, value: int) -> None:
+        data = bytes([address]) + value.to_bytes(2, "big")
+        assert active.board.camera.i2c_write(0x5D, data, active.board.kernel.now)
+
+    write(0x03, 511)
+    found = active.aramis.measure()
+    assert found.reason is Reason.CAMERA_FRAME
+    write(0x03, 1023)
+    write(0x04, 639)
+    assert active.aramis.measure().reason is Reason.CAMERA_FRAME
+    assert active.flags() == {"CameraFrameError"}
+
+
+def test_exposure_and_gain_reach_the_sensor_and_registers_can_be_read(active: Desk) -> None:
+    active.client.command("SetExposure", Rows=2000)
+    active.client.command("SetGain", Gain=8.0)
+    active.aramis.measure()
+    assert active.board.ppi.stored is not None
+    assert active.board.ppi.stored.exposure_lines == 2000
+    active.client.command("SelectCameraRegister", Address=0x35)
+    active.client.wait_processed(1)
+    register = active.client.telemetry("CameraRegister")
+    assert register == {"Address": 0x35, "Value": 0x60, "Valid": 1}
+    active.client.command("WriteCameraRegister", Address=0x35, Value=8)
+    active.client.wait_processed(1)
+    active.aramis.measure()
+    active.client.command("SelectCameraRegister", Address=0x35)
+    active.client.wait_processed(1)
+    assert active.client.telemetry("CameraRegister")["Value"] == 0x60
+
+
+def test_pictures_come_down_as_the_camera_took_them(active: Desk) -> None:
+    active.aramis.measure()
+    star = active.aramis.stars()[0]
+    number, column = divmod(1280 * round(star.y_px) + round(star.x_px), 128)
+    active.client.command("ImageBlockSet", BlockNumber=number)
+    active.client.wait_processed(1)
+    block = active.client.telemetry("ImageBlock")["Block"]
+    assert isinstance(block, bytes)
+    assert block[column] > 100
+    active.client.command("ImageBlockSet", BlockNumber=9)
+    active.client.wait_processed(1)
+    tenth = active.client.telemetry("ImageBlock")["Block"]
+    streamed = list(active.client.stream("StreamDownImage", 20))
+    assert streamed[9] == tenth
+    assert {len(block) for block in streamed} == {128}
+
+
+# --- loop -----------------------------------------------------------------------------------------
+
+
+def test_the_loop_runs_at_1_hz(active: Desk) -> None:
+    active.client.command("StartLoop", Period=1000, Mode=MeasurementMode.AIDED)
+    active.client.pause(10)
+    status = active.client.telemetry("LoopStatus")
+    assert status["Iterations"] == 10
+    assert status["LateIterations"] == 0
+    assert active.aramis.attitude().mode is MeasurementMode.AIDED
+    assert active.error_deg()[0] < 0.01
+    active.client.command("StopLoop")
+    active.client.pause(1.5)
+    done = active.client.telemetry("LoopStatus")["Iterations"]
+    active.client.pause(3)
+    assert active.client.telemetry("LoopStatus")["Iterations"] == done
+
+
+def test_below_a_second_the_next_frame_comes_while_the_last_one_is_worked_on(active: Desk) -> None:
+    active.client.command("StartLoop", Period=600, Mode=MeasurementMode.LOST_IN_SPACE)
+    active.client.pause(6.05)
+    status = active.client.telemetry("LoopStatus")
+    assert status["Iterations"] >= 9
+    assert active.aramis.phase_times()["capture"] < 5.0
+    assert active.error_deg()[0] < 0.01
+
+
+def test_a_turning_satellite_s_attitude_is_that_of_its_image_time() -> None:
+    desk = Desk(scene(rate_deg_s=(0.02, 0.1, 0.05)))
+    desk.aramis.activate()
+    desk.client.command("StartLoop", Period=1000, Mode=MeasurementMode.AIDED)
+    for _ in range(3):
+        desk.client.pause(1.0)
+        assert desk.aramis.attitude().valid
+        assert desk.error_deg()[0] < 0.01
+
+
+# --- buses, clocks, robustness --------------------------------------------------------------------
+
+
+def test_the_same_node_answers_on_i2c() -> None:
+    board = AramisBoard(scene(), catalogue())
+    bus = board.i2c()
+    client = I2cClient(bus, INTERFACE, wait=bus.wait)
+    aramis = Aramis(client)
+    assert aramis.activate() is CatalogueState.GOOD
+    assert aramis.measure().valid
+    assert client.telemetry("Identification")["NodeType"] == 6
+    with pytest.raises(CommandRefusedError, match="BAD_PARAMETER"):
+        client.command("SetExposure", Rows=0)
+
+
+def test_runs_repeat_exactly() -> None:
+    def run() -> list[dict[str, Any]]:
+        desk = Desk()
+        desk.aramis.activate()
+        desk.aramis.measure()
+        return [desk.client.telemetry(name) for name in ("Attitude", "PhaseTimes", "StarDetails")]
+
+    assert run() == run()
+
+
+def test_every_telemetry_frame_can_be_read_at_any_time(desk: Desk) -> None:
+    def read_all() -> None:
+        for message in INTERFACE.telemetries:
+            assert set(desk.client.telemetry(message.name)) == {f.name for f in message.fields}
+
+    read_all()
+    desk.aramis.activate()
+    read_all()
+    desk.aramis.measure()
+    read_all()
+
+
+def test_every_telecommand_has_an_effect(desk: Desk) -> None:
+    assert desk.board.program.commands.handled == {m.name for m in INTERFACE.telecommands}
+
+
+def test_the_times_of_the_steps_add_up(active: Desk) -> None:
+    active.aramis.measure()
+    times = active.aramis.phase_times()
+    total = times.pop("total")
+    assert sum(times.values()) == pytest.approx(total, rel=0.02)
+    assert times["spikes"] > times["centroids"] > 0
+
+
+def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
+    for save in (False, True):
+        active.client.command("SetExposure", Rows=1234)
+        if save:
+            active.client.command("SaveConfig")
+        active.client.command("Reset")
+        active.client.pause(0.3)
+        kept = active.client.telemetry("Exposure")["Rows"] == 1234
+        assert kept is save
+    active.client.command("ClearConfig")
+    active.client.wait_processed(1)
+    assert active.client.telemetry("Exposure")["Rows"] == 6299
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_that_a_host_sends_stops_the_node(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    board = AramisBoard(scene(noise=False, mag_limit=3.0), None, seed=seed)
+    line = board.serial()
+    commands = [m for m in INTERFACE.telecommands if m.name != "StreamDownImage"]
+    for _ in range(60):
+        message = commands[int(rng.integers(len(commands)))]
+        kind = rng.integers(4)
+        payload = bytes([message.id]) + rng.bytes(message.length)
+        if kind == 0:
+            line.write(rng.bytes(int(rng.integers(1, 60))))
+        elif kind == 1:
+            line.write(b"\x1f\x7f" + payload[: int(rng.integers(len(payload) + 1))])
+        else:
+            line.write(b"\x1f\x7f" + payload.replace(b"\x1f", b"\x1f\x1f") + b"\x1f\xff")
+        line.read(10_000, float(rng.uniform(0, 0.05)))
+    while line.read(10_000, 1.0):  # what is still on its way in either direction
+        pass
+    client = NodeClient(line, INTERFACE)
+    assert client.telemetry("Identification")["NodeType"] == 6
+    client.wait_processed(60)
+
+
+def test_power_follows_what_runs(desk: Desk) -> None:
+    desk.client.pause(1.0)
+    resting_ma = desk.board.power.charge_mas() / desk.now_s
+    desk.aramis.activate()
+    desk.client.command("StartLoop", Period=1000, Mode=0)
+    desk.client.pause(5.0)
+    assert desk.board.power.charge_mas() / desk.now_s > resting_ma + 200 / ARAMIS_POWER.volts
+
+
+def test_the_truth_is_that_of_the_frame_asked_for() -> None:
+    desk = Desk(scene(rate_deg_s=(0.0, 0.5, 0.0)))
+    assert desk.board.truth() is None
+    desk.aramis.activate()
+    times = []
+    for _ in range(2):
+        found = desk.aramis.measure()
+        times.append(found.image_uptime_s)
+    one, two = desk.board.truth(1), desk.board.truth(2)
+    assert one is not None
+    assert two is not None
+    turned = attitude_error_deg(two, one)[0]
+    assert turned == pytest.approx(0.5 * (times[1] - times[0]), abs=0.001)
+    assert desk.board.truth(3) is None
+    np.testing.assert_array_equal(desk.board.truth(), two)
+
+
+def test_busy_says_whether_it_waits_for_the_host(active: Desk) -> None:
+    active.client.pause(0.1)
+    assert not active.board.busy()
+    active.client.command("GetAttitude")
+    assert active.board.busy()
+    active.client.wait_processed(5)
+    active.board.kernel.advance_to(active.board.kernel.now + 50 * PS_PER_MS)
+    assert not active.board.busy()

@@ -1,0 +1,173 @@
+"""The star tracker's use cases, over the wire."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.boards.aramis.board import AramisBoard
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.aramis import (
+    INTERFACE,
+    MS_PER_DAY,
+    CatalogueState,
+    LatchUpStep,
+    MeasurementMode,
+    MeasurementOutcome,
+    Reason,
+    SensorState,
+)
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.node import NodeClient
+
+from .desk import Desk, scene
+
+
+def test_activate_measure_deactivate(desk: Desk) -> None:
+    desk.client.pause(0.1)
+    status = desk.client.telemetry("SensorStatus")
+    assert (status["State"], status["Catalogue"]) == (SensorState.INACTIVE, 0)
+    assert not desk.board.camera.enabled
+    assert desk.aramis.activate() is CatalogueState.GOOD
+    assert desk.board.camera.enabled
+    found = desk.aramis.measure()
+    assert found.valid
+    assert found.outcome is MeasurementOutcome.CONCLUSIVE
+    assert found.mode is MeasurementMode.LOST_IN_SPACE
+    cross, roll = desk.error_deg()
+    assert cross < 0.01
+    assert abs(roll) < 0.05
+    desk.aramis.deactivate()
+    assert not desk.board.camera.enabled
+    assert desk.client.telemetry("SensorStatus")["State"] == SensorState.INACTIVE
+    assert desk.flags() == set()
+
+
+def test_a_measurement_without_activation_says_so(desk: Desk) -> None:
+    found = desk.aramis.measure()
+    assert (found.valid, found.reason, found.quaternion) == (False, Reason.NOT_ACTIVE, None)
+    assert desk.flags() == {"NotActive"}
+    desk.client.command("StartLoop", Period=1000, Mode=0)
+    desk.client.wait_processed(1)
+    assert desk.client.telemetry("LoopStatus")["Running"] == 0
+
+
+def test_rough_directions_as_vector_and_as_angles(active: Desk) -> None:
+    boresight = np.array([0.104, 0.994, -0.017])
+    for near in ({"near": boresight}, {"near_rad": (1.466, -0.017)}):
+        found = active.aramis.measure(**near)  # type: ignore[arg-type]
+        assert (found.valid, found.mode) == (True, MeasurementMode.AIDED)
+        assert active.error_deg()[0] < 0.01
+    away = active.aramis.measure(near=-boresight)
+    assert not away.valid
+    assert away.outcome is MeasurementOutcome.NONE
+    assert away.quaternion is not None  # an older one, marked as such
+    with pytest.raises(ValueError, match="give one of them"):
+        active.aramis.measure(boresight, near_rad=(0.0, 0.0))
+
+
+def test_the_answer_carries_the_image_s_time(active: Desk) -> None:
+    assert active.aramis.julian_date() is None
+    assert active.aramis.measure().julian_date is None
+    active.aramis.set_time(2_461_366.75)
+    set_at_s = active.now_s
+    found = active.aramis.measure()
+    assert active.board.ppi.stored is not None
+    exposed_s = active.board.ppi.stored.mid_exposure_ps(511.5) / PS_PER_S
+    assert found.image_uptime_s == pytest.approx(exposed_s, abs=0.0011)
+    assert found.julian_date is not None
+    seconds = (found.julian_date - 2_461_366.75) * MS_PER_DAY / 1000
+    assert seconds == pytest.approx(exposed_s - set_at_s, abs=0.03)
+    now = active.aramis.julian_date()
+    assert now is not None
+    assert (now - 2_461_366.75) * 86_400 == pytest.approx(active.now_s - set_at_s, abs=0.03)
+
+
+def test_the_body_s_attitude_is_turned_by_the_loaded_rotation(active: Desk) -> None:
+    turn = Rotation.from_euler("xyz", [20, -40, 75], degrees=True)
+    assert active.aramis.body_quaternion() is None
+    active.aramis.measure()
+    plain, camera = active.aramis.body_quaternion(), active.aramis.attitude().quaternion
+    assert plain is not None
+    assert camera is not None
+    np.testing.assert_allclose(plain, camera, atol=1e-6)
+    active.aramis.set_body_rotation(turn.as_quat().tolist())
+    body = active.aramis.body_quaternion()
+    assert body is not None
+    expected = turn * Rotation.from_quat(camera)
+    assert (Rotation.from_quat(body).inv() * expected).magnitude() < 1e-6
+    active.client.command("Reset")
+    active.client.pause(0.3)
+    assert active.client.telemetry("BodyRotation")["Q2"] == pytest.approx(turn.as_quat()[2])
+    assert active.client.telemetry("ExtendedIdentification")["ResetCause"] == 2
+
+
+def test_latch_up_action(active: Desk) -> None:
+    assert active.client.telemetry("SupplyStatus")["Current"] == 110.0
+    active.board.power.latch_up("camera", 300.0)
+    assert active.client.telemetry("SupplyStatus")["Current"] == 410.0
+    active.client.command("LatchUpAction", Step=LatchUpStep.OFF)
+    assert active.client.telemetry("SupplyStatus") == {"Switch": 0, "Current": 0.0}
+    found = active.aramis.measure()
+    assert (found.valid, found.reason) == (False, Reason.CAMERA_OFF)
+    active.client.command("LatchUpAction", Step=LatchUpStep.ON)
+    active.client.wait_processed(1)
+    assert active.client.telemetry("SupplyStatus") == {"Switch": 1, "Current": 110.0}
+    assert active.aramis.measure().valid
+
+
+def test_the_supply_is_cut_at_once_even_in_the_middle_of_a_measurement(active: Desk) -> None:
+    active.client.command("GetAttitude")
+    before = active.now_s
+    active.client.command("LatchUpAction", Step=LatchUpStep.OFF)
+    assert not active.board.camera.running
+    assert active.now_s - before < 0.01
+    active.client.wait_processed(5)
+    assert active.aramis.attitude().reason is Reason.CAMERA_OFF
+    active.aramis.latch_up_action()
+    assert active.aramis.measure().valid
+
+
+def test_a_catalogue_is_loaded_by_telecommand() -> None:
+    small = build_database(CatalogueParameters(step_deg=10, stars_per_field=3, mag_limit=3.0))
+    desk = Desk()
+    board = AramisBoard(scene(), None)
+    desk.board, desk.client = board, NodeClient(board.serial(), INTERFACE)
+    desk.aramis = Aramis(desk.client)
+    assert desk.aramis.activate() is CatalogueState.MISSING
+    assert desk.aramis.measure().reason is Reason.NO_CATALOGUE
+    assert "CatalogueMissing" in desk.flags()
+    image = small.pack()
+    seen: list[tuple[int, int]] = []
+    state = desk.aramis.load_catalogue(image, lambda done, total: seen.append((done, total)))
+    assert state is CatalogueState.GOOD
+    assert seen[-1] == (-(-len(image) // 128),) * 2
+    status = desk.client.telemetry("CatalogueStatus")
+    assert (status["Stars"], status["Triangles"], status["Bytes"]) == (
+        len(small.numbers),
+        len(small),
+        len(image),
+    )
+    desk.aramis.deactivate()
+    assert desk.aramis.activate() is CatalogueState.GOOD
+
+
+def test_a_bad_upload_leaves_the_catalogue_alone(active: Desk) -> None:
+    def try_to_load(image: bytes, checksum: int, numbers: range) -> set[str]:
+        active.client.command("ClearErrorFlags")
+        active.client.command("BeginCatalogue", Length=len(image), Checksum=checksum)
+        for number in numbers:
+            active.client.command("CatalogueBlock", BlockNumber=number, Data=bytes(128))
+        active.client.wait_processed(5)
+        active.client.command("CommitCatalogue")
+        active.client.wait_processed(5)
+        return active.flags()
+
+    zeros = 0xD8EF_0F4A  # any checksum
+    assert try_to_load(bytes(300), zeros, range(3)) == {"UploadError"}  # checksum
+    assert try_to_load(bytes(300), 0x6B86_8B3A, range(2)) == {"UploadError"}  # a block is missing
+    assert try_to_load(bytes(300), zeros, range(2, 4)) == {"UploadError"}  # a stray block
+    active.client.command("CommitCatalogue")
+    active.client.wait_processed(5)
+    assert active.client.telemetry("UploadStatus")["Blocks"] == 3
+    assert active.aramis.measure().valid

@@ -1,0 +1,209 @@
+"""CubeSense's board: pins, supplies, and what happens to pictures and memories.
+
+A tiny program stands in for the firmware where only wires matter.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.cubesense.board import BOOT_US, CubeSenseBoard
+from cubestack.emulator.boards.cubesense.gpio import CHANNELS, Lines
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.sim.virtual_time import PS_PER_MS
+from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
+from cubestack.firmware_model.interface.cubesense.pins import (
+    CAMERA_SCL,
+    CAMERA_SDA,
+    MA_PER_COUNT,
+    SRAM_POWER,
+    Monitor,
+)
+
+FRAME_MS = 34
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def board() -> Iterator[CubeSenseBoard]:
+    made = CubeSenseBoard(EarthSunScene(noise=False), seed=4)
+    yield made
+    made.close()
+
+
+def let_pass(board: CubeSenseBoard, ms: float) -> None:
+    board.kernel.advance_to(board.kernel.now + int(ms * PS_PER_MS))
+
+
+def test_starts_with_the_processor_in_reset_and_everything_switched_off(
+    board: CubeSenseBoard,
+) -> None:
+    assert not any(board.power.is_on(channel) for channel in CHANNELS.values())
+    assert board.power.current_ma() * 5.0 == pytest.approx(41.9, rel=0.06)
+    let_pass(board, BOOT_US / 1000 - 0.01)
+    assert board.power.current_ma() * 5.0 == pytest.approx(41.9, rel=0.06)
+
+
+def test_firmware_switches_everything_on_and_shows_the_published_power(
+    board: CubeSenseBoard,
+) -> None:
+    let_pass(board, 500)
+    assert all(board.power.is_on(channel) for channel in CHANNELS.values())
+    assert board.power.current_ma() * 5.0 == pytest.approx(359.5, rel=0.06)
+
+
+def test_the_firmware_has_set_the_cameras_by_their_control_lines(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    for camera, exposure_lines in ((Camera.SUN, 2), (Camera.NADIR, 8)):
+        shutter = board.cameras[camera].frame_from(board.kernel.now)
+        assert shutter.exposure_lines == exposure_lines
+
+
+def test_monitors_show_what_the_parts_draw(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    hardware = board.hardware
+
+    def shown(monitor: Monitor) -> float:
+        return hardware.adc_counts(monitor) * MA_PER_COUNT
+
+    assert shown(Monitor.SRAM1) == pytest.approx(4.6, abs=MA_PER_COUNT)
+    assert shown(Monitor.SUPPLY_5V) == pytest.approx(board.power.current_ma(), abs=MA_PER_COUNT)
+    cameras = 2 * 25.15
+    assert shown(Monitor.SUPPLY_5V) - shown(Monitor.SUPPLY_3V3) == pytest.approx(
+        cameras, abs=2 * MA_PER_COUNT
+    )
+    board.power.latch_up("SRAM2", 5000.0)
+    assert hardware.adc_counts(Monitor.SRAM2) == 1023  # no more than full scale
+
+
+@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.parametrize("sram", Sram)
+def test_a_picture_on_its_way_takes_current(
+    board: CubeSenseBoard, camera: Camera, sram: Sram
+) -> None:
+    """Storing takes it in one memory; FPGAs take it on their own, or both of them linked."""
+    let_pass(board, 500)
+    idle_ma = board.power.current_ma()
+    board.serial().write(bytes([0x1F, 0x7F, 20, camera, sram, 0x1F, 0xFF]))
+    let_pass(board, 10)
+    taken = [board.power.current_ma(half.name) for half in Sram]
+    assert taken == [7.6 if half is sram else 4.6 for half in Sram]
+    fpgas = 1 if sram == camera else 2
+    assert board.power.current_ma() - idle_ma == pytest.approx(3.0 + 4.3 * fpgas)
+    let_pass(board, 500)
+    assert board.power.current_ma() == pytest.approx(idle_ma)
+
+
+def test_a_memory_loses_its_content_with_its_supply(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    before = {half: memory.copy() for half, memory in board.engine.memories.items()}
+    board.power.switch("SRAM1", False)
+    assert np.mean(board.engine.memories["sun"] != before["sun"]) > 0.9
+    np.testing.assert_array_equal(board.engine.memories["nadir"], before["nadir"])
+
+
+def test_memories_hold_noise_of_the_seed_after_power_up() -> None:
+    contents = []
+    for seed in (1, 1, 2):
+        board = CubeSenseBoard(EarthSunScene(), seed=seed)
+        contents.append(board.engine.memories["sun"].copy())
+        board.close()
+    np.testing.assert_array_equal(contents[0], contents[1])
+    assert np.mean(contents[0] != contents[2]) > 0.9
+
+
+def test_a_dead_camera_has_no_clock_and_answers_nothing(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    board.fail_camera(Camera.SUN)
+    camera = board.cameras[Camera.SUN]
+    assert camera.segment_at(board.kernel.now) is None
+    board.power.switch("sun_camera", False)
+    board.power.switch("sun_camera", True)
+    assert not camera.running
+
+
+def test_a_failed_memory_draws_too_much_each_time_it_is_switched_on(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    board.fail_memory(Sram.SRAM1)
+    assert board.power.current_ma("SRAM1") > 100
+    let_pass(board, 100)
+    assert not board.power.is_on("SRAM1")  # the firmware has cut it off
+    board.power.switch("SRAM1", True)
+    assert board.power.current_ma("SRAM1") > 100
+
+
+def test_truth_is_of_the_frame_that_was_stored(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    assert board.truth(Camera.NADIR) is None
+    board.scene = EarthSunScene(rate_deg_s=(0, 10.0, 0), noise=False)
+    start_ms = board.kernel.now / PS_PER_MS
+    board.serial().write(bytes.fromhex("1f7f1401011fff"))  # capture and detect: nadir, SRAM2
+    let_pass(board, 400)
+    truth = board.truth(Camera.NADIR)
+    assert truth is not None
+    turned_ms = abs(truth.alpha_deg) / 10.0 * 1000
+    assert start_ms < turned_ms < start_ms + 10 + 2 * FRAME_MS
+    assert board.truth(Camera.SUN) is None
+
+
+def test_ports_are_separate(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    node, bench = board.serial(), board.bench_serial()
+    board.hardware.uart_send(Port.BENCH, b"bench")
+    board.hardware.uart_send(Port.NODE, b"node")
+    assert bench.read(10, 0.1)[:1] == b"b"
+    let_pass(board, 2)
+    assert node.read(10, 0.1) == b"node"
+    assert bench.read(10, 0.0) == b"ench"
+
+
+def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> None:
+    from smbus2 import i2c_msg
+
+    let_pass(board, 500)
+    bus = board.i2c()
+    identification = i2c_msg.read(0x1B, 8)
+    bus.i2c_rdwr(i2c_msg.write(0x1B, [0x80]), identification)
+    assert list(identification)[1] == 2  # interface version
+    threshold = i2c_msg.read(0x1C, 1)
+    bus.i2c_rdwr(i2c_msg.write(0x1C, [0x00]), threshold)
+    assert list(threshold) == [225]
+
+
+def test_busy_while_it_works_and_not_while_it_waits(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    assert not board.busy()
+    board.serial().write(bytes.fromhex("1f7f1401011fff"))
+    assert board.busy()
+    let_pass(board, 50)
+    assert board.busy()
+    let_pass(board, 500)
+    assert not board.busy()
+
+
+def test_reset_of_the_processor_releases_every_pin(board: CubeSenseBoard) -> None:
+    let_pass(board, 500)
+    board.serial().write(bytes.fromhex("1f7f00031fff"))
+    while not board.processor.resets:
+        let_pass(board, 0.1)
+    assert not any(board.power.is_on(channel) for channel in CHANNELS.values())
+    assert [board.engine.get_pin(pin) for pin in ("SUNEN", "NADEN")] == [1, 1]
+    let_pass(board, 500)
+    assert board.processor.resets == 1
+    assert all(board.power.is_on(channel) for channel in CHANNELS.values())
+    assert board.hardware.uptime_ms() == pytest.approx(500, abs=5)  # the timer has started anew
+
+
+def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
+    lines = Lines(board.kernel, board.cameras, board.power)
+    scl, sda = CAMERA_SCL[Camera.SUN], CAMERA_SDA[Camera.SUN]
+    assert all(pin in lines for pin in (scl, sda, *SRAM_POWER.values()))
+    assert "SUNEN" not in lines
+    assert lines.get(sda) == 1
+    lines.set(sda, 0)
+    assert lines.get(sda) == 0
+    assert lines.get(scl) == 1

@@ -1,0 +1,55 @@
+"""The board's own knowledge; what it does as a whole is tested in tests/system."""
+
+from collections.abc import Generator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.cubestar import board as cubestar
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.scene.attitude import attitude_error_deg
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.mcu.requests import CameraTransfer, SetPin, Sleep
+
+ENABLE_SENSOR = CameraTransfer(b"\x81\x00\x21")
+
+
+def truth_of_capture(
+    monkeypatch: pytest.MonkeyPatch, scene: SkyScene, enable_us: int, release_us: int
+) -> np.ndarray:
+    """Truth of the frame that a program stores which does nothing else."""
+
+    class Program:
+        def __init__(self, *_hardware: Any) -> None:
+            pass
+
+        def main(self) -> Generator[Any, Any, None]:
+            yield ENABLE_SENSOR
+            yield Sleep(enable_us, wakeable=False)
+            yield SetPin("ENABLE", 1)
+            yield Sleep(release_us, wakeable=False)
+            yield SetPin("ENABLE", 0)
+            yield Sleep(None)
+
+    monkeypatch.setattr(cubestar, "CubeStarProgram", Program)
+    board = cubestar.CubeStarBoard(scene, None)  # type: ignore[arg-type]  # nobody matches stars
+    board.kernel.advance_to(PS_PER_S)
+    truth = board.truth()
+    board.close()
+    assert truth is not None
+    return truth
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="full frames take minutes in the simulator")
+def test_truth_is_that_of_the_stored_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many frames the sensor sends before the program looks at ACK."""
+    scene = SkyScene([0, 0, 0, 1], rate_deg_s=(0, 1, 0), mag_limit=-2, noise=False)
+    first, late, next_one = (
+        truth_of_capture(monkeypatch, scene, 1000 * enable_ms, 1000 * release_ms)
+        for enable_ms, release_ms in ((75, 170), (75, 500), (100, 500))
+    )
+    np.testing.assert_array_equal(late, first)
+    # The reset value of the rate register gives 11.11 frames a second.
+    assert attitude_error_deg(next_one, first)[0] == pytest.approx(1 / 11.11, rel=1e-3)

@@ -1,0 +1,27 @@
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.cubestar.catalogue import PAIR_LIMIT_DEG, onboard_catalogue
+from cubestack.emulator.camera.common.optics import COLUMNS, ROWS, Optics
+
+ALPHA_CENTAURI = {71681: "B", 71683: "A"}
+
+
+def test_published_number_of_stars() -> None:
+    listed = set(onboard_catalogue().hip.tolist())
+    assert len(listed) == 405
+    assert [ALPHA_CENTAURI[hip] for hip in listed & ALPHA_CENTAURI.keys()] == ["A"]
+
+
+def test_every_pair_that_a_picture_can_show_is_listed() -> None:
+    x, y = COLUMNS - 0.5, ROWS - 0.5
+    corners = Optics().unproject(np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]]))
+    diagonal = np.degrees(np.arccos(np.clip(corners @ corners.T, -1, 1))).max()
+    assert diagonal < PAIR_LIMIT_DEG == pytest.approx(diagonal, abs=0.1)
+
+
+def test_compiled_the_same_again() -> None:
+    first, again = onboard_catalogue(3.0), onboard_catalogue.__wrapped__(3.0)
+    assert first is not again
+    np.testing.assert_array_equal(first.vectors, again.vectors)
+    np.testing.assert_array_equal(first.pairs.angle, again.pairs.angle)

@@ -1,0 +1,244 @@
+"""The I2C bus: bits counted by hand, targets called like slave peripherals."""
+
+import errno
+
+import pytest
+
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.sim.virtual_time import Kernel
+
+BIT_PS = {100_000: 10_000_000, 400_000: 2_500_000}
+
+
+class Memory:
+    """A target that answers 0, 1, 2 ... and writes down its calls."""
+
+    def __init__(self, refuse: int | None = None) -> None:
+        self.calls: list[object] = []
+        self.refuse = refuse
+        self._next = 0
+
+    def i2c_start(self, read: bool) -> None:
+        self.calls.append("read" if read else "write")
+
+    def i2c_write(self, byte: int) -> bool:
+        self.calls.append(byte)
+        return byte != self.refuse
+
+    def i2c_read(self) -> int:
+        self._next += 1
+        return self._next - 1
+
+    def i2c_stop(self) -> None:
+        self.calls.append("stop")
+
+
+def make(hz: int = 100_000, **targets: Memory) -> tuple[Kernel, I2cBus]:
+    kernel = Kernel()
+    bus = I2cBus(kernel, hz)
+    for name, target in targets.items():
+        bus.attach(int(name[1:], 16), target)
+    return kernel, bus
+
+
+def perform(kernel: Kernel, bus: I2cBus, *messages: I2cMessage) -> None:
+    kernel.run(until=kernel.process(bus.transfer(list(messages))))
+
+
+@pytest.mark.parametrize("hz", BIT_PS)
+@pytest.mark.parametrize(
+    ("messages", "bits"),
+    [
+        ([I2cMessage(0x1A)], 1 + 9 + 1),
+        ([I2cMessage(0x1A, bytearray(3))], 1 + 9 + 3 * 9 + 1),
+        ([I2cMessage(0x1A, read=4)], 1 + 9 + 4 * 9 + 1),
+        ([I2cMessage(0x1A, bytearray(1)), I2cMessage(0x1A, read=8)], 1 + 18 + 1 + 9 + 72 + 1),
+    ],
+)
+def test_time_on_the_wire(hz, messages, bits):
+    """A start and a stop of one bit each, nine bits a byte, the address included."""
+    kernel, bus = make(hz, x1A=Memory())
+    perform(kernel, bus, *messages)
+    assert kernel.now == bits * BIT_PS[hz]
+
+
+def test_repeated_start_joins_a_write_and_a_read():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    reading = I2cMessage(0x1A, read=3)
+    perform(kernel, bus, I2cMessage(0x1A, bytearray([0x83])), reading)
+    assert target.calls == ["write", 0x83, "read", "stop"]
+    assert reading.data == bytes([0, 1, 2])
+
+
+def test_probe_only_addresses():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    perform(kernel, bus, I2cMessage(0x1A))
+    assert target.calls == ["write", "stop"]
+
+
+def test_each_target_is_called_for_its_own_address():
+    first, second = Memory(), Memory()
+    kernel, bus = make(x1A=first, x1B=second)
+    perform(kernel, bus, I2cMessage(0x1B, bytearray([1])))
+    assert first.calls == []
+    assert second.calls == ["write", 1, "stop"]
+
+
+def test_transfer_over_two_targets_stops_the_first_one_at_the_change():
+    order: list[str] = []
+    first, second = Memory(), Memory()
+    first.i2c_stop = lambda: order.append("first stops")
+    second.i2c_start = lambda _read: order.append("second starts")
+    kernel, bus = make(x1A=first, x1B=second)
+    perform(kernel, bus, I2cMessage(0x1A, bytearray([1])), I2cMessage(0x1B, bytearray([2])))
+    assert order == ["first stops", "second starts"]
+    assert second.calls == [2, "stop"]
+
+
+def test_nobody_at_the_address():
+    kernel, bus = make(x1A=Memory())
+    with pytest.raises(I2cNackError, match="no I2C device answers at 0x30") as raised:
+        perform(kernel, bus, I2cMessage(0x30, bytearray([1, 2, 3])))
+    assert raised.value.errno == errno.ENXIO
+    assert kernel.now == (1 + 9 + 1) * BIT_PS[100_000]  # no data after the address
+
+
+def test_refused_byte_ends_the_transfer():
+    target = Memory(refuse=2)
+    kernel, bus = make(x1A=target)
+    with pytest.raises(I2cNackError, match="0x1a refused byte 0x02") as raised:
+        perform(kernel, bus, I2cMessage(0x1A, bytearray([1, 2, 3])), I2cMessage(0x1A, read=1))
+    assert raised.value.errno == errno.EIO
+    assert target.calls == ["write", 1, 2, "stop"]
+    assert kernel.now == (1 + 9 + 2 * 9 + 1) * BIT_PS[100_000]
+
+
+def test_open_target_is_stopped_when_the_next_address_is_not_acknowledged():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    with pytest.raises(I2cNackError):
+        perform(kernel, bus, I2cMessage(0x1A, bytearray([1])), I2cMessage(0x30))
+    assert target.calls == ["write", 1, "stop"]
+
+
+def test_bus_is_free_after_a_failure():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    for _ in range(3):
+        with pytest.raises(I2cNackError):
+            perform(kernel, bus, I2cMessage(0x30))
+    perform(kernel, bus, I2cMessage(0x1A, bytearray([7])))
+    assert target.calls == ["write", 7, "stop"]
+
+
+def test_concurrent_transfers_wait_for_each_other():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    for byte in (1, 2):
+        kernel.process(bus.transfer([I2cMessage(0x1A, bytearray([byte]))]))
+    kernel.run()
+    assert target.calls == ["write", 1, "stop", "write", 2, "stop"]
+    assert kernel.now == 2 * (1 + 9 + 9 + 1) * BIT_PS[100_000]
+
+
+@pytest.mark.parametrize("granted", [False, True])
+def test_who_gives_up_waiting_holds_up_nobody(granted):
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    first = bus.transfer([I2cMessage(0x1A, bytearray([1]))])
+    kernel.process(first)
+    kernel.step()
+    impatient = bus.transfer([I2cMessage(0x1A, bytearray([2]))])
+    turn = next(impatient)
+    kernel.process(bus.transfer([I2cMessage(0x1A, bytearray([3]))]))
+    while granted and not turn.triggered:
+        kernel.step()
+    impatient.close()
+    kernel.run()
+    assert target.calls == ["write", 1, "stop", "write", 3, "stop"]
+
+
+@pytest.mark.parametrize("address", [-1, 0x00, 0x07, 0x78, 0x3FF])
+def test_reserved_addresses_are_refused(address):
+    _, bus = make()
+    with pytest.raises(ValueError, match=r"is not in 0x08\.\.0x77"):
+        bus.attach(address, Memory())
+
+
+def test_address_is_taken_once():
+    _, bus = make(x1A=Memory())
+    with pytest.raises(ValueError, match="0x1a is taken already"):
+        bus.attach(0x1A, Memory())
+
+
+def test_bit_rate_must_be_positive():
+    with pytest.raises(ValueError, match="positive bit rate, not 0 Hz"):
+        make(0)
+
+
+def test_target_stretches_the_clock_until_it_has_a_byte():
+    kernel, bus = make(x1A=(target := Memory()))
+    ready, read = 50 * BIT_PS[100_000], target.i2c_read
+    target.i2c_read = lambda: read() if kernel.now >= ready else None
+    reading = I2cMessage(0x1A, read=2)
+    perform(kernel, bus, reading)
+    assert reading.data == bytes([0, 1])
+    assert kernel.now == ready + (2 * 9 + 1) * BIT_PS[100_000]
+
+
+def test_clock_held_low_for_ever_ends_the_transfer():
+    kernel, bus = make(x1A=(target := Memory()))
+    target.i2c_read = lambda: None
+    with pytest.raises(I2cNackError, match="held the clock low") as raised:
+        perform(kernel, bus, I2cMessage(0x1A, read=1))
+    assert raised.value.errno == errno.ETIMEDOUT
+    assert target.calls[-1] == "stop"
+
+
+def test_probe_for_reading_addresses_only():
+    target = Memory()
+    kernel, bus = make(x1A=target)
+    perform(kernel, bus, I2cMessage(0x1A, probe_read=True))
+    assert target.calls == ["read", "stop"]
+    assert kernel.now == (1 + 9 + 1) * BIT_PS[100_000]
+
+
+def test_general_call_reaches_those_that_listen():
+    kernel, bus = make(x1A=(deaf := Memory()))
+    listeners = [Memory(refuse=6), Memory(refuse=7)]
+    for address, target in enumerate(listeners, 0x20):
+        bus.attach(address, target, general_call=True)
+    perform(kernel, bus, I2cMessage(0, bytearray([6, 7])))  # one acknowledge is enough
+    assert deaf.calls == []
+    assert [target.calls for target in listeners] == [["write", 6, 7, "stop"]] * 2
+    with pytest.raises(I2cNackError, match="no I2C device answers at 0x00"):
+        perform(kernel, bus, I2cMessage(0, read=1))
+
+
+def test_general_call_without_listeners():
+    kernel, bus = make(x1A=Memory())
+    with pytest.raises(I2cNackError, match="no I2C device answers at 0x00"):
+        perform(kernel, bus, I2cMessage(0, bytearray([6])))
+
+
+@pytest.mark.parametrize("length", [1, 32])
+@pytest.mark.parametrize("rest", [1, 2])  # the length alone, or a checksum as well
+def test_block_brings_its_length(length, rest):
+    kernel, bus = make(x1A=(target := Memory()))
+    target.i2c_read = iter([length, *range(100, 200)]).__next__
+    reading = I2cMessage(0x1A, read=rest, block=True)
+    perform(kernel, bus, reading)
+    assert reading.data == bytes([length, *range(100, 100 + length + rest - 1)])
+    assert kernel.now == (1 + 9 + 9 * (length + rest) + 1) * BIT_PS[100_000]
+
+
+@pytest.mark.parametrize("length", [0, 33, 255])
+def test_block_length_must_make_sense(length):
+    kernel, bus = make(x1A=(target := Memory()))
+    target.i2c_read = lambda: length
+    with pytest.raises(I2cNackError, match=rf"block length {length}, not 1\.\.32") as raised:
+        perform(kernel, bus, I2cMessage(0x1A, read=1, block=True))
+    assert raised.value.errno == errno.EPROTO
+    assert target.calls[-1] == "stop"

@@ -1,0 +1,251 @@
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.special import ndtr
+
+from cubestack.emulator.camera.common.exposure import FAINTEST_V, star_light, star_pixels
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.photometry import (
+    DN12_PER_DN8,
+    ELECTRONS_PER_DN12,
+    electrons_per_second,
+)
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mlx75412.pixel_array import ideal_counts
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.sky import Pose, SkyScene
+
+LINE = Fraction(132_200_000)
+LONG = RollingShutter(10**12, LINE, 2917, 2917)
+VEGA = 91262
+
+
+def star(hip: int) -> np.ndarray:
+    sky = load_sky(2026.0)
+    return sky.vectors[np.searchsorted(sky.hip, hip)].copy()
+
+
+def magnitude(hip: int) -> float:
+    sky = load_sky(2026.0)
+    return float(sky.v_mag[np.searchsorted(sky.hip, hip)])
+
+
+def vega_at(pixel: tuple[float, float], time_s: float, rate: tuple[float, ...]) -> SkyScene:
+    """Only Vega, which ``time_s`` puts on ``pixel`` while the camera turns."""
+    target = Optics().unproject(np.array([pixel]))[0]
+    turn, _ = Rotation.align_vectors([target], [star(VEGA)])
+    start = Rotation.from_rotvec(np.radians(rate) * time_s) * turn
+    quaternion = start.as_quat()
+    return SkyScene(quaternion, rate, mag_limit=0.1)
+
+
+def light_around(image: np.ndarray, x: float, y: float, half: int = 12) -> tuple[float, np.ndarray]:
+    """Sum and centroid (x, y) of the light near a place."""
+    row, column = round(y), round(x)
+    box = image[row - half : row + half + 1, column - half : column + half + 1].astype(float)
+    rows, columns = np.mgrid[row - half : row + half + 1, column - half : column + half + 1]
+    total = box.sum()
+    return total, np.array([(box * columns).sum(), (box * rows).sum()]) / total
+
+
+def brute_force(scene: SkyScene, shutter: RollingShutter, instants: int) -> np.ndarray:
+    """Vega's light, every row integrated over its own exposure, pixel by pixel."""
+    lens = scene.optics
+    image = np.zeros((512, 1024))
+    electrons = electrons_per_second(magnitude(VEGA)) * shutter.exposure_s / instants
+    start = Rotation.from_quat(np.asarray(scene.quaternion))
+    columns = np.arange(1024)
+    for row in range(512):
+        end = shutter.readout_ps / 1e12 + row * shutter.line_s
+        times = end - shutter.exposure_s * (np.arange(instants) + 0.5) / instants
+        turns = Rotation.from_rotvec(-np.radians(scene.rate_deg_s) * times[:, None]) * start
+        x, y = lens.project(turns.apply(star(VEGA))).T
+        sigma = lens.psf_sigma_px
+        down = ndtr((row + 0.5 - y) / sigma) - ndtr((row - 0.5 - y) / sigma)
+        if down.max() < 1e-9:
+            continue
+        edges = (np.append(columns, 1024)[:, None] - 0.5 - x) / sigma
+        image[row] = (np.diff(ndtr(edges), axis=0) * down).sum(axis=1) * electrons
+    return image
+
+
+def test_stars_are_where_scipy_and_the_lens_put_them() -> None:
+    scene = replace(SkyScene.pointing(83.8, -1.0, 40.0), mag_limit=3.0)
+    hips, pixels = star_pixels(scene, LONG)
+    axes = Rotation.from_quat(np.asarray(scene.quaternion))
+    assert {24436, 26311, 25336} <= set(hips)  # Rigel, Alnilam, Bellatrix
+    for hip, pixel in zip(hips, pixels, strict=True):
+        expected = scene.optics.project(axes.apply(star(hip))[None])[0]
+        np.testing.assert_allclose(pixel, expected, atol=1e-9)
+
+
+def test_orion_stands_upright() -> None:
+    hips, pixels = star_pixels(replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.0), LONG)
+    place = dict(zip(hips, pixels, strict=True))
+    rigel, betelgeuse, bellatrix = place[24436], place[27989], place[25336]
+    assert betelgeuse[1] < rigel[1]  # north is up
+    assert betelgeuse[0] < bellatrix[0]  # east is left
+
+
+def test_light_of_a_star_is_complete_and_centred() -> None:
+    scene = replace(SkyScene.pointing(83.8, -1.0, 40.0), mag_limit=1.0)
+    image = star_light(scene, LONG)
+    assert image.shape == (512, 1024)
+    assert image.dtype == np.float32
+    hips, pixels = star_pixels(scene, LONG)
+    assert len(hips) >= 2
+    for hip, (x, y) in zip(hips, pixels, strict=True):
+        total, centroid = light_around(image, x, y)
+        expected = electrons_per_second(magnitude(hip)) * LONG.exposure_s
+        assert total == pytest.approx(expected, rel=1e-5)
+        np.testing.assert_allclose(centroid, (x, y), atol=1e-4)
+
+
+def test_spot_is_the_gaussian_over_each_pixels_square() -> None:
+    scene = vega_at((400.3, 200.8), 0.0, (0, 0, 0))
+    np.testing.assert_allclose(star_light(scene, LONG), brute_force(scene, LONG, 1), atol=0.3)
+    assert star_light(scene, LONG).max() > 50_000
+
+
+def test_defocus_widens_the_spot() -> None:
+    sharp = vega_at((400.3, 200.8), 0.0, (0, 0, 0))
+    soft = replace(sharp, optics=Optics(psf_sigma_px=2.5))
+    x = np.arange(1024)
+    for scene in (sharp, soft):
+        columns = star_light(scene, LONG).sum(axis=0).astype(float)
+        variance = np.average((x - 400.3) ** 2, weights=columns)
+        sigma = scene.optics.psf_sigma_px
+        assert variance == pytest.approx(sigma**2 + 1 / 12, rel=1e-3)  # the pixel's own width
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        (2.0, 0, 0),  # the star sinks, with the read-out
+        (-2.0, 0, 0),
+        (0, -2.0, 0),
+        (1.0, 0.7, 5.0),
+        (0, 0, 6.0),
+    ],
+)
+def test_streak_against_brute_force(rate: tuple[float, ...]) -> None:
+    # Long lines make the rolling shutter plain to see.
+    shutter = RollingShutter(2 * 10**12, 4 * LINE, 700, 700)
+    scene = vega_at((800.0, 430.0), 1.9, rate)
+    expected = brute_force(scene, shutter, 400)
+    found = star_light(scene, shutter)
+    assert found.sum() == pytest.approx(expected.sum(), rel=2e-3)
+    assert np.abs(found - expected).max() < 0.02 * expected.max()
+
+
+def test_rolling_shutter_shifts_lower_rows_later() -> None:
+    # Turning about y by 1 deg/s moves stars 20 px/s along x; row 511 is 67.6 ms after row 0.
+    top, bottom = (
+        star_pixels(vega_at((539.0, row), 0.0, (0, 1.0, 0)), replace(LONG, readout_ps=0))[1][0]
+        for row in (20.0, 490.0)
+    )
+    # Both were on column 539 at time 0; the exposure of the bottom row is 470 lines later.
+    speed = -np.radians(1) * 6.28 / 0.0056
+    assert bottom[0] - top[0] == pytest.approx(speed * 470 * 132.2e-6, rel=0.2)
+    assert abs(bottom[0] - top[0]) > 1
+
+
+def test_rolling_shutter_stretches_streaks_that_move_with_it() -> None:
+    # A star that moves down by v px a line is seen by rows that are exposed later and later.
+    shutter = RollingShutter(10**12, 20 * LINE, 100, 100)
+
+    def height(rate: float) -> float:
+        columns = star_light(vega_at((539.0, 175.5), 0.9, (rate, 0, 0)), shutter).sum(axis=1)
+        y = np.arange(512)
+        mean = np.average(y, weights=columns)
+        return float(np.sqrt(12 * np.average((y - mean) ** 2, weights=columns)))
+
+    down, up = height(4.0), height(-4.0)
+    per_line = np.radians(4) * 6.28 / 0.0056 * shutter.line_s
+    assert down / up == pytest.approx((1 + per_line) / (1 - per_line), rel=0.02)
+
+
+def test_static_scene_does_not_depend_on_time() -> None:
+    scene = replace(SkyScene.pointing(10.0, 20.0), mag_limit=3.8)
+    later = replace(LONG, readout_ps=7 * 10**14)
+    np.testing.assert_array_equal(star_light(scene, LONG), star_light(scene, later))
+
+
+def test_poses_follow_each_other() -> None:
+    q = SkyScene.pointing(83.8, -1.0).quaternion
+    scene = replace(SkyScene.pointing(10.0, 20.0), poses=(Pose(q, start_s=5.0),), mag_limit=3.8)
+    late = replace(LONG, readout_ps=6 * 10**12)
+    orion = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
+    np.testing.assert_allclose(star_light(scene, late), star_light(orion, late), atol=1e-2)
+    assert np.abs(star_light(scene, LONG) - star_light(orion, LONG)).max() > 1000
+
+
+def test_stars_at_the_limit_and_at_the_detection_limit() -> None:
+    # A V 3.8 star: about 300 counts of 8 bits in the default exposure; V 8: below one at its peak.
+    sky = load_sky(2026.0)
+    hip = int(sky.hip[np.abs(sky.v_mag - 3.8).argmin()])
+    x, y, z = star(hip)
+    dec, ra = np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x))
+    scene = replace(SkyScene.pointing(ra, dec), mag_limit=3.81, noise=False)
+    counts = ideal_counts(star_light(scene, LONG))
+    total, _ = light_around(counts, 539, 175, half=5)
+    assert 275 < total < 301  # truncation to whole counts takes some
+    peak = electrons_per_second(FAINTEST_V) * LONG.exposure_s * 0.39**2 / 0.81
+    assert peak / ELECTRONS_PER_DN12 / DN12_PER_DN8 < 1.3
+
+
+def test_magnitude_limit_leaves_stars_out() -> None:
+    scene = SkyScene.pointing(83.8, -1.0)
+    count = {
+        limit: len(star_pixels(replace(scene, mag_limit=limit), LONG)[0])
+        for limit in (3.0, 3.8, 6.0, None)
+    }
+    assert 5 < count[3.0] < count[3.8] < count[6.0] < count[None]
+    assert star_light(replace(scene, mag_limit=-5), LONG).max() == 0
+
+
+def test_false_stars() -> None:
+    empty = replace(SkyScene.pointing(0.0, 0.0), mag_limit=-5, seed=4)
+    images = [
+        star_light(replace(empty, false_stars=n, seed=s), LONG)
+        for n, s in ((1, 4), (5, 4), (5, 4), (5, 5))
+    ]
+    one, five, again, other = (image.astype(float) for image in images)
+    assert (one > 0).sum() < 400
+    np.testing.assert_array_equal(five, again)
+    assert np.abs(five - other).max() > 100
+    brightest, faintest = (electrons_per_second(m) * LONG.exposure_s for m in empty.false_star_mag)
+    assert 5 * faintest < five.sum() < 5 * brightest
+
+
+def test_vignetting_dims_the_corners() -> None:
+    scene = vega_at((30.0, 480.0), 0.0, (0, 0, 0))
+    dimmed = replace(scene, optics=Optics(vignetting=4.0))
+    off_axis = Optics().unproject(np.array([[30.0, 480.0]]))[0, 2]
+    ratio = star_light(dimmed, LONG).sum() / star_light(scene, LONG).sum()
+    assert ratio == pytest.approx(off_axis**4, rel=1e-5)
+
+
+def test_published_centroiding_error_of_18_noise_free_stars() -> None:
+    # CubeStar thesis, section 4.1.6: 0.0244 px along x, 0.0427 px along y, mean.
+    scene = replace(SkyScene.pointing(0.0, 0.0), mag_limit=-5, false_stars=18, noise=False)
+    errors = []
+    for seed in range(20):
+        generator = np.random.default_rng([seed, 0xFA15E])  # where the scene puts them
+        places = generator.uniform([0, 0], [1023, 511], (18, 2))
+        counts = ideal_counts(star_light(replace(scene, seed=seed), LONG)).astype(float)
+        apart = np.linalg.norm(places[:, None] - places, axis=2) + 100 * np.eye(18)
+        inside = np.all((places > 8) & (places < (1015, 503)), axis=1) & (apart.min(axis=1) > 16)
+        for x, y in places[inside]:
+            row, column = round(y), round(x)
+            box = counts[row - 1 : row + 2, column - 1 : column + 2]
+            dy, dx = np.divmod(int(box.argmax()), 3)
+            _, centroid = light_around(counts, column + dx - 1, row + dy - 1, half=2)
+            errors.append(np.abs(centroid - (x, y)))
+    assert len(errors) > 200
+    mean_x, mean_y = np.mean(errors, axis=0)
+    assert mean_x <= 0.0244
+    assert mean_y <= 0.0427

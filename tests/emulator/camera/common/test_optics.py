@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+
+from cubestack.emulator.camera.common.optics import COLUMNS, ROWS, Distortion, Optics
+
+
+def grid(step: int = 16) -> np.ndarray:
+    y, x = np.mgrid[0:ROWS:step, 0:COLUMNS:step]
+    corners = [[-0.5, -0.5], [1023.5, -0.5], [-0.5, 511.5], [1023.5, 511.5]]
+    return np.concatenate([np.stack([x.ravel(), y.ravel()], axis=1), corners])
+
+
+def firmware_vectors(pixels: np.ndarray) -> np.ndarray:
+    """Equations 4.1.3 to 4.1.6 with the thesis' calibration, written down a second time."""
+    k1, k2, p1, p2 = 0.32358, -0.12456, -0.00414, 0.00624
+    x, y = (pixels[:, 0] - 539.0) / 1147.5, (pixels[:, 1] - 175.5) / 1147.4
+    r2 = x**2 + y**2
+    xu = x * (1 + k1 * r2 + k2 * r2**2) + p2 * (r2 + 2 * x**2) + 2 * p1 * x * y
+    yu = y * (1 + k1 * r2 + k2 * r2**2) + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
+    u = np.stack([1147.5 * xu * 0.0056 / 6.28, 1147.4 * yu * 0.0056 / 6.28, np.ones(len(x))], 1)
+    return u / np.linalg.norm(u, axis=1, keepdims=True)
+
+
+def test_default_lens_makes_the_firmwares_equations_exact() -> None:
+    np.testing.assert_allclose(Optics().unproject(grid()), firmware_vectors(grid()), atol=1e-15)
+
+
+@pytest.mark.parametrize("distortion", Distortion)
+def test_there_and_back(distortion: Distortion) -> None:
+    lens = Optics(distortion=distortion)
+    np.testing.assert_allclose(lens.project(lens.unproject(grid())), grid(), atol=1e-9)
+
+
+def test_inverse_against_a_general_solver() -> None:
+    lens = Optics()
+    generator = np.random.default_rng(5)
+    for pixel in generator.uniform([0, 0], [COLUMNS - 1, ROWS - 1], (20, 2)):
+        vector = firmware_vectors(pixel[None])[0]
+
+        def miss(guess: np.ndarray, vector: np.ndarray = vector) -> np.ndarray:
+            found = firmware_vectors(guess[None])[0]
+            return (found[:2] / found[2] - vector[:2] / vector[2]) * 1000
+
+        solved = fsolve(miss, pixel + 3, xtol=1e-13)
+        np.testing.assert_allclose(lens.project(vector[None])[0], solved, atol=1e-8)
+
+
+def test_without_distortion_it_is_a_pinhole() -> None:
+    lens = Optics(k1=0, k2=0, p1=0, p2=0)
+    angle = np.radians(10)
+    pixel = lens.project(np.array([[np.sin(angle), 0, np.cos(angle)]]))[0]
+    assert pixel == pytest.approx([539.0 + 6.28 / 0.0056 * np.tan(angle), 175.5])
+    assert lens.project(np.array([[0.0, 0, 1]]))[0] == pytest.approx([539.0, 175.5])
+
+
+def test_published_field_without_distortion() -> None:
+    # 49.1 x 25.7 deg at 6.28 mm, for a centred principal point.
+    lens = Optics(k1=0, k2=0, p1=0, p2=0, cx=511.5, cy=255.5)
+    left, right, top, bottom = lens.unproject(
+        np.array([[-0.5, 255.5], [1023.5, 255.5], [511.5, -0.5], [511.5, 511.5]])
+    )
+    assert np.degrees(np.arccos(left @ right)) == pytest.approx(49.1, abs=0.1)
+    assert np.degrees(np.arccos(top @ bottom)) == pytest.approx(25.7, abs=0.1)
+
+
+def test_toolbox_reading_against_the_toolboxs_own_formula() -> None:
+    # Camera Calibration Toolbox: x_d = (1 + kc1 r2 + kc2 r4) x + dx with kc as published.
+    kc = (-0.32358, 0.12456, 0.00414, -0.00624)
+    lens = Optics(distortion=Distortion.TOOLBOX)
+    generator = np.random.default_rng(6)
+    plane = generator.uniform([-0.4, -0.15], [0.4, 0.25], (50, 2))
+    vectors = np.concatenate([plane, np.ones((50, 1))], axis=1)
+    x, y = (plane * (6.28 / 0.0056) / [1147.5, 1147.4]).T
+    r2 = x**2 + y**2
+    radial = 1 + kc[0] * r2 + kc[1] * r2**2
+    xd = radial * x + 2 * kc[2] * x * y + kc[3] * (r2 + 2 * x**2)
+    yd = radial * y + kc[2] * (r2 + 2 * y**2) + 2 * kc[3] * x * y
+    expected = np.stack([1147.5 * xd + 539.0, 1147.4 * yd + 175.5], axis=1)
+    np.testing.assert_allclose(lens.project(vectors), expected, atol=1e-9)
+
+
+def test_error_of_the_toolbox_reading_is_as_documented() -> None:
+    lens = Optics(distortion=Distortion.TOOLBOX)
+    true, computed = lens.unproject(grid(4)), firmware_vectors(grid(4))
+    miss = (true[:, :2] / true[:, 2:] - computed[:, :2] / computed[:, 2:]) * 1147.5
+    miss_px = np.linalg.norm(miss, axis=1)
+    assert miss_px.mean() == pytest.approx(1.7, abs=0.1)
+    assert miss_px.max() == pytest.approx(15, abs=0.5)
+
+
+def test_what_the_lens_can_not_see_is_nan() -> None:
+    lens = Optics()
+    assert lens.half_field_deg == pytest.approx(31.4, abs=0.1)
+    angles = np.radians([0, 31, 36, 60, 89, 90, 91, 180])
+    along = np.array([np.cos(0.56), np.sin(0.56)])  # towards the farthest corner
+    vectors = np.stack(
+        [np.sin(angles) * -along[0], np.sin(angles) * along[1], np.cos(angles)], axis=1
+    )
+    assert list(np.isnan(lens.project(vectors)).any(axis=1)) == [False, False] + [True] * 6
+    assert lens.project(np.empty((0, 3))).shape == (0, 2)
+
+
+def test_one_direction_out_of_reach_does_not_hide_the_others() -> None:
+    lens = Optics(k1=-0.62, k2=0, p1=0, p2=0)  # folds right outside of the sensor
+    plane = np.linspace(0, 0.55, 200)
+    vectors = np.stack([plane, 0 * plane, np.ones(200)], axis=1)
+    seen = ~np.isnan(lens.project(vectors)).any(axis=1)
+    reach = int(seen.sum())
+    assert 150 < reach < 200
+    assert seen[:reach].all()
+    nearer = lens.project(vectors[:reach])
+    np.testing.assert_array_equal(lens.project(vectors)[:reach], nearer)
+
+
+def test_vignetting() -> None:
+    vectors = np.array([[0, 0, 1.0], [np.sin(0.5), 0, np.cos(0.5)]])
+    np.testing.assert_array_equal(Optics().transmission(vectors), [1, 1])
+    np.testing.assert_allclose(Optics(vignetting=4).transmission(vectors), [1, np.cos(0.5) ** 4])
+
+
+def test_impossible_lenses_are_refused() -> None:
+    with pytest.raises(ValueError, match="psf_sigma_px must be above 0, not 0"):
+        Optics(psf_sigma_px=0)
+    with pytest.raises(ValueError, match="psf_sigma_px must be at most 20, not 21"):
+        Optics(psf_sigma_px=21)
+    for distortion, k1 in ((Distortion.INVERSE, -1.5), (Distortion.TOOLBOX, 1.5)):
+        with pytest.raises(ValueError, match="folds the picture within the sensor"):
+            Optics(k1=k1, distortion=distortion)

@@ -1,0 +1,111 @@
+import logging
+
+import pytest
+
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.firmware_model.interface.cameras.registers import (
+    BitField,
+    CameraRegister,
+    CameraRegisterMap,
+    RegisterAccess,
+)
+
+RW = RegisterAccess.READ_WRITE
+MODE = CameraRegister(
+    0x10, "MODE", 1, RW, 1, "", (BitField("ON", 0, 1, ""), BitField("ODD", 1, 1, "", False))
+)
+RATE = CameraRegister(0x11, "RATE", 2, RW, 0x0203, "", needs_sync=True)
+FANCY = CameraRegister(0x13, "FANCY", 1, RW, 0, "", modelled=False)
+CHIP = CameraRegister(0x14, "CHIP", 1, RegisterAccess.READ_ONLY, 0x42, "")
+
+
+@pytest.fixture
+def registers() -> RegisterFile:
+    return RegisterFile(CameraRegisterMap("TEST1", 0x21, 1, (MODE, RATE, FANCY, CHIP)))
+
+
+def test_reset_values_can_be_read_in_order(registers: RegisterFile) -> None:
+    registers.select(0x10)
+    assert [registers.read() for _ in range(5)] == [1, 2, 3, 0, 0x42]
+    assert registers.active("RATE") == 0x0203
+
+
+def test_register_at_once_and_register_with_sync(registers: RegisterFile) -> None:
+    registers.select(0x10)
+    assert [registers.write(b) for b in (0, 0xAB, 0xCD)] == [MODE, RATE, RATE]
+    assert registers.active("MODE") == 0
+    assert registers.active("RATE") == 0x0203
+    registers.select(0x11)
+    assert [registers.read(), registers.read()] == [0xAB, 0xCD]  # reads what was written
+    registers.sync()
+    assert registers.active("RATE") == 0xABCD
+
+
+def test_reset_forgets_everything(registers: RegisterFile) -> None:
+    registers.select(0x10)
+    for byte in (0, 9, 9):
+        registers.write(byte)
+    registers.sync()
+    registers.reset()
+    assert registers.active("MODE") == 1
+    assert registers.active("RATE") == 0x0203
+
+
+def test_stored_by_the_camera(registers: RegisterFile) -> None:
+    registers.store("RATE", 0x1234)
+    assert registers.active("RATE") == 0x1234
+    registers.select(0x11)
+    assert registers.read() == 0x12
+
+
+def test_pointer_wraps(registers: RegisterFile) -> None:
+    registers.select(0xFF)
+    registers.read()
+    assert registers.read() == 0  # address 0x00
+
+
+@pytest.mark.parametrize(
+    ("address", "byte", "level", "text"),
+    [
+        (0x13, 1, logging.INFO, "wrote FANCY, which is not modelled"),
+        (0x10, 0x03, logging.INFO, "set ODD of MODE, which is not modelled"),
+        (0x10, 0x81, logging.WARNING, "set bits 0x80 of MODE, which are not known"),
+        (0x14, 0x00, logging.WARNING, "wrote to CHIP, which is read-only"),
+        (0x30, 0x05, logging.WARNING, "wrote 0x05 to 0x0030, where no register is known"),
+    ],
+)
+def test_what_is_not_modelled_is_logged(
+    registers: RegisterFile,
+    caplog: pytest.LogCaptureFixture,
+    address: int,
+    byte: int,
+    level: int,
+    text: str,
+) -> None:
+    with caplog.at_level(logging.INFO):
+        registers.select(address)
+        registers.write(byte)
+    assert [(r.levelno, r.message) for r in caplog.records] == [(level, f"TEST1: {text}")]
+
+
+def test_reading_what_is_not_modelled_is_logged(
+    registers: RegisterFile, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.INFO):
+        registers.select(0x13)
+        assert [registers.read(), registers.read(), registers.read()] == [0, 0x42, 0]
+    assert [r.message for r in caplog.records] == [
+        "TEST1: read FANCY, which is not modelled",
+        "TEST1: read 0x0015, where no register is known",
+    ]
+
+
+def test_modelled_accesses_are_silent(
+    registers: RegisterFile, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.DEBUG):
+        registers.select(0x10)
+        for byte in (1, 2, 3):
+            registers.write(byte)
+    assert not caplog.records
+    assert registers.active("RATE") == 0x0203

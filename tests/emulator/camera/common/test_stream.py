@@ -1,0 +1,37 @@
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.emulator.camera.common.stream import PixelClock
+
+
+def test_grid_of_a_whole_period() -> None:
+    clock = PixelClock(10_000_000, origin_ps=7)
+    assert clock.period == 100_000
+    assert [clock.edge_ps(k) for k in range(3)] == [7, 100_007, 200_007]
+    assert [clock.first_edge(t) for t in (0, 7, 8, 100_007, 100_008)] == [0, 0, 1, 1, 2]
+
+
+def test_grid_does_not_drift() -> None:
+    clock = PixelClock(11_000_000)
+    assert clock.period == Fraction(10**12, 11_000_000)
+    assert clock.edge_ps(11_000_000 * 3600) == 3600 * 10**12
+
+
+@given(
+    hz=st.integers(1, 60_000_000),
+    origin=st.integers(0, 10**15),
+    time=st.integers(0, 10**16),
+)
+def test_first_edge_is_the_first(hz: int, origin: int, time: int) -> None:
+    clock = PixelClock(hz, origin)
+    edge = clock.first_edge(time)
+    assert clock.edge_ps(edge) >= time
+    assert edge == 0 or clock.edge_ps(edge - 1) < time
+
+
+def test_stopped_clock_is_refused() -> None:
+    with pytest.raises(ValueError, match="positive frequency, not 0 Hz"):
+        PixelClock(0)

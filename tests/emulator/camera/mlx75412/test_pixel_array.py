@@ -1,0 +1,150 @@
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.photometry import DN12_PER_DN8, ELECTRONS_PER_DN12
+from cubestack.emulator.camera.mlx75412.pixel_array import (
+    FACTORY_DEAD,
+    FACTORY_HOT,
+    READ_NOISE_ELECTRONS,
+    Corrections,
+    PixelArray,
+    dark_dn12_per_second,
+    grown_hot_pixels,
+    ideal_counts,
+)
+
+RAW = Corrections(defects=False, fixed_pattern=False, dark=False)
+BITS = DN12_PER_DN8 * ELECTRONS_PER_DN12  # electrons per count of 8 bits
+
+
+def flat(electrons: float) -> np.ndarray:
+    return np.full((512, 1024), electrons, np.float32)
+
+
+def frame(
+    electrons: np.ndarray,
+    corrections: Corrections = Corrections(),  # noqa: B008 - frozen
+    exposure_s: float = 0.3,
+    temperature_c: float = 20.0,
+    seed: int = 1,
+    part: int = 0,
+    **more: object,
+) -> np.ndarray:
+    return (
+        PixelArray(part)
+        .read_out(
+            electrons, exposure_s, temperature_c, corrections, np.random.default_rng(seed), **more
+        )
+        .astype(float)
+    )
+
+
+def test_ideal_counts_are_the_upper_bits() -> None:
+    # Counts of 12 bits 0, 7.4, 15.6 (rounds to 16), 31.4, 4095, beyond.
+    dn12 = np.array([0, 7.4, 15.6, 31.4, 4095, 9000], np.float32)
+    assert list(ideal_counts(dn12 * np.float32(ELECTRONS_PER_DN12))) == [0, 0, 1, 1, 255, 255]
+
+
+def test_every_count_of_12_bits() -> None:
+    dn12 = np.arange(4096, dtype=np.float32)
+    np.testing.assert_array_equal(
+        ideal_counts(dn12 * np.float32(ELECTRONS_PER_DN12)), np.arange(4096) >> 4
+    )
+
+
+def test_dark_signal_is_published_at_65_degrees() -> None:
+    assert dark_dn12_per_second(65) == 1008
+    assert dark_dn12_per_second(57) == pytest.approx(504)
+    # Uncorrected, at 65 C, 0.3 s: 302 counts of 12 bits.
+    counts = frame(flat(0), RAW, temperature_c=65)
+    assert counts.mean() == pytest.approx(302 / 16 - 0.5, abs=0.2)
+
+
+def test_dark_rows_take_the_mean_away() -> None:
+    bright = 100 * BITS
+    with_dark = frame(flat(bright), temperature_c=65)
+    assert with_dark.mean() == pytest.approx(100 - 0.5, abs=0.1)
+    dark = frame(flat(0), temperature_c=65)
+    assert dark.mean() < 2.5  # only the positive half of the noise is left
+    assert np.mean(dark == 0) > 0.4
+
+
+@pytest.mark.parametrize("level", [20.0, 60.0, 150.0, 230.0])
+def test_noise_is_poisson_plus_read_noise(level: float) -> None:
+    # Two frames of one sensor: the difference has no fixed pattern.
+    electrons = level * BITS
+    first, second = (frame(flat(electrons), exposure_s=0.0, seed=s) for s in (1, 2))
+    # Quantisation adds 1/12 of a squared step of 8 bits per frame.
+    expected = (electrons + READ_NOISE_ELECTRONS**2) / BITS**2 + 1 / 12
+    inside = (first > 0) & (first < 255) & (second > 0) & (second < 255)
+    assert np.var(first[inside] - second[inside]) / 2 == pytest.approx(expected, rel=0.02)
+
+
+def test_normal_noise_is_near_the_sum_of_poisson_and_normal() -> None:
+    # The worst case for the approximation is a mean of twice the squared read noise.
+    mean = 2 * READ_NOISE_ELECTRONS**2
+    counts = frame(flat(mean), Corrections(), exposure_s=0.0)
+    generator = np.random.default_rng(3)
+    exact = generator.poisson(mean, 500_000) + generator.normal(0, READ_NOISE_ELECTRONS, 500_000)
+    reference = ideal_counts(exact.astype(np.float32)).astype(float)
+    for level in range(4, 12):
+        assert np.mean(counts >= level) == pytest.approx(np.mean(reference >= level), abs=0.01)
+
+
+def test_dark_sky_is_nearly_black() -> None:
+    # At room temperature the noise alone must not look like stars: threshold 6, thesis 5.3.3.
+    counts = frame(flat(0))
+    assert np.mean(counts > 0) < 0.005
+    assert np.sum(counts > 6) <= FACTORY_HOT
+
+
+def test_fixed_pattern_and_its_correction() -> None:
+    def columns(corrections: Corrections) -> float:
+        frames = [frame(flat(100 * BITS), corrections, 0.0, seed=s) for s in range(4)]
+        return float(np.mean(frames, axis=0).mean(axis=0).std())
+
+    raw = columns(Corrections(fixed_pattern=False))
+    corrected = columns(Corrections())
+    assert raw == pytest.approx(4 / 16, rel=0.15)  # 4 counts of 12 bits between columns
+    assert corrected < 0.2 * raw
+
+
+def test_defects_and_their_correction() -> None:
+    bright = flat(100 * BITS)
+    raw, corrected = frame(bright, RAW, exposure_s=0.4), frame(bright, exposure_s=0.4)
+    assert np.sum(raw < 20) == FACTORY_DEAD
+    assert np.sum(corrected < 50) == 0
+    dark = frame(flat(0), RAW, exposure_s=0.4)
+    assert 5 < np.sum(dark > 20) <= FACTORY_HOT  # mean strength 37 counts, exponential
+    assert np.sum(frame(flat(0), exposure_s=0.4) > 20) == 0
+
+
+def test_grown_hot_pixels_are_not_corrected() -> None:
+    hot = grown_hot_pixels(seed=9, count=50)
+    counts = frame(flat(0), exposure_s=0.4, grown_hot=hot)
+    bright = np.flatnonzero(counts.ravel() > 10)
+    assert len(bright) > 20
+    assert set(bright) <= set(hot[0])
+    cold = frame(flat(0), exposure_s=0.4, temperature_c=-20, grown_hot=hot)
+    assert np.sum(cold > 10) == 0
+    np.testing.assert_array_equal(hot[0], grown_hot_pixels(9, 50)[0])
+    assert set(hot[0]) != set(grown_hot_pixels(10, 50)[0])
+
+
+def test_seeds_repeat_a_sensor_and_a_frame() -> None:
+    electrons = flat(30 * BITS)
+    np.testing.assert_array_equal(frame(electrons), frame(electrons))
+    assert np.any(frame(electrons) != frame(electrons, seed=2))
+    # Another part has its defects elsewhere.
+    first, second = (frame(flat(100 * BITS), RAW, part=p) < 20 for p in (0, 1))
+    assert not np.any(first & second)
+
+
+def test_saturation() -> None:
+    assert frame(flat(5000 * ELECTRONS_PER_DN12))[100:110].min() == 255
+
+
+def test_light_is_not_written_to() -> None:
+    electrons = flat(50)
+    frame(electrons)
+    assert np.all(electrons == 50)

@@ -1,0 +1,365 @@
+import itertools
+import logging
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
+from cubestack.emulator.scene.sky import PictureScene, SkyScene
+from cubestack.firmware_model.interface.cameras.mlx75412 import (
+    LONGEST_EXPOSURE,
+    REGISTERS,
+    SYNC_APPLY,
+)
+
+MS = 10**9
+LINE_PS = 132_200_000
+FRAME_LINES = 2918  # of the default rate register 7
+ADDRESS = 0x2C
+
+
+def write(camera: Mlx75412, name: str, value: int, now_ps: int = 0) -> None:
+    register = REGISTERS[name]
+    message = register.address.to_bytes(2, "big") + value.to_bytes(register.width, "big")
+    assert camera.i2c_write(ADDRESS, message, now_ps)
+
+
+def configure(camera: Mlx75412, rate: int = 7, now_ps: int = 0) -> None:
+    write(camera, "FRAMES_PER_SECOND", rate, now_ps)
+    write(camera, "EXPOSURE_RULE", LONGEST_EXPOSURE, now_ps)
+    write(camera, "SYNC", SYNC_APPLY, now_ps)
+
+
+def enable(camera: Mlx75412, now_ps: int, on: bool = True) -> None:
+    write(camera, "MODE_SELECT", 0x20 | on, now_ps)
+
+
+def segments(camera: Mlx75412, start_ps: int, count: int) -> list[StreamSegment]:
+    """Consecutive segments, as an engine asks for them."""
+    found = []
+    for _ in range(count):
+        segment = camera.segment_at(start_ps)
+        assert segment is not None
+        found.append(segment)
+        start_ps = segment.start_ps + int(segment.clocks * camera.period)
+    return found
+
+
+@pytest.fixture
+def camera() -> Mlx75412:
+    made = Mlx75412(SkyScene.pointing(80.0, 0.0), seed=3)
+    configure(made)
+    return made
+
+
+def test_only_its_own_address_is_acknowledged(camera: Mlx75412) -> None:
+    assert not camera.i2c_write(0x2D, b"\x81\x00\x01", 0)
+    assert camera.i2c_read(0x2D, 1, 0) is None
+    assert not camera.enabled
+    assert camera.i2c_write(ADDRESS, b"", 0)
+    assert camera.i2c_write(ADDRESS, b"\x81", 0)
+
+
+def test_registers_are_read_back_with_auto_increment(camera: Mlx75412) -> None:
+    camera.i2c_write(ADDRESS, b"\x85\x18", 0)
+    assert camera.i2c_read(ADDRESS, 6, 0) == bytes.fromhex("019BFCC00007")
+    camera.i2c_write(ADDRESS, b"\x85\x00", 0)
+    assert camera.i2c_read(ADDRESS, 1, 0) == b"\x00"
+
+
+@pytest.mark.parametrize("how", ["power", "reset"])
+def test_without_power_or_in_reset_there_is_nothing(camera: Mlx75412, how: str) -> None:
+    def switch(on: bool, now_ps: int) -> None:
+        if how == "power":
+            camera.power(on, now_ps)
+        else:
+            camera.set_reset_pin(int(on), now_ps)
+
+    changes: list[int] = []
+    camera.on_change = lambda: changes.append(1)
+    switch(False, 1 * MS)
+    assert not camera.running
+    assert camera.segment_at(1 * MS) is None
+    assert not camera.i2c_write(ADDRESS, b"\x81\x00\x01", 1 * MS)
+    assert camera.i2c_read(ADDRESS, 1, 1 * MS) is None
+    switch(True, 2 * MS + 33)
+    segment = camera.segment_at(2 * MS + 33)
+    assert segment is not None
+    assert segment.start_ps == 2 * MS + 33  # the grid starts anew
+    switch(True, 3 * MS)
+    assert len(changes) == 2
+    camera.i2c_write(ADDRESS, b"\x85\x1c", 3 * MS)
+    assert camera.i2c_read(ADDRESS, 2, 3 * MS) == b"\x00\x1e"  # reset values
+
+
+def test_pixel_clock_runs_while_disabled(camera: Mlx75412) -> None:
+    assert not camera.enabled
+    for segment in segments(camera, 0, 3):
+        assert (segment.vsync, segment.rows, segment.pixels) == (0, 0, None)
+    assert camera.period == 100_000
+    assert (camera.line_clocks, camera.active_columns) == (1322, 1024)
+
+
+def test_sequence_after_enable(camera: Mlx75412) -> None:
+    now = 5 * MS + 12_345
+    enable(camera, now)
+    found = segments(camera, now, 6)
+    blanking = FRAME_LINES - 512
+    assert [(s.rows, s.clocks // 1322, s.vsync) for s in found] == [
+        (512, 512, 1),  # undefined frame, at once
+        (0, blanking, 1),  # no VSync low before the first good one
+        (512, 512, 1),
+        (0, blanking, 0),
+        (512, 512, 1),
+        (0, blanking, 0),
+    ]
+    assert all(s.clocks % 1322 == 0 for s in found)
+    assert found[0].start_ps == 5 * MS + 100_000  # the first edge of the grid
+    for before, after in itertools.pairwise(found):
+        assert after.start_ps == before.start_ps + before.clocks * 100_000
+
+
+def test_vsync_before_the_first_good_frame_is_a_parameter() -> None:
+    camera = Mlx75412(SkyScene.pointing(80.0, 0.0), vsync_before_first_frame=True)
+    configure(camera)
+    enable(camera, 0)
+    assert [s.vsync for s in segments(camera, 0, 4)] == [1, 0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("register", "fps"), [(30, 11.11), (9, 3.33), (8, 2.96), (7, 2.59), (6, 2.22)]
+)
+def test_published_frame_rates(camera: Mlx75412, register: int, fps: float) -> None:
+    configure(camera, register)
+    enable(camera, 0)
+    starts = [s.start_ps for s in segments(camera, 0, 8) if s.rows]
+    assert np.unique(np.diff(starts)).size == 1
+    assert round(10**12 / (starts[1] - starts[0]), 2) == fps
+
+
+def test_longest_exposure_follows_the_frame_rate(camera: Mlx75412) -> None:
+    enable(camera, 0)
+    shutters = [camera.frame_from(s.start_ps) for s in segments(camera, 0, 5) if s.rows]
+    assert [s.exposure_lines for s in shutters if s][1:] == [FRAME_LINES - 1] * 2
+    assert all(s.programmed_lines == s.exposure_lines for s in shutters[1:] if s)
+
+
+def test_values_wait_for_sync_and_for_the_next_frame(camera: Mlx75412) -> None:
+    enable(camera, 0)
+    first, blanking = segments(camera, 0, 2)
+    write(camera, "EXPOSURE_RULE", 0, 10 * MS)
+    write(camera, "EXPOSURE", 1000, 10 * MS)
+    write(camera, "FRAMES_PER_SECOND", 9, 10 * MS)
+    assert segments(camera, 20 * MS, 2)[1] == blanking
+    write(camera, "SYNC", 0x01, 10 * MS)  # not the value that applies
+    assert segments(camera, 20 * MS, 4)[3].clocks == blanking.clocks
+    write(camera, "SYNC", SYNC_APPLY, 20 * MS)
+    found = segments(camera, 20 * MS, 6)
+    assert found[0].start_ps == first.start_ps  # the running read-out goes on
+    assert found[1].clocks == blanking.clocks  # its frame keeps its length
+    assert found[3].clocks == (2269 - 512) * 1322
+    shutters = [camera.frame_from(s.start_ps) for s in found if s.rows]
+    # The frame that is read out next was exposed by the values at the last frame's start.
+    assert [s.exposure_lines for s in shutters if s][1:] == [FRAME_LINES - 1, 1000]
+
+
+def test_exposure_register_is_limited_by_the_frame(camera: Mlx75412) -> None:
+    write(camera, "EXPOSURE_RULE", 0)
+    write(camera, "EXPOSURE", 0xFFFF)
+    write(camera, "SYNC", SYNC_APPLY)
+    enable(camera, 0)
+    second = segments(camera, 0, 3)[2]
+    shutter = camera.frame_from(second.start_ps)
+    assert shutter is not None
+    assert shutter.exposure_lines == FRAME_LINES - 1
+
+
+def test_first_exposure_is_undefined_but_repeatable() -> None:
+    def exposures(seed: int) -> list[int]:
+        camera = Mlx75412(SkyScene.pointing(80.0, 0.0), seed=seed)
+        configure(camera)
+        found = []
+        for n in range(6):
+            now = n * 1000 * MS
+            enable(camera, now)
+            shutter = camera.frame_from(now)
+            assert shutter is not None
+            assert shutter.programmed_lines == FRAME_LINES - 1
+            found.append(shutter.exposure_lines)
+            enable(camera, now + 100 * MS, on=False)
+        return found
+
+    assert exposures(1) == exposures(1)
+    assert exposures(1) != exposures(2)
+    assert len(set(exposures(1))) == 6
+    assert all(1 <= lines < FRAME_LINES for lines in exposures(1))
+
+
+def test_disabling_cuts_the_output_at_once(camera: Mlx75412) -> None:
+    enable(camera, 0)
+    segments(camera, 0, 4)  # looked ahead
+    now = 30 * MS + 50
+    enable(camera, now, on=False)
+    rest = camera.segment_at(now)
+    assert rest is not None
+    assert (rest.start_ps, rest.rows, rest.vsync) == (30 * MS + 100_000, 0, 0)
+    shutter = camera.frame_from(0)
+    assert shutter is not None
+    assert shutter.readout_ps == 0
+    assert camera.frame_from(1) is None  # the frames that were looked up will never be
+    enable(camera, 900 * MS)
+    again = camera.segment_at(900 * MS)
+    assert again is not None
+    assert (again.start_ps, again.rows, again.vsync) == (900 * MS, 512, 1)
+    following = segments(camera, 900 * MS, 2)[1]
+    assert following.vsync == 1  # it starts with an undefined frame again
+
+
+def test_two_changes_at_one_instant(camera: Mlx75412) -> None:
+    enable(camera, 0)
+    enable(camera, 30 * MS + 1, on=False)
+    enable(camera, 30 * MS + 1)
+    assert [s.rows for s in segments(camera, 30 * MS + 1, 2)] == [512, 0]
+    assert segments(camera, 30 * MS + 1, 1)[0].start_ps == 30 * MS + 100_000
+
+
+def test_writing_the_same_mode_changes_nothing(camera: Mlx75412) -> None:
+    changes: list[int] = []
+    camera.on_change = lambda: changes.append(1)
+    enable(camera, 0)
+    before = segments(camera, 0, 3)
+    enable(camera, 20 * MS)
+    assert [s.start_ps for s in segments(camera, 20 * MS, 3)] == [s.start_ps for s in before]
+    assert len(changes) == 1
+
+
+def test_change_after_the_output_was_looked_up_too_far(camera: Mlx75412) -> None:
+    enable(camera, 0)
+    segments(camera, 0, 40)
+    with pytest.raises(ValueError, match="after its output was looked up to"):
+        enable(camera, 1 * MS, on=False)
+
+
+def test_odd_crystal_keeps_its_grid() -> None:
+    camera = Mlx75412(SkyScene.pointing(80.0, 0.0), crystal_hz=11_000_000)
+    configure(camera)
+    enable(camera, 1)
+    assert camera.period == Fraction(10**12, 11 * 10**6)
+    for segment in segments(camera, 1, 20):
+        number = round(segment.start_ps / camera.period)
+        assert segment.start_ps == number * camera.period // 1
+    shutter = camera.frame_from(0)
+    assert shutter is not None
+    assert shutter.line_ps == Fraction(1322 * 10**6, 11)
+
+
+def stored(camera: Mlx75412, fpga_enable_ps: int) -> np.ndarray:
+    """What a frame buffer keeps: rows from the first line's start on, VSync low starts over."""
+    rows: list[np.ndarray] = []
+    now = fpga_enable_ps
+    while True:
+        segment = camera.segment_at(now)
+        assert segment is not None
+        if not segment.vsync:
+            rows = []
+        if segment.pixels is not None:
+            first = max(0, -(-(now - segment.start_ps) // LINE_PS))
+            rows += list(segment.pixels()[first:])
+            if len(rows) >= 512:
+                return np.array(rows[:512])
+        now = segment.start_ps + segment.clocks * 100_000
+
+
+@pytest.mark.parametrize("wait_ms", [0, 10, 40, 67])
+def test_capturing_too_early_splits_the_picture(striped: PictureScene, wait_ms: int) -> None:
+    camera = Mlx75412(striped, seed=5)
+    configure(camera)
+    enable(camera, 0)
+    shutter = camera.frame_from(0)
+    assert shutter is not None
+    scale = shutter.relative_exposure
+    assert abs(scale - 1) > 0.05  # else the two exposures could not be told apart
+    picture = stored(camera, wait_ms * MS)
+    split = 512 - -(-wait_ms * MS // LINE_PS)  # rows of the undefined frame still to come
+    assert 0 < split <= 512
+    undefined = np.minimum(striped.pixels[512 - split :] * scale, 255)
+    np.testing.assert_allclose(picture[:split], undefined, atol=1)
+    np.testing.assert_array_equal(picture[split:], striped.pixels[: 512 - split])
+
+
+def test_waiting_70_ms_gives_the_second_frame(striped: PictureScene) -> None:
+    camera = Mlx75412(striped, seed=5)
+    configure(camera)
+    enable(camera, 0)
+    np.testing.assert_array_equal(stored(camera, 70 * MS), striped.pixels)
+
+
+def test_joining_in_mid_frame_later_drops_the_partial_frame(striped: PictureScene) -> None:
+    camera = Mlx75412(striped, seed=5)
+    configure(camera)
+    enable(camera, 0)
+    np.testing.assert_array_equal(stored(camera, 400 * MS), striped.pixels)
+
+
+def test_frame_lookup() -> None:
+    camera = Mlx75412(SkyScene.pointing(80.0, 0.0))
+    configure(camera)
+    assert camera.frame_from(0) is None
+    enable(camera, 10 * MS)
+    segments(camera, 10 * MS, 5)
+    frame_ps = FRAME_LINES * LINE_PS
+    starts = [10 * MS + number * frame_ps for number in range(3)]
+    wanted = [0, starts[0], starts[0] + 1, starts[1], starts[1] + 1, starts[2]]
+    found = [camera.frame_from(time_ps) for time_ps in wanted]
+    assert [s.readout_ps for s in found if s] == [starts[n] for n in (0, 0, 1, 1, 2, 2)]
+    assert camera.frame_from(starts[2] + 1) is None
+
+
+def test_pixels_are_rendered_on_demand_and_once(camera: Mlx75412) -> None:
+    enable(camera, 0)
+    segment = segments(camera, 0, 3)[2]
+    assert segment.pixels is not None
+    picture = segment.pixels()
+    assert picture.shape == (512, 1024)
+    assert picture.dtype == np.uint8
+    assert picture.flags.c_contiguous
+    assert segment.pixels() is picture
+    camera.scene = SkyScene.pointing(200.0, 50.0)
+    assert np.any(segment.pixels() != picture)
+
+
+def test_features_reach_the_pixels() -> None:
+    camera = Mlx75412(SkyScene([0, 0, 0, 1], mag_limit=-5, temperature_c=45), seed=1)
+    configure(camera)
+
+    def mean(features: int, now_ps: int) -> float:
+        write(camera, "HARDWARE_FEATURES", features, now_ps)
+        write(camera, "SYNC", SYNC_APPLY, now_ps)
+        enable(camera, now_ps)
+        segment = segments(camera, now_ps, 3)[2]
+        assert segment.pixels is not None
+        enable(camera, segment.start_ps, on=False)
+        return float(segment.pixels().mean())
+
+    dark = REGISTERS["HARDWARE_FEATURES"].field("DARK_SUBTRACTION").mask
+    assert mean(0, 0) > 3  # 69 counts of 12 bits of dark signal
+    assert mean(dark, 2000 * MS) < 1
+
+
+def test_published_set_up_only_logs_what_is_not_modelled(caplog: pytest.LogCaptureFixture) -> None:
+    camera = Mlx75412(SkyScene.pointing(80.0, 0.0))
+    with caplog.at_level(logging.INFO):
+        configure(camera)
+        assert not caplog.records
+        write(camera, "LINEARITY", 0)
+        write(camera, "HARDWARE_FEATURES", 0x4E)
+    messages = [r.message for r in caplog.records]
+    assert messages == ["MLX75412: wrote LINEARITY, which is not modelled"] * 21 + [
+        "MLX75412: set HISTOGRAM_REMAP of HARDWARE_FEATURES, which is not modelled"
+    ]
+
+
+def test_temperature_is_the_scenes() -> None:
+    assert Mlx75412(SkyScene([0, 0, 0, 1], temperature_c=-12.5)).temperature_c == -12.5

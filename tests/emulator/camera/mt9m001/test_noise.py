@@ -1,0 +1,123 @@
+"""Each term of the noise alone, against its formula in section 3.4 of the AraMiS thesis."""
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.mt9m001.noise import (
+    BLACK_LEVEL,
+    FULL_WELL_ELECTRONS,
+    READ_NOISE_ELECTRONS,
+    NoiseTerms,
+    Surroundings,
+    counts,
+    dark_electrons_per_s,
+    hot_pixels,
+    quantisation_sigma,
+)
+
+SHAPE = (400, 500)
+LSB8 = FULL_WELL_ELECTRONS / 256  # electrons of a count of 8 bits at gain 1
+
+
+def frame(
+    light: float, terms: NoiseTerms, gain: float = 1.0, seed: int = 1, **surroundings: float
+) -> np.ndarray:
+    electrons = np.full(SHAPE, light, np.float32)
+    generator = np.random.Generator(np.random.SFC64(seed))
+    return counts(electrons, 1.0, gain, Surroundings(**surroundings), terms, generator)
+
+
+def only(**terms: bool) -> NoiseTerms:
+    names = ("shot", "dark", "background", "quantisation", "readout")
+    return NoiseTerms(**(dict.fromkeys(names, False) | terms))
+
+
+def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
+    return float(picture.std()) * LSB8 / gain
+
+
+def test_the_data_sheet_s_ratios_come_out() -> None:
+    assert 20 * np.log10(np.sqrt(FULL_WELL_ELECTRONS)) == pytest.approx(45)
+    assert 20 * np.log10(FULL_WELL_ELECTRONS / READ_NOISE_ELECTRONS) == pytest.approx(68.2)
+
+
+def test_without_noise_there_is_one_value() -> None:
+    picture = frame(10_000, NoiseTerms.none())
+    expected = 10_000 / LSB8 + BLACK_LEVEL / 4
+    assert np.unique(picture).tolist() == [int(expected + 0.5)]
+
+
+@pytest.mark.parametrize("light", [4_000.0, 25_000.0])
+def test_shot_noise_is_the_root_of_the_light(light: float) -> None:
+    rounding = LSB8 / np.sqrt(12)
+    measured = electrons_sigma(frame(light, only(shot=True)))
+    assert measured == pytest.approx(np.hypot(np.sqrt(light), rounding), rel=0.02)
+
+
+def test_read_out_noise() -> None:
+    gain = 8.0
+    rounding = LSB8 / gain / np.sqrt(12)
+    measured = electrons_sigma(frame(2_000, only(readout=True), gain), gain)
+    assert measured == pytest.approx(np.hypot(READ_NOISE_ELECTRONS, rounding), rel=0.02)
+
+
+def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
+    assert dark_electrons_per_s(33) / dark_electrons_per_s(25) == pytest.approx(2)
+    gain, warm = 8.0, 65.0
+    dark = dark_electrons_per_s(warm)
+    picture = frame(1_500, only(dark=True), gain, temperature_c=warm)
+    rounding = LSB8 / gain / np.sqrt(12)
+    assert electrons_sigma(picture, gain) == pytest.approx(np.hypot(dark**0.5, rounding), rel=0.02)
+    plain = frame(1_500, only(), gain, temperature_c=warm)
+    assert picture.mean() == pytest.approx(plain.mean(), abs=0.5)
+
+
+def test_background_adds_its_mean_and_its_noise() -> None:
+    gain = 8.0
+    picture = frame(500, only(background=True), gain, background_electrons_per_s=1_000.0)
+    plain = frame(500, only(), gain)
+    assert picture.mean() - plain.mean() == pytest.approx(1_000 * gain / LSB8, abs=0.5)
+    rounding = LSB8 / gain / np.sqrt(12)
+    assert electrons_sigma(picture, gain) == pytest.approx(np.hypot(1_000**0.5, rounding), rel=0.03)
+
+
+def test_quantisation_follows_its_formula() -> None:
+    assert quantisation_sigma(1.0) == pytest.approx(FULL_WELL_ELECTRONS / 1024 / np.sqrt(12))
+    rng = np.random.default_rng(2)
+    light = rng.uniform(5_000, 25_000, SHAPE).astype(np.float32)
+    generator = np.random.Generator(np.random.SFC64(3))
+
+    def error(terms: NoiseTerms) -> np.ndarray:
+        picture = counts(light, 1.0, 1.0, Surroundings(), terms, generator)
+        return light - (picture - BLACK_LEVEL / 4) * LSB8
+
+    wired = error(only(quantisation=True))
+    # The upper 8 of 10 bits: the error of 8 bits, and on the average what is cut off.
+    assert wired.std() == pytest.approx(quantisation_sigma(1.0, bits=8), rel=0.02)
+    assert wired.mean() == pytest.approx(1.5 * LSB8 / 4, rel=0.05)
+    assert error(only()).mean() == pytest.approx(0, abs=0.02 * LSB8)
+
+
+def test_the_terms_add_up_as_variances() -> None:
+    light, gain = 800.0, 8.0
+    everything = NoiseTerms()
+    dark, background = dark_electrons_per_s(20.0), 15.0
+    variance = light + dark + background + READ_NOISE_ELECTRONS**2
+    variance += quantisation_sigma(gain, bits=8) ** 2
+    measured = electrons_sigma(frame(light, everything, gain), gain)
+    assert measured == pytest.approx(np.sqrt(variance), rel=0.02)
+
+
+def test_hot_pixels_shine_where_they_are_and_scale_with_the_dark_current() -> None:
+    places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1])
+    electrons = np.zeros(SHAPE, np.float32)
+    generator = np.random.Generator(np.random.SFC64(1))
+    picture = counts(
+        electrons, 1.0, 1.0, Surroundings(), only(dark=True), generator, (places, shares)
+    )
+    bright = set(np.flatnonzero(picture > 10).tolist())
+    strong = set(places[shares * dark_electrons_per_s(20.0) > 12 * LSB8].tolist())
+    assert strong
+    assert strong <= bright <= set(places.tolist())
+    repeated = hot_pixels(7, 10, SHAPE[0] * SHAPE[1])
+    np.testing.assert_array_equal(repeated[0], places)

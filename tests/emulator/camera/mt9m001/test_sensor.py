@@ -1,0 +1,276 @@
+"""Timing against the data sheet's formulas, the window and gain against an ideal picture."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
+from cubestack.firmware_model.interface.cameras.mt9m001 import (
+    COLUMNS,
+    PIXEL_CLOCK_HZ,
+    REGISTERS,
+    ROWS,
+    gain_register,
+)
+
+ADDRESS = REGISTERS.i2c_address
+ROW_CLOCKS = 1524
+ROW_S = ROW_CLOCKS / PIXEL_CLOCK_HZ
+
+
+def scene(**changes: object) -> SkyScene:
+    orion = quaternion_from_pointing(84.0, -1.0, 0.0)
+    return SkyScene(orion, optics=aramis_lens(), **changes)  # type: ignore[arg-type]
+
+
+def put(camera: Mt9m001, name: str, *words: int, now_ps: int = 0) -> None:
+    data = b"".join(word.to_bytes(2, "big") for word in words)
+    assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]) + data, now_ps)
+
+
+def get(camera: Mt9m001, name: str) -> int:
+    assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]), 0)
+    answer = camera.i2c_read(ADDRESS, 2, 0)
+    assert answer is not None
+    return int.from_bytes(answer, "big")
+
+
+def stream(camera: Mt9m001, start_ps: int, until_ps: int) -> list[tuple[int, int, int, int]]:
+    """Start, clocks, FRAME_VALID and rows of each segment."""
+    segments, now = [], start_ps
+    while now < until_ps:
+        segment = camera.segment_at(now)
+        assert segment is not None
+        segments.append((segment.start_ps, segment.clocks, segment.vsync, segment.rows))
+        now = segment.start_ps + int(segment.clocks * camera.period)
+    return segments
+
+
+def frame(camera: Mt9m001, after_ps: int) -> np.ndarray:
+    """The first whole picture after a time."""
+    pieces, now, low = [], after_ps, False
+    while len(pieces) < 2:
+        segment = camera.segment_at(now)
+        assert segment is not None
+        low |= not segment.vsync
+        if low and segment.pixels is not None:
+            pieces.append(segment.pixels())
+        now = segment.start_ps + int(segment.clocks * camera.period)
+    return np.concatenate(pieces)
+
+
+def test_default_frames_follow_the_data_sheet() -> None:
+    camera = Mt9m001(scene())
+    segments = stream(camera, 0, 100 * PS_PER_MS)
+    first_frame = next(i for i, s in enumerate(segments) if s[2])
+    assert segments[first_frame : first_frame + 4] == [
+        (segments[first_frame][0], 242, 1, 0),
+        (segments[first_frame + 1][0], 1023 * ROW_CLOCKS, 1, 1023),
+        (segments[first_frame + 2][0], 1282, 1, 1),  # the last line ends 2 clocks after its pixels
+        (segments[first_frame + 3][0], 26 * ROW_CLOCKS, 0, 0),
+    ]
+    starts = [s[0] for s in segments if s[1] == 242]
+    assert np.diff(starts) == pytest.approx(1050 * ROW_S * PS_PER_S)
+    assert starts[0] == pytest.approx(1050 * ROW_S * PS_PER_S)  # one exposure and a row
+
+
+def test_segments_leave_no_gap_and_no_overlap() -> None:
+    camera = Mt9m001(scene())
+    put(camera, "SHUTTER_WIDTH", 1500)
+    segments = stream(camera, 0, 300 * PS_PER_MS)
+    for (start, clocks, *_), (following, *_) in pairwise(segments):
+        assert following - (start + clocks * PS_PER_S // PIXEL_CLOCK_HZ) in (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("shutter", "rows"), [(100, 1050), (1049, 1050), (1050, 1051), (6299, 6300)]
+)
+def test_a_long_exposure_makes_the_frame_longer(shutter: int, rows: int) -> None:
+    camera = Mt9m001(scene())
+    put(camera, "SHUTTER_WIDTH", shutter)
+    starts = [s[0] for s in stream(camera, 0, PS_PER_S) if s[1] == 242]
+    assert np.diff(starts) == pytest.approx(rows * ROW_S * PS_PER_S)
+    exposure = camera.frame_from(starts[-1])
+    assert exposure is not None
+    assert exposure.exposure_s == pytest.approx(shutter * ROW_S)
+    assert exposure.readout_ps == pytest.approx(starts[-1] + 242 / PIXEL_CLOCK_HZ * PS_PER_S, abs=1)
+
+
+def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure() -> None:
+    camera = Mt9m001(scene())
+    stream(camera, 0, 40 * PS_PER_MS)
+    change = 50 * PS_PER_MS  # in the read-out of the first frame, which lasts to 67.5 ms
+    put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
+    segments = stream(camera, change, PS_PER_S)
+    first = segments[0]
+    assert first[2] == 1  # the frame under way goes on
+    starts = [s[0] for s in segments if s[1] == 242]
+    end_of_old = 1050 * ROW_S + 1024 * ROW_S
+    assert starts[0] / PS_PER_S == pytest.approx(end_of_old + 3001 * ROW_S, abs=1e-7)
+
+
+def test_a_change_between_frames_counts_from_its_own_time() -> None:
+    camera = Mt9m001(scene())
+    change = 662 * PS_PER_MS // 10  # the first frame ended at 65.85 ms, the next is due at 66.68
+    stream(camera, 0, change)
+    put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
+    starts = [s[0] for s in stream(camera, change, PS_PER_S) if s[1] == 242]
+    assert starts[0] / PS_PER_S == pytest.approx(0.0662 + 3001 * ROW_S, abs=1e-7)
+
+
+def test_changes_wait_while_they_are_held() -> None:
+    camera = Mt9m001(scene())
+    put(camera, "OUTPUT_CONTROL", 0b11)
+    put(camera, "SHUTTER_WIDTH", 2000)
+    put(camera, "GLOBAL_GAIN", 0x20)
+    assert camera.frame_from(0).exposure_lines == 1049  # type: ignore[union-attr]
+    put(camera, "OUTPUT_CONTROL", 0b10)
+    assert camera.frame_from(0).exposure_lines == 2000  # type: ignore[union-attr]
+
+
+def test_registers_answer_as_declared() -> None:
+    camera = Mt9m001(scene())
+    for register in REGISTERS:
+        assert get(camera, register.name) == register.reset, register.name
+    put(camera, "GLOBAL_GAIN", 0x51)
+    assert {get(camera, n) for n in ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")} == {
+        0x51
+    }
+    put(camera, "CHIP_VERSION", 1)  # read-only
+    assert get(camera, "CHIP_VERSION") == 0x8431
+    put(camera, "CHIP_ENABLE", 0)
+    assert get(camera, "OUTPUT_CONTROL") == 0
+    assert not camera.enabled
+    put(camera, "OUTPUT_CONTROL", 2)
+    assert get(camera, "CHIP_ENABLE") == 1
+    put(camera, "RESET", 1)
+    assert get(camera, "GLOBAL_GAIN") == 8
+    assert not camera.enabled
+    put(camera, "RESET", 0)
+    assert camera.enabled
+
+
+def test_consecutive_registers_half_words_and_strangers() -> None:
+    camera = Mt9m001(scene())
+    put(camera, "ROW_START", 20, 40, 255, 639)
+    assert [get(camera, n) for n in ("ROW_START", "COLUMN_START", "ROW_SIZE", "COLUMN_SIZE")] == [
+        20,
+        40,
+        255,
+        639,
+    ]
+    assert camera.i2c_write(ADDRESS, b"\x09\x12", 0)
+    assert get(camera, "SHUTTER_WIDTH") == 0x0419
+    assert camera.i2c_write(ADDRESS, b"", 0)
+    assert not camera.i2c_write(0x2C, b"\x09\x00\x01", 0)
+    assert camera.i2c_read(0x2C, 2, 0) is None
+
+
+def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs() -> None:
+    camera = Mt9m001(scene())
+    put(camera, "SHUTTER_WIDTH", 77)
+    for off, on in ((camera.power, camera.power), (camera.set_reset_pin, camera.set_reset_pin)):
+        off(False, 10)
+        assert camera.segment_at(20) is None
+        assert camera.frame_from(20) is None
+        assert not camera.i2c_write(ADDRESS, b"\x00", 20)
+        on(True, 30)
+        assert get(camera, "SHUTTER_WIDTH") == 0x0419
+
+
+def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure() -> None:
+    camera = Mt9m001(scene())
+    changes: list[int] = []
+    camera.on_change = lambda: changes.append(1)
+    stop, start = 40 * PS_PER_MS, 90 * PS_PER_MS
+    assert camera.segment_at(stop).vsync == 1  # type: ignore[union-attr]
+    put(camera, "OUTPUT_CONTROL", 0, now_ps=stop)
+    assert changes
+    assert all(s[2:] == (0, 0) for s in stream(camera, stop, start))
+    put(camera, "OUTPUT_CONTROL", 2, now_ps=start)
+    frames = [s[0] for s in stream(camera, start, 200 * PS_PER_MS) if s[1] == 242]
+    assert frames[0] == pytest.approx(start + 1050 * ROW_S * PS_PER_S, rel=1e-6)
+    put(camera, "RESTART", 1, now_ps=250 * PS_PER_MS)
+    frames = [s[0] for s in stream(camera, 250 * PS_PER_MS, 350 * PS_PER_MS) if s[1] == 242]
+    assert frames[0] == pytest.approx(250 * PS_PER_MS + 1050 * ROW_S * PS_PER_S, rel=1e-6)
+
+
+def test_a_window_is_a_part_of_the_picture() -> None:
+    still = scene(noise=False, hot_pixels=0)
+    camera = Mt9m001(still)
+    put(camera, "SHUTTER_WIDTH", 6000)
+    whole = frame(camera, 0)
+    assert whole.shape == (ROWS, COLUMNS)
+    small = Mt9m001(still)
+    put(small, "ROW_START", 12 + 300, 20 + 200, 399, 517)  # lines of half the length
+    put(small, "SHUTTER_WIDTH", 12_000)
+    np.testing.assert_array_equal(frame(small, 0), whole[300:700, 200:718])
+    beyond = Mt9m001(still)
+    put(beyond, "ROW_START", 2, 10, 99, 517)  # ten rows and ten columns before the active ones
+    put(beyond, "SHUTTER_WIDTH", 12_000)
+    picture = frame(beyond, 0)
+    np.testing.assert_array_equal(picture[10:, 10:], whole[:90, :508])
+    assert (picture[:10] == 1).all()
+
+
+def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
+    dark = scene(noise=False, mag_limit=-5.0, hot_pixels=0)
+    lit = replace(scene(noise=False, hot_pixels=0), optics=aramis_lens(spot_sigma_px=4))
+    camera = Mt9m001(dark)
+    assert np.unique(frame(camera, 0)).tolist() == [2]  # the black level, rounded
+    bright = Mt9m001(lit)
+    put(bright, "SHUTTER_WIDTH", 6000)
+    once = frame(bright, 0).astype(int) - 1.5
+    put(bright, "GLOBAL_GAIN", gain_register(8.0), now_ps=PS_PER_S)
+    eight = frame(bright, PS_PER_S).astype(int) - 1.5
+    clear = (eight < 250) & (once > 5)
+    assert clear.any()
+    assert np.median(eight[clear] / once[clear]) == pytest.approx(8, rel=0.1)
+    put(bright, "RED_GAIN", gain_register(1.0), now_ps=2 * PS_PER_S)
+    mixed = frame(bright, 2 * PS_PER_S).astype(int) - 1.5
+    np.testing.assert_array_equal(mixed[0::2, 1::2], once[0::2, 1::2])
+    np.testing.assert_array_equal(mixed[1::2, 1::2], eight[1::2, 1::2])
+
+
+def test_frames_repeat_with_the_same_seed_and_differ_in_time() -> None:
+    one, two = Mt9m001(scene(seed=5)), Mt9m001(scene(seed=5))
+    np.testing.assert_array_equal(frame(one, 0), frame(two, 0))
+    assert (frame(one, 0) != frame(one, PS_PER_S)).any()
+    assert (frame(one, 0) != frame(Mt9m001(scene(seed=6)), 0)).any()
+
+
+def test_another_sensor_s_scene_is_refused() -> None:
+    with pytest.raises(ValueError, match="1280 x 1024 pixels, the scene's sensor"):
+        Mt9m001(SkyScene([0, 0, 0, 1]))
+
+
+def test_a_turning_camera_smears_along_its_motion() -> None:
+    """At 10 deg/s across, 10 ms of exposure draw 4.7 px."""
+    turning = scene(rate_deg_s=(0.0, 10.0, 0.0), noise=False, mag_limit=4.5, hot_pixels=0)
+
+    def spread(sky: SkyScene) -> tuple[float, float]:
+        """Variances of the brightest star along the columns and along the rows, px^2."""
+        camera = Mt9m001(sky)
+        put(camera, "SHUTTER_WIDTH", 315)
+        put(camera, "GLOBAL_GAIN", gain_register(4.0))
+        picture = frame(camera, 0)
+        row, column = divmod(int(np.argmax(picture)), COLUMNS)
+        around = picture[row - 12 : row + 13, column - 12 : column + 13].astype(float) - 2
+        y, x = np.mgrid[:25, :25]
+        total = around.sum()
+        return tuple(  # type: ignore[return-value]
+            float((around * axis**2).sum() / total - ((around * axis).sum() / total) ** 2)
+            for axis in (x, y)
+        )
+
+    wide, high = spread(turning)
+    round_wide, round_high = spread(scene(noise=False, mag_limit=4.5, hot_pixels=0))
+    assert round_wide == pytest.approx(round_high, rel=0.1)
+    streak_px = 10 * 315 * ROW_S * np.radians(1) * 2692.34
+    assert wide - high == pytest.approx(streak_px**2 / 12, rel=0.2)

@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.camera.ov7620.fisheye import (
+    FIELD_DEG,
+    LENSES,
+    angles_from_vector,
+    distorted,
+    undistorted,
+    vector_from_angles,
+)
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+
+
+def towards(theta_deg: float, phi_deg: float) -> np.ndarray:
+    """The boresight turned by theta towards phi, x first, then y."""
+    phi = np.radians(phi_deg)
+    axis = np.array([-np.sin(phi), np.cos(phi), 0])
+    return Rotation.from_rotvec(np.radians(theta_deg) * axis).apply([0, 0, 1])
+
+
+def test_published_radii_of_the_test_ball() -> None:
+    assert distorted(182.0) == pytest.approx(168, abs=0.5)
+    assert undistorted(168.0) == pytest.approx(182, abs=0.5)
+
+
+def test_rim_is_where_the_field_ends() -> None:
+    assert distorted(2.9 * 95) == pytest.approx(226, abs=0.7)
+
+
+@pytest.mark.parametrize("radius", [0.2, 1.0, 50.0, 168.0, 226.0])
+def test_undistorting_finds_the_root_of_the_cubic(radius: float) -> None:
+    roots = np.roots([-2.5572e-6, 7.6076e-5, 0.9953, 0.1036 - radius])
+    inside = [r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real < 276]
+    assert inside == [pytest.approx(float(undistorted(radius)), abs=1e-9)]
+
+
+def test_nothing_is_below_the_smallest_distorted_radius() -> None:
+    np.testing.assert_array_equal(undistorted([0.0, 0.05, 0.1]), 0)
+
+
+def test_angles_are_a_turn_away_from_the_boresight() -> None:
+    for theta in (0.0, 10.0, 90.0, 95.0, 170.0):
+        for phi in (-170.0, -45.0, 0.0, 90.0, 135.0):
+            alpha, beta = theta * np.cos(np.radians(phi)), theta * np.sin(np.radians(phi))
+            vector = vector_from_angles(alpha, beta)
+            np.testing.assert_allclose(vector, towards(theta, phi), atol=1e-12)
+            assert angles_from_vector(3 * vector) == pytest.approx((alpha, beta), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("camera", "centre"), [(Camera.SUN, (369, 250)), (Camera.NADIR, (371, 236))]
+)
+def test_published_boresights(camera: Camera, centre: tuple[float, float]) -> None:
+    lens = LENSES[camera]
+    np.testing.assert_array_equal(lens.project([0, 0, 2.0]), centre)
+    np.testing.assert_array_equal(lens.unproject([centre]), [[0, 0, 1]])
+
+
+def test_right_is_right_and_down_is_down() -> None:
+    lens = LENSES[Camera.NADIR]
+    x, y = lens.project(towards(63.48, 0))
+    assert (x, y) == (pytest.approx(371 + float(distorted(63.48 * 2.9))), pytest.approx(236))
+    x, y = lens.project(towards(10.0, 90))
+    assert (x, y) == (pytest.approx(371), pytest.approx(236 + float(distorted(29.0))))
+
+
+def test_projecting_is_undone() -> None:
+    lens = LENSES[Camera.SUN]
+    generator = np.random.default_rng(5)
+    for theta, phi in generator.uniform([0, -180], [FIELD_DEG, 180], (200, 2)):
+        pixel = lens.project(towards(theta, phi))
+        assert pixel is not None
+        np.testing.assert_allclose(lens.unproject([pixel])[0], towards(theta, phi), atol=1e-9)
+
+
+def test_what_is_outside_the_field_is_not_projected() -> None:
+    lens = LENSES[Camera.SUN]
+    assert lens.project(towards(95.001, 20)) is None
+    assert lens.project([0, 0, -1.0]) is None
+    assert lens.project(towards(94.999, 20)) is not None
+
+
+@pytest.mark.parametrize("camera", list(Camera))
+def test_field_of_view(camera: Camera) -> None:
+    lens = LENSES[camera]
+    field = lens.field
+    y, x = np.divmod(field.index, 640)
+    assert np.all(np.diff(field.index) > 0)
+    whole = field.lit == 1
+    np.testing.assert_allclose(
+        field.vectors[whole], lens.unproject(np.stack([x, y], axis=1)[whole]), atol=1e-6
+    )
+    radius = np.hypot(x - lens.cx, y - lens.cy)
+    assert radius.max() < 227.2
+    assert np.all(field.lit[radius < 226] == 1)
+    seen = np.zeros((480, 640), bool)
+    seen.ravel()[field.index] = True
+    rows, columns = np.mgrid[:480, :640]
+    assert np.all(seen[np.hypot(columns - lens.cx, rows - lens.cy) < 226.5])
+    # The lit pixels together have the area of the rim's circle, where the sensor does not cut it.
+    cut = lens.cy + 226.7 > 479.5
+    if not cut:
+        assert field.lit.sum() == pytest.approx(np.pi * 226.61**2, rel=1e-4)
+
+
+def test_pixel_angle_is_that_between_neighbours() -> None:
+    lens = LENSES[Camera.NADIR]
+    field = lens.field
+    for x, y in [(380, 240), (471, 336), (371, 36), (160, 236)]:
+        here, right, down = lens.unproject(
+            [[x - 0.5, y - 0.5], [x + 0.5, y - 0.5], [x - 0.5, y + 0.5]]
+        )
+        area = np.linalg.norm(np.cross(right - here, down - here))
+        at = np.searchsorted(field.index, y * 640 + x)
+        assert field.pixel_rad[at] == pytest.approx(np.sqrt(area), rel=0.02)

@@ -1,0 +1,165 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistorted
+from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE, scene_light
+from cubestack.emulator.camera.ov7620.luminance import BLACK
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection
+from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+
+SUN, NADIR = Camera.SUN, Camera.NADIR
+ROWS, COLUMNS = np.mgrid[:480, :640]
+DOWN = Mounting([0, 0, 1])
+
+
+def levels(scene: EarthSunScene, camera: Camera) -> np.ndarray:
+    """Grey values at the exposure of the published levels, without noise and without a limit."""
+    return BLACK + scene_light(scene, camera, 0) * (USUAL_EXPOSURE[camera] * EXPOSURE_LINES)
+
+
+def noon(scene: EarthSunScene) -> EarthSunScene:
+    """The same with the Sun in the zenith below the satellite."""
+    return replace(scene, sun=-np.asarray(scene.nadir))
+
+
+def radius(camera: Camera) -> np.ndarray:
+    return np.hypot(COLUMNS - LENSES[camera].cx, ROWS - LENSES[camera].cy)
+
+
+def bright(picture: np.ndarray, threshold: float = 99) -> tuple[float, np.ndarray]:
+    """Radius of a circle as large as all that is brighter, and its centre."""
+    y, x = np.nonzero(picture >= threshold)
+    return float(np.sqrt(len(x) / np.pi)), np.array([x.mean(), y.mean()])
+
+
+def test_full_earth_has_the_published_levels() -> None:
+    picture = levels(EarthSunScene(unevenness=0), NADIR)
+    assert picture[radius(NADIR) < 170].mean() == pytest.approx(153, abs=0.5)
+    assert np.all(picture[radius(NADIR) > 175] == 34)
+
+
+def test_limb_is_63_48_deg_from_the_nadir_all_around() -> None:
+    tilted = noon(EarthSunScene.facing(nadir_deg=(20, 15), unevenness=0, glow_km=0))
+    picture = levels(tilted, NADIR)
+    # The limb is a little darker than the middle, as the Sun is lower there.
+    inside = picture - 34 > 0.895 * 120.4 / 2
+    lens, nadir = LENSES[NADIR], tilted.truth(NADIR, 0).vector
+    along = inside[:, 1:] != inside[:, :-1]
+    y, x = np.nonzero(along)
+    assert len(x) > 300
+    edges = lens.unproject(np.stack([x + 0.5, y], axis=1))
+    angles = np.degrees(np.arccos(edges @ nadir))
+    # Half a pixel is a sixth of a degree in the middle and a third at the rim.
+    assert np.abs(angles - 63.48).max() < 0.35
+    assert angles.mean() == pytest.approx(63.48, abs=0.02)
+
+
+def test_nothing_is_beyond_the_rim() -> None:
+    picture = levels(noon(EarthSunScene.facing(nadir_deg=(70, 0))), NADIR)
+    assert np.all(picture[radius(NADIR) > 227.2] == 34)
+    assert np.all(picture[(radius(NADIR) < 226) & (ROWS == 236) & (COLUMNS > 400)] > 100)
+    # A pixel that the rim crosses has a part of the light of the one inside.
+    lens = LENSES[NADIR]
+    share = lens.field.lit[np.searchsorted(lens.field.index, 236 * 640 + 371 + 227)]
+    assert 0 < share < 0.2
+    part, whole = picture[236, 371 + 227] - 34, picture[236, 371 + 226] - 34
+    assert part == pytest.approx(share * whole, rel=0.05)
+
+
+def test_night_side_is_dark() -> None:
+    picture = levels(EarthSunScene(sun=(0, 0, 1)), NADIR)
+    assert picture.max() < 34.5
+
+
+def test_terminator_divides_the_picture() -> None:
+    picture = levels(EarthSunScene(sun=(1, 0, 0), sun_camera=DOWN, unevenness=0), NADIR)
+    row = picture[236]
+    assert row[371 - 168 : 371 - 30].max() < 36
+    assert row[371 + 160] > 60
+    # The Sun itself is in the picture too: without a filter, a large saturated spot.
+    size, _ = bright(np.where(COLUMNS > 371 + 180, picture, 0), 255)
+    assert size > 10
+
+
+@pytest.mark.parametrize("bloom_px", [4.0, 6.0, 7.0, 8.0])
+def test_sun_has_the_size_asked_for_on_the_boresight(bloom_px: float) -> None:
+    picture = levels(EarthSunScene(bloom_px=bloom_px), SUN)
+    size, centre = bright(picture)
+    assert size == pytest.approx(bloom_px, abs=0.25)
+    np.testing.assert_allclose(centre, [369, 250], atol=1e-9)
+    assert picture.max() > 255
+    assert picture[0, 0] == 34
+
+
+def test_sun_shrinks_as_published_towards_the_rim() -> None:
+    size, _ = bright(levels(EarthSunScene.facing((90, 0), bloom_px=8), SUN))
+    assert size == pytest.approx(6, abs=0.3)
+
+
+def test_sun_is_where_its_direction_says() -> None:
+    generator = np.random.default_rng(2)
+    for alpha, beta in generator.uniform(-60, 60, (20, 2)):
+        picture = levels(EarthSunScene.facing((alpha, beta)), SUN)
+        light = picture - 34
+        centre = [(light * COLUMNS).sum() / light.sum(), (light * ROWS).sum() / light.sum()]
+        offset = np.array(centre) - (369, 250)
+        theta = undistorted(np.hypot(*offset)) / 2.9
+        np.testing.assert_allclose(offset / np.hypot(*offset) * theta, [alpha, beta], atol=0.01)
+
+
+def test_sun_camera_sees_no_earth_at_its_exposure() -> None:
+    picture = levels(EarthSunScene.facing((94, 0), (0, 0), sun_camera=DOWN), SUN)
+    assert picture[radius(SUN) < 160].max() < 34.1
+
+
+def test_sun_behind_the_earth_and_outside_the_field_is_dark() -> None:
+    behind = EarthSunScene.facing((30, 0), sun_camera=DOWN)
+    assert levels(behind, SUN).max() < 34.1
+    assert levels(EarthSunScene.facing((96, 0)), SUN).max() == pytest.approx(34, abs=0.1)
+
+
+def test_sun_at_the_corner_of_the_picture_is_cut() -> None:
+    # 94 deg down is below the sensor's last row: the sun camera's field is cut there.
+    picture = levels(EarthSunScene.facing((0, 94)), SUN)
+    assert np.nonzero(picture > 99)[0].min() > 465
+    assert picture.shape == (480, 640)
+
+
+def test_moon_is_small_and_has_phases() -> None:
+    def moon(sun: tuple[float, float, float]) -> float:
+        picture = levels(EarthSunScene(sun=sun, moon=(1, 0, 0), nadir=(-1, 0, 0)), NADIR)
+        return float((picture - 34)[226:247, 582:603].sum())
+
+    along = np.radians(150)
+    full = moon((-0.999, 0.04, 0))
+    half = moon((0, 1, 0))
+    crescent = moon((-np.cos(along), np.sin(along), 0))
+    assert 50 < full < 120
+    assert half == pytest.approx(full / 2, rel=0.01)
+    assert crescent == pytest.approx(full * (1 - np.cos(np.radians(30))) / 2, rel=0.01)
+    hidden = EarthSunScene(moon=(0, 0, 1))
+    np.testing.assert_array_equal(
+        scene_light(hidden, NADIR, 0), scene_light(replace(hidden, moon=None), NADIR, 0)
+    )
+
+
+def test_reflection_is_an_even_disc_in_its_own_camera() -> None:
+    ghost = Reflection(SUN, 20, -30, radius_px=6, level=180)
+    scene = EarthSunScene.facing((40, 40), reflections=(ghost,))
+    plain = replace(scene, reflections=())
+    light = levels(scene, SUN) - levels(plain, SUN)
+    assert light.max() == pytest.approx(180, rel=1e-4)
+    assert light.sum() / light.max() == pytest.approx(np.pi * 36, rel=0.02)
+    centre = LENSES[SUN].unproject([bright(light, 90)[1]])[0]
+    assert np.degrees(np.arctan2(centre[1], centre[0])) == pytest.approx(-56.3, abs=0.5)
+    np.testing.assert_array_equal(levels(scene, NADIR), levels(plain, NADIR))
+
+
+def test_picture_is_that_of_its_instant() -> None:
+    scene = EarthSunScene(rate_deg_s=(0, 1.0, 0), unevenness=0)
+    later = scene_light(scene, NADIR, 10 * 10**12)
+    expected = EarthSunScene.facing(nadir_deg=(-10, 0), unevenness=0)
+    np.testing.assert_allclose(later, scene_light(noon(expected), NADIR, 0), atol=0.02)

@@ -1,0 +1,122 @@
+import logging
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.ov7620.sccb import SccbSlave
+
+from .sccb_master import US, send
+
+
+class Device:
+    def __init__(self) -> None:
+        self.written: list[tuple[int, int, int]] = []
+        self.slave = SccbSlave(0x21, lambda *write: self.written.append(write))
+
+    def send(self, data: bytes, now_ps: int = 0, step_ps: int = 3 * US) -> list[int]:
+        return send(self.slave.on_pin, lambda: self.slave.sda, data, now_ps, step_ps)
+
+    @property
+    def registers(self) -> list[tuple[int, int]]:
+        return [write[:2] for write in self.written]
+
+
+@pytest.fixture
+def device() -> Device:
+    return Device()
+
+
+def test_three_bytes_write_a_register(device: Device) -> None:
+    assert device.send(bytes([0x42, 0x10, 0x5A])) == [0, 0, 0]
+    assert device.registers == [(0x10, 0x5A)]
+
+
+def test_all_values_come_through(device: Device) -> None:
+    generator = np.random.default_rng(6)
+    expected = [(int(a), int(v)) for a, v in generator.integers(0, 256, (50, 2))]
+    for address, value in expected:
+        device.send(bytes([0x42, address, value]))
+    assert device.registers == expected
+
+
+def test_value_counts_with_the_ninth_clock_of_the_third_byte(device: Device) -> None:
+    device.send(bytes([0x42, 0x10, 0x5A]), step_ps=10 * US)
+    # 4 steps of the start, 2 bytes of 27 steps, 8 bits of 3 steps, SDA released, SCL up.
+    assert device.written[0][2] == (4 + 2 * 27 + 24 + 2) * 10 * US
+
+
+@pytest.mark.parametrize("address", [0x40, 0x43, 0x00, 0xFF])
+def test_other_addresses_and_reading_are_not_answered(device: Device, address: int) -> None:
+    assert device.send(bytes([address, 0x10, 0x5A])) == [1, 1, 1]
+    assert device.registers == []
+    device.send(bytes([0x42, 0x10, 0x5A]))
+    assert device.registers == [(0x10, 0x5A)]
+
+
+def test_short_transmissions_write_nothing(device: Device) -> None:
+    for data in (b"", b"\x42", b"\x42\x10"):
+        assert device.send(data) == [0] * len(data)
+    assert device.registers == []
+
+
+def test_further_bytes_are_ignored_and_logged(
+    device: Device, caplog: pytest.LogCaptureFixture
+) -> None:
+    device.send(bytes([0x42, 0x10, 0x5A, 0x77]))
+    assert device.registers == [(0x10, 0x5A)]
+    assert [r.message for r in caplog.records] == [
+        "SCCB: ignored byte 0x77 after a register's value"
+    ]
+
+
+def test_a_start_in_the_middle_begins_anew(device: Device) -> None:
+    pin = device.slave.on_pin
+    for byte in (0x42, 0x10):
+        for n in range(8):
+            pin("SDA", byte >> (7 - n) & 1, 0)  # SCL is high at first: starts and stops
+    device.send(bytes([0x42, 0x11, 0x01]))
+    # Cut off after five bits of the value, by a stop.
+    now = 10**9
+    for name, level in (("SDA", 0), ("SCL", 0)):
+        now += 3 * US
+        pin(name, level, now)
+    for n in range(9 + 5):
+        for name, level in (("SDA", 0x4210 >> (15 - n) & 1), ("SCL", 1), ("SCL", 0)):
+            now += 3 * US
+            pin(name, level, now)
+    for name, level in (("SDA", 0), ("SCL", 1), ("SDA", 1)):
+        now += 3 * US
+        pin(name, level, now)
+    device.send(bytes([0x42, 0x12, 0x02]), now_ps=now)
+    assert device.registers == [(0x11, 0x01), (0x12, 0x02)]
+
+
+def test_line_is_released_after_each_ninth_bit(device: Device) -> None:
+    lows: list[tuple[str, int]] = []
+
+    def pin(name: str, level: int, now_ps: int) -> None:
+        device.slave.on_pin(name, level, now_ps)
+        if device.slave.sda == 0:
+            lows.append((name, level))
+
+    send(pin, lambda: device.slave.sda, bytes([0x42]))
+    # From the fall after the eighth bit to the one after the ninth.
+    assert lows == [("SCL", 0), ("SDA", 1), ("SCL", 1)]
+
+
+def test_too_fast_a_clock_is_logged_once_and_decoded(
+    device: Device, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        device.send(bytes([0x42, 0x10, 0x5A]), step_ps=700_000)
+        assert not caplog.records  # 0.7 us high, 1.4 us low
+        device.send(bytes([0x42, 0x10, 0x5B]), now_ps=10**9, step_ps=500_000)
+    assert device.registers == [(0x10, 0x5A), (0x10, 0x5B)]
+    assert [r.message for r in caplog.records] == [
+        "SCCB: SCL was low for 1.00 us only, right would be 1.3 us or more"
+    ]
+
+
+def test_there_are_only_two_pins(device: Device) -> None:
+    with pytest.raises(ValueError, match="has the pins SCL and SDA, not 'CLK'"):
+        device.slave.on_pin("CLK", 1, 0)

@@ -1,0 +1,187 @@
+"""Targets on a bus, and clients of its socket."""
+
+import select
+import socket
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.pacing import wait_precisely
+from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, request, split_reply
+
+TIMEOUT_S = 20.0
+
+
+class Registers:
+    """256 registers behind a pointer that counts up; beyond 0xF0 a write is not acknowledged.
+
+    Attributes:
+        log: messages that came, as bytes written or number of bytes read.
+        busy_reads: how often the next byte is not ready yet.
+    """
+
+    def __init__(self) -> None:
+        self.memory = bytearray(range(256))
+        self.pointer = 0
+        self.log: list[list[int] | int] = []
+        self.busy_reads = 0
+        self._first = True
+
+    def i2c_start(self, read: bool) -> None:
+        self._first = not read
+        self.log.append(0 if read else [])
+
+    def i2c_write(self, byte: int) -> bool:
+        entry = self.log[-1]
+        assert isinstance(entry, list)
+        entry.append(byte)
+        if self._first:
+            self.pointer = byte
+        elif self.pointer > 0xF0:
+            return False
+        else:
+            self.memory[self.pointer] = byte
+            self.pointer += 1
+        self._first = False
+        return True
+
+    def i2c_read(self) -> int | None:
+        if self.busy_reads:
+            self.busy_reads -= 1
+            return None
+        entry = self.log[-1]
+        assert isinstance(entry, int)
+        self.log[-1] = entry + 1
+        byte = self.memory[self.pointer & 0xFF]
+        self.pointer += 1
+        return byte
+
+    def i2c_stop(self) -> None:
+        self.log.append(-1)
+
+
+@pytest.fixture
+def registers() -> Registers:
+    return Registers()
+
+
+@pytest.fixture
+def kernel() -> Kernel:
+    return Kernel()
+
+
+@pytest.fixture
+def bus(kernel: Kernel, registers: Registers) -> I2cBus:
+    bus = I2cBus(kernel, 400_000)
+    bus.attach(0x1A, registers)
+    return bus
+
+
+@pytest.fixture
+def adapter(kernel: Kernel, bus: I2cBus) -> I2cAdapter:
+    return I2cAdapter(kernel, bus)
+
+
+class Client:
+    """A program with a connection to the server; it blocks with a timeout."""
+
+    def __init__(self, path: str) -> None:
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.socket.settimeout(TIMEOUT_S)
+        self.socket.connect(path)
+
+    def send(self, call: Call, body: bytes = b"", key: int = 0) -> None:
+        data = request(key, call, body)
+        self.socket.sendall(LENGTH.pack(len(data)) + data)
+
+    def receive(self) -> tuple[int, bytes]:
+        (length,) = LENGTH.unpack(self._exactly(LENGTH.size))
+        return split_reply(self._exactly(length))
+
+    def _exactly(self, count: int) -> bytes:
+        data = b""
+        while len(data) < count:
+            part = self.socket.recv(count - len(data))
+            if not part:
+                raise EOFError
+            data += part
+        return data
+
+    def hung_up(self) -> bool:
+        try:
+            return self.socket.recv(1) == b""
+        except ConnectionResetError:
+            return True
+
+    def reset(self) -> None:
+        """Die without reading what is there."""
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self.socket.close()
+
+
+class Served:
+    """A server with its kernel, driven by hand."""
+
+    def __init__(self, path: Path, adapter: I2cAdapter) -> None:
+        self.server = I2cServer(path, adapter)
+        self.kernel = adapter.env
+        self.adapter = adapter
+        self.opened: list[Client] = []
+
+    def connect(self) -> Client:
+        self.opened.append(Client(self.server.name))
+        self.serve()
+        return self.opened[-1]
+
+    def serve(self) -> None:
+        """Serve until nothing is under way and nobody has anything to say."""
+        while True:
+            ready = self._ready()
+            self.server.exchange(self.kernel.now)
+            if not ready and not self.adapter.busy:
+                return
+            while self.adapter.busy:
+                self.kernel.step()
+
+    def _ready(self) -> bool:
+        poller = select.poll()
+        for fileno, events in self.server.watched():
+            poller.register(fileno, events)
+        return bool(poller.poll(0))
+
+    def wait(self, timeout_s: float) -> None:
+        wait_precisely(self.server.watched(), timeout_s)
+
+    def ask(self, client: Client, call: Call, body: bytes = b"", key: int = 0) -> tuple[int, bytes]:
+        client.send(call, body, key)
+        self.serve()
+        return client.receive()
+
+
+@pytest.fixture
+def served(tmp_path: Path, adapter: I2cAdapter) -> Iterator[Served]:
+    served = Served(tmp_path / "private" / "bus", adapter)
+    yield served
+    for client in served.opened:
+        client.socket.close()
+    served.server.close()
+
+
+@pytest.fixture
+def serve_at(adapter: I2cAdapter) -> Iterator[Callable[[Path], I2cServer]]:
+    """Makes further servers."""
+    made: list[I2cServer] = []
+
+    def make(path: Path) -> I2cServer:
+        made.append(I2cServer(path, adapter))
+        return made[-1]
+
+    yield make
+    for server in made:
+        server.close()

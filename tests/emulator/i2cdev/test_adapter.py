@@ -1,0 +1,143 @@
+"""The adapter: ends of transfers, told at once or when wall time gets there."""
+
+import errno
+
+import pytest
+
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.device_file import DeviceFile
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, reply
+
+from .conftest import Registers
+
+BIT_PS = 2_500_000
+
+
+def test_ends_are_told_in_virtual_time(kernel, adapter):
+    told: list[tuple[int, int]] = []
+    for _ in range(2):
+        adapter.submit([I2cMessage(0x1A, read=1)], lambda result: told.append((result, kernel.now)))
+    assert adapter.busy
+    kernel.run()
+    transfer = (1 + 2 * 9 + 1) * BIT_PS
+    assert told == [(0, transfer), (0, 2 * transfer)]
+    assert not adapter.busy
+    assert adapter.told == 2
+
+
+def test_ends_that_are_held(kernel, adapter):
+    told: list[int] = []
+    adapter.holding = True
+    for _ in range(2):
+        adapter.submit([I2cMessage(0x1A, read=1)], told.append)
+    kernel.run()
+    transfer = (1 + 2 * 9 + 1) * BIT_PS
+    assert (told, adapter.busy, adapter.release_ps()) == ([], False, transfer)
+    adapter.release(transfer - 1)
+    assert told == []
+    adapter.release(transfer)
+    assert (told, adapter.release_ps()) == ([0], 2 * transfer)
+    adapter.release(10 * transfer)
+    assert (told, adapter.release_ps()) == ([0, 0], None)
+
+
+def test_the_bus_is_free_after_a_refusal(kernel, adapter):
+    told: list[int] = []
+    adapter.submit([I2cMessage(0x30)], told.append)
+    adapter.submit([I2cMessage(0x1A)], told.append)
+    kernel.run()
+    assert told == [-6, 0]
+
+
+@pytest.mark.parametrize(
+    ("retries", "timeout", "tries", "result"),
+    [
+        (0, 100, 1, -errno.EAGAIN),
+        (2, 100, 3, -errno.EAGAIN),
+        (9, 100, 4, 0),
+        (9, 0, 1, -errno.EAGAIN),
+    ],
+)
+def test_a_lost_bus_is_tried_again(kernel, bus, adapter, retries, timeout, tries, result):
+    """As Linux's core does for drivers that report EAGAIN; both settings by ioctl."""
+    plain, tried = bus.transfer, []
+
+    def transfer(messages):
+        tried.append(kernel.now)
+        yield kernel.timeout(1)
+        if len(tried) < 4:
+            raise I2cNackError(errno.EAGAIN, "another master was quicker")
+        yield from plain(messages)
+
+    bus.transfer = transfer
+    file, replies = DeviceFile(adapter), []
+    file.perform(Call.IOCTL, pack_ioctl(Ioctl.RETRIES, retries), replies.append)
+    file.perform(Call.IOCTL, pack_ioctl(Ioctl.TIMEOUT, timeout), replies.append)
+    assert replies == [reply(0)] * 2
+    told: list[int] = []
+    adapter.submit([I2cMessage(0x1A)], told.append)
+    kernel.run()
+    assert (len(tried), told) == (tries, [result])
+
+
+class Patience:
+    """Says no after so many questions."""
+
+    def __init__(self, questions: int) -> None:
+        self.left = questions
+
+    def __call__(self) -> bool:
+        self.left -= 1
+        return self.left >= 0
+
+
+def outcome(kernel, adapter, registers, run):
+    """Three transfers: their ends, and what came to the target."""
+    told: list[tuple[int, int]] = []
+    for messages in (
+        [I2cMessage(0x1A, bytearray(40)), I2cMessage(0x1A, read=30)],
+        [I2cMessage(0x30)],
+        [I2cMessage(0x1A, bytearray([0xF0, 1, 2])), I2cMessage(0x1A, read=1)],
+    ):
+        adapter.submit(messages, lambda result: told.append((result, kernel.now)))
+    run()
+    assert not adapter.busy
+    return told, registers.log
+
+
+@pytest.mark.parametrize(("patience", "steps"), [(0, 1), (0, 5), (1, 0), (1, 1), (3, 7), (100, 0)])
+def test_driven_transfers_are_the_same(patience, steps):
+    """Also when the kernel is run by others between two drives."""
+
+    def make():
+        kernel, registers = Kernel(), Registers()
+        bus = I2cBus(kernel)
+        bus.attach(0x1A, registers)
+        return kernel, I2cAdapter(kernel, bus), registers
+
+    kernel, adapter, registers = make()
+    expected = outcome(kernel, adapter, registers, kernel.run)
+    kernel, adapter, registers = make()
+    adapter.driven = True
+
+    def run():
+        while adapter.busy:
+            adapter.drive(kernel, Patience(patience))
+            for _ in range(steps):
+                if kernel.horizon() is not None:
+                    kernel.step()
+
+    assert outcome(kernel, adapter, registers, run) == expected
+
+
+def test_a_drive_without_a_transfer(kernel, adapter):
+    adapter.driven = True
+    assert not adapter.beginning
+    adapter.drive(kernel, lambda: True)
+    adapter.submit([I2cMessage(0x1A)], lambda _result: None)
+    assert adapter.beginning
+    adapter.drive(kernel, lambda: True)
+    assert not adapter.beginning
+    assert not adapter.busy

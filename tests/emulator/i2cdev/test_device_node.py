@@ -1,0 +1,73 @@
+"""The name of the device file, and what it looks like."""
+
+import ctypes
+import os
+import stat
+import struct
+
+import pytest
+
+from cubestack.emulator.i2cdev.device_node import DeviceNode, Found
+
+NODE = DeviceNode(7)
+
+
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        ("/dev/i2c-7", Found.DEVICE),
+        ("/dev/./i2c-7", Found.DEVICE),
+        ("//dev/../dev/i2c-7", Found.DEVICE),
+        ("/proc/bus/i2c", Found.LISTING),
+        ("/dev/i2c-77", None),
+        ("/dev/i2c-", None),
+        ("/var/i2c-7", None),
+        ("/dev/shm/../xi2c-7", None),
+        ("/dev/xi2c-7", None),
+        ("i2c-7", None),
+        ("", None),
+    ],
+)
+def test_paths(path, found):
+    assert (NODE.find(path, os.getpid(), None) if NODE.may_be(path) else None) is found
+
+
+def test_relative_paths(monkeypatch):
+    monkeypatch.chdir("/dev")
+    assert NODE.find("i2c-7", os.getpid(), None) is Found.DEVICE
+    assert NODE.find("./i2c-7", os.getpid(), -100) is Found.DEVICE
+    folder = os.open("/", os.O_RDONLY)
+    try:
+        assert NODE.find("dev/i2c-7", os.getpid(), folder) is Found.DEVICE
+        assert NODE.find("i2c-7", os.getpid(), folder) is None
+    finally:
+        os.close(folder)
+    assert NODE.find("i2c-7", os.getpid(), 9999) is None
+
+
+@pytest.mark.skipif(ctypes.sizeof(ctypes.c_void_p) != 8, reason="structures of 64-bit machines")
+def test_stat_is_laid_out_as_the_kernel_does():
+    """The fields of a real struct stat, found at their places in the one made up."""
+    made = NODE.stat(compact=False)
+    assert len(made) == 144
+    device, inode, links, mode, owner, group, _, number = struct.unpack_from("=QQQIIIIQ", made)
+    assert device == os.stat("/dev").st_dev
+    assert (links, owner, group) == (1, os.getuid(), os.getgid())
+    assert stat.S_ISCHR(mode)
+    assert (os.major(number), os.minor(number)) == (89, 7)
+    compact = NODE.stat(compact=True)
+    assert len(compact) == 128
+    assert struct.unpack_from("=QQIIIIQ", compact) == (device, inode, mode, 1, owner, group, number)
+
+
+def test_statx():
+    made = NODE.statx()
+    assert len(made) == 256
+    assert stat.S_ISCHR(struct.unpack_from("=H", made, 28)[0])
+    assert struct.unpack_from("=II", made, 128) == (89, 7)
+
+
+def test_listing_is_what_i2c_tools_read():
+    number, kind, name, _ = NODE.listing.split("\t")
+    assert (number, kind.strip()) == ("i2c-7", "i2c")
+    assert "cubestack" in name

@@ -1,0 +1,62 @@
+"""Starting programs: routes that are not there say why."""
+
+import errno
+import os
+
+import pytest
+
+from cubestack.emulator.i2cdev import guest_process as program
+from cubestack.emulator.i2cdev.device_node import DeviceNode
+from cubestack.emulator.i2cdev.seccomp.filter import native_abi
+
+needs_abi = pytest.mark.skipif(native_abi() is None, reason="no filter for this machine")
+
+
+def start(*command: str) -> None:
+    def files():
+        raise AssertionError("nobody opens a device file here")
+
+    program.start_filtered(command, {}, DeviceNode(7), files)
+
+
+def test_an_unknown_machine(monkeypatch):
+    monkeypatch.setattr(program, "native_abi", lambda: None)
+    with pytest.raises(program.RouteError, match="no table of system calls for"):
+        start("true")
+
+
+@needs_abi
+def test_memory_out_of_reach(monkeypatch):
+    def refuse(_pid: int, _address: int, _count: int) -> bytes:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(program, "read_memory", refuse)
+    with pytest.raises(program.RouteError, match=r"no access to the program's memory \(Operation"):
+        start("true")
+
+
+@needs_abi
+def test_a_filter_that_the_kernel_does_not_take(monkeypatch):
+    monkeypatch.setattr(program, "make_filter", lambda _abi, _numbers: bytes(8))
+    with pytest.raises(program.RouteError, match=r"the kernel refuses a seccomp listener \("):
+        start("true")
+
+
+def test_exit_codes(tmp_path):
+    for script, code in (("exit 3", 3), ("kill -9 $$", 128 + 9)):
+        running = program.start_preloaded(["sh", "-c", script], {}, tmp_path / "none.so")
+        assert running.exit_code == code
+        assert running.ended
+        assert running.watched() == []
+        running.close()
+
+
+def test_a_library_that_can_not_be_named(tmp_path):
+    with pytest.raises(program.RouteError, match="has a blank or colon"):
+        program.start_preloaded(["sh"], {}, tmp_path / "a b.so")
+
+
+def test_a_static_program_is_not_preloaded(tmp_path, monkeypatch):
+    monkeypatch.setattr(program, "is_static", lambda _path: True)
+    with pytest.raises(program.RouteError, match=r"sh is linked statically, so no library"):
+        program.start_preloaded(["sh"], {}, tmp_path / "none.so")

@@ -1,0 +1,325 @@
+"""Turns with programs, in a made-up wall time: when their answers come."""
+
+import heapq
+import itertools
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
+from cubestack.emulator.i2cdev import scheduler as turns
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, Turns
+from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.sim.virtual_time import Kernel
+
+US = 1000
+BIT_NS = 2500
+READ_BITS = (1 + 9 + 9) + (1 + 9 + 9) + 1
+READ_NS = READ_BITS * BIT_NS
+"""A register's byte at 400 kHz."""
+
+WAY_NS = 15 * US
+"""From a program to the emulation, or back."""
+
+
+class Registers:
+    def i2c_start(self, read: bool) -> None: ...
+
+    def i2c_write(self, byte: int) -> bool:
+        return True
+
+    def i2c_read(self) -> int:
+        return 7
+
+    def i2c_stop(self) -> None: ...
+
+
+class World:
+    """Wall time, which passes a bit at each look at the clock, and what happens in it.
+
+    Attributes:
+        now_ns: wall time.
+        stalls: time that goes by, all at once, at the next look at the clock after a time.
+    """
+
+    def __init__(self) -> None:
+        self.now_ns = 12_345_678
+        self.stalls: list[tuple[int, int]] = []
+        self._arrivals: list[tuple[int, int, Callable[[], None]]] = []
+        self._order = itertools.count()
+
+    def monotonic_ns(self) -> int:
+        self.now_ns += 100
+        if self.stalls and self.now_ns >= self.stalls[0][0]:
+            self.now_ns += self.stalls.pop(0)[1]
+        return self.now_ns
+
+    def arrive(self, time_ns: int, what: Callable[[], None]) -> None:
+        heapq.heappush(self._arrivals, (time_ns, next(self._order), what))
+
+    def take(self) -> None:
+        while self._arrivals and self._arrivals[0][0] <= self.now_ns:
+            heapq.heappop(self._arrivals)[2]()
+
+    def sleep(self, duration_ns: int) -> bool:
+        """Sleep until something arrives; returns whether it did."""
+        end_ns = self.now_ns + duration_ns
+        if not self._arrivals or self._arrivals[0][0] > end_ns:
+            self.now_ns = max(self.now_ns, end_ns)
+            return False
+        self.now_ns = max(self.now_ns, self._arrivals[0][0])
+        return True
+
+
+class Port:
+    """Where all calls come from."""
+
+    name = "calls"
+    congested = False
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def watched(self) -> list[tuple[int, int]]:
+        return []
+
+    def exchange(self, now_ps: int) -> None:
+        self._world.take()
+
+    def release_ps(self, count: int) -> int | None:
+        return None
+
+    def close(self) -> None: ...
+
+
+class Program:
+    """Calls again and again, as often as it has messages.
+
+    Attributes:
+        times: wall time before and after each call, as the program sees it, in ns.
+        ends: virtual time of the ends, in ps.
+    """
+
+    def __init__(
+        self,
+        bench: "Bench",
+        wait_ns: int,
+        think_ns: int,
+        calls: int,
+        message: Callable[[], list[I2cMessage]],
+    ) -> None:
+        self.times: list[tuple[int, int]] = []
+        self.ends: list[int] = []
+        self._bench = bench
+        self._think_ns = think_ns
+        self._left = calls
+        self._message = message
+        self._began_ns = 0
+        self._next(bench.world.now_ns + wait_ns)
+
+    def _next(self, now_ns: int) -> None:
+        self._began_ns = now_ns + self._think_ns
+        self._bench.world.arrive(self._began_ns + WAY_NS, self._submit)
+
+    def _submit(self) -> None:
+        self._bench.adapter.submit(self._message(), self._done)
+
+    def _done(self, result: int) -> None:
+        assert result == 0
+        seen_ns = self._bench.world.now_ns + WAY_NS
+        self.times.append((self._began_ns, seen_ns))
+        self.ends.append(self._bench.kernel.now)
+        self._left -= 1
+        if self._left:
+            self._next(seen_ns)
+        else:
+            self._bench.running -= 1
+
+    @property
+    def durations(self) -> list[int]:
+        return [end - start for start, end in self.times]
+
+    @property
+    def span(self) -> int:
+        """From the end of the first call to that of the last one."""
+        return self.times[-1][1] - self.times[0][1]
+
+
+class Bench:
+    """Turns and a pump in a world."""
+
+    def __init__(
+        self,
+        patch: pytest.MonkeyPatch,
+        *,
+        fast: bool = False,
+        busy: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.world = World()
+        patch.setattr(turns, "time", self.world)
+        patch.setattr(turns, "Watch", AtWork)
+        self.kernel = Kernel()
+        bus = I2cBus(self.kernel, 10**9 // BIT_NS)
+        bus.attach(0x1A, Registers())
+        self.adapter = I2cAdapter(self.kernel, bus)
+        self.running = 0
+        port = Port(self.world)
+        self.turns = Turns("calls", self.kernel, self.adapter, [port], busy, fast=fast)
+        self.pump = Pump(
+            self.kernel,
+            [self.turns, port],
+            lambda: self.adapter.busy or busy(),
+            pace="fast" if fast else "real",
+            clock_ns=self.turns.clock_ns,
+            wait=self._wait,
+        )
+
+    def _wait(self, _watched: object, timeout_s: float) -> None:
+        if not self.running:
+            self.pump.stop()
+        self.world.sleep(max(0, int(timeout_s * 1e9) - 150 * US))
+
+    def program(
+        self,
+        think_ns: int,
+        calls: int,
+        message: Callable[[], list[I2cMessage]] = lambda: [
+            I2cMessage(0x1A, bytearray(1)),
+            I2cMessage(0x1A, read=1),
+        ],
+        *,
+        wait_ns: int = 0,
+    ) -> Program:
+        """One that starts after ``wait_ns``."""
+        self.running += 1
+        return Program(self, wait_ns, think_ns, calls, message)
+
+    def quick_and_slow(self, think_ns: int, calls: int) -> Program:
+        """A program that shows how long the way of a call is, then another one."""
+        self.program(think_ns=0, calls=3)
+        return self.program(think_ns, calls, wait_ns=1_000 * US)
+
+
+class AtWork:
+    """Stands in for Watch."""
+
+    def __init__(self, ports: list[Port], *, always_asleep: bool) -> None:
+        assert not always_asleep
+        self._ports = ports
+        self._world = ports[0]._world
+
+    def wait(self, timeout_ns: int, *, awake: bool = False) -> list[Port]:
+        return self._ports if self._world.sleep(timeout_ns) else []
+
+    def nap(self, duration_ns: int) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def make(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Bench]:
+    return partial(Bench, monkeypatch)
+
+
+def test_transfers_one_after_the_other_take_the_time_of_the_wire(make):
+    bench = make()
+    program = bench.program(think_ns=8 * US, calls=201)
+    bench.pump.run()
+    assert program.span / 200 == pytest.approx(READ_NS, rel=0.01)
+    assert min(program.durations[1:]) > READ_NS - 8 * US - US
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.lists(st.integers(0, 1000), min_size=1, max_size=5))
+def test_no_answer_is_early(think_us):
+    """Whatever the programs do, the wire does one thing at a time."""
+    with pytest.MonkeyPatch.context() as patch:
+        bench = Bench(patch)
+        programs = [bench.program(think * US, 20) for think in think_us]
+        bench.pump.run()
+    seen = sorted(end for program in programs for _, end in program.times)
+    began = min(program.times[0][0] for program in programs)
+    for count, end in enumerate(seen, 1):
+        assert end - began >= count * READ_NS - 1
+
+
+@pytest.mark.parametrize("think_us", [TURNAROUND_NS // US, 500, 5_000, 50_000])
+def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
+    bench = make()
+    program = bench.quick_and_slow(think_ns=think_us * US, calls=20)
+    bench.pump.run()
+    assert len(program.durations) == 20
+    for duration in program.durations:
+        assert duration == pytest.approx(READ_NS, abs=5 * US)
+
+
+def test_nothing_is_known_of_the_first_call(make):
+    bench = make()
+    program = bench.program(think_ns=1_000 * US, calls=1)
+    bench.pump.run()
+    assert program.durations[0] == pytest.approx(READ_NS + 2 * WAY_NS, abs=5 * US)
+
+
+@pytest.mark.parametrize(
+    ("think_us", "when_us"), [*((8, 3_000 + step) for step in range(0, 100, 13)), (500, 3_360)]
+)
+def test_a_late_answer_is_made_up_for(make, think_us, when_us):
+    """Soon a program is where it would be."""
+    spans = []
+    for stalls in ([], [(make().world.now_ns + when_us * US, 150 * US)]):
+        bench = make()
+        bench.world.stalls = stalls
+        program = bench.quick_and_slow(think_ns=think_us * US, calls=101)
+        bench.pump.run()
+        spans.append(program.span)
+    assert spans[1] == pytest.approx(spans[0], abs=50 * US)
+
+
+@pytest.mark.parametrize("when_us", range(1_000, 1_100, 13))
+@pytest.mark.parametrize("stall_us", [3_000, 20_000])
+def test_what_is_too_late_is_lost(make, when_us, stall_us):
+    bench = make()
+    bench.world.stalls = [(bench.world.now_ns + when_us * US, stall_us * US)]
+    program = bench.program(think_ns=8 * US, calls=101)
+    bench.pump.run()
+    lost_us = (program.span - 100 * READ_NS) / US
+    assert stall_us - 1_050 < lost_us < stall_us + 200
+
+
+@pytest.mark.parametrize("bytes_", [32, 8192])
+def test_a_long_transfer(make, bytes_):
+    bench = make()
+    program = bench.program(8 * US, 5, lambda: [I2cMessage(0x1A, read=bytes_)])
+    bench.pump.run()
+    wire_ns = (1 + 9 + 9 * bytes_ + 1) * BIT_NS
+    assert program.span / 4 == pytest.approx(wire_ns, rel=0.01)
+
+
+def test_programs_take_turns_on_the_wire(make):
+    bench = make()
+    programs = [bench.program(think_ns=8 * US, calls=51) for _ in range(3)]
+    bench.pump.run()
+    for program in programs:
+        assert program.span / 50 == pytest.approx(3 * READ_NS, rel=0.05)
+
+
+def test_as_fast_as_possible_virtual_time_is_that_of_the_wire(make):
+    bench = make(fast=True)
+    program = bench.program(think_ns=0, calls=101)
+    bench.pump.run()
+    assert program.span / 100 < READ_NS * 0.7
+    assert bench.kernel.now >= 101 * READ_NS * US
+
+
+def test_as_fast_as_possible_a_device_at_work_goes_ahead(make):
+    """Programs need not ask again and again until it has done its work."""
+    bench = make(fast=True, busy=lambda: bool(program.ends) and bench.kernel.now < 10**11)
+    bench.kernel.process(bench.kernel.timeout(10**9) for _ in range(100))
+    program = bench.program(think_ns=0, calls=10)
+    bench.pump.run()
+    assert program.ends[0] < 10**10
+    assert program.ends[1] > 10**11

@@ -1,0 +1,322 @@
+"""The pump on a wall clock of the test's own: every reading of it costs 10 us."""
+
+import select
+import signal
+import socket
+import threading
+from collections.abc import Callable, Generator
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.ports.realtime import IDLE_S, LAG_REPORT_S, SLICE_S, Pump, wait_ready
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
+
+NS_PER_MS = 1_000_000
+PS_PER_NS = 1000
+ORIGIN_NS = 123_456_789_012_345
+
+
+class Wall:
+    """Wall time of the test. Attributes: the waits so far in s, and what happens in them."""
+
+    def __init__(self) -> None:
+        self.ns = ORIGIN_NS
+        self.waits: list[float] = []
+        self.during_wait: dict[int, Callable[[], object]] = {}
+
+    def clock(self) -> int:
+        self.ns += 10_000
+        return self.ns
+
+    def wait(self, _watched: Any, timeout_s: float) -> None:
+        action = self.during_wait.get(len(self.waits))
+        self.waits.append(timeout_s)
+        if action is None:
+            self.ns += int(timeout_s * 1e9)
+        else:
+            action()
+
+    @property
+    def ms(self) -> float:
+        return (self.ns - ORIGIN_NS) / NS_PER_MS
+
+
+class FakePort:
+    """An endpoint that takes note of its calls and stops the pump in the end."""
+
+    name = "fake"
+
+    def __init__(self, wall: Wall) -> None:
+        self._wall = wall
+        self.congested = False
+        self.exchanges: list[int] = []
+        self.wall_ms: list[float] = []
+        self.releases: list[int] = []
+        self.on_exchange: Callable[[], object] = lambda: None
+
+    def watched(self) -> list[tuple[int, int]]:
+        return []
+
+    def exchange(self, now_ps: int) -> None:
+        self.exchanges.append(now_ps)
+        self.wall_ms.append(self._wall.ms)
+        self.releases = [ps for ps in self.releases if ps > now_ps]
+        self.on_exchange()
+
+    def release_ps(self, count: int) -> int | None:
+        return self.releases[:count][-1] if self.releases else None
+
+    def close(self) -> None:
+        pass
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.kernel = Kernel()
+        self.wall = Wall()
+        self.port = FakePort(self.wall)
+        self.reports: list[tuple[float, str]] = []
+        self.busy: Callable[[], bool] = lambda: False
+
+    def run(self, pace: Any, wall_ms: float) -> "Bench":
+        """Let the pump serve for so long on the test's clock."""
+        pump = Pump(
+            self.kernel,
+            [self.port],
+            lambda: self.busy(),
+            pace=pace,
+            report=lambda text: self.reports.append((self.wall.ms, text)),
+            clock_ns=self.wall.clock,
+            wait=self.wall.wait,
+        )
+        self.port.on_exchange = lambda: pump.stop() if self.wall.ms >= wall_ms else None
+        pump.run()
+        return self
+
+    def tick(self, period_ps: int, cost_ns: int = 0, until_ps: int | None = None) -> list[Any]:
+        """Start a process that works off one event a period; virtual and wall ms of each."""
+        ticks = []
+
+        def process() -> Generator[Any, Any, None]:
+            while until_ps is None or self.kernel.now < until_ps:
+                yield self.kernel.timeout(period_ps)
+                self.wall.ns += cost_ns
+                ticks.append((self.kernel.now / PS_PER_MS, self.wall.ms))
+
+        self.kernel.process(process())
+        return ticks
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+# --- real pace ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("pace", ["real", "fast"])
+def test_idle_pump_sleeps(bench, pace):
+    bench.run(pace, 10_000)
+    assert min(bench.wall.waits) == IDLE_S
+    assert len(bench.wall.waits) <= 10 / IDLE_S
+
+
+def test_virtual_time_follows_wall_time(bench):
+    ticks = bench.tick(7 * PS_PER_MS)
+    bench.run("real", 5000)
+    assert len(ticks) == pytest.approx(5000 / 7, abs=1)
+    assert max(abs(wall - virtual) for virtual, wall in ticks) < 0.2
+    assert bench.kernel.now / PS_PER_MS == pytest.approx(5000, abs=IDLE_S * 1000 + 1)
+
+
+def test_pump_sleeps_until_something_is_due(bench):
+    bench.tick(7 * PS_PER_MS)
+    bench.run("real", 1000)
+    assert bench.wall.waits[0] == pytest.approx(0.007, abs=0.0002)
+    assert len(bench.wall.waits) == pytest.approx(1000 / 7, abs=3)
+
+
+def test_pump_sleeps_until_a_byte_is_due(bench):
+    bench.port.releases = [3 * PS_PER_MS, 5 * PS_PER_MS]
+    bench.run("real", 100)
+    assert bench.wall.waits[0] == pytest.approx(0.003, abs=0.0002)
+    assert bench.wall.waits[1] == pytest.approx(0.002, abs=0.0002)
+
+
+def test_virtual_time_starts_where_it_stands(bench):
+    bench.kernel.advance_to(77 * PS_PER_S)
+    bench.run("real", 1000)
+    assert bench.kernel.now == pytest.approx(78 * PS_PER_S, abs=0.05 * PS_PER_S)
+
+
+def test_what_a_client_writes_comes_at_the_time_of_its_writing(bench):
+    """Not at the time when the pump went to sleep."""
+
+    def write() -> None:
+        bench.wall.ns += 11 * NS_PER_MS
+
+    bench.wall.during_wait[3] = write
+    bench.run("real", 200)
+    before = 3 * IDLE_S * 1000
+    assert bench.port.exchanges[4] / PS_PER_MS == pytest.approx(before + 11, abs=0.5)
+
+
+def test_lag_is_told(bench):
+    """A device that costs twice the time it simulates: after 10 s, 5 s are missing."""
+    bench.tick(PS_PER_MS, cost_ns=2 * NS_PER_MS)
+    bench.run("real", 10_100)
+    times = [time for time, _ in bench.reports]
+    assert times == [pytest.approx(LAG_REPORT_S * 1000 * i, abs=20) for i in (1, 2)]
+    lags = [float(text.split()[5]) for _, text in bench.reports]
+    assert lags == [pytest.approx(2.5, abs=0.1), pytest.approx(5.0, abs=0.1)]
+    assert bench.reports[0][1].startswith("can not keep real time: ")
+
+
+def test_ports_are_served_while_the_machine_lags(bench):
+    bench.tick(PS_PER_MS, cost_ns=2 * NS_PER_MS)
+    bench.run("real", 1000)
+    assert len(bench.port.exchanges) >= 1 / (2 * SLICE_S)
+
+
+def test_lag_is_caught_up_and_not_told_any_more(bench):
+    bench.tick(PS_PER_MS, cost_ns=3 * NS_PER_MS, until_ps=2 * PS_PER_S)
+    bench.run("real", 20_000)
+    assert [text for time, text in bench.reports if time > 6500] == []
+    assert bench.kernel.now / PS_PER_MS == pytest.approx(20_000, abs=50)
+
+
+def test_short_hiccup_is_not_told(bench):
+    bench.tick(7 * PS_PER_S, cost_ns=300 * NS_PER_MS)
+    bench.run("real", 30_000)
+    assert not bench.reports
+
+
+# --- fast pace ---------------------------------------------------------------------------------
+
+
+def test_work_runs_ahead_of_wall_time(bench):
+    ticks = bench.tick(10 * PS_PER_MS, until_ps=100 * PS_PER_S)
+    bench.busy = lambda: bench.kernel.now < 100 * PS_PER_S
+    bench.run("fast", 1000)
+    assert ticks[-1][0] == 100_000
+    assert ticks[-1][1] < 1000
+    assert len(bench.port.exchanges) > ticks[-1][1] / (2 * SLICE_S * 1000)
+
+
+def test_virtual_time_follows_wall_time_when_the_work_is_done(bench):
+    bench.tick(10 * PS_PER_MS, until_ps=100 * PS_PER_S)
+    bench.busy = lambda: bench.kernel.now < 100 * PS_PER_S
+    bench.run("fast", 3000)
+    passed_ms = bench.kernel.now / PS_PER_MS - 100_000
+    assert 1000 < passed_ms < 3000
+    assert min(bench.wall.waits) > 0.9 * IDLE_S
+
+
+def test_bytes_on_the_wire_are_brought_to_their_end(bench):
+    """Nothing is scheduled then, so there is no event to go to."""
+    uart = Uart(bench.kernel, 10_000, lambda _byte: None, lambda: None, silence_bytes=100)
+    bench.busy = lambda: uart.busy
+    uart.send(bytes(5000))
+    bench.port.releases = [i * PS_PER_MS for i in range(1, 5001)]
+    bench.run("fast", 500)
+    assert bench.port.releases == []
+    assert 5 * PS_PER_S <= bench.kernel.now < 5.6 * PS_PER_S
+
+
+def test_far_event_is_not_jumped_to_for_the_sake_of_bytes_on_the_wire(bench):
+    bench.kernel.timeout(3600 * PS_PER_S)
+    bench.port.releases = [i * PS_PER_MS for i in range(1, 101)]
+    bench.busy = lambda: bool(bench.port.releases)
+    bench.run("fast", 500)
+    assert bench.kernel.now < PS_PER_S
+
+
+def test_bytes_that_have_arrived_are_handed_over_before_time_goes_on(bench):
+    bench.tick(PS_PER_MS)
+    bench.busy = lambda: True
+    bench.port.releases = [5 * PS_PER_MS + 1]
+    bench.run("fast", 100)
+    first = bench.port.exchanges.index(5 * PS_PER_MS + 1)
+    assert bench.port.wall_ms[first] < SLICE_S * 1000  # at once
+
+
+def test_slow_client_holds_virtual_time_back(bench):
+    bench.tick(PS_PER_MS)
+    bench.busy = lambda: True
+    bench.port.congested = True
+    bench.run("fast", 1000)
+    assert bench.kernel.now / PS_PER_MS == pytest.approx(1000, abs=50)
+
+
+def test_busy_device_without_events_does_not_make_the_pump_spin(bench):
+    bench.busy = lambda: True
+    bench.run("fast", 1000)
+    assert min(bench.wall.waits) == IDLE_S
+
+
+# --- the end, and the real clock ---------------------------------------------------------------
+
+
+def test_stop_before_the_start():
+    pump = Pump(Kernel(), [], lambda: False, pace="real")
+    pump.stop()
+    pump.run()
+
+
+def test_stop_from_a_signal_handler(bench):
+    pump = Pump(
+        bench.kernel,
+        [],
+        lambda: False,
+        pace="real",
+        wait=lambda _watched, _timeout: signal.raise_signal(signal.SIGUSR1),
+    )
+    before = signal.signal(signal.SIGUSR1, lambda _number, _frame: pump.stop())
+    try:
+        pump.run()
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.mark.parametrize("pace", ["real", "fast"])
+def test_stop_from_another_thread_while_the_device_is_busy(bench, pace):
+    bench.tick(PS_PER_MS)
+    pump = Pump(bench.kernel, [], lambda: True, pace=pace)
+    thread = threading.Thread(target=pump.run)
+    thread.start()
+    pump.stop()
+    thread.join(20)
+    assert not thread.is_alive()
+
+
+def test_error_of_the_device_ends_the_run(bench):
+    def process() -> Generator[Any, Any, None]:
+        yield bench.kernel.timeout(PS_PER_MS)
+        raise LookupError("the program is wrong")
+
+    bench.kernel.process(process())
+    with pytest.raises(LookupError, match="the program is wrong"):
+        bench.run("real", 100)
+
+
+def test_waiting_ends_with_input():
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.send(b"x")
+        wait_ready([(ours.fileno(), select.POLLIN)], 3600)  # hangs, if it does not
+
+
+def test_waiting_ends_with_room_for_output():
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        wait_ready([(ours.fileno(), select.POLLOUT)], 3600)
+
+
+def test_waiting_ends_with_the_timeout():
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        wait_ready([(ours.fileno(), select.POLLIN)], 0.0001)
+        wait_ready([], 0.0)

@@ -1,0 +1,175 @@
+"""The library cache: built once, never trusted blindly, and what happens without a compiler."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.rtl.cxxrtl import build
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.simulated import SimulatedEngine
+from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
+from cubestack.hdl.cubestar.top import CubeStarTop
+
+TIMEOUT_S = 300
+
+needs_compiler = pytest.mark.skipif(build.find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch) -> Path:
+    # Not by XDG_CACHE_HOME: Yosys would have to fill its own cache anew, which takes seconds.
+    folder = tmp_path / "cache"
+    monkeypatch.setattr(build, "cache_folder", lambda: folder)
+    return folder
+
+
+@pytest.fixture
+def without_compiler(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+
+
+def make_compiler(folder: Path, name: str, on_compile: str, version: str = "1.0") -> Path:
+    """A compiler that knows its version and, when it is to compile, runs ``on_compile``."""
+    program = folder / name
+    program.write_text(
+        f'#!/bin/sh\ncase "$*" in *--version) echo {version}; exit 0;; esac\n{on_compile}\n'
+    )
+    program.chmod(0o755)
+    return program
+
+
+def top() -> CubeStarTop:
+    return CubeStarTop(3, 2)
+
+
+def wiring() -> Wiring:
+    return cubestar_wiring(top())
+
+
+@pytest.fixture
+def quick_compiler(tmp_path, monkeypatch) -> None:
+    """Makes a file of the right name, its content telling the options."""
+    on_compile = 'for last; do :; done\necho "options $*" | tr -d / >"$last"'
+    monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "quickcc", on_compile)))
+
+
+def test_built_once_then_taken_from_the_cache(quick_compiler, cache, monkeypatch):
+    library = build.library_for(wiring())
+    assert library.parent == cache
+    monkeypatch.setattr(build, "_compile", lambda *_: pytest.fail("built again"))
+    assert build.library_for(wiring()) == library
+    assert sorted(path.suffix for path in cache.iterdir()) == [".log", ".so"]
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed"])
+def test_damaged_library_is_built_again(quick_compiler, cache, damage):
+    library = build.library_for(wiring())
+    content = library.read_bytes()
+    library.write_bytes(content[:9] if damage == "cut" else content[:-1] + b"\x55")
+    again = build.library_for(wiring())
+    assert again.read_bytes().startswith(b"options -std=c++17")
+    assert list(cache.glob("*.so")) == [again]
+
+
+def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypatch):
+    libraries = [build.library_for(wiring()), build.library_for(cubestar_wiring(CubeStarTop(2, 3)))]
+    monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-g"))
+    libraries.append(build.library_for(wiring()))
+    monkeypatch.setattr(build, "SOURCES", ("driver.cpp",))
+    libraries.append(build.library_for(wiring()))
+    libraries.append(build.library_for(replace(wiring(), data="SRAM_A")))
+    assert len(set(libraries)) == 5
+
+
+@needs_compiler
+def test_two_processes_may_build_at_once(cache):
+    program = (
+        "from pathlib import Path\n"
+        "from cubestack.emulator.rtl import build\n"
+        f"build.cache_folder = lambda: Path({str(cache)!r})\n"
+        "from cubestack.emulator.rtl.contract import make_engine\n"
+        "from cubestack.hdl.cubestar.top import CubeStarTop\n"
+        "print(make_engine(CubeStarTop(3, 2), 'compiled').get_pin('SRAM_WE_N'))"
+    )
+    started = [
+        subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    assert [process.communicate(timeout=TIMEOUT_S)[0] for process in started] == ["1\n", "1\n"]
+    assert not [path for path in cache.iterdir() if path.is_dir()]
+
+
+@needs_compiler
+def test_compiled_where_there_is_a_compiler_and_nothing_printed(cache, capfd, recwarn):
+    assert isinstance(make_engine(top()), CompiledEngine)
+    assert capfd.readouterr() == ("", "")
+    assert not recwarn.list
+
+
+def test_compiler_that_fails_is_one_line_with_its_log(cache, tmp_path, monkeypatch, capfd):
+    program = make_compiler(tmp_path, "badcc", "echo no such thing >&2; exit 3")
+    monkeypatch.setenv("CXX", f"{program} -m64")
+    with pytest.raises(build.CompilerError) as caught:
+        make_engine(top())
+    (log,) = cache.glob("*.log")
+    assert str(caught.value) == f"{program} -m64 failed; its log is {log}"
+    assert "no such thing" in log.read_text()
+    assert not list(cache.glob("*.so"))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_cxx_comes_first_and_version_tells_compilers_apart(tmp_path, monkeypatch):
+    monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1", "one")))
+    first = build.find_compiler()
+    assert first is not None
+    assert first.command == (str(tmp_path / "mycc"),)
+    make_compiler(tmp_path, "mycc", "exit 1", "two")
+    assert build.find_compiler() != first
+
+
+def test_broken_compiler_is_passed_over(without_compiler, tmp_path):
+    (tmp_path / "c++").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "c++").chmod(0o755)
+    assert build.find_compiler() is None
+    make_compiler(tmp_path, "clang++", "exit 1")
+    found = build.find_compiler()
+    assert found is not None
+    assert found.command == (str(tmp_path / "clang++"),)
+
+
+def test_ziglang_wheel_is_the_last_resort(without_compiler, monkeypatch):
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: name == "ziglang" or None)
+    monkeypatch.setattr(build, "version", lambda name: f"7.8 of {name}")
+    assert build.find_compiler() == build.Compiler(
+        (sys.executable, "-m", "ziglang", "c++"), "ziglang 7.8 of ziglang"
+    )
+
+
+def test_simulator_with_a_warning_where_there_is_no_compiler(without_compiler, cache):
+    with pytest.warns(UserWarning, match=r"^no C\+\+ compiler .* found; using the Amaranth"):
+        engine = make_engine(top())
+    assert isinstance(engine, SimulatedEngine)
+    with pytest.raises(build.NoCompilerError, match="ziglang wheel"):
+        make_engine(top(), "compiled")
+    assert not cache.exists()
+
+
+def test_cache_that_can_not_be_used(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(build, "cache_folder", lambda: tmp_path / "file" / "cubestack")
+    monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1")))
+    with pytest.raises(build.CompilerError, match="XDG_CACHE_HOME names another one"):
+        make_engine(top())
+
+
+def test_cache_is_where_the_user_wants_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert build.cache_folder() == tmp_path / "cubestack"
+    monkeypatch.setenv("XDG_CACHE_HOME", "")
+    assert build.cache_folder() == Path.home() / ".cache" / "cubestack"

@@ -1,0 +1,315 @@
+"""The contract of both engines, on small frames."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.rtl.contract import PinEvent, RtlEngine, make_engine
+from cubestack.emulator.rtl.wiring import cubestar_wiring
+from cubestack.hdl.cubestar.top import CubeStarTop
+
+PERIOD = 100_000
+LINE = 12
+BLANK = 30
+ROWS, COLUMNS = 4, 8
+OUTPUT_PINS = cubestar_wiring().output_pins
+# The last pixel is taken by the rising edge of its own clock, stored during that clock, and
+# acknowledged by the next rising edge.
+FIRST_ACK = (BLANK + (ROWS - 1) * LINE + COLUMNS) * PERIOD
+FRAME = (BLANK + ROWS * LINE) * PERIOD
+
+
+@pytest.fixture(params=["compiled", "python"])
+def engine(request):
+    engine = make_engine(CubeStarTop(COLUMNS, ROWS), request.param)
+    yield engine
+    engine.close()
+
+
+def read(engine: RtlEngine, count: int) -> np.ndarray:
+    """Switch to reading, and read ``count`` bytes at 1 MB/s."""
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    engine.run(engine.now_ps + 50_000)
+    out = np.zeros(count, np.uint8)
+    assert engine.strobe_read(out, Fraction(1_000_000), engine.now_ps + count * 1_000_000) == count
+    return out
+
+
+def test_reset_state(engine):
+    levels = {name: engine.get_pin(name) for name in OUTPUT_PINS}
+    active_low = {"SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"}
+    assert levels == {name: int(name in active_low) for name in OUTPUT_PINS}
+    assert engine.now_ps == 0
+    assert engine.sram.shape == (2 * ROWS * COLUMNS,)
+
+
+def test_frame_is_stored_and_acknowledged_at_the_last_pixel(engine, make_camera):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
+    assert engine.now_ps == FIRST_ACK
+    assert engine.get_pin("ACK") == 1
+    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+    assert not engine.violations
+
+
+def test_second_bank(engine, make_camera):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.set_pin("BANK", 1)
+    engine.set_pin("ENABLE", 1)
+    engine.run(10 * FRAME, ("ACK", 1))
+    assert not engine.sram[: ROWS * COLUMNS].any()
+    assert (engine.sram[ROWS * COLUMNS :] == camera.images[0].ravel()).all()
+    engine.set_pin("ENABLE", 0)
+    engine.set_pin("BANK", 0)
+    assert not read(engine, ROWS * COLUMNS).any()
+
+
+def test_enabled_in_mid_frame_stores_the_next_whole_frame(engine, make_camera):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.run((BLANK + 2 * LINE + 3) * PERIOD)
+    engine.set_pin("ENABLE", 1)
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + FRAME
+    assert (engine.sram[: ROWS * COLUMNS] == camera.images[1].ravel()).all()
+
+
+@pytest.mark.parametrize(("early_ps", "frame"), [(0, 1), (1, 0)])
+def test_pixel_clock_comes_first_at_one_instant(engine, make_camera, early_ps, frame):
+    """Two edges release the reset, a third must see HSYNC low: this one comes just too late."""
+    camera = make_camera()
+    engine.run((BLANK - 3) * PERIOD - early_ps)
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + frame * FRAME
+
+
+def test_pixel_clock_level_while_blank(engine, make_camera):
+    engine.attach(make_camera())
+    engine.set_pin("ENABLE", 1)
+    for offset_ps, level in [(-1, 0), (0, 1), (PERIOD // 2 - 1, 1), (PERIOD // 2, 0)]:
+        engine.run(25 * PERIOD + offset_ps)
+        assert engine.get_pin("PIXCLK") == level
+
+
+def test_run_that_meets_no_stop_ends_on_time(engine, make_camera):
+    engine.attach(make_camera())
+    engine.set_pin("ENABLE", 1)
+    assert engine.run(FIRST_ACK - 1, ("ACK", 1)) == FIRST_ACK - 1
+    assert engine.get_pin("ACK") == 0
+    assert engine.run(FIRST_ACK) == FIRST_ACK
+    assert engine.get_pin("ACK") == 1
+    assert engine.run(2 * FRAME, ("ACK", 1)) == FIRST_ACK
+
+
+def test_reading_wraps_and_needs_no_pixel_clock(engine, make_camera):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    engine.run(10 * FRAME, ("ACK", 1))
+    engine.attach(None)
+    expected = np.resize(camera.images[0], 3 * ROWS * COLUMNS)
+    assert (read(engine, 3 * ROWS * COLUMNS) == expected).all()
+    assert not engine.violations
+
+
+def test_dead_camera_never_acknowledges(engine, make_camera):
+    engine.attach(make_camera())
+    engine.set_pin("ENABLE", 1)
+    engine.run((BLANK + 2 * LINE) * PERIOD)
+    engine.attach(None)
+    assert [engine.get_pin(pin) for pin in ("PIXCLK", "HSYNC", "VSYNC", "PIXDATA")] == [0] * 4
+    assert engine.run(100 * FRAME, ("ACK", 1)) == 100 * FRAME
+    assert engine.get_pin("ACK") == 0
+
+
+def test_stored_frame_is_kept_while_the_camera_goes_on(engine, make_camera):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    engine.run(3 * FRAME)
+    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+
+
+def test_pixels_are_rendered_only_while_they_may_be_stored(engine, make_camera):
+    camera = make_camera(frames=5)
+    engine.attach(camera)
+    engine.run(FRAME + 1)
+    assert camera.rendered == []
+    engine.set_pin("ENABLE", 1)
+    engine.run(10 * FRAME, ("ACK", 1))
+    assert camera.rendered == [1]
+    engine.run(3 * FRAME)
+    engine.set_pin("RNW", 1)
+    engine.run(5 * FRAME)
+    assert camera.rendered == [1]
+
+
+def test_changed_stream_is_followed_from_now_on(engine, make_camera):
+    camera, other = make_camera(seed=1), make_camera(seed=2)
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    engine.run((BLANK - 5) * PERIOD)
+    camera.segments[1].pixels = other.segments[1].pixels
+    camera.segments[0].clocks += 7
+    for segment in camera.segments[1:]:
+        segment.start_ps += 7 * PERIOD
+    engine.stream_changed()
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + 7 * PERIOD
+    assert (engine.sram[: ROWS * COLUMNS] == other.images[0].ravel()).all()
+
+
+@pytest.mark.parametrize("offset_ps", [-1, 0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD // 2 + 1])
+def test_asking_the_source_again_makes_no_clock_more_or_less(engine, make_camera, offset_ps):
+    camera = make_camera()
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    engine.run((BLANK + LINE + 3) * PERIOD + offset_ps)
+    engine.stream_changed()
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
+    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+    assert not engine.violations
+
+
+def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine, make_camera):
+    engine.run(5 * PERIOD + 10)
+    engine.attach(make_camera())
+    engine.run(5 * PERIOD + 20)
+    assert engine.get_pin("PIXCLK") == 0
+    engine.run(6 * PERIOD)
+    assert engine.get_pin("PIXCLK") == 1
+
+
+def test_stream_that_stops_and_comes_back(engine, make_camera):
+    camera = make_camera()
+    segments, camera.segments = camera.segments, []
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    engine.run(5 * PERIOD)
+    assert engine.get_pin("PIXCLK") == 0
+    camera.segments = segments
+    engine.stream_changed()
+    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
+
+
+def test_strobes_keep_their_rate_over_bursts(engine):
+    period = Fraction(37 * 10**12, 48_000_000)  # 770 833 1/3 ps
+    out = np.zeros(7, np.uint8)
+    made = sum(engine.strobe_read(out, period, 10**12) for _ in range(11))
+    assert made == 77
+    assert engine.now_ps == int(77 * period)
+
+
+def test_every_rising_data_clock_is_on_the_grid(engine):
+    """Told by the violations of reading too fast."""
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    period = Fraction(22_001, 3)
+    for count in (3, 1, 2, 5, 4):
+        engine.strobe_read(np.zeros(count, np.uint8), period, 10**9)
+    assert [v.time_ps for v in engine.violations] == [int(i * period) for i in range(15)]
+
+
+def test_burst_after_a_pause_starts_its_own_count(engine):
+    period = Fraction(1_000_001, 2)
+    out = np.zeros(1, np.uint8)
+    engine.strobe_read(out, period, 10**9)
+    engine.run(engine.now_ps + 1)
+    start = engine.now_ps
+    engine.strobe_read(out, period, 10**9)
+    assert engine.now_ps == start + 500_000
+
+
+@pytest.mark.parametrize(("reach", "cycles"), [(-5, 0), (0, 0), (999, 0), (1000, 1), (3999, 3)])
+def test_only_cycles_that_end_in_time_are_made(engine, reach, cycles):
+    out = np.zeros(9, np.uint8)
+    engine.run(10_000)
+    assert engine.strobe_read(out, Fraction(1000), 10_000 + reach) == cycles
+    assert engine.now_ps == 10_000 + 1000 * cycles
+
+
+def test_reading_faster_than_the_memory_is_a_violation(engine):
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    out = np.zeros(100, np.uint8)
+    engine.strobe_read(out, Fraction(11_000), 10**12)
+    assert engine.violation_counts == {"read-access": 100}
+    assert engine.violations[1].time_ps == 11_000
+    assert engine.violations[1].address == 1
+    assert len(engine.violations) == 64
+
+
+def test_write_pulse_cut_short_by_enable(engine, make_camera):
+    engine.attach(make_camera())
+    engine.set_pin("ENABLE", 1)
+    fall = BLANK * PERIOD + PERIOD // 2
+    engine.run(fall + 3_000)
+    engine.set_pin("ENABLE", 0)
+    assert [(v.kind, v.time_ps, v.address) for v in engine.violations] == [
+        ("short-write-pulse", fall + 3_000, 0)
+    ]
+
+
+def test_apply_shows_every_output_after_every_event(engine):
+    outputs = engine.apply(
+        [PinEvent(10, "RNW", 1), PinEvent(20, "ENABLE", 1), PinEvent(30, "ENABLE", 0)]
+    )
+    by_name = [dict(zip(OUTPUT_PINS, row, strict=True)) for row in outputs.tolist()]
+    assert [row["SRAM_OE_N"] for row in by_name] == [1, 0, 1]
+    assert [row["SRAM_CE_N"] for row in by_name] == [1, 0, 1]
+    assert engine.now_ps == 30
+
+
+def test_wrong_calls_name_the_offender(engine, make_camera):
+    engine.run(100)
+    with pytest.raises(ValueError, match="run back from 100 ps to 99 ps"):
+        engine.run(99)
+    with pytest.raises(ValueError, match="not PIXCLK"):
+        engine.set_pin("PIXCLK", 1)
+    with pytest.raises(ValueError, match="no pin 'ACKK'"):
+        engine.get_pin("ACKK")
+    with pytest.raises(ValueError, match="ACK only, not on DATA"):
+        engine.run(200, ("DATA", 1))
+    with pytest.raises(ValueError, match="at least 2 ps"):
+        engine.strobe_read(np.zeros(1, np.uint8), Fraction(1), 200)
+    engine.attach(make_camera())
+    with pytest.raises(ValueError, match="not PIXCLK"):
+        engine.apply([PinEvent(300, "PIXCLK", 1)])
+
+
+@pytest.mark.parametrize(
+    ("image", "found"),
+    [
+        (np.zeros((4, 7), np.uint8), "shape .4, 7."),
+        (np.zeros((4, 8), np.int16), "int16"),
+        (np.zeros((8, 4), np.uint8).T, "C-contiguous"),
+    ],
+)
+def test_frames_that_do_not_fit_are_refused(engine, make_camera, image, found):
+    camera = make_camera()
+    camera.segments[1].pixels = lambda: image
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    with pytest.raises(ValueError, match=found):
+        engine.run(FRAME)
+
+
+def test_segments_that_do_not_fit_are_refused(engine, make_camera):
+    camera = make_camera()
+    camera.segments[1].clocks += 1
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    with pytest.raises(ValueError, match="48 clocks, not 49"):
+        engine.run(FRAME)
+
+
+def test_closed_compiled_engine_says_so():
+    engine = make_engine(CubeStarTop(COLUMNS, ROWS), "compiled")
+    engine.close()
+    with pytest.raises(RuntimeError, match="the engine is closed"):
+        engine.get_pin("ACK")
+    engine.close()

@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.scene.earth_sun import (
+    EarthSunScene,
+    Mounting,
+)
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+
+SUN, NADIR = Camera.SUN, Camera.NADIR
+S = 10**12
+
+
+def test_both_cameras_look_at_their_object_by_default() -> None:
+    scene = EarthSunScene()
+    for camera in Camera:
+        truth = scene.truth(camera, 0)
+        np.testing.assert_allclose(truth.vector, [0, 0, 1], atol=1e-15)
+        assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((0, 0), abs=1e-12)
+        assert truth.visible
+
+
+def test_mounting_is_a_rotation_to_the_pictures_axes() -> None:
+    matrix = Mounting([0, 2.0, 0], [3.0, 1.0, 0]).matrix
+    np.testing.assert_allclose(matrix @ [0, 1, 0], [0, 0, 1], atol=1e-15)  # boresight
+    np.testing.assert_allclose(matrix @ [1, 0, 0], [1, 0, 0], atol=1e-15)  # right
+    np.testing.assert_allclose(matrix @ [0, 0, -1], [0, 1, 0], atol=1e-15)  # so that is down
+    Rotation.from_matrix(matrix)
+    assert np.linalg.det(matrix) == pytest.approx(1)
+
+
+def test_alpha_is_to_the_right_and_beta_down() -> None:
+    # Nadir camera along +z, its right side +x: so down is +y.
+    scene = EarthSunScene(nadir=[np.sin(0.5), 0, np.cos(0.5)])
+    truth = scene.truth(NADIR, 0)
+    assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((np.degrees(0.5), 0))
+    # Sun camera along -z, its right side +x: so down is -y.
+    scene = EarthSunScene(sun=[0, -np.sin(0.5), -np.cos(0.5)])
+    truth = scene.truth(SUN, 0)
+    assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((0, np.degrees(0.5)))
+
+
+def test_truth_is_the_direction_from_the_boresight() -> None:
+    scene = EarthSunScene.facing(nadir_deg=(30, -40))
+    truth = scene.truth(NADIR, 0)
+    angle = np.degrees(np.arccos(truth.vector @ [0, 0, 1]))
+    assert angle == pytest.approx(50)
+    assert truth.vector[0] / truth.vector[1] == pytest.approx(30 / -40)
+
+
+def test_facing_is_what_the_truth_says_whatever_the_mounting() -> None:
+    mounting = Mounting([1, 2, 3], [0, 1, 0])
+    scene = EarthSunScene.facing((20, -10), (-5, 60), sun_camera=mounting, altitude_km=400)
+    sun, nadir = scene.truth(SUN, 0), scene.truth(NADIR, 0)
+    assert (sun.alpha_deg, sun.beta_deg) == pytest.approx((20, -10))
+    assert (nadir.alpha_deg, nadir.beta_deg) == pytest.approx((-5, 60))
+    assert scene.altitude_km == 400
+
+
+def test_truth_follows_the_body_rate() -> None:
+    rate = np.array([0.3, -0.2, 1.0])
+    scene = EarthSunScene.facing(nadir_deg=(10, 20), rate_deg_s=rate)
+    before = scene.truth(NADIR, 0).vector
+    # The satellite turns by the rate, so what it sees turns the other way.
+    expected = Rotation.from_rotvec(np.radians(rate * 4)).inv().apply(before)
+    np.testing.assert_allclose(scene.truth(NADIR, 4 * S).vector, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("sun_deg", "visible"), [((94.9, 0), True), ((0, -95.1), False), ((150, 0), False)]
+)
+def test_sun_is_seen_within_the_field(sun_deg: tuple[float, float], visible: bool) -> None:
+    scene = EarthSunScene.facing(sun_deg, altitude_km=1e6)
+    assert scene.truth(SUN, 0).visible is visible
+
+
+def test_sun_behind_the_earth_is_not_seen() -> None:
+    # The sun camera looks down here. The limb is 63.48 deg from the nadir.
+    down = Mounting([0, 0, 1])
+    for theta, visible in ((63.3, False), (63.7, True)):
+        scene = EarthSunScene.facing((theta, 0), sun_camera=down)
+        assert scene.truth(SUN, 0).visible is visible
+
+
+def test_earth_is_seen_while_any_of_it_is_in_the_field() -> None:
+    for theta, visible in ((158.0, True), (159.0, False)):
+        assert EarthSunScene.facing(nadir_deg=(theta, 0)).truth(NADIR, 0).visible is visible

@@ -1,0 +1,123 @@
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.scene import earth_sun_file
+from cubestack.emulator.scene.earth_sun import Reflection
+from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+
+SUN, NADIR = Camera.SUN, Camera.NADIR
+
+
+def save(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_scene_from_a_file(tmp_path: Path) -> None:
+    scene = load_earth_sun_scene(
+        save(
+            tmp_path,
+            """
+            kind = "earth-sun"
+            altitude_km = 600
+            nadir_deg = [10.0, -20.0]
+            sun = [0.0, 3.0, -4.0]
+            moon = [2, 0, 0]
+            rate_deg_s = [0.0, 0.1, 0.0]
+            bloom_px = 6.5
+            unevenness = 0.2
+            glow_km = 0
+            hot_pixels = 5
+            hot_pairs = 2
+            noise = false
+            seed = 9
+            [nadir_camera]
+            boresight = [1.0, 0.0, 0.0]
+            right = [0.0, 1.0, 0.0]
+            [[reflections]]
+            camera = "sun"
+            at_deg = [20.0, -10.0]
+            radius_px = 4
+            level = 200
+            """,
+        )
+    )
+    truth = scene.truth(NADIR, 0)
+    assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((10, -20))
+    np.testing.assert_allclose(scene.sun, [0, 0.6, -0.8])
+    assert scene.moon is not None
+    np.testing.assert_allclose(scene.moon, [1, 0, 0])
+    np.testing.assert_allclose(scene.nadir_camera.matrix[2], [1, 0, 0])
+    assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
+    assert (scene.altitude_km, scene.bloom_px, scene.unevenness) == (600, 6.5, 0.2)
+    assert (scene.glow_km, scene.hot_pixels, scene.hot_pairs) == (0, 5, 2)
+    assert (scene.noise, scene.seed) == (False, 9)
+    assert tuple(np.asarray(scene.rate_deg_s)) == (0, 0.1, 0)
+
+
+def test_example_in_the_documentation_is_a_scene(tmp_path: Path) -> None:
+    assert earth_sun_file.__doc__ is not None
+    example = earth_sun_file.__doc__.split("::\n", 1)[1].rsplit("\n\n", 1)[0]
+    scene = load_earth_sun_scene(save(tmp_path, textwrap.dedent(example)))
+    assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
+    assert scene.truth(NADIR, 0).visible
+
+
+def test_shortest_file(tmp_path: Path) -> None:
+    scene = load_earth_sun_scene(save(tmp_path, 'kind = "earth-sun"'))
+    assert scene.altitude_km == 750
+    assert scene.moon is None
+
+
+KIND = 'kind = "earth-sun"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", 'kind must be "earth-sun" for a sun and nadir sensor, not None'),
+        ('kind = "sky"', "not 'sky'"),
+        ("kind", "is no TOML file"),
+        (f"{KIND}height = 3", "unknown key 'height'; allowed are nadir, nadir_deg"),
+        (f"{KIND}sun = [1, 0, 0]\nsun_deg = [1, 0]", "give either sun or sun_deg, not both"),
+        (f"{KIND}nadir = [0, 0, 0]", "nadir must be 3 numbers, not all 0, not (0.0, 0.0, 0.0)"),
+        (f"{KIND}moon = [0, 0, nan]", "moon must be a number, not nan"),
+        (f"{KIND}nadir_deg = [1]", "nadir_deg must be a list of 2 numbers, not [1]"),
+        (f"{KIND}altitude_km = 0", "altitude_km must be above 0, not 0.0"),
+        (f"{KIND}bloom_px = -1", "bloom_px must be above 0, not -1.0"),
+        (f"{KIND}unevenness = -0.1", "unevenness must not be negative, not -0.1"),
+        (f"{KIND}hot_pairs = -3", "hot_pairs must not be negative, not -3"),
+        (f"{KIND}seed = 0.5", "seed must be a whole number, not 0.5"),
+        (f"{KIND}noise = 0", "noise must be true or false, not 0"),
+        (f"{KIND}rate_deg_s = [inf, 0, 0]", "rate_deg_s must be a number, not inf"),
+        (f"{KIND}sun_camera = 3", "sun_camera must be a table, not 3"),
+        (f"{KIND}[sun_camera]\nright = [1, 0, 0]", "sun_camera: needs the key boresight"),
+        (f"{KIND}[sun_camera]\nboresight = [1, 0, 0]", "sun_camera: right must not be along the"),
+        (f"{KIND}[sun_camera]\nup = 1", "sun_camera: unknown key 'up'; allowed are boresight"),
+        (f"{KIND}reflections = 1", "reflections must be tables, each under [[reflections]]"),
+        (f'{KIND}[[reflections]]\ncamera = "star"', "camera must be one of ['sun', 'nadir']"),
+        (f'{KIND}[[reflections]]\ncamera = "sun"', "needs the keys at_deg, level, radius_px"),
+        (
+            f'{KIND}[[reflections]]\ncamera = "sun"\nat_deg = [90, 90]\nlevel = 1\nradius_px = 1',
+            "at_deg must be within 95.0 deg of the boresight, not 90.0, 90.0",
+        ),
+        (
+            f'{KIND}[[reflections]]\ncamera = "sun"\nat_deg = [9, 9]\nlevel = 0\nradius_px = 1',
+            "level must be above 0, not 0.0",
+        ),
+    ],
+)
+def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
+    path = save(tmp_path, text)
+    with pytest.raises(SceneError) as caught:
+        load_earth_sun_scene(path)
+    message = str(caught.value)
+    assert complaint in message
+    assert str(path) in message
+    assert "\n" not in message

@@ -1,0 +1,223 @@
+"""Supplies: the published currents as sums of parts, charge, latch-up and its comparators."""
+
+import pytest
+
+from cubestack.emulator.sim.power import COMPARATOR_US, PowerModel
+from cubestack.emulator.sim.power_tables import CUBESENSE, CUBESTAR
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US, Kernel
+
+TRIP_PS = COMPARATOR_US * PS_PER_US
+PARTS, CHANNELS = CUBESTAR.parts, CUBESTAR.channels
+
+# CubeStar thesis, table 6.2: current in mA, duration in ms, and what the parts do then.
+MODES = {
+    1: (71.2, 140, ("sleep", "disabled", "standby", "standby")),
+    2: (121.2, 68, ("sleep", "enabled", "standby", "standby")),
+    3: (177.3, 388, ("run", "enabled", "storing", "standby")),
+    4: (81.81, 404, ("run", "disabled", "reading", "transfer")),
+}
+
+
+def enter(power: PowerModel, states: tuple[str, str, str, str]) -> None:
+    for part, state in zip(("processor", "imager", "fpga", "memory"), states, strict=True):
+        power.set_state(part, state)
+
+
+@pytest.fixture
+def kernel() -> Kernel:
+    return Kernel()
+
+
+@pytest.fixture
+def power(kernel) -> PowerModel:
+    return PowerModel(kernel, CUBESTAR)
+
+
+@pytest.fixture
+def tripped(kernel, power) -> list[tuple[int, str]]:
+    found: list[tuple[int, str]] = []
+    power.on_overcurrent = lambda channel: found.append((kernel.now, channel))
+    return found
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_published_currents(power, mode):
+    current_ma, _, states = MODES[mode]
+    enter(power, states)
+    assert power.current_ma() == pytest.approx(current_ma, abs=0.005)
+
+
+def test_starts_as_mode_1(power):
+    assert power.current_ma() == pytest.approx(MODES[1][0], abs=0.005)
+
+
+def test_charge_of_a_published_iteration(kernel, power):
+    """Equation 6.3.1: 396.2 mW over one second at 3.3 V."""
+    for _, duration_ms, states in MODES.values():
+        enter(power, states)
+        kernel.advance_to(kernel.now + duration_ms * PS_PER_MS)
+    assert kernel.now == 1000 * PS_PER_MS
+    assert power.charge_mas() * 3.3 == pytest.approx(396.2, abs=0.1)
+
+
+def test_channels_and_unswitched_parts_add_up(power):
+    enter(power, MODES[3][2])
+    always_on = PARTS["leds"].ma["on"] + PARTS["processor"].ma["run"]
+    channels = sum(power.current_ma(channel) for channel in CHANNELS)
+    assert power.current_ma() == pytest.approx(channels + always_on)
+
+
+def test_no_regular_state_trips_a_comparator(power):
+    for channel, limit in CHANNELS.items():
+        highest = sum(max(part.ma.values()) for part in PARTS.values() if part.channel == channel)
+        assert limit is not None
+        assert highest < limit
+
+
+def test_channel_that_is_off_draws_nothing(power):
+    before = power.current_ma()
+    imager = power.current_ma("imager")
+    power.switch("imager", False)
+    power.set_state("imager", "enabled")
+    assert power.current_ma("imager") == 0
+    assert power.current_ma() == pytest.approx(before - imager)
+    power.switch("imager", True)
+    assert power.current_ma("imager") == pytest.approx(imager + 50)
+
+
+def test_switch_tells_changes_only(power):
+    told = []
+    power.on_switch = lambda *change: told.append(change)
+    power.switch("memory", True)
+    power.switch("memory", False)
+    power.switch("memory", False)
+    power.switch("memory", True)
+    assert told == [("memory", False), ("memory", True)]
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_latch_up_trips_its_comparator_once(kernel, power, tripped, channel):
+    kernel.advance_to(5 * PS_PER_MS)
+    before = power.current_ma(channel)
+    power.latch_up(channel)
+    assert power.current_ma(channel) == pytest.approx(before + 300)
+    power.set_state("processor", "run")  # whatever changes meanwhile
+    kernel.advance_to(100 * PS_PER_MS)
+    power.set_state("processor", "sleep")
+    kernel.advance_to(200 * PS_PER_MS)
+    assert tripped == [(5 * PS_PER_MS + TRIP_PS, channel)]
+
+
+def test_switching_off_ends_a_latch_up(kernel, power, tripped):
+    power.latch_up("memory")
+    kernel.advance_to(PS_PER_MS)
+    power.switch("memory", False)
+    assert power.current_ma("memory") == 0
+    power.switch("memory", True)
+    assert power.current_ma("memory") == PARTS["memory"].ma["standby"]
+    kernel.advance_to(2 * PS_PER_MS)
+    power.latch_up("memory")  # and the comparator is ready for the next
+    kernel.advance_to(3 * PS_PER_MS)
+    assert tripped == [(TRIP_PS, "memory"), (2 * PS_PER_MS + TRIP_PS, "memory")]
+
+
+def test_current_that_ends_before_the_comparator_answers_is_not_told(kernel, power, tripped):
+    power.latch_up("imager")
+    kernel.advance_to(TRIP_PS - 1)
+    power.switch("imager", False)
+    kernel.advance_to(PS_PER_MS)
+    assert tripped == []
+
+
+def test_small_latch_up_goes_unnoticed_but_costs_charge(kernel, power, tripped):
+    power.latch_up("memory", 20.0)
+    kernel.advance_to(1000 * PS_PER_MS)
+    assert tripped == []
+    assert power.charge_mas() == pytest.approx(71.2 + 20.0, abs=0.005)
+
+
+def test_comparator_trips_again_after_the_current_fell(kernel, power, tripped):
+    """27.5 mA beside 2 or 3 mA: only a transfer brings the memory above its 30 mA."""
+    power.latch_up("memory", 27.5)
+    for state in ("transfer", "standby", "transfer"):
+        power.set_state("memory", state)
+        kernel.advance_to(kernel.now + PS_PER_MS)
+    assert [channel for _, channel in tripped] == ["memory", "memory"]
+
+
+def test_channel_that_is_off_can_not_latch_up(kernel, power, tripped):
+    power.switch("memory", False)
+    power.latch_up("memory")
+    power.switch("memory", True)
+    kernel.advance_to(PS_PER_MS)
+    assert tripped == []
+    assert power.current_ma("memory") == PARTS["memory"].ma["standby"]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda power: power.switch("radio", False),
+        lambda power: power.latch_up("radio"),
+        lambda power: power.current_ma("radio"),
+    ],
+)
+def test_unknown_channel(power, call):
+    with pytest.raises(ValueError, match=r"no supply channel 'radio', only \['imager', 'memory'\]"):
+        call(power)
+
+
+def test_unknown_part_and_state(power):
+    with pytest.raises(ValueError, match=r"no supplied part 'radio', only .*'fpga'"):
+        power.set_state("radio", "on")
+    with pytest.raises(
+        ValueError, match=r"memory has no state 'on', only \['standby', 'transfer'\]"
+    ):
+        power.set_state("memory", "on")
+    assert power.current_ma() == pytest.approx(71.2, abs=0.005)
+
+
+def test_lasting_latch_up_comes_back_with_each_switching_on(kernel, power, tripped):
+    power.latch_up("memory", lasting=True)
+    kernel.advance_to(PS_PER_MS)
+    power.switch("memory", False)
+    assert power.current_ma("memory") == 0
+    power.switch("memory", True)
+    kernel.advance_to(2 * PS_PER_MS)
+    assert [channel for _, channel in tripped] == ["memory", "memory"]
+
+
+# CubeSense thesis, table 7.1: power in mW, and what the parts do then.
+CUBESENSE_STATES = [
+    (41.9, "reset", 0, 0, 0),
+    (62.2, "on", 0, 0, 0),
+    (84.2, "on", 1, 0, 0),
+    (108.1, "on", 2, 0, 0),
+    (246.8, "on", 2, 1, 0),
+    (359.5, "on", 2, 2, 0),
+    (396.4, "on", 2, 2, 1),
+    (432.4, "on", 2, 2, 2),
+]
+
+
+@pytest.mark.parametrize(
+    ("published_mw", "processor", "memories", "cameras", "sides"), CUBESENSE_STATES
+)
+def test_published_power_of_cubesense(kernel, published_mw, processor, memories, cameras, sides):
+    power = PowerModel(kernel, CUBESENSE)
+    power.set_state("processor", processor)
+    for half, (memory, side) in enumerate((("1", "sun"), ("2", "nadir"))):
+        power.switch(f"SRAM{memory}", half < memories)
+        power.switch(f"{side}_camera", half < cameras)
+        if half < sides:
+            power.set_state(f"sram{memory}", "active")
+            power.set_state(f"{side}_fpga", "imaging")
+    assert power.current_ma() * CUBESENSE.volts == pytest.approx(published_mw, rel=0.06)
+
+
+def test_channel_without_a_comparator_is_never_told(kernel):
+    power = PowerModel(kernel, CUBESENSE)
+    power.on_overcurrent = lambda channel: pytest.fail(f"{channel} has no comparator")
+    power.latch_up("SRAM1")
+    kernel.advance_to(PS_PER_MS)
+    assert power.current_ma("SRAM1") > 300

@@ -1,0 +1,202 @@
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore, flash_image
+from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
+from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
+
+from ..program_bench import Bench
+from ..sky import database
+
+
+@pytest.fixture(scope="module")
+def catalogue() -> Database:
+    return database(CatalogueParameters(step_deg=10, stars_per_field=5))
+
+
+@pytest.fixture
+def desk(catalogue: Database) -> "Desk":
+    return Desk(catalogue)
+
+
+class Desk:
+    """A store whose flash holds a catalogue."""
+
+    def __init__(self, catalogue: Database) -> None:
+        self.bench = Bench()
+        self.image = catalogue.pack()
+        self.coded = flash_image(self.image)
+        self.bench.catalogue_flash[: len(self.coded)] = self.coded
+        self.store = CatalogueStore(self.bench, self.bench.meter)
+
+    def load(self) -> bool:
+        return self.bench.run(self.store.load())
+
+    def flip_flash(self, *bits: int) -> None:
+        for bit in bits:
+            self.bench.catalogue_flash[bit // 8] ^= np.uint8(1 << bit % 8)
+
+    @property
+    def ram(self) -> np.ndarray:
+        return self.bench.sdram[CATALOGUE_AT : CATALOGUE_AT + len(self.image)]
+
+
+def test_what_was_written_is_loaded(desk: Desk) -> None:
+    assert desk.load()
+    assert desk.store.state is CatalogueState.GOOD
+    assert desk.ram.tobytes() == desk.image
+    assert desk.store.database is not None
+    assert desk.store.database.pack() == desk.image
+    assert (desk.store.corrected, desk.store.lost, desk.store.loads, desk.store.failures) == (
+        0,
+        0,
+        1,
+        0,
+    )
+    assert desk.store.length == len(desk.image)
+
+
+def test_loading_takes_the_flash_s_time_and_a_little_more(desk: Desk) -> None:
+    desk.load()
+    flash_us = len(desk.coded) / 2 * 0.070
+    assert flash_us < desk.store.load_us < 2 * flash_us
+    assert desk.store.loaded_us == desk.bench.us
+
+
+def test_single_errors_all_over_the_flash_are_corrected(desk: Desk) -> None:
+    words = len(desk.coded) // 9
+    rng = np.random.default_rng(3)
+    damaged = np.unique(np.concatenate([[0, 1, words - 1], rng.integers(0, words, 500)]))
+    desk.flip_flash(*(int(word) * 72 + int(rng.integers(72)) for word in damaged))
+    assert desk.load()
+    assert desk.store.corrected == len(damaged) == desk.store.corrected_total
+    assert desk.ram.tobytes() == desk.image
+    desk.load()
+    assert desk.store.corrected_total == 2 * len(damaged)
+
+
+@pytest.mark.parametrize("word", [0, 1, 5000, -1])
+def test_a_double_error_is_detected_wherever_it_is(desk: Desk, word: int) -> None:
+    word %= len(desk.coded) // 9
+    desk.flip_flash(72 * word + 3, 72 * word + 40)
+    assert not desk.load()
+    assert desk.store.state is CatalogueState.DAMAGED
+    assert desk.store.database is None
+    assert desk.store.length == 0
+    assert (desk.store.lost, desk.store.failures) == (1, 1)
+
+
+def test_three_errors_that_look_like_one_do_not_pass_the_checksum(desk: Desk) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(200):  # until a triple is taken for a single error
+        bits = 72 * 700 + rng.choice(72, 3, replace=False)
+        desk.flip_flash(*bits.tolist())
+        desk.load()
+        desk.flip_flash(*bits.tolist())
+        assert desk.store.state is CatalogueState.DAMAGED
+        if not desk.store.lost:
+            break
+    else:
+        pytest.fail("no triple error was miscorrected")
+
+
+def test_an_erased_flash_holds_no_catalogue() -> None:
+    bench = Bench()
+    store = CatalogueStore(bench, bench.meter)
+    assert not bench.run(store.load())
+    assert store.state is CatalogueState.MISSING
+    bench.catalogue_flash[:] = 0
+    assert not bench.run(store.load())
+    assert store.state is CatalogueState.MISSING
+
+
+@pytest.mark.parametrize("content", [b"", b"x", b"ARAM" + bytes(100)])
+def test_contents_that_are_no_catalogue_are_refused(content: bytes) -> None:
+    bench = Bench()
+    coded = flash_image(content)
+    bench.catalogue_flash[: len(coded)] = coded
+    store = CatalogueStore(bench, bench.meter)
+    assert not bench.run(store.load())
+    assert store.state in (CatalogueState.DAMAGED, CatalogueState.MISSING)
+
+
+def test_a_catalogue_longer_than_the_flash_is_refused() -> None:
+    with pytest.raises(ValueError, match="fewer stars per field"):
+        flash_image(bytes(MOST_CATALOGUE_BYTES + 1))
+
+
+def test_damaged_ram_is_noticed_before_use_and_loaded_anew(desk: Desk) -> None:
+    desk.load()
+    assert desk.bench.run(desk.store.ensure())
+    assert desk.store.loads == 1
+    for place in (0, 100, len(desk.image) // 2, len(desk.image) - 1):
+        errors = desk.store.ram_errors
+        desk.ram[place] ^= 0x10
+        assert desk.bench.run(desk.store.ensure())
+        assert desk.store.ram_errors == errors + 1
+        assert desk.ram.tobytes() == desk.image
+
+
+def test_damaged_ram_and_damaged_flash_leave_nothing(desk: Desk) -> None:
+    desk.load()
+    desk.ram[77] ^= 1
+    desk.flip_flash(72 * 300, 72 * 300 + 1)
+    assert not desk.bench.run(desk.store.ensure())
+    assert desk.store.state is CatalogueState.DAMAGED
+    assert not desk.bench.run(desk.store.ensure())
+
+
+def test_a_reload_spares_the_good_copy_what_flash_has_lost(desk: Desk) -> None:
+    desk.load()
+    database = desk.store.database
+    desk.flip_flash(72 * 300, 72 * 300 + 1)
+    assert desk.load()
+    assert desk.store.database is database
+    assert (desk.store.lost, desk.store.failures) == (1, 1)
+    assert desk.store.state is CatalogueState.GOOD
+    assert desk.bench.run(desk.store.ensure())
+    assert desk.ram.tobytes() == desk.image
+
+
+def test_a_pass_comes_in_slices_of_a_few_milliseconds(desk: Desk) -> None:
+    ended, longest, slices = False, 0, 0
+    while not ended:
+        before = desk.bench.us
+        ended = desk.bench.run(desk.store.load_step())
+        assert desk.store.loading is not ended
+        if not ended:
+            longest = max(longest, desk.bench.us - before)
+        slices += 1
+    assert slices > 10
+    assert longest < 5_000
+    assert desk.store.database is not None
+
+
+def test_refreshing_repairs_the_flash_from_ram(desk: Desk) -> None:
+    assert not desk.bench.run(desk.store.refresh())  # nothing in RAM yet
+    desk.load()
+    desk.flip_flash(72 * 300, 72 * 300 + 1, 72 * 500)
+    before_us = desk.bench.us
+    assert desk.bench.run(desk.store.refresh())
+    np.testing.assert_array_equal(desk.bench.catalogue_flash[: len(desk.coded)], desk.coded)
+    sectors = -(-len(desk.coded) // SECTOR_BYTES)
+    assert desk.bench.us - before_us > sectors * 800_000 + len(desk.coded) // 2 * 10
+
+
+def test_random_upsets_at_one_in_a_million_never_leave_a_wrong_byte(desk: Desk) -> None:
+    """The rate that the code is to stand: every load is the true image or is refused."""
+    rng = np.random.default_rng(11)
+    bits = 8 * len(desk.coded)
+    good = 0
+    for _ in range(20):
+        flips = np.unique(rng.integers(0, bits, rng.poisson(bits * 1e-6))).tolist()
+        desk.flip_flash(*flips)
+        desk.store.forget()
+        if desk.load():
+            good += 1
+            assert desk.ram.tobytes() == desk.image
+            assert desk.store.corrected == len(flips)
+        desk.flip_flash(*flips)
+    assert good == 20

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.aramis.catalogue.hamming import (
+    CODED_BYTES,
+    _columns,
+    coded_size,
+    decode,
+    encode,
+)
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+
+words = st.binary(min_size=8, max_size=8)
+
+
+def meter() -> Meter:
+    return Meter(BLACKFIN_BF533)
+
+
+def flipped(coded: np.ndarray, *bits: int) -> np.ndarray:
+    damaged = coded.copy()
+    for bit in bits:
+        damaged[bit // 8] ^= 1 << bit % 8
+    return damaged
+
+
+def test_columns_are_distinct_odd_and_none_is_a_check_bit_s() -> None:
+    columns = _columns()
+    assert len(set(columns)) == 64
+    assert all(column.bit_count() % 2 == 1 and column.bit_count() > 1 for column in columns)
+
+
+@given(st.binary(max_size=100))
+def test_what_is_not_damaged_comes_back(data: bytes) -> None:
+    coded = encode(data)
+    assert len(coded) == coded_size(len(data))
+    decoded = decode(coded, meter())
+    assert decoded.data[: len(data)].tobytes() == data
+    assert not decoded.data[len(data) :].any()
+    assert decoded.corrected == 0
+    assert not len(decoded.lost)
+
+
+@given(words)
+def test_each_single_error_is_corrected(data: bytes) -> None:
+    coded = encode(data)
+    copies = np.concatenate([flipped(coded, bit) for bit in range(72)])
+    decoded = decode(copies, meter())
+    assert decoded.data.tobytes() == data * 72
+    assert decoded.corrected == 72
+    assert not len(decoded.lost)
+
+
+@given(words)
+def test_each_double_error_is_detected(data: bytes) -> None:
+    coded = encode(data)
+    pairs = [(one, two) for one in range(72) for two in range(one)]
+    copies = np.concatenate([flipped(coded, *pair) for pair in pairs])
+    decoded = decode(copies, meter())
+    assert decoded.corrected == 0
+    assert decoded.lost.tolist() == list(range(len(pairs)))
+
+
+def test_the_code_is_linear() -> None:
+    """The check byte of a sum is the sum of the check bytes: an oracle for the tables."""
+    rng = np.random.default_rng(1)
+    one, two = rng.bytes(8), rng.bytes(8)
+    both = bytes(a ^ b for a, b in zip(one, two, strict=True))
+    assert (encode(one) ^ encode(two)).tolist() == encode(both).tolist()
+    single = encode((1 << 5).to_bytes(8, "little"))
+    assert single[8] == _columns()[5]
+
+
+def test_the_cost_is_that_of_the_words_read() -> None:
+    counter = meter()
+    decode(encode(bytes(800)), counter)
+    assert counter.counts["coded_word"] == 100
+    assert counter.counts["flash_read"] == 100 * CODED_BYTES // 2
+
+
+@pytest.mark.parametrize("size", [8, 16])
+def test_decoding_leaves_the_coded_words_alone(size: int) -> None:
+    damaged = flipped(encode(bytes(size)), 3)
+    before = damaged.copy()
+    assert decode(damaged, meter()).corrected == 1
+    np.testing.assert_array_equal(damaged, before)
+
+
+def test_parts_of_words_are_refused() -> None:
+    with pytest.raises(ValueError, match="words of 9 bytes, not 10"):
+        decode(np.zeros(10, np.uint8), meter())

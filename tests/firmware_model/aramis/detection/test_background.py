@@ -1,0 +1,71 @@
+"""The threshold of the last five pictures."""
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.aramis.detection.background import FRAMES, Background
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+
+FLAT = Field(columns=64, rows=48, round=False)
+ROUND = Field(columns=64, rows=48)
+
+
+def meter() -> Meter:
+    return Meter(BLACKFIN_BF533)
+
+
+def noise(level: float, sigma: float, seed: int) -> np.ndarray:
+    values = np.random.default_rng(seed).normal(level, sigma, (48, 64))
+    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+
+
+def test_mean_plus_two_sigma_of_all_pixels() -> None:
+    background, pictures = Background(), [noise(20, 3, seed) for seed in range(FRAMES)]
+    for picture in pictures:
+        background.add(picture, FLAT, meter())
+    pixels = np.stack(pictures)
+    assert background.mean(meter()) == round(pixels.mean())
+    assert background.threshold(2, meter()) == int(pixels.mean() + 2 * pixels.std())
+    assert background.threshold(0, meter()) == int(pixels.mean())
+
+
+def test_only_the_last_five_count() -> None:
+    background = Background()
+    for level in (200, 200, 10, 10, 10, 10, 10):
+        background.add(np.full((48, 64), level, dtype=np.uint8), FLAT, meter())
+    assert len(background.sums) == FRAMES
+    assert background.mean(meter()) == 10
+    assert background.threshold(2, meter()) == 10
+
+
+def test_fewer_pictures_do() -> None:
+    background = Background()
+    assert background.mean(meter()) == background.threshold(2, meter()) == 0
+    background.add(noise(50, 5, 1), FLAT, meter())
+    assert background.threshold(2, meter()) == pytest.approx(60, abs=1)
+
+
+def test_a_change_of_level_is_followed_slowly() -> None:
+    background = Background()
+    for _ in range(4):
+        background.add(noise(20, 2, 1), FLAT, meter())
+    background.add(noise(40, 2, 2), FLAT, meter())
+    assert background.mean(meter()) == 24
+
+
+def test_what_is_outside_the_field_does_not_count() -> None:
+    picture = np.where(ROUND.mask, 30, 255).astype(np.uint8)
+    background = Background()
+    background.add(picture, ROUND, meter())
+    assert background.mean(meter()) == background.threshold(5, meter()) == 30
+
+
+def test_the_largest_sums() -> None:
+    """All white at full size: the squares of five pictures exceed 32 bits."""
+    field, background = Field(round=False), Background()
+    for _ in range(FRAMES):
+        background.add(np.full((1024, 1280), 255, dtype=np.uint8), field, meter())
+    assert background.sums[0][2] < 2**39
+    assert background.threshold(2, meter()) == 255

@@ -1,0 +1,79 @@
+"""Both ways to remove spikes, against counting window by window."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+
+Mask = NDArray[np.bool_]
+SHAPES = [(20, 25), (21, 28), (24, 22), (5, 5), (3, 4), (1, 1)]
+
+
+def run(mask: Mask, method: SpikeRemoval, needed: int = HALF) -> Mask:
+    return remove_spikes(mask, method, needed, Meter(BLACKFIN_BF533))
+
+
+def slowly(mask: Mask, method: SpikeRemoval, needed: int) -> Mask:
+    """As section 3.5 says it, one window after the other."""
+    rows, columns = mask.shape
+    result = np.zeros_like(mask)
+    if method is SpikeRemoval.CENTRE:
+        for y in range(rows):
+            for x in range(columns):
+                window = mask[max(0, y - 2) : y + 3, max(0, x - 2) : x + 3]
+                result[y, x] = 25 * window.sum() >= needed * window.size
+        return result
+    for y in range(0, rows, 5):
+        for x in range(0, columns, 5):
+            window = mask[y : y + 5, x : x + 5]
+            if 25 * window.sum() >= needed * window.size:
+                result[y : y + 5, x : x + 5] = window
+    return result
+
+
+@pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("needed", [1, 8, HALF, 25])
+def test_against_window_by_window(
+    method: SpikeRemoval, shape: tuple[int, int], needed: int
+) -> None:
+    for seed in range(5):
+        mask = np.random.default_rng(seed).random(shape) < 0.5
+        np.testing.assert_array_equal(run(mask, method, needed), slowly(mask, method, needed))
+
+
+@pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
+def test_spikes_go_and_stars_stay(method: SpikeRemoval) -> None:
+    rng = np.random.default_rng(1)
+    spikes = rng.random((100, 100)) < 0.05
+    assert not run(spikes, method).any()
+    star = np.zeros((100, 100), dtype=bool)
+    star[40:50, 40:50] = True
+    assert run(spikes | star, method)[40:50, 40:50].sum() > 90
+
+
+def test_a_window_of_thirteen_stays_and_one_of_twelve_goes() -> None:
+    mask = np.zeros((15, 15), dtype=bool)
+    mask[5:10, 5:10].flat[:13] = True
+    assert run(mask, SpikeRemoval.WINDOW).sum() == 13
+    mask[5, 5] = False
+    assert run(mask, SpikeRemoval.WINDOW).sum() == 0
+
+
+def test_off_changes_nothing() -> None:
+    mask = np.random.default_rng(2).random((9, 9)) < 0.5
+    assert run(mask, SpikeRemoval.OFF) is mask
+
+
+def test_the_second_method_is_the_quicker_one() -> None:
+    mask = np.zeros((100, 100), dtype=bool)
+    meters = [Meter(BLACKFIN_BF533) for _ in range(2)]
+    for meter, method in zip(meters, (SpikeRemoval.CENTRE, SpikeRemoval.WINDOW), strict=True):
+        remove_spikes(mask, method, HALF, meter)
+        assert meter.phases == {"spikes": meter.total}
+    assert meters[0].counts["table_byte"] == (100 * 5 - 6) ** 2
+    assert meters[1].counts["table_byte"] == 100**2
+    assert meters[0].total > 10 * meters[1].total

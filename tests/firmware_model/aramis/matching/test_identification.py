@@ -1,0 +1,219 @@
+"""From stars to attitudes: the published profile, and the one that verifies.
+
+`campaign` measures the same over a thousand attitudes.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.matching.identification import identify
+from cubestack.firmware_model.aramis.matching.matching import MatchEnd
+from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
+from cubestack.firmware_model.aramis.solution import (
+    NONE,
+    Outcome,
+    Profile,
+    Reason,
+    Solution,
+    StarList,
+)
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+
+from ..campaign import COARSE, rates
+from ..sky import Light, Picture, database, errors_deg, picture
+
+FIELD = Field()
+
+
+def run(
+    made: Picture, profile: Profile = VERIFIED.profile, hint: np.ndarray | None = None
+) -> Solution:
+    return identify(made.stars, FIELD, profile, database(), Meter(BLACKFIN_BF533), hint)
+
+
+def pictures(count: int, seed: int, light: Light | None = None) -> list[Picture]:
+    rng = np.random.default_rng(seed)
+    return [picture(rng, FIELD, light) for _ in range(count)]
+
+
+def test_the_published_profile_is_mostly_right_and_sometimes_wrong() -> None:
+    """The thesis has 60 % conclusive results, many of them wrong, with more noise than here."""
+    found = rates(120, PUBLISHED.profile)
+    assert found["right"] > 0.9
+    assert found["wrong"] > 0.005
+
+
+def test_with_more_noise_than_assumed_the_published_profile_fails_as_published() -> None:
+    found = rates(120, PUBLISHED.profile, light=replace(COARSE, noise_px=1.0))
+    assert 0.5 < found["right"] + found["wrong"] < 0.8
+    assert found["wrong"] > 0.1
+    assert found["far"] > 0.03
+
+
+def test_a_rough_direction_leaves_only_right_results() -> None:
+    found = rates(120, PUBLISHED.profile, hint_error_deg=2)
+    assert found["wrong"] == 0
+    assert found["right"] > 0.95
+
+
+def test_a_rough_direction_rules_out_what_is_far_away() -> None:
+    """The thesis' own criterion of a true result, in the noise that fails without a direction."""
+    found = rates(120, PUBLISHED.profile, light=replace(COARSE, noise_px=1.0), hint_error_deg=2)
+    assert found["far"] == 0
+    assert found["wrong"] < 0.05
+    assert found["right"] > 0.35
+
+
+@pytest.mark.parametrize(
+    ("light", "hint_error_deg", "right"),
+    [
+        (Light(), None, 0.98),
+        (Light(false_stars=5), None, 0.98),
+        (Light(false_stars=5), 2.0, 0.98),
+        (Light(false_stars=5, false_mags=(0, 3)), None, 0.95),
+        (Light(mag_limit=5, false_stars=5), None, 0.95),
+    ],
+)
+def test_verification_is_right_and_never_wrong(
+    light: Light, hint_error_deg: float | None, right: float
+) -> None:
+    found = rates(50, VERIFIED.profile, light=light, hint_error_deg=hint_error_deg, seed=1)
+    assert found["wrong"] == 0
+    assert found["right"] >= right
+
+
+def test_a_lens_of_18_degrees() -> None:
+    found = rates(40, VERIFIED.profile, Field(fov_deg=18), Light(false_stars=5))
+    assert found["wrong"] == 0
+    assert found["right"] >= 0.95
+
+
+def test_false_stars_alone_give_no_attitude() -> None:
+    light = Light(mag_limit=-2, false_stars=20, false_mags=(2, 6))
+    for made in pictures(20, 2, light):
+        solution = run(made)
+        assert solution.outcome is Outcome.NONE
+        assert solution.quaternion is None
+        assert (solution.stars == NONE).all()
+
+
+def test_all_confirming_stars_make_the_attitude_better() -> None:
+    triple, all_stars = [], []
+    for made in pictures(40, 3):
+        plain, verified = run(made, replace(VERIFIED.profile, verify=False)), run(made)
+        if plain.quaternion is None or errors_deg(plain.quaternion, made.attitude)[0] > 0.1:
+            continue
+        assert verified.quaternion is not None
+        triple.append(errors_deg(plain.quaternion, made.attitude))
+        all_stars.append(errors_deg(verified.quaternion, made.attitude))
+    assert np.median(all_stars, axis=0)[0] < 0.7 * np.median(triple, axis=0)[0]
+    assert np.max(all_stars, axis=0)[0] < 0.01
+
+
+def test_what_a_solution_tells() -> None:
+    (made,) = pictures(1, 4)
+    solution = run(made)
+    assert solution.outcome is Outcome.CONCLUSIVE
+    assert solution.reason is Reason.CONFIRMED
+    assert solution.quaternion is not None
+    assert solution.quaternion[3] >= 0
+    assert np.linalg.norm(solution.quaternion) == pytest.approx(1, abs=1e-6)
+    named = solution.stars != NONE
+    assert (database().numbers[solution.stars[named]] == made.hip[named]).all()
+    assert 3 < named.sum() <= solution.expected
+    assert solution.triples >= 1
+    assert solution.measured is made.stars
+
+
+def test_the_order_of_brightness_is_not_needed() -> None:
+    """Verification tells stars apart by their sides when their brightness misleads."""
+    rng = np.random.default_rng(5)
+    right = 0
+    for made in pictures(30, 5):
+        shuffled = rng.permutation(len(made.stars))[:12]
+        stars = StarList(
+            made.stars.centroids[np.sort(shuffled)], np.sort(made.stars.brightness[shuffled])
+        )
+        solution = identify(stars, FIELD, VERIFIED.profile, database(), Meter(BLACKFIN_BF533))
+        if solution.quaternion is not None:
+            assert errors_deg(solution.quaternion, made.attitude)[0] < 0.1
+            right += 1
+    assert right > 10
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_few_stars(count: int) -> None:
+    (made,) = pictures(1, 6)
+    stars = StarList(made.stars.centroids[:count], made.stars.brightness[:count])
+    for profile in (PUBLISHED.profile, VERIFIED.profile):
+        solution = identify(stars, FIELD, profile, database(), Meter(BLACKFIN_BF533))
+        assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.TOO_FEW_STARS)
+
+
+@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+def test_stars_that_all_coincide(profile: Profile) -> None:
+    stars = StarList(np.full((6, 2), 500, dtype=np.float32), np.ones(6, dtype=np.float32))
+    solution = identify(stars, FIELD, profile, database(), Meter(BLACKFIN_BF533))
+    assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.DEGENERATE)
+
+
+@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_a_direction_that_is_none_gives_nothing(profile: Profile, value: float) -> None:
+    for made in pictures(5, 11):
+        solution = run(made, profile, np.full(3, value, dtype=np.float32))
+        assert solution.outcome is not Outcome.CONCLUSIVE
+
+
+@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+def test_a_direction_on_the_other_side_of_the_sky_gives_nothing(profile: Profile) -> None:
+    for made in pictures(10, 7):
+        assert run(made, profile, -made.boresight.astype(np.float32)).outcome is not (
+            Outcome.CONCLUSIVE
+        )
+
+
+def test_an_attitude_far_from_the_direction_is_refused() -> None:
+    """The faces around a direction reach farther than its tolerance."""
+    rng = np.random.default_rng(8)
+    strict = replace(VERIFIED.profile, hint_tolerance_deg=1.0)
+    loose = replace(VERIFIED.profile, hint_tolerance_deg=5.0)
+    for made in pictures(10, 8):
+        hint = made.hint(2.0, rng)
+        assert run(made, strict, hint).outcome is Outcome.NONE
+        assert run(made, loose, hint).outcome is Outcome.CONCLUSIVE
+
+
+def test_the_published_profile_names_the_same_end_as_matching() -> None:
+    assert {Reason.of(end).value for end in MatchEnd} <= {reason.value for reason in Reason}
+    reasons = {run(made, PUBLISHED.profile).reason for made in pictures(100, 9, Light(noise_px=1))}
+    assert Reason.UNIQUE in reasons
+    assert Reason.NO_SHARED_PAIR in reasons
+
+
+def test_phases_add_up() -> None:
+    (made,) = pictures(1, 10)
+    meter = Meter(BLACKFIN_BF533)
+    identify(made.stars, FIELD, VERIFIED.profile, database(), meter, made.boresight)
+    assert set(meter.phases) >= {"faces", "triangles", "search", "identities", "attitude"}
+    assert 0.9 * meter.total < sum(meter.phases.values()) <= meter.total
+    assert meter.table.seconds(meter.total) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"sigma_rad": 0.0}, "sigma_rad must be 1e-07 to 0.01, not 0.0"),
+        ({"sigma_rad": float("nan")}, "sigma_rad must be"),
+        ({"pivots": 4}, "pivots must be 0 to 3, not 4"),
+        ({"triple_stars": 2}, "triple_stars must be 3 to 64, not 2"),
+        ({"largest_chance": -1.0}, "largest_chance must be 0 to 1, not -1.0"),
+    ],
+)
+def test_settings_out_of_range_are_refused(setting: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Profile(**setting)  # type: ignore[arg-type]

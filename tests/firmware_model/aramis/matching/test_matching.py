@@ -1,0 +1,207 @@
+"""Candidates against a search of the whole database, and pivoting on real and invented skies."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.matching.matching import MatchEnd, find_triangles, match_triple
+from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import Light, Picture, database, picture
+
+SIGMA = 5.6e-5
+FIELD = Field()
+
+
+def meter() -> Meter:
+    return Meter(BLACKFIN_BF533)
+
+
+def directions(made: Picture) -> NDArray[np.float32]:
+    return FIELD.directions(made.stars.centroids, meter())
+
+
+def pictures(count: int, light: Light | None = None, seed: int = 0) -> list[Picture]:
+    rng = np.random.default_rng(seed)
+    return [picture(rng, FIELD, light) for _ in range(count)]
+
+
+def triangle_of(hip: NDArray[np.int32]) -> int | None:
+    """Where the database has the triangle of three Hipparcos numbers."""
+    onboard = database()
+    stars = np.flatnonzero(np.isin(onboard.numbers, hip))
+    if len(stars) < 3:
+        return None
+    places = np.flatnonzero((onboard.stars == stars).all(axis=1))
+    return int(places[0]) if len(places) else None
+
+
+@pytest.mark.parametrize("sigma", [3.7e-5, 1.7e-4])
+@pytest.mark.parametrize("aided", [False, True])
+def test_candidates_are_those_of_comparing_everything(sigma: float, aided: bool) -> None:
+    onboard = database()
+    all_moments = np.empty_like(onboard.moments)
+    all_moments[onboard.moment_triangles] = onboard.moments
+    for made in pictures(40):
+        triangle = measure_triangle(directions(made)[:3], sigma, meter())
+        if triangle is None:
+            continue
+        faces = onboard.sphere.around(made.boresight.astype(np.float32), meter()) if aided else None
+        found = find_triangles(triangle, onboard, faces, meter())
+        area_reach = np.float32(3) * triangle.area_sigma
+        moment_reach = np.float32(3) * triangle.moment_sigma
+        expected = (
+            (onboard.areas >= triangle.area - area_reach)
+            & (onboard.areas <= triangle.area + area_reach)
+            & (all_moments >= triangle.moment - moment_reach)
+            & (all_moments <= triangle.moment + moment_reach)
+        )
+        if faces is not None:
+            expected &= faces[onboard.faces]
+        assert sorted(found.tolist()) == np.flatnonzero(expected).tolist()
+
+
+def test_a_search_looks_at_less_than_a_hundredth_of_the_database() -> None:
+    onboard = database()
+    for made in pictures(60, seed=1):
+        triangle = measure_triangle(directions(made)[:3], SIGMA, meter())
+        if triangle is None:
+            continue
+        for index, values, middle, sigma in (
+            (onboard.area_index, onboard.areas, triangle.area, triangle.area_sigma),
+            (onboard.moment_index, onboard.moments, triangle.moment, triangle.moment_sigma),
+        ):
+            reach = np.float32(3) * sigma
+            places = index.find(values, middle - reach, middle + reach, meter())
+            assert places.looked_at < 0.01 * len(onboard)
+
+
+def test_the_true_triangle_is_nearly_always_a_candidate() -> None:
+    """Two bounds of three sigma that are not independent: at least 99 % with the right noise."""
+    onboard, found, listed = database(), 0, 0
+    sigma = 0.1 * FIELD.scale[0]
+    for made in pictures(300, seed=2):
+        true = triangle_of(made.hip[:3])
+        if true is None:
+            continue
+        triangle = measure_triangle(directions(made)[:3], sigma, meter())
+        assert triangle is not None
+        listed += 1
+        found += true in find_triangles(triangle, onboard, None, meter())
+    assert listed > 270
+    assert found >= 0.985 * listed
+
+
+def test_pivots_leave_the_true_triangle() -> None:
+    ends = []
+    for made in pictures(100, seed=3):
+        true = triangle_of(made.hip[:3])
+        if true is None or any(triangle_of(made.hip[[0, 1, star]]) is None for star in (3, 5)):
+            continue
+        match = match_triple(
+            directions(made), (0, 1, 2), (3, 4, 5), 2 * SIGMA, database(), None, meter()
+        )
+        if match.end is MatchEnd.UNIQUE:
+            assert match.candidates.tolist() == [true]
+        ends.append(match.end)
+    assert ends.count(MatchEnd.UNIQUE) > 0.9 * len(ends)
+
+
+def test_each_pivot_thins_the_candidates() -> None:
+    for made in pictures(20, seed=4):
+        left = [
+            set(
+                match_triple(
+                    directions(made), (0, 1, 2), (3, 4, 5)[:count], 2e-4, database(), None, meter()
+                ).candidates.tolist()
+            )
+            for count in range(4)
+        ]
+        assert left[3] <= left[2] <= left[1] <= left[0]
+
+
+def test_survivors_of_pivots_share_two_stars_with_a_candidate_of_each() -> None:
+    """The pivots are 1 2 4, 1 3 5 and 1 2 6, counted from 1."""
+    onboard, sigma, thinned = database(), 4e-4, 0
+    for made in pictures(10, seed=5):
+        vectors = directions(made)
+        left = match_triple(vectors, (0, 1, 2), (), sigma, onboard, None, meter()).candidates
+        for pivots, corners in ((1, (0, 1, 3)), (2, (0, 2, 4)), (3, (0, 1, 5))):
+            triangle = measure_triangle(vectors[list(corners)], sigma, meter())
+            if triangle is None or len(left) < 2:
+                break
+            others = onboard.stars[find_triangles(triangle, onboard, None, meter())].tolist()
+            pairs = {pair for other in others for pair in combinations(other, 2)}
+            before, left = (
+                len(left),
+                left[
+                    [
+                        bool(pairs & set(combinations(row, 2)))
+                        for row in onboard.stars[left].tolist()
+                    ]
+                ],
+            )
+            thinned += len(left) < before
+            after = match_triple(
+                vectors, (0, 1, 2), (3, 4, 5)[:pivots], sigma, onboard, None, meter()
+            )
+            assert after.candidates.tolist() == left.tolist()
+    assert thinned > 10
+
+
+def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
+    """With a moment that excludes nothing, the candidates are a stretch of the list of areas."""
+    onboard, rng = database(), np.random.default_rng(7)
+    every = float(onboard.moments[-1])
+    for _ in range(20):
+        first, last = np.sort(rng.integers(0, len(onboard), 2))
+        low, high = float(onboard.areas[first]), float(onboard.areas[last])
+        triangle = Triangle(
+            sides=np.ones(3, dtype=np.float32),
+            area=np.float32((low + high) / 2),
+            moment=np.float32(0),
+            area_sigma=np.float32((high - low) / 6),
+            moment_sigma=np.float32(every),
+        )
+        reach = np.float32(3) * triangle.area_sigma
+        inside = (onboard.areas >= triangle.area - reach) & (onboard.areas <= triangle.area + reach)
+        found = find_triangles(triangle, onboard, None, meter())
+        assert np.sort(found).tolist() == np.flatnonzero(inside).tolist()
+
+
+def test_enough_candidates_need_no_pivot() -> None:
+    (made,) = pictures(1, seed=6)
+    vectors = directions(made)
+    plain = match_triple(vectors, (0, 1, 2), (), 1e-4, database(), None, meter())
+    assert len(plain.candidates) > 1
+    enough = match_triple(
+        vectors, (0, 1, 2), (3, 4, 5), 1e-4, database(), None, meter(), len(plain.candidates)
+    )
+    assert enough.pivots == 0
+    assert enough.candidates.tolist() == plain.candidates.tolist()
+
+
+def test_a_triangle_that_the_sky_does_not_have() -> None:
+    far = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
+    match = match_triple(far, (0, 1, 2), (), SIGMA, database(), None, meter())
+    assert match.end is MatchEnd.NO_TRIANGLE
+    assert len(match.candidates) == 0
+
+
+def test_three_times_the_same_star() -> None:
+    same = np.tile(np.array([0, 0, 1], dtype=np.float32), (3, 1))
+    match = match_triple(same, (0, 1, 2), (), SIGMA, database(), None, meter())
+    assert match.end is MatchEnd.DEGENERATE
+
+
+def test_phases_are_booked() -> None:
+    (made,) = pictures(1, seed=6)
+    spent = meter()
+    match_triple(directions(made), (0, 1, 2), (3, 4, 5), 2e-4, database(), None, spent)
+    assert set(spent.phases) == {"triangles", "search", "pivoting"}
+    assert all(spent.phases.values())

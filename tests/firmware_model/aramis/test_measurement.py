@@ -1,0 +1,73 @@
+"""What the settings make of the processing; measurements themselves are tested on the board."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.measurement import configuration
+from cubestack.firmware_model.aramis.pipeline import VERIFIED
+from cubestack.firmware_model.aramis.settings import Settings
+from cubestack.firmware_model.aramis.telemetry import body_quaternion
+from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.firmware_model.mcu.requests import FlashStore
+
+
+def test_reset_values_are_the_verified_way() -> None:
+    found = configuration(Settings(FlashStore()))
+    assert found.detection == VERIFIED.detection
+    assert found.field.fov_deg == pytest.approx(VERIFIED.field.fov_deg, abs=1e-5)
+    assert found.profile.sigma_rad == pytest.approx(VERIFIED.profile.sigma_rad, rel=0.01)
+    assert found.profile.verify
+
+
+def test_every_setting_arrives() -> None:
+    settings = Settings(FlashStore())
+    settings.put("SetField", {"FieldOfView": 18.0, "Round": 0})
+    settings.put(
+        "SetDetection",
+        {
+            "Sigmas": 3.5,
+            "Spikes": 2,
+            "Needed": 9,
+            "MinPixels": 4,
+            "MaxPixels": 99,
+            "MaxStars": 12,
+            "Subtract": 0,
+        },
+    )
+    settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 1, "Verify": 0, "HintTolerance": 9})
+    found = configuration(settings)
+    assert (found.field.fov_deg, found.field.round) == (18.0, False)
+    search = found.detection
+    assert (search.sigmas, search.spikes, search.needed) == (3.5, SpikeRemoval.WINDOW, 9)
+    assert (search.min_pixels, search.max_pixels, search.max_stars) == (4, 99, 12)
+    assert not search.subtract
+    assert found.profile.sigma_rad == pytest.approx(0.5 / 3232.64, rel=1e-4)
+    assert (found.profile.pivots, found.profile.verify) == (1, False)
+    assert found.profile.hint_tolerance_deg == 9
+
+
+@given(st.data())
+def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObject) -> None:
+    settings = Settings(FlashStore())
+    for name in ("SetField", "SetDetection", "SetIdentification"):
+        message = INTERFACE.telecommand(name)
+        values = message.unpack(
+            data.draw(st.binary(min_size=message.length, max_size=message.length))
+        )
+        if not message.violations(values):
+            settings.put(name, values)
+    configuration(settings)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn, attitude = Rotation.random(2, random_state=rng)
+    found = body_quaternion(
+        turn.as_quat().astype(np.float32), attitude.as_quat().astype(np.float32)
+    )
+    assert ((turn * attitude).inv() * Rotation.from_quat(found)).magnitude() < 1e-6

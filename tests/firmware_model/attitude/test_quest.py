@@ -1,0 +1,126 @@
+"""QUEST against the singular value decomposition, which solves Wahba's problem exactly."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+
+Matrix = NDArray[np.float64]
+
+
+def wahba(body: Matrix, inertial: Matrix, weights: Matrix) -> Matrix:
+    u, _, vt = np.linalg.svd((body * weights[:, None]).T @ inertial)
+    return np.asarray(u @ np.diag([1, 1, np.linalg.det(u) * np.linalg.det(vt)]) @ vt)
+
+
+def in_field(rng: np.random.Generator, count: int) -> Matrix:
+    body = np.column_stack(
+        [rng.uniform(-0.45, 0.45, count), rng.uniform(-0.23, 0.23, count), np.ones(count)]
+    )
+    return np.asarray(body / np.linalg.norm(body, axis=1, keepdims=True))
+
+
+def solve(body: Matrix, inertial: Matrix, weights: Matrix) -> NDArray[np.float32]:
+    return quest(
+        body.astype(np.float32),
+        inertial.astype(np.float32),
+        weights.astype(np.float32),
+        Meter(CORTEX_M3),
+    )
+
+
+def angle_deg(a: Matrix, b: Matrix) -> float:
+    return float(np.degrees(Rotation.from_matrix(a @ b.T).magnitude()))
+
+
+def attitude_of(quaternion: NDArray[np.float32]) -> Matrix:
+    """Our convention is scipy's: the quaternion turns vectors."""
+    return np.asarray(Rotation.from_quat(quaternion.astype(np.float64)).as_matrix())
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_noisy_vectors_give_the_best_attitude(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(3, 21))
+    truth = Rotation.random(random_state=rng).as_matrix()
+    body = in_field(rng, count)
+    noisy = body + rng.normal(0, 1e-4, body.shape)
+    noisy /= np.linalg.norm(noisy, axis=1, keepdims=True)
+    weights = rng.integers(1, 20, count).astype(float)
+    best = wahba(noisy, body @ truth, weights)
+    found = solve(noisy, body @ truth, weights)
+    spread = np.linalg.svd(body - body.mean(axis=0))[1][0] / np.sqrt(count)
+    assert angle_deg(attitude_of(found), best) < 2e-4 / spread
+    assert np.linalg.norm(found) == pytest.approx(1, abs=1e-6)
+    assert found[3] >= 0
+
+
+@pytest.mark.parametrize("off_deg", [0.0, 1e-6, 1e-3, 0.1, 2.0])
+@pytest.mark.parametrize("seed", range(20))
+def test_rotations_near_180_deg_lose_no_accuracy(off_deg: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3) if seed > 2 else np.eye(3)[seed]
+    axis /= np.linalg.norm(axis)
+    truth = Rotation.from_rotvec(axis * np.radians(180 - off_deg)).as_matrix()
+    body = in_field(rng, 8)
+    assert angle_deg(attitude_of(solve(body, body @ truth, np.ones(8))), truth) < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_dcm_is_the_rotation_of_the_quaternion(seed: int) -> None:
+    quaternion = Rotation.random(random_state=seed).as_quat().astype(np.float32)
+    found = dcm(quaternion, Meter(CORTEX_M3))
+    np.testing.assert_allclose(found, attitude_of(quaternion), atol=5e-7)
+
+
+def test_dcm_turns_reference_into_measured() -> None:
+    rng = np.random.default_rng(3)
+    truth = Rotation.random(random_state=rng).as_matrix()
+    body = in_field(rng, 6)
+    inertial = body @ truth
+    found = dcm(solve(body, inertial, np.ones(6)), Meter(CORTEX_M3))
+    np.testing.assert_allclose(inertial @ found.T, body, atol=3e-6)
+
+
+def test_a_heavy_star_pulls_more() -> None:
+    body = in_field(np.random.default_rng(4), 4)
+    moved = body.copy()
+    moved[0, 0] += 1e-3
+    light = solve(moved, body, np.array([1.0, 10, 10, 10]))
+    heavy = solve(moved, body, np.array([100.0, 1, 1, 1]))
+
+    def miss(q: NDArray[np.float32]) -> float:
+        return float(np.linalg.norm(attitude_of(q) @ body[0] - moved[0]))
+
+    assert miss(heavy) < 0.5 * miss(light)
+
+
+def test_two_stars_are_enough() -> None:
+    truth = Rotation.random(random_state=5).as_matrix()
+    body = in_field(np.random.default_rng(5), 2)
+    assert angle_deg(attitude_of(solve(body, body @ truth, np.ones(2))), truth) < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("body", "weights", "message"),
+    [
+        ([[0, 0, 1]], [1], "at least 2 vectors, not 1"),
+        ([[0, 0, 1], [0, 0, 1]], [1, 1], "all point the same way"),
+        ([[0, 0, 1], [0.6, 0, 0.8]], [0, 0], "add up to 0"),
+    ],
+)
+def test_vectors_that_determine_nothing_are_refused(
+    body: list[list[float]], weights: list[float], message: str
+) -> None:
+    with pytest.raises(AttitudeError, match=message):
+        solve(np.array(body), np.array(body), np.array(weights, dtype=float))
+
+
+def test_twenty_stars_take_less_than_ten_milliseconds() -> None:
+    meter = Meter(CORTEX_M3)
+    body = in_field(np.random.default_rng(6), 20).astype(np.float32)
+    quest(body, body, np.ones(20, np.float32), meter)
+    assert 0.0001 < CORTEX_M3.seconds(meter.total) < 0.010

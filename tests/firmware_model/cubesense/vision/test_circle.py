@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from cubestack.firmware_model.cubesense.vision.circle import (
+    Circle,
+    LeastSquaresCircle,
+    three_point_circle,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+
+
+def on_circle(rng: np.random.Generator, count: int, spread: float = 6.3) -> np.ndarray:
+    turn = rng.uniform(0, spread, count)
+    centre, radius = rng.uniform(-100, 100, 2), rng.uniform(50, 180)
+    points = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return np.concatenate([points, [[*centre]], [[radius, 0]]])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_points_on_a_circle_give_it_back(meter: Meter, seed: int) -> None:
+    data = on_circle(np.random.default_rng(seed), 20)
+    circle = LeastSquaresCircle(data[:20].astype(np.float32), meter).solve()
+    assert circle is not None
+    assert [circle.x, circle.y] == pytest.approx(data[20].tolist(), abs=0.01)
+    assert circle.radius == pytest.approx(data[21, 0], abs=0.01)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_fit_minimises_the_algebraic_error(meter: Meter, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = on_circle(rng, 12)[:12] + rng.normal(0, 2, (12, 2))
+    circle = LeastSquaresCircle(points.astype(np.float32), meter).solve()
+    assert circle is not None
+
+    def error(c: np.ndarray) -> np.ndarray:
+        return (points**2).sum(axis=1) + 2 * points @ c[:2] + c[2]
+
+    best = least_squares(error, np.zeros(3), x_scale=[100, 100, 1e4], xtol=1e-14, ftol=1e-14).x
+    assert [circle.x, circle.y] == pytest.approx((-best[:2]).tolist(), abs=0.02)
+    assert circle.power == pytest.approx(best[2], rel=1e-3, abs=5)
+
+
+def test_taking_a_point_out_is_as_never_having_had_it(meter: Meter) -> None:
+    rng = np.random.default_rng(7)
+    points = (on_circle(rng, 15)[:15] + rng.normal(0, 1, (15, 2))).astype(np.float32)
+    equations = LeastSquaresCircle(points, meter)
+    equations.remove(points[4])
+    kept = LeastSquaresCircle(np.delete(points, 4, axis=0), meter).solve()
+    taken = equations.solve()
+    assert kept is not None
+    assert taken is not None
+    assert [taken.x, taken.y, taken.radius] == pytest.approx(
+        [kept.x, kept.y, kept.radius], abs=0.02
+    )
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_few_points(meter: Meter, count: int) -> None:
+    assert LeastSquaresCircle(np.ones((count, 2), np.float32), meter).solve() is None
+
+
+def test_points_on_a_line(meter: Meter) -> None:
+    points = np.array([[x, 2 * x + 3] for x in range(-100, 100, 13)], np.float32)
+    assert LeastSquaresCircle(points, meter).solve() is None
+    assert LeastSquaresCircle(np.full((9, 2), 50, np.float32), meter).solve() is None
+    assert three_point_circle(points[:3], meter) is None
+    assert three_point_circle(np.array([[1, 0], [1, 5], [1, 9]], np.float32), meter) is None
+
+
+def test_residuals_are_distances_from_the_circle(meter: Meter) -> None:
+    circle = Circle(np.float32(10), np.float32(-20), np.float32(150))
+    turn = np.linspace(0, 6, 30)
+    outside = np.linspace(-2, 2, 30)
+    radius = 150 + outside
+    points = np.stack([10 + radius * np.cos(turn), -20 + radius * np.sin(turn)], axis=1)
+    assert circle.residuals(points.astype(np.float32), meter) == pytest.approx(outside, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_three_points_of_a_circle(meter: Meter, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centre, radius = rng.uniform(-100, 100, 2), rng.uniform(50, 180)
+    turn = rng.uniform(0, 2.1) + np.array([0, 2.1, 4.2]) + rng.uniform(-0.3, 0.3, 3)
+    points = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    circle = three_point_circle(points.astype(np.float32), meter)
+    assert circle is not None
+    assert [circle.x, circle.y, circle.radius] == pytest.approx([*centre, radius], abs=0.05)
+
+
+@pytest.mark.parametrize("turn", range(3))
+@pytest.mark.parametrize("backwards", [False, True])
+def test_three_points_with_upright_and_level_chords(
+    meter: Meter, turn: int, backwards: bool
+) -> None:
+    points = np.roll(np.array([[0, 0], [0, 60], [80, 60]], np.float32), turn, axis=0)
+    circle = three_point_circle(points[::-1] if backwards else points, meter)
+    assert circle is not None
+    assert [circle.x, circle.y, circle.radius] == pytest.approx([40, 30, 50], abs=1e-3)

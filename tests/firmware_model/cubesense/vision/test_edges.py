@@ -1,0 +1,207 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubesense.vision.edges import (
+    MAX_EDGES,
+    EdgeConfig,
+    EdgeList,
+    NadirLines,
+)
+from cubestack.firmware_model.cubesense.vision.masks import Mask
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.mcu.costs import Meter
+
+from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, chequered, distort, earth, place, scan
+
+WHOLE = EdgeConfig(sub_pixel=False)
+NO_RIM = EdgeConfig(sub_pixel=False, rim_px=1000)
+
+
+def search(
+    picture: NDArray[np.uint8], config: EdgeConfig, meter: Meter, read_out: ReadOut = FULL_SIZE
+) -> EdgeList:
+    lines = NadirLines(config, meter, read_out)
+    lines.feed(scan(picture, read_out))
+    return lines.edges
+
+
+def literal(picture: NDArray[np.uint8], config: EdgeConfig) -> list[list[int]]:
+    """The published search, pixel by pixel over the picture, with each step as it is described."""
+    found = []
+    lines = [(y, False) for y in range(15, ROWS, 64)] + [(x, True) for x in range(63, COLUMNS, 64)]
+    for line, vertical in lines:
+        values = [int(v) for v in (picture[:, line] if vertical else picture[line])]
+        samples = [-1, *range(63, len(values), 64)]
+        if samples[-1] != len(values) - 1:
+            samples.append(len(values) - 1)
+        for before, now in pairwise(samples):
+            was = before >= 0 and values[before] >= config.threshold
+            if was == (values[now] >= config.threshold):
+                continue
+            light, dark = (before, now) if was else (now, before)
+            for _ in range(int(np.log2(now - before))):
+                middle = (light + dark) // 2
+                if values[middle] >= config.threshold:
+                    light = middle
+                else:
+                    dark = middle
+            x, y = (line, light) if vertical else (light, line)
+            if np.hypot(x - config.boresight[0], y - config.boresight[1]) < config.rim_px:
+                found.append([x, y])
+    return found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whole_pixels_agree_with_the_literal_search_in_rough_pictures(
+    meter: Meter, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    picture = rng.integers(0, 90, (ROWS, COLUMNS)).astype(np.uint8)
+    picture[rng.integers(0, 2, (ROWS // 40, COLUMNS // 40)).repeat(40, 0).repeat(40, 1) > 0] += 60
+    config = EdgeConfig(sub_pixel=False, threshold=80, rim_px=float(rng.uniform(100, 230)))
+    edges = search(picture, config, meter)
+    expected = literal(picture, config)
+    assert len(expected) > 8
+    assert (edges.points // 32).tolist() == expected[:MAX_EDGES]
+    assert edges.full == (len(expected) > MAX_EDGES)
+
+
+def test_the_pieces_in_which_bytes_come_do_not_matter(meter: Meter) -> None:
+    data = scan(earth(10, -5))
+    at_once = NadirLines(EdgeConfig(), meter)
+    at_once.feed(data)
+    cycles = meter.take()
+    cuts = np.sort(np.random.default_rng(3).integers(0, len(data), 300))
+    piecewise = NadirLines(EdgeConfig(), meter)
+    for piece in np.split(data, cuts):
+        piecewise.feed(piece)
+    assert piecewise.edges.points.tolist() == at_once.edges.points.tolist()
+    assert meter.take() == cycles
+    assert piecewise.wanted == 0
+
+
+def test_the_buffer_asks_for_64_pixels_and_32_at_a_column_s_end(meter: Meter) -> None:
+    lines = NadirLines(EdgeConfig(), meter)
+    asked = []
+    while lines.wanted:
+        asked.append(lines.wanted)
+        lines.feed(np.zeros(lines.wanted, np.uint8))
+    assert asked == [1, *[64] * 80, 1, *([64] * 7 + [32]) * 10]
+    assert sum(asked) == 1 + 5120 + 1 + 4800
+    with pytest.raises(ValueError, match="1 bytes are too many"):
+        lines.feed(np.zeros(1, np.uint8))
+
+
+@pytest.mark.parametrize(("start", "end", "steps"), [(200, 300, 6 + 6), (0, 463, 6 + 5)])
+def test_steps_of_the_binary_search(meter: Meter, start: int, end: int, steps: int) -> None:
+    picture = np.zeros((ROWS, COLUMNS), np.uint8)
+    picture[start:end, 127] = 200
+    edges = search(picture, NO_RIM, meter)
+    on_rows = edges.points[:, 1] % (64 * 32) == 15 * 32
+    assert (edges.points[~on_rows] // 32).tolist() == [[127, start], [127, end - 1]]
+    row_edges = int(on_rows.sum())
+    assert meter.counts["array_byte"] == 2 * 160 + steps + 6 * row_edges
+
+
+@pytest.mark.parametrize("first", [0, 1, 62, 63, 64, 65, 126, 127])
+def test_an_edge_on_any_pixel_of_the_buffer_is_exact(meter: Meter, first: int) -> None:
+    picture = np.zeros((ROWS, COLUMNS), np.uint8)
+    picture[15, first:320] = 70
+    edges = search(picture, NO_RIM, meter)
+    on_the_row = [point // 32 for point in edges.points if point[1] == 15 * 32]
+    assert [point[0] for point in on_the_row][:2] == [first, 319]
+
+
+def test_sub_pixel_edges_lie_where_the_threshold_is_met(meter: Meter) -> None:
+    picture = np.zeros((ROWS, COLUMNS), np.uint8)
+    picture[79, 300:400] = 100
+    picture[79, [299, 400]] = 40  # 70 is half-way from 40 to 100
+    edges = search(picture, EdgeConfig(), meter)
+    assert edges.points.tolist()[:2] == [[32 * 300 - 16, 79 * 32], [32 * 399 + 16, 79 * 32]]
+    assert edges.offsets()[0].tolist() == [299.5 - 371, 79 - 236]
+
+
+def test_sub_pixel_edges_follow_the_limb(meter: Meter) -> None:
+    # A limb's radius at 30 % of its contrast is a constant fifth of a pixel outside of it.
+    rng = np.random.default_rng(1)
+    spread: dict[bool, float] = {}
+    for sub_pixel in (False, True):
+        distance: list[float] = []
+        for _ in range(8):
+            picture = earth(0, 0, altitude_km=float(rng.uniform(500, 1500)))
+            edges = search(picture, EdgeConfig(sub_pixel=sub_pixel), meter)
+            radii = np.hypot(*edges.offsets().T)
+            distance += (radii - radii.mean()).tolist()
+        spread[sub_pixel] = float(np.std(distance))
+    assert spread[True] < 0.1 < 0.2 < spread[False]
+
+
+def test_the_rim_makes_no_edges(meter: Meter) -> None:
+    # The Earth fills one side of the field of view and ends at its rim.
+    edges = search(earth(75, 20), EdgeConfig(), meter)
+    assert edges.false > 3
+    assert np.hypot(*edges.offsets().T).max() < 226
+    outward = edges.offsets() @ np.array([75, 20]) / np.hypot(75, 20)
+    assert outward.max() < distort(2.9 * 90)
+    for config, expected in ((WHOLE, True), (EdgeConfig(), False)):
+        offsets = search(earth(75, 20), config, meter).offsets()
+        assert bool((np.hypot(*offsets.T) > 225).any()) is expected
+
+
+@pytest.mark.parametrize("turn", range(0, 360, 30))
+@pytest.mark.parametrize("tilt", [0, 15, 30])
+def test_a_full_earth_at_750_km_gives_18_to_24_edges(meter: Meter, turn: int, tilt: int) -> None:
+    a, b = tilt * np.cos(np.radians(turn)), tilt * np.sin(np.radians(turn))
+    assert 18 <= len(search(earth(a, b), EdgeConfig(), meter)) <= 24
+
+
+def test_edges_in_a_mask_are_dropped(meter: Meter) -> None:
+    x, y = place(0, 0, NADIR_BORESIGHT)
+    mask = Mask(0, int(x), 0, ROWS - 1)
+    everything = search(earth(0, 0), EdgeConfig(), meter).points
+    kept = search(earth(0, 0), EdgeConfig(masks=(Mask(), mask)), meter)
+    assert kept.points.tolist() == [p for p in everything.tolist() if p[0] >= 32 * x + 32]
+    assert kept.false == len(everything) - len(kept) > 0
+    assert int(y) == 236
+
+
+def test_more_edges_than_the_part_keeps(meter: Meter) -> None:
+    edges = search(chequered(), NO_RIM, meter)
+    assert len(edges) == MAX_EDGES
+    assert edges.full
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_small_frames(meter: Meter, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    small = ReadOut(columns=24, rows=20, scan_step=8, first_row=3, first_column=7, window=7)
+    picture = rng.integers(0, 255, (20, 24)).astype(np.uint8)
+    config = EdgeConfig(threshold=128, boresight=(12, 10), rim_px=100, sub_pixel=False)
+    for x, y in search(picture, config, meter, small).points.tolist():
+        neighbours = []
+        if y // 32 in small.scan_rows:
+            neighbours += [(x // 32 + d, y // 32) for d in (-1, 1)]
+        if x // 32 in small.scan_columns:
+            neighbours += [(x // 32, y // 32 + d) for d in (-1, 1)]
+        assert picture[y // 32, x // 32] >= 128
+        inside = [(a, b) for a, b in neighbours if 0 <= a < 24 and 0 <= b < 20]
+        assert len(inside) < len(neighbours) or any(picture[b, a] < 128 for a, b in inside)
+
+
+def test_bytes_can_be_put_straight_into_the_buffer(meter: Meter) -> None:
+    picture = earth(12, -7)
+    buffer = np.zeros(FULL_SIZE.scan_step, np.uint8)
+    lines = NadirLines(EdgeConfig(), meter, buffer=buffer)
+    data, at = scan(picture), 0
+    while lines.wanted:
+        space = lines.space
+        assert np.shares_memory(space, buffer)
+        space[:] = data[at : at + len(space)]
+        at += len(space)
+        lines.filled()
+    assert at == len(data)
+    fed = search(picture, EdgeConfig(), meter)
+    assert np.array_equal(lines.edges.points, fed.points)

@@ -1,0 +1,282 @@
+"""The search against a literal transcription of its rules, and its accuracy on drawn stars."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from cubestack.firmware_model.cubestar.detection import (
+    Detection,
+    DetectionConfig,
+    DetectionConfigError,
+    SearchEnd,
+    detect_stars,
+)
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+
+Place = tuple[int, int]
+
+
+class TooLargeError(Exception):
+    pass
+
+
+def literal_grow(
+    image: NDArray[np.int64],
+    y: int,
+    x: int,
+    area: list[tuple[int, int, int]],
+    config: DetectionConfig,
+) -> None:
+    if len(area) == config.max_pixels:
+        raise TooLargeError
+    area.append((y, x, int(image[y, x])))
+    image[y, x] = 0
+    for ny, nx in ((y, x - 1), (y, x + 1), (y - 1, x), (y + 1, x)):
+        inside = 0 <= ny < image.shape[0] and 0 <= nx < image.shape[1]
+        if inside and image[ny, nx] > config.star_threshold:
+            literal_grow(image, ny, nx, area, config)
+
+
+def literal_search(picture: NDArray[np.uint8], config: DetectionConfig) -> Detection:
+    """The rules of the module docstring, one pixel at a time."""
+    image = picture.astype(np.int64)
+    threshold = max(config.detection_threshold, config.star_threshold)
+    centroids, sizes, sums = [], [], []
+    invalid = noise = 0
+    background = []
+    end = SearchEnd.COMPLETE
+    for y in range(config.y_start, config.y_end, config.step):
+        for x in range(config.x_start, config.x_end, config.step):
+            if image[y, x] <= threshold:
+                background.append(int(image[y, x]))
+                continue
+            area: list[tuple[int, int, int]] = []
+            try:
+                literal_grow(image, y, x, area, config)
+            except TooLargeError:
+                invalid += 1
+            else:
+                if len(area) < config.min_pixels:
+                    noise += 1
+                else:
+                    centroids.append(literal_centroid(area, config))
+                    sizes.append(len(area))
+                    sums.append(sum(value for _, _, value in area))
+            if len(sizes) == config.max_stars:
+                end = SearchEnd.STARS
+            elif invalid > config.max_invalid:
+                end = SearchEnd.INVALID
+            elif noise > config.max_noise:
+                end = SearchEnd.NOISE
+            if end is not SearchEnd.COMPLETE:
+                break
+        if end is not SearchEnd.COMPLETE:
+            break
+    dark = int(np.floor(np.mean(background) + 0.5)) if background else 0
+    return Detection(
+        np.array(centroids, dtype=np.float32).reshape(-1, 2),
+        np.array(sizes),
+        np.array(sums),
+        invalid,
+        noise,
+        dark,
+        end,
+    )
+
+
+def literal_centroid(area: list[tuple[int, int, int]], config: DetectionConfig) -> Place:
+    peak = max(value for _, _, value in area)
+    top = np.array([(y, x) for y, x, value in area if value == peak])
+    cy, cx = np.floor(top.mean(axis=0) + 0.5)
+    half = config.grid_size // 2
+    kept = np.array([p for p in area if abs(p[0] - cy) <= half and abs(p[1] - cx) <= half])
+    weights = kept[:, 2] - config.star_threshold
+    return (np.average(kept[:, 1], weights=weights), np.average(kept[:, 0], weights=weights))
+
+
+def same(found: Detection, expected: Detection) -> None:
+    np.testing.assert_allclose(found.centroids, expected.centroids, rtol=0, atol=1e-4)
+    assert found.sizes.tolist() == expected.sizes.tolist()
+    assert found.intensities.tolist() == expected.intensities.tolist()
+    assert (found.invalid, found.noise) == (expected.invalid, expected.noise)
+    assert (found.dark_value, found.end) == (expected.dark_value, expected.end)
+
+
+def crowded(rng: np.random.Generator, rows: int, columns: int) -> NDArray[np.uint8]:
+    """Noise, lines that touch the edges, and blobs of all sizes."""
+    image = rng.integers(0, 9, (rows, columns)).astype(float)
+    y, x = np.mgrid[0:rows, 0:columns]
+    for _ in range(rng.integers(0, 12)):
+        cy, cx = rng.uniform(0, rows), rng.uniform(0, columns)
+        width = rng.uniform(0.6, 3)
+        image += rng.uniform(5, 300) * np.exp(-((y - cy) ** 2 + (x - cx) ** 2) / (2 * width**2))
+    if rng.random() < 0.3:
+        image[rng.integers(rows)] += 40
+    if rng.random() < 0.3:
+        image[:, rng.integers(columns)] += 40
+    picture: NDArray[np.uint8] = np.clip(image, 0, 255).astype(np.uint8)
+    return picture
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_search_follows_the_literal_rules(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows, columns = int(rng.integers(12, 60)), int(rng.integers(12, 60))
+    image = crowded(rng, rows, columns)
+    x_start, y_start = (int(v) for v in rng.integers(0, 6, 2))
+    config = DetectionConfig(
+        step=int(rng.integers(1, 5)),
+        x_start=x_start, x_end=int(rng.integers(x_start + 4, columns + 1)),
+        y_start=y_start, y_end=int(rng.integers(y_start + 4, rows + 1)),
+        detection_threshold=int(rng.integers(4, 14)), star_threshold=int(rng.integers(4, 14)),
+        min_pixels=int(rng.integers(1, 8)), max_pixels=int(rng.integers(8, 70)),
+        grid_size=int(rng.choice([3, 5, 7])),
+        max_stars=int(rng.integers(1, 12)), max_invalid=int(rng.integers(0, 8)),
+        max_noise=int(rng.choice([2, 20, 255])),
+    )  # fmt: skip
+    same(detect_stars(image, config, Meter(CORTEX_M3)), literal_search(image, config))
+
+
+def test_the_random_pictures_reach_every_end() -> None:
+    ends = set()
+    for seed in range(40):
+        image = crowded(np.random.default_rng(seed), 50, 50)
+        for settings in ({}, {"max_stars": 1}, {"max_invalid": 0}, {"max_noise": 0}):
+            config = DetectionConfig(
+                x_end=50, y_end=50, detection_threshold=10, star_threshold=8, **settings
+            )
+            ends.add(detect_stars(image, config, Meter(CORTEX_M3)).end)
+    assert ends == set(SearchEnd)
+
+
+def test_the_picture_is_left_as_it_was() -> None:
+    image = crowded(np.random.default_rng(1), 60, 90)
+    before = image.copy()
+    image.setflags(write=False)
+    detect_stars(image, DetectionConfig(x_end=90, y_end=60), Meter(CORTEX_M3))
+    assert np.array_equal(image, before)
+
+
+def drawn(
+    kind: str, rng: np.random.Generator, count: int = 18, background: float = 0.0
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """A full picture with stars on a jittered grid, and their true x, y in scan order."""
+    places = np.array([(60 + 110 * c, 80 + 170 * r) for r in range(3) for c in range(9)])[:count]
+    true = places + rng.uniform(-20, 20, (count, 2))
+    image = np.zeros((512, 1024))
+    y, x = np.mgrid[0:512, 0:1024]
+    for tx, ty in true:
+        window = np.s_[int(ty) - 8 : int(ty) + 9, int(tx) - 8 : int(tx) + 9]
+        wy, wx = y[window] - ty, x[window] - tx
+        if kind == "sampled":  # thesis section 4.1.6, sigma 1 px, 255 at the centre
+            image[window] += 255 * np.exp(-(wx**2 + wy**2) / 2)
+        elif kind == "sampled in 5 x 5":
+            near = (np.abs(np.rint(tx) - x[window]) <= 2) & (np.abs(np.rint(ty) - y[window]) <= 2)
+            image[window] += 255 * np.exp(-(wx**2 + wy**2) / 2) * near
+        else:  # light integrated over each pixel, sigma 0.9 px, V 1 to 3.8
+            light = 300 * 10 ** (0.4 * rng.uniform(0, 2.8))
+            edge = 0.9 * np.sqrt(2)
+            image[window] += (
+                light
+                / 4
+                * (erf((wx + 0.5) / edge) - erf((wx - 0.5) / edge))
+                * (erf((wy + 0.5) / edge) - erf((wy - 0.5) / edge))
+            )
+    image += background * (1 + 0.5 * np.sin(x / 150) * np.cos(y / 100))
+    return np.clip(np.floor(image), 0, 255).astype(np.uint8), true
+
+
+def errors(found: Detection, true: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Centroid minus the nearest true star, for each centroid."""
+    nearest = [np.argmin(np.hypot(*(true - place).T)) for place in found.centroids]
+    assert len(set(nearest)) == len(nearest)
+    return np.asarray(found.centroids - true[nearest], dtype=np.float64)
+
+
+@pytest.mark.parametrize("kind", ["sampled", "sampled in 5 x 5", "integrated"])
+@pytest.mark.parametrize("seed", range(5))
+def test_eighteen_noise_free_stars_are_as_accurate_as_published(kind: str, seed: int) -> None:
+    image, true = drawn(kind, np.random.default_rng(seed))
+    found = detect_stars(image, DetectionConfig(), Meter(CORTEX_M3))
+    assert len(found.centroids) == 18
+    assert (found.invalid, found.noise, found.end) == (0, 0, SearchEnd.COMPLETE)
+    error_x, error_y = np.abs(errors(found, true)).mean(axis=0)
+    assert error_x <= 0.0244
+    assert error_y <= 0.0427
+
+
+def test_a_bright_uneven_background_hardly_moves_a_centroid() -> None:
+    rng = np.random.default_rng(2)
+    image, true = drawn("integrated", rng, background=30.0)
+    image = np.clip(image + rng.normal(0, 1.5, image.shape), 0, 255).astype(np.uint8)
+    config = DetectionConfig(detection_threshold=55, star_threshold=55, min_pixels=4)
+    found = detect_stars(image, config, Meter(CORTEX_M3))
+    assert len(found.centroids) >= 12
+    error = errors(found, true)
+    assert np.abs(error).mean() < 0.03
+    assert np.abs(error).max() < 0.15
+
+
+def test_a_saturated_star_is_centred_on_its_plateau() -> None:
+    image = np.zeros((60, 60), dtype=np.uint8)
+    y, x = np.mgrid[0:60, 0:60]
+    image[:] = np.clip(1500 * np.exp(-((x - 30.3) ** 2 + (y - 28.8) ** 2) / 2), 0, 255)
+    config = DetectionConfig(x_end=60, y_end=60)
+    found = detect_stars(image, config, Meter(CORTEX_M3))
+    assert found.centroids[0] == pytest.approx([30.3, 28.8], abs=0.1)
+
+
+def test_dark_value_is_the_mean_of_the_background_alone() -> None:
+    image = np.full((512, 1024), 4, dtype=np.uint8)
+    image[100:106, 200:206] = 200
+    found = detect_stars(image, DetectionConfig(), Meter(CORTEX_M3))
+    assert found.dark_value == 4
+    assert len(found.centroids) == 1
+
+
+def test_a_field_full_of_light_ends_after_fifty_one_invalid_areas() -> None:
+    found = detect_stars(
+        np.full((512, 1024), 255, dtype=np.uint8), DetectionConfig(), Meter(CORTEX_M3)
+    )
+    assert (found.invalid, len(found.centroids)) == (51, 0)
+    assert found.end is SearchEnd.INVALID
+
+
+def test_every_ninth_pixel_is_read_and_twice_the_stars_cost_twice_the_growing() -> None:
+    rng = np.random.default_rng(3)
+    empty, few, many = Meter(CORTEX_M3), Meter(CORTEX_M3), Meter(CORTEX_M3)
+    detect_stars(np.zeros((512, 1024), dtype=np.uint8), DetectionConfig(), empty)
+    assert empty.counts["ebi_read"] == 342 * 171
+    assert empty.counts["ebi_write"] == 0
+    few_found = detect_stars(drawn("sampled", rng, 6)[0], DetectionConfig(), few)
+    many_found = detect_stars(drawn("sampled", rng, 12)[0], DetectionConfig(), many)
+    for meter, found in ((few, few_found), (many, many_found)):
+        pixels = int(found.sizes.sum())
+        assert meter.counts["ebi_write"] == 2 * pixels
+        assert meter.counts["ebi_read"] == 342 * 171 + 4 * pixels
+        assert meter.phases["search"] + meter.phases["centroid"] == meter.total
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"grid_size": 4}, "grid_size must be odd, not 4"),
+        ({"step": 0}, "step must be 1 to 255, not 0"),
+        ({"min_pixels": 61}, "max_pixels must be 61 to 255, not 60"),
+        ({"x_start": 1024}, "x_end must be 1025 to 65535, not 1024"),
+        ({"max_stars": 0}, "max_stars must be 1 to 255, not 0"),
+        ({"star_threshold": 256}, "star_threshold must be 0 to 255, not 256"),
+    ],
+)
+def test_settings_out_of_range_are_named(settings: dict[str, int], message: str) -> None:
+    with pytest.raises(DetectionConfigError, match=message) as error:
+        replace(DetectionConfig(), **settings)
+    assert error.value.setting == message.split()[0]
+
+
+def test_a_region_beyond_the_picture_is_refused() -> None:
+    with pytest.raises(DetectionConfigError, match="y_end must be at most 256, not 512"):
+        detect_stars(np.zeros((256, 1024), dtype=np.uint8), DetectionConfig(), Meter(CORTEX_M3))

@@ -1,0 +1,54 @@
+from cubestack.firmware_model.interface.cameras.mlx75412 import (
+    LONGEST_EXPOSURE,
+    REGISTERS,
+    SYNC_APPLY,
+)
+
+# CubeStar thesis, appendix D, typed from the text: name, first address, bytes.
+PUBLISHED = {
+    "MODE_SELECT": (0x8100, 1),
+    "HARDWARE_FEATURES": (0x8102, 1),
+    "LINEARITY": (0x840B, 21),
+    "EXPOSURE_RULE": (0x8444, 2),
+    "SYNC": (0x8500, 1),
+    "FIRMWARE_FEATURES": (0x8502, 1),
+    "CLOCKS_PER_SECOND": (0x8518, 4),
+    "FRAMES_PER_SECOND": (0x851C, 2),
+    "EXPOSURE": (0x8526, 2),
+}
+
+
+def test_every_published_register_is_declared_where_it_is() -> None:
+    assert {r.name: (r.address, r.width) for r in REGISTERS} == PUBLISHED
+    assert REGISTERS.i2c_address == 0b0101100
+    assert REGISTERS.at(0x841F) is REGISTERS["LINEARITY"]
+    assert REGISTERS.at(0x8420) is None
+
+
+def test_published_values() -> None:
+    assert REGISTERS["CLOCKS_PER_SECOND"].reset == 0x019BFCC0
+    assert REGISTERS["FRAMES_PER_SECOND"].reset == 0x001E
+    assert LONGEST_EXPOSURE.to_bytes(2, "big") == b"\x00\x02"
+    assert SYNC_APPLY == 0x03
+    mode = REGISTERS["MODE_SELECT"]
+    assert mode.field("ENABLE").mask == 0x01
+    assert mode.field("OUTPUT_DEPTH").of(0x20) == 1  # bit 5 set, bit 6 clear: 8 bits
+    features = REGISTERS["FIRMWARE_FEATURES"]
+    assert features.field("AUTOVIEW").mask == 0x80
+    assert features.field("AUTO_EXPOSURE").mask == 0x20
+    assert features.field("BARRIER_UPDATE").mask | features.field("AUTO_DYNAMIC_RANGE").mask == 0x50
+    assert REGISTERS["HARDWARE_FEATURES"].field("HISTOGRAM_REMAP").mask == 0x40
+
+
+def test_tables_are_consistent() -> None:
+    for register in REGISTERS:
+        assert 0 <= register.reset < 1 << (8 * register.width)
+        assert register.reset & ~register.bits == 0
+        masks = [field.mask for field in register.fields]
+        assert sum(masks) == register.bits or not masks
+        assert all(a & b == 0 for i, a in enumerate(masks) for b in masks[:i])
+        assert register.modelled or not any(field.modelled for field in register.fields)
+
+
+def test_only_mode_select_and_sync_act_at_once() -> None:
+    assert {r.name for r in REGISTERS if not r.needs_sync} == {"MODE_SELECT", "SYNC"}

@@ -1,0 +1,76 @@
+import pytest
+
+from cubestack.firmware_model.interface.cameras.mt9m001 import (
+    COLUMNS,
+    FRAME_END_CLOCKS,
+    FRAME_START_CLOCKS,
+    PIXEL_CLOCK_HZ,
+    REGISTERS,
+    ROWS,
+    gain,
+    gain_register,
+)
+
+# MT9M001 data sheet, register list, typed from the text: address, reset value.
+PUBLISHED = {
+    "CHIP_VERSION": (0x00, 0x8431),
+    "ROW_START": (0x01, 0x000C),
+    "COLUMN_START": (0x02, 0x0014),
+    "ROW_SIZE": (0x03, 0x03FF),
+    "COLUMN_SIZE": (0x04, 0x04FF),
+    "HORIZONTAL_BLANKING": (0x05, 0x0009),
+    "VERTICAL_BLANKING": (0x06, 0x0019),
+    "OUTPUT_CONTROL": (0x07, 0x0002),
+    "SHUTTER_WIDTH": (0x09, 0x0419),
+    "RESTART": (0x0B, 0x0000),
+    "SHUTTER_DELAY": (0x0C, 0x0000),
+    "RESET": (0x0D, 0x0000),
+    "READ_OPTIONS_1": (0x1E, 0x8000),
+    "READ_OPTIONS_2": (0x20, 0x1104),
+    "GREEN_1_GAIN": (0x2B, 0x0008),
+    "BLUE_GAIN": (0x2C, 0x0008),
+    "RED_GAIN": (0x2D, 0x0008),
+    "GREEN_2_GAIN": (0x2E, 0x0008),
+    "GLOBAL_GAIN": (0x35, 0x0008),
+    "BLACK_THRESHOLDS": (0x5F, 0x0904),
+    "BLACK_CONTROL": (0x62, 0x0498),
+    "CHIP_ENABLE": (0xF1, 0x0001),
+}
+
+
+def test_every_published_register_is_declared_where_it_is() -> None:
+    assert {r.name: (r.address, r.reset) for r in REGISTERS} == PUBLISHED
+    assert REGISTERS.i2c_address == 0xBA >> 1
+    assert REGISTERS.address_bytes == 1
+    assert all(r.unit_bits == 16 and r.width == 1 for r in REGISTERS)
+
+
+def test_tables_are_consistent() -> None:
+    for register in REGISTERS:
+        assert register.reset & ~register.bits == 0
+        masks = [field.mask for field in register.fields]
+        assert all(a & b == 0 for i, a in enumerate(masks) for b in masks[:i])
+        assert register.modelled or not any(field.modelled for field in register.fields)
+
+
+def test_published_frame_time() -> None:
+    line = COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS
+    assert line / PIXEL_CLOCK_HZ == pytest.approx(31.75e-6)
+    assert (ROWS + 26) * line / PIXEL_CLOCK_HZ == pytest.approx(33.34e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("register", "amplification"),
+    [(0x08, 1.0), (0x20, 4.0), (0x51, 4.25), (0x60, 8.0), (0x61, 9.0), (0x67, 15.0)],
+)
+def test_published_gains(register: int, amplification: float) -> None:
+    assert gain(register) == amplification
+    assert gain(gain_register(amplification)) == amplification
+
+
+def test_the_nearest_gain_is_found_and_others_refused() -> None:
+    assert gain(gain_register(5.1)) == 5.0
+    assert gain(gain_register(14.6)) == 15.0
+    for wrong in (0.9, 15.1, float("nan")):
+        with pytest.raises(ValueError, match=r"1\.\.15"):
+            gain_register(wrong)

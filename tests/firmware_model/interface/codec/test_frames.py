@@ -1,0 +1,111 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+
+LIMIT = 20
+# Bytes that mean something are drawn often, or no property would meet them.
+BYTES = st.one_of(st.sampled_from([0x1F, 0x7F, 0xFF]), st.integers(0, 255))
+NOISE = st.lists(BYTES, max_size=60).map(bytes)
+PAYLOAD = st.lists(BYTES, max_size=LIMIT).map(bytes)
+
+
+def events(decoder: FrameDecoder, data: bytes) -> list[FrameEvent | bytes]:
+    """What ``data`` brings about; whole frames as their payload."""
+    found: list[FrameEvent | bytes] = []
+    for byte in data:
+        event = decoder.feed(byte)
+        if event is FrameEvent.FRAME:
+            found.append(decoder.payload)
+        elif event is not None:
+            found.append(event)
+    return found
+
+
+def trailing_escapes(data: bytes) -> int:
+    return len(data) - len(data.rstrip(b"\x1f"))
+
+
+@pytest.mark.parametrize(
+    ("payload", "frame"),
+    [
+        ("80", "1F7F 80 1FFF"),
+        ("14 00 00", "1F7F 14 00 00 1FFF"),
+        ("00", "1F7F 00 1FFF"),
+        ("D204 C9FD 02 07", "1F7F D204 C9FD 02 07 1FFF"),
+        ("2D 1F 1F 1F 80 80", "1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF"),
+        ("41 1F 00", "1F7F 41 1F1F 00 1FFF"),
+        ("", "1F7F 1FFF"),
+    ],
+)
+def test_published_examples(payload: str, frame: str) -> None:
+    assert encode_frame(bytes.fromhex(payload)) == bytes.fromhex(frame)
+    assert events(FrameDecoder(LIMIT), bytes.fromhex(frame)) == [bytes.fromhex(payload)]
+
+
+@given(st.lists(PAYLOAD))
+def test_any_payloads_round_trip(payloads: list[bytes]) -> None:
+    stream = b"".join(map(encode_frame, payloads))
+    assert events(FrameDecoder(LIMIT), stream) == payloads
+
+
+@given(NOISE, PAYLOAD)
+def test_noise_before_a_frame_loses_it_only_as_declared(noise: bytes, payload: bytes) -> None:
+    found = events(FrameDecoder(LIMIT), noise + encode_frame(payload))
+    swallowed = b"\x1f\x7f" in noise and trailing_escapes(noise) % 2 == 1
+    if not swallowed:
+        assert found[-1] == payload
+
+
+@given(NOISE, PAYLOAD, PAYLOAD)
+def test_the_second_frame_after_any_noise_is_found(noise: bytes, one: bytes, two: bytes) -> None:
+    found = events(FrameDecoder(LIMIT), noise + encode_frame(one) + encode_frame(two))
+    assert found[-1] == two
+
+
+@given(NOISE, PAYLOAD)
+def test_after_a_silence_the_next_frame_is_found(noise: bytes, payload: bytes) -> None:
+    decoder = FrameDecoder(LIMIT)
+    events(decoder, noise)
+    decoder.reset()
+    assert events(decoder, encode_frame(payload)) == [payload]
+
+
+@given(NOISE)
+def test_payloads_stay_within_the_limit(noise: bytes) -> None:
+    for event in events(FrameDecoder(LIMIT), noise * 3):
+        assert not isinstance(event, bytes) or len(event) <= LIMIT
+
+
+def test_a_long_frame_is_reported_once_at_its_end() -> None:
+    decoder = FrameDecoder(LIMIT)
+    assert events(decoder, encode_frame(bytes(LIMIT + 50))) == [FrameEvent.TOO_LONG]
+    assert events(decoder, encode_frame(bytes(LIMIT))) == [bytes(LIMIT)]
+    assert events(decoder, encode_frame(bytes(LIMIT + 1))) == [FrameEvent.TOO_LONG]
+
+
+def test_a_start_inside_a_frame_is_incomplete_and_begins_anew() -> None:
+    stream = encode_frame(b"abc")[:-2] + encode_frame(b"de")
+    assert events(FrameDecoder(LIMIT), stream) == [FrameEvent.INCOMPLETE, b"de"]
+
+
+def test_an_unknown_escape_drops_the_frame() -> None:
+    stream = bytes.fromhex("1F7F 80 1F00") + encode_frame(b"de")
+    assert events(FrameDecoder(LIMIT), stream) == [FrameEvent.PROTOCOL_ERROR, b"de"]
+
+
+@pytest.mark.parametrize("stray", ["00", "1F00", "1FFF", "1F"])
+def test_bytes_outside_of_a_frame_are_a_protocol_error(stray: str) -> None:
+    found = events(FrameDecoder(LIMIT), bytes.fromhex(stray) + encode_frame(b"de"))
+    assert found == [FrameEvent.PROTOCOL_ERROR, b"de"]
+
+
+@pytest.mark.parametrize(
+    ("received", "unfinished"), [("", False), ("1F", True), ("1F7F80", True), ("1F7F801FFF", False)]
+)
+def test_a_silence_tells_whether_a_frame_was_unfinished(received: str, unfinished: bool) -> None:
+    decoder = FrameDecoder(LIMIT)
+    events(decoder, bytes.fromhex(received))
+    assert decoder.reset() is unfinished
+    assert decoder.reset() is False

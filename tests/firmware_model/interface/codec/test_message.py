@@ -1,0 +1,188 @@
+from collections.abc import Callable
+from enum import IntEnum
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
+from cubestack.firmware_model.interface.codec.message import (
+    Field,
+    Interface,
+    InterfaceError,
+    Kind,
+    Message,
+)
+from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
+from cubestack.firmware_model.interface.cubestar.codes import AckError
+
+MIXED = Message(
+    200,
+    "Mixed",
+    8,
+    "",
+    (
+        Field("a", "u8", 0, ""),
+        Field("b", "bool1", 8, ""),
+        Field("c", "bool1", 15, ""),
+        Field("d", "i16", 16, "", scale=100),
+        Field("e", "u32", 32, ""),
+    ),
+)
+
+WINDOW = Message(
+    20,
+    "Window",
+    2,
+    "",
+    (
+        Field("low", "u8", 0, "", minimum=1, range_flag="LowError", reset=1),
+        Field("high", "u8", 8, "", maximum=9, range_flag="HighError", reset=9),
+    ),
+    ordered=(("low", "high"),),
+)
+
+
+def test_bytes_are_little_endian_and_bits_count_from_the_lowest() -> None:
+    data = MIXED.pack(a=0x12, b=True, c=True, d=-1.0, e=0x01020304)
+    assert data == bytes.fromhex("12 81 9cff 04030201")
+
+
+@given(st.binary(min_size=8, max_size=8))
+def test_every_declared_bit_survives(data: bytes) -> None:
+    packed = MIXED.pack(**MIXED.unpack(data))
+    assert packed == bytes((data[0], data[1] & 0x81)) + data[2:]
+
+
+def test_kind_follows_from_the_identifier() -> None:
+    assert MIXED.kind is Kind.TELEMETRY
+    assert WINDOW.kind is Kind.TELECOMMAND
+
+
+def test_telemetry_saturates_and_telecommands_do_not() -> None:
+    assert MIXED.pack(a=999, b=0, c=0, d=0, e=0)[0] == 255
+    with pytest.raises(InterfaceError, match="Window: field low: 256 does not fit"):
+        WINDOW.pack(low=256, high=9)
+
+
+def test_values_beyond_the_limits_can_be_sent_for_the_node_to_refuse() -> None:
+    assert WINDOW.pack(low=0, high=255) == b"\x00\xff"
+
+
+@pytest.mark.parametrize(
+    ("values", "flags"),
+    [
+        ((1, 9), []),
+        ((5, 5), []),
+        ((0, 9), ["LowError"]),
+        ((0, 10), ["LowError", "HighError"]),
+        ((6, 5), ["LowError"]),
+    ],
+)
+def test_violations_name_the_flag(values: tuple[int, int], flags: list[str]) -> None:
+    found = WINDOW.violations({"low": values[0], "high": values[1]})
+    assert [flag for _, flag in found] == flags
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: WINDOW.pack(low=1, hihg=2), "Window has no field 'hihg'; did you mean high?"),
+        (lambda: WINDOW.pack(low=1), "Window needs a value for high"),
+        (lambda: WINDOW.field("q"), "Window has no field 'q'; known: low, high"),
+        (lambda: Message(2, "Reset", 0, "").pack(now=1), "Reset has no field 'now'; it has no"),
+        (lambda: WINDOW.unpack(b"abc"), "Window has 2 bytes, not 3"),
+    ],
+)
+def test_errors_name_the_offender_in_one_line(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(InterfaceError) as caught:
+        call()
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_fields_are_found_in_any_case() -> None:
+    assert WINDOW.field("LOW").name == "low"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((1, "M", 1, "", (Field("a", "u16", 0, ""),)), "field a exceeds its 1 bytes"),
+        (
+            (1, "M", 2, "", (Field("a", "u16", 0, ""), Field("b", "bool1", 3, ""))),
+            "field b overlaps another",
+        ),
+        (
+            (1, "M", 2, "", (Field("a", "u8", 0, ""), Field("a", "u8", 8, ""))),
+            "two fields of one name",
+        ),
+        ((256, "M", 0, ""), "ID 256 is not a byte"),
+        ((1, "M", 1, "", (Field("a", "u8", 0, "", minimum=1),)), "reset value of a"),
+        ((1, "M", 1, "", (Field("a", "u8", 0, ""),), (("a", "z"),)), "no field 'z'"),
+    ],
+)
+def test_wrong_declarations_are_refused(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(InterfaceError, match=message):
+        Message(*arguments)  # type: ignore[arg-type]
+
+
+NODE = Interface("Node", 1, 0x1A, 57_600, (WINDOW,), (MIXED,), AckError)
+
+
+def test_messages_are_found_by_name_in_any_case_and_by_identifier() -> None:
+    assert NODE.telecommand("window") is NODE.telecommand(20) is NODE.find(20) is WINDOW
+    assert NODE.telemetry("MIXED") is NODE.telemetry(200) is NODE.find(200) is MIXED
+    assert NODE.find(21) is None
+
+
+def test_unknown_messages_get_a_suggestion() -> None:
+    with pytest.raises(InterfaceError, match="Node has no telecommand 'windw'; did you mean Wind"):
+        NODE.telecommand("windw")
+    with pytest.raises(InterfaceError, match="Node has no telemetry frame 131; known: Mixed"):
+        NODE.telemetry(131)
+
+
+def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
+    later = Message(201, "Later", 0, "", supported=False)
+    node = Interface("Node", 1, 0x1A, 57_600, (), (later,), AckError)
+    assert node.telemetry("Later") is later
+    assert node.find(201) is None
+
+
+@pytest.mark.parametrize(
+    ("telecommands", "telemetries", "message"),
+    [
+        ((MIXED,), (), "Mixed: ID 200 is no telecommand's"),
+        ((), (WINDOW,), "Window: ID 20 is no telemetry's"),
+        ((WINDOW, Message(20, "Other", 0, "")), (), "Other: ID 20 is taken"),
+        ((WINDOW, Message(21, "window", 0, "")), (), "two telecommands of one name"),
+    ],
+)
+def test_wrong_interfaces_are_refused(
+    telecommands: tuple[Message, ...], telemetries: tuple[Message, ...], message: str
+) -> None:
+    with pytest.raises(InterfaceError, match=message):
+        Interface("Node", 1, 0x1A, 57_600, telecommands, telemetries, AckError)
+
+
+def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -> None:
+    class Level(IntEnum):
+        LOW = 0
+
+    error = Message(201, "Last", 1, "", (Field("error", "u8", 0, "", choices=AckError),))
+    register = PointerRegister(
+        0, RegisterAccess.READ_WRITE, Field("level", "u8", 0, "", choices=Level)
+    )
+    node = Interface(
+        "Node",
+        1,
+        0x1A,
+        57_600,
+        (),
+        (error,),
+        AckError,
+        registers=PointerMap(0x1C, (register,)),
+    )
+    assert node.choices == (Level,)
+    assert Interface("Node", 1, 0x1A, 57_600, (), (error,), AckError).choices == ()

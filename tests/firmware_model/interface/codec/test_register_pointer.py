@@ -1,0 +1,76 @@
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
+from cubestack.firmware_model.interface.codec.field import Field, InterfaceError
+from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
+
+_RW, _RO, _WO = (
+    RegisterAccess.READ_WRITE,
+    RegisterAccess.READ_ONLY,
+    RegisterAccess.WRITE_ONLY,
+)
+LEVEL = PointerRegister(0x10, _RW, Field("LEVEL", "u8", 0, "", maximum=9))
+CENTRE = PointerRegister(0x20, _RO, Field("CENTRE", "i16", 0, "", "px", 100))
+START = PointerRegister(0x30, _WO, Field("START", "u8", 0, ""))
+STREAM = PointerRegister(0x40, _RO, Field("STREAM", "bytes5", 0, ""))
+MAP = PointerMap(0x1C, (STREAM, LEVEL, CENTRE, START))
+
+
+@given(st.integers(-32768, 32767))
+def test_two_bytes_are_signed_with_the_most_significant_first(raw: int) -> None:
+    data = raw.to_bytes(2, "big", signed=True)
+    assert CENTRE.decode(data) == raw / 100
+    assert CENTRE.encode(raw / 100) == data
+
+
+def test_measurements_saturate_and_writes_do_not() -> None:
+    assert CENTRE.encode(1e6) == b"\x7f\xff"
+    assert CENTRE.encode(-1e6) == b"\x80\x00"
+    with pytest.raises(InterfaceError, match="LEVEL: 256 does not fit"):
+        LEVEL.encode(256, saturate=False)
+
+
+def test_what_may_be_written() -> None:
+    assert [LEVEL.allows(value) for value in (0, 9, 10)] == [True, True, False]
+    assert not CENTRE.allows(0)
+    assert START.allows(255)
+    assert [r.readable for r in MAP] == [True, True, False, True]
+
+
+def test_a_stream_carries_bytes() -> None:
+    assert STREAM.decode(b"abcde") == b"abcde"
+    assert [r.streams for r in MAP] == [False, False, False, True]
+
+
+def test_lookup() -> None:
+    assert list(MAP) == [LEVEL, CENTRE, START, STREAM]
+    assert len(MAP) == 4
+    assert MAP["centre"] is MAP.at(0x20) is CENTRE
+    assert MAP.at(0x21) is None
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: MAP["LEVL"], "no register 'LEVL'; did you mean LEVEL?"),
+        (lambda: CENTRE.decode(b"a"), "register CENTRE has 2 bytes, not 1"),
+        (lambda: STREAM.encode(1), "register STREAM is a stream"),
+        (lambda: PointerRegister(256, _RO, Field("A", "u8", 0, "")), "address 256 is not a byte"),
+        (lambda: PointerRegister(0, _RO, Field("A", "u8", 8, "")), "whole bytes at offset 0"),
+        (lambda: PointerRegister(0, _RO, Field("A", "bool1", 0, "")), "whole bytes at offset 0"),
+        (lambda: PointerRegister(0, _RW, Field("A", "i16", 0, "")), "writes one byte, not 2"),
+        (lambda: PointerMap(1, (LEVEL, LEVEL)), "both have address 0x10"),
+        (
+            lambda: PointerMap(1, (LEVEL, PointerRegister(0, _RO, Field("level", "u8", 0, "")))),
+            "two registers are called",
+        ),
+    ],
+)
+def test_errors_name_the_offender(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(InterfaceError) as caught:
+        call()
+    assert message in str(caught.value)

@@ -1,0 +1,146 @@
+"""The command table against table 6.4 as printed, and the published read-outs."""
+
+from itertools import product
+
+import pytest
+
+from cubestack.firmware_model.interface.cubesense.fpga import (
+    ADDRESSING_COMMANDS,
+    COMMANDS,
+    FULL_SIZE,
+    SUN_NOT_FOUND,
+    Action,
+    Actions,
+    ReadOut,
+    actions,
+    address_bytes,
+    link_shows_enables,
+)
+
+# SHIFT EDGE RNW SUNEN NADEN, then what the sun's and the nadir's FPGA do.
+PRINTED = {
+    "00001": (Action.STORE, Action.STANDBY),
+    "00010": (Action.STANDBY, Action.STORE),
+    "00101": (Action.READ, Action.STANDBY),
+    "00110": (Action.STANDBY, Action.READ),
+    "01101": (Action.EDGE, Action.STANDBY),
+    "01110": (Action.STANDBY, Action.EDGE),
+    "10000": (Action.SEND_PICTURE, Action.STORE_OTHER),
+    "10100": (Action.STORE_OTHER, Action.SEND_PICTURE),
+    "11000": (Action.PASS_EDGE, Action.SEND_EDGE),
+    "11100": (Action.SEND_EDGE, Action.PASS_EDGE),
+}
+OURS = {"00000": (Action.STORE, Action.STORE)}
+ADDRESSING = {
+    "01001": (Action.TAKE_ADDRESS, Action.STANDBY),
+    "01010": (Action.STANDBY, Action.TAKE_ADDRESS),
+    "11001": (Action.READ_FROM, Action.STANDBY),
+    "11010": (Action.STANDBY, Action.READ_FROM),
+}
+
+
+def test_printed_rows_and_standby_in_all_others() -> None:
+    listed = PRINTED | OURS
+    for levels in product("01", repeat=5):
+        expected = listed.get("".join(levels), (Action.STANDBY, Action.STANDBY))
+        assert actions(*map(int, levels)) == expected, levels
+
+
+def test_address_control_adds_rows_that_are_standby_without_it() -> None:
+    listed = PRINTED | OURS | ADDRESSING
+    for levels in product("01", repeat=5):
+        expected = listed.get("".join(levels), (Action.STANDBY, Action.STANDBY))
+        assert actions(*map(int, levels), mcu_addressing=True) == expected, levels
+
+
+def test_no_levels_are_listed_twice() -> None:
+    for levels in product((0, 1), repeat=5):
+        commands = COMMANDS + ADDRESSING_COMMANDS
+        assert sum(command.fits(*levels) for command in commands) <= 1
+
+
+def test_address_control_sees_the_other_enable_and_moves_shift_only() -> None:
+    for command in ADDRESSING_COMMANDS:
+        assert link_shows_enables(command.shift or 0, command.edge or 0)
+    rows = {(c.edge, c.rnw) for c in ADDRESSING_COMMANDS}
+    assert len(rows) == 1
+
+
+@pytest.mark.parametrize(
+    ("pixel", "sent"),
+    [((0, 0), "000000"), ((639, 0), "00027f"), ((0, 1), "000400"), ((639, 479), "077e7f")],
+)
+def test_address_is_row_and_column_highest_byte_first(pixel: tuple[int, int], sent: str) -> None:
+    assert address_bytes(*pixel).hex() == sent
+
+
+@pytest.mark.parametrize("pixel", [(640, 0), (0, 480), (-1, 0), (0, -1)])
+def test_address_of_a_pixel_outside_is_refused(pixel: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="not inside of 640 x 480 pixels"):
+        address_bytes(*pixel)
+
+
+def test_a_picture_on_the_link_hides_the_enables() -> None:
+    hidden = [pair for pair in product((0, 1), repeat=2) if not link_shows_enables(*pair)]
+    assert hidden == [(1, 0)]
+    crosses = {Action.SEND_PICTURE, Action.STORE_OTHER}
+    for command in COMMANDS:
+        assert ((command.shift, command.edge) in hidden) == (crosses == set(command.actions))
+
+
+def test_one_fpga_at_most_drives_the_microcontrollers_bus() -> None:
+    drivers = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
+    for command in COMMANDS + ADDRESSING_COMMANDS:
+        driving = [action for action in command.actions if action in drivers]
+        assert len(driving) <= 1
+        assert command.shift or command.rnw or not driving, "the microcontroller may drive here"
+
+
+def test_both_ends_of_the_link_fit() -> None:
+    pairs = {Action.SEND_PICTURE: Action.STORE_OTHER, Action.SEND_EDGE: Action.PASS_EDGE}
+    for command in COMMANDS:
+        for one, other in (command.actions, Actions(*command.actions[::-1])):
+            assert one not in pairs or other is pairs[one]
+
+
+def test_full_size_scan() -> None:
+    assert list(FULL_SIZE.scan_rows) == [15, 79, 143, 207, 271, 335, 399, 463]
+    assert list(FULL_SIZE.scan_columns) == [63, 127, 191, 255, 319, 383, 447, 511, 575, 639]
+    pixels = list(FULL_SIZE.scan())
+    assert len(pixels) == FULL_SIZE.scan_clocks == 1 + 8 * 640 + 1 + 10 * 480
+    assert [index for index, pixel in enumerate(pixels) if pixel is None] == [0, 5121]
+    assert pixels[1:3] == [(0, 15), (1, 15)]
+    assert pixels[5120] == (639, 463)
+    assert pixels[5122:5124] == [(63, 0), (63, 1)]
+    assert pixels[-1] == (639, 479)
+
+
+@pytest.mark.parametrize(
+    ("sun", "origin"),
+    [
+        ((300, 200), (295, 197)),
+        ((5, 3), (0, 0)),
+        ((0, 0), (0, 0)),
+        ((6, 2), (1, 0)),
+        ((630, 468), (625, 465)),
+        ((637, 479), (625, 465)),
+        (SUN_NOT_FOUND, (625, 465)),
+    ],
+)
+def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int, int]) -> None:
+    assert FULL_SIZE.window_origin(*sun) == origin
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"scan_step": 48}, "power of two"),
+        ({"first_row": 64}, "below scan_step 64"),
+        ({"first_column": 100}, "below scan_step 64"),
+        ({"columns": 63}, "inside of the picture"),
+        ({"rows": 16, "window": 17}, "does not fit into 640 x 16"),
+    ],
+)
+def test_impossible_read_outs_are_refused(change: dict[str, int], error: str) -> None:
+    with pytest.raises(ValueError, match=error):
+        ReadOut(**change)

@@ -1,0 +1,306 @@
+"""The oracle is LAYOUTS: IDs, lengths, types and confidence as hosts of the CubeSpace family use
+them, typed from their description. A telemetry ID counts without its bit 7.
+"""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Kind, Message
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense.bench import BENCH, CAPTURES, DOWNLOADS
+from cubestack.firmware_model.interface.cubesense.codes import (
+    Camera,
+    CaptureResult,
+    DetectResult,
+    ImageLocation,
+    ImageSize,
+    Measurement,
+    ResetTarget,
+    Sram,
+    checksum,
+    coefficient,
+    split_coefficient,
+)
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
+from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
+
+LAYOUTS = """
+TC 0 1 u8 H
+TC 11 1 u8 L
+TC 20 2 u8,u8 H
+TC 21 3 u8,u8,u8 M
+TC 40 1 u8 H
+TC 41 1 u8 H
+TC 42 1 u8 H
+TC 43 5 u16,u8,u8,u8 H
+TC 44 1 u8 H
+TC 45 5 u16,u8,u8,u8 H
+TC 50 4 u16,u16 L
+TC 51 4 u16,u16 L
+TC 52 9 u8,u16,u16,u16,u16 L
+TC 53 9 u8,u16,u16,u16,u16 L
+TC 54 15 u16,u8,u16,u8,u16,u8,u16,u8,u16,u8 L
+TC 55 15 u16,u8,u16,u8,u16,u8,u16,u8,u16,u8 L
+TC 64 3 u8,u8,u8 H
+TC 65 2 u16 H
+TLM 0 8 u8,u8,u8,u8,u16,u16 H
+TLM 1 6 bytes6 L
+TLM 2 8 u16,u16,u8,u8,u8,u8 L
+TLM 3 3 u8,u8,u8 H
+TLM 20 6 i16,i16,u8,u8 M
+TLM 21 6 i16,i16,u8,u8 M
+TLM 22 6 i16,i16,u8,u8 H
+TLM 23 6 i16,i16,u8,u8 H
+TLM 24 6 i16,i16,u8,u8 H
+TLM 25 6 i16,i16,u8,u8 H
+TLM 26 10 u16,u16,u16,u16,u8,u8 H
+TLM 40 14 u8,u8,u8,u16,u8,u8,u8,u8,u16,u8,u8,u8 H
+TLM 64 128 bytes128 H
+TLM 65 3 u16,u8 H
+TLM 72 40 u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16 M
+TLM 73 40 u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16 M
+"""
+
+
+def by_id() -> dict[int, Message]:
+    return {message.id: message for message in INTERFACE.messages}
+
+
+@pytest.mark.parametrize("entry", LAYOUTS.strip().splitlines())
+def test_layout_is_the_known_one(entry: str) -> None:
+    kind, number, length, types, confidence = entry.split()
+    message = by_id()[int(number) + (0x80 if kind == "TLM" else 0)]
+    assert (message.length, message.ours) == (int(length), False)
+    # Signed mantissas are ours: the description has an unsigned one and no sign.
+    signless = [
+        "u16" if field.name.startswith("Mantissa") else field.type for field in message.fields
+    ]
+    assert signless == types.split(",")
+    offset = 0
+    for field in message.fields:
+        assert field.bit_offset == offset
+        offset += field.bits
+    assert offset == 8 * message.length
+    assert message.confidence is not None
+    assert message.confidence.name[0] == confidence
+
+
+def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
+    known = set()
+    for entry in LAYOUTS.strip().splitlines():
+        kind, number = entry.split()[:2]
+        known.add(int(number) + (0x80 if kind == "TLM" else 0))
+    ours = {message.id for message in INTERFACE.messages if message.ours}
+    assert by_id().keys() - ours == known
+    assert ours <= set(range(100, 128)) | set(range(220, 256))
+    assert all(by_id()[identifier].confidence is None for identifier in ours)
+
+
+def test_seconds_stand_before_milliseconds() -> None:
+    identification = INTERFACE.telemetry("Identification").unpack(bytes.fromhex("0502010300010200"))
+    assert identification["RuntimeSeconds"] == 256
+    assert identification["RuntimeMilliseconds"] == 2
+    assert (INTERFACE.name, INTERFACE.version, INTERFACE.i2c_address) == ("CubeSense", 2, 0x1B)
+    assert INTERFACE.baud == 57_600
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "frame"),
+    [
+        ("CaptureAndDetect", {"Camera": 0, "Sram": 0}, "1F7F 14 00 00 1FFF"),
+        (
+            "CameraSettings2",
+            {"Exposure": 0x1F1F, "Gain": 0x1F, "BlueGain": 0x80, "RedGain": 0x80},
+            "1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF",
+        ),
+        ("NextImageFrame", {"Frame": 31}, "1F7F 41 1F1F 00 1FFF"),
+    ],
+)
+def test_published_telecommand_bytes(name: str, parameters: dict[str, int], frame: str) -> None:
+    message = INTERFACE.telecommand(name)
+    assert encode_frame(bytes([message.id]) + message.pack(**parameters)) == bytes.fromhex(frame)
+
+
+def test_published_telemetry_bytes() -> None:
+    assert encode_frame(bytes([INTERFACE.telemetry("Identification").id])) == bytes.fromhex(
+        "1F7F 80 1FFF"
+    )
+    result = INTERFACE.telemetry("Result1ThenSram1")
+    assert encode_frame(bytes([result.id])) == bytes.fromhex("1F7F 96 1FFF")
+    data = result.pack(Alpha=12.34, Beta=-5.67, Capture=2, Detect=7)
+    assert encode_frame(data) == bytes.fromhex("1F7F D204 C9FD 02 07 1FFF")
+    values = result.unpack(data)
+    assert (values["Alpha"], values["Beta"]) == (12.34, -5.67)
+    assert DetectResult(int(values["Detect"])) is DetectResult.SUCCESS
+    assert CaptureResult(int(values["Capture"])) is CaptureResult.STORED_OWN_SRAM
+
+
+@pytest.mark.parametrize("message", INTERFACE.messages, ids=lambda m: m.name)
+def test_every_message_and_field_is_explained_and_round_trips(message: Message) -> None:
+    for text in [message.meaning, *(field.meaning for field in message.fields)]:
+        assert 2 < len(text) < 100
+        assert not text.endswith(".")
+    for byte in (0x00, 0x55, 0xAA, 0x1F):
+        data = bytes([byte]) * message.length
+        values = message.unpack(data)
+        assert message.unpack(message.pack(**values)) == values
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "wrong"),
+    [
+        ("CaptureOnly", {"Location": ImageLocation.BOTTOM}, ["Location"]),
+        ("CaptureOnly", {"Camera": 2, "Sram": 2}, ["Camera", "Sram"]),
+        ("StartImageDownload", {"Location": 1}, ["Location"]),
+        ("StartImageDownload", {"Size": 5}, ["Size"]),
+        ("NextImageFrame", {"Frame": 8192}, ["Frame"]),
+        ("Reset", {"Target": 0}, ["Target"]),
+        ("ClearOverCurrent", {"Selection": 3}, ["Selection"]),
+        ("AutoAdjust1", {"Enabled": 2}, ["Enabled"]),
+        ("Mask1", {"Area": 0}, ["Area"]),
+        ("Mask2", {"Area": 6}, ["Area"]),
+        ("Mask1", {"XMin": 9, "XMax": 8}, ["XMin"]),
+        ("Mask1", {"XMax": 640}, ["XMax"]),
+        ("Mask1", {"YMax": 480}, ["YMax"]),
+        ("Boresight2", {"X": 640}, ["X"]),
+        ("SetNadirSearch", {"Search": 3}, ["Search"]),
+        ("CameraSettings1", {"Exposure": 65535, "Gain": 255}, []),
+        ("Mask1", {"XMax": 639, "YMax": 479}, []),
+        ("NextImageFrame", {"Frame": 8191}, []),
+    ],
+)
+def test_bad_parameters_are_found(name: str, change: dict[str, int], wrong: list[str]) -> None:
+    message = INTERFACE.telecommand(name)
+    values = message.unpack(message.pack(**(message.reset_values() | change)))
+    assert [field.name for field, _ in message.violations(values)] == wrong
+
+
+def test_published_reset_values() -> None:
+    def resets(name: str) -> dict[str, object]:
+        return dict(INTERFACE.telecommand(name).reset_values())
+
+    assert resets("DetectionThreshold1") == {"Threshold": 225}
+    assert resets("DetectionThreshold2") == {"Threshold": 70}
+    assert resets("Boresight1") == {"X": 369.0, "Y": 250.0}
+    assert resets("Boresight2") == {"X": 371.0, "Y": 236.0}
+    assert resets("CameraSettings1")["Exposure"] == 1
+
+
+def test_the_distortion_that_is_set_is_the_measured_one() -> None:
+    values = INTERFACE.telecommand("Distortion2").reset_values()
+    factors = [
+        coefficient(int(values[f"Mantissa{power}"]), int(values[f"Exponent{power}"]))
+        for power in range(5)
+    ]
+    assert factors == pytest.approx(list(DISTORTION), rel=1.6e-4)
+    radius = sum(factor * 182.0**power for power, factor in enumerate(factors))
+    assert radius == pytest.approx(168.0, abs=0.5)  # CubeSense thesis, section 5.2
+
+
+@given(st.floats(-32767, 32767).filter(lambda value: value == 0 or abs(value) > 1e-200))
+def test_coefficients_keep_their_digits(value: float) -> None:
+    mantissa, exponent = split_coefficient(value)
+    assert -32768 <= mantissa <= 32767
+    assert 0 <= exponent <= 255
+    assert coefficient(mantissa, exponent) == pytest.approx(value, rel=1.6e-4)
+
+
+def test_coefficients_that_do_not_fit_are_told() -> None:
+    for value in (32768.0, -1e9, math.inf, math.nan):
+        with pytest.raises(ValueError, match="within \\+-32767"):
+            split_coefficient(value)
+    assert split_coefficient(1e-300) == (0, 255)
+
+
+def test_named_numbers() -> None:
+    assert [(result.value, result.stored) for result in CaptureResult] == [
+        (0, False),
+        (1, False),
+        (2, True),
+        (3, True),
+        (4, False),
+        (5, False),
+    ]
+    assert [result.name for result in DetectResult] == [
+        "START_UP",
+        "NONE_SCHEDULED",
+        "PENDING",
+        "TOO_MANY_EDGES",
+        "TOO_FEW_EDGES",
+        "BAD_FIT",
+        "SUN_NOT_FOUND",
+        "SUCCESS",
+    ]
+    assert [target.value for target in ResetTarget] == [1, 2, 3]
+    assert [(size.side, size.frames) for size in ImageSize] == [
+        (1024, 8192),
+        (512, 2048),
+        (256, 512),
+        (128, 128),
+        (64, 32),
+    ]
+
+
+def test_results_schedule_the_four_combinations() -> None:
+    assert {camera: identifier - 0x80 for camera, identifier in RESULTS.items()} == {
+        Camera.SUN: 20,
+        Camera.NADIR: 21,
+    }
+    assert {identifier - 0x80: target for identifier, target in SCHEDULES.items()} == {
+        22: (Camera.SUN, Sram.SRAM1),
+        23: (Camera.NADIR, Sram.SRAM2),
+        24: (Camera.SUN, Sram.SRAM2),
+        25: (Camera.NADIR, Sram.SRAM1),
+    }
+    assert {(m.camera, m.sram) for m in Measurement} == set(SCHEDULES.values())
+
+
+def test_checksum_is_the_exclusive_or() -> None:
+    assert checksum(b"") == 0
+    assert checksum(bytes([0x0F, 0xF0, 0x3C])) == 0xC3
+
+
+def test_registers_are_one_byte_two_bytes_or_the_picture() -> None:
+    assert REGISTERS is INTERFACE.registers
+    assert REGISTERS.i2c_address == 0x1C
+    assert [r.name for r in REGISTERS if r.length == 2] == ["SUN_X", "SUN_Y", "NADIR_X", "NADIR_Y"]
+    assert [(r.name, r.length) for r in REGISTERS if r.length > 2] == [("IMAGE", 307_200)]
+    assert all(2 < len(r.field.meaning) < 100 for r in REGISTERS)
+    assert REGISTERS["NADIR_X"].encode(-12.34) == bytes.fromhex("FB2E")
+
+
+def test_registers_and_node_protocol_start_with_the_same_settings() -> None:
+    for camera in Camera:
+        number = camera + 1
+        settings = INTERFACE.telecommand(f"CameraSettings{number}").reset_values()
+        threshold = INTERFACE.telecommand(f"DetectionThreshold{number}").reset_values()
+        for register, value in (
+            ("THRESHOLD", threshold["Threshold"]),
+            ("EXPOSURE", settings["Exposure"]),
+            ("BLUE_GAIN", settings["BlueGain"]),
+        ):
+            assert REGISTERS[f"{camera.name}_{register}"].field.reset == value
+
+
+def test_bench_letters_are_the_published_ones() -> None:
+    assert BENCH is INTERFACE.bench
+    assert BENCH.baud == 115_200
+    assert {letter.letter: (letter.length, letter.answer) for letter in BENCH.letters} == {
+        "a": (1, b"Y"),
+        "q": (1, b"Y"),
+        "s": (307_200, None),
+        "w": (307_200, None),
+    }
+    assert (CAPTURES[Camera.NADIR].letter, DOWNLOADS[Camera.NADIR].letter) == ("a", "s")
+    assert (CAPTURES[Camera.SUN].letter, DOWNLOADS[Camera.SUN].letter) == ("q", "w")
+
+
+def test_error_codes_are_listed_once() -> None:
+    assert INTERFACE.ack_errors not in INTERFACE.choices
+    assert Measurement in INTERFACE.choices  # only registers use it
+    assert all(message.kind is Kind.TELECOMMAND for message in INTERFACE.telecommands)

@@ -1,0 +1,200 @@
+"""The oracle is printed_layouts.txt: the layouts as the CubeSpace family's tables print
+them. One message an entry: ID, name, length in bytes, then every field as name@bit offset:type,
+with what the value is divided by.
+"""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.message import Kind, Message, Value
+from cubestack.firmware_model.interface.cubestar import (
+    INTERFACE,
+    AckError,
+    ImageBlockSize,
+    TaskStatus,
+)
+
+PRINTED = Path(__file__).with_name("printed_layouts.txt").read_text(encoding="ascii")
+
+# Fields whose scale is ours, because the tables print a plain integer and no unit.
+OUR_SCALES = {
+    "setDelayTimerTimeout": {"Time"},
+    "DelayTime": {"Timeout"},
+    "PowerStatus": {"Current", "MaxCurrent", "MinCurrent"},
+    "LogStatus": {"Current", "MaxCurrent", "MinCurrent"},
+    "Star1Details": {"S1CentX", "S1CentY"},
+    "Star2Details": {"S2CentX", "S2CentY"},
+    "Star3Details": {"S3CentX", "S3CentY"},
+    "StarDetails": {"Vbx", "Vby", "Vbz"},
+}
+
+STEPPING = {
+    "StarPositions",
+    "BodyUnitVectors",
+    "IDStarsDetails",
+    "InertialUnitVectors",
+    "StarDetails",
+    "HipparcosNumber",
+}
+
+
+def by_id() -> dict[int, Message]:
+    return {message.id: message for message in INTERFACE.messages}
+
+
+@pytest.mark.parametrize("entry", re.split(r"\n(?=\d)", PRINTED.strip()))
+def test_layout_is_the_printed_one(entry: str) -> None:
+    number, name, length, *fields = entry.split()
+    message = by_id()[int(number)]
+    assert (message.name, message.length, message.ours) == (name, int(length), False)
+    assert len(message.fields) == len(fields)
+    for field, printed in zip(message.fields, fields, strict=True):
+        layout, _, scale = printed.partition("/")
+        assert f"{field.name}@{field.bit_offset}:{field.type}" == layout
+        if field.name not in OUR_SCALES.get(name, set()):
+            assert field.scale == float(scale or 1)
+
+
+def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
+    printed = {int(entry.split()[0]) for entry in re.split(r"\n(?=\d)", PRINTED.strip())}
+    ours = {message.id for message in INTERFACE.messages if message.ours}
+    assert printed == set(range(1, 39)) | set(range(128, 178))
+    assert ours == by_id().keys() - printed
+    assert ours <= set(range(100, 128)) | set(range(200, 256))
+
+
+@pytest.mark.parametrize("message", INTERFACE.messages, ids=lambda m: m.name)
+def test_every_message_and_field_is_explained(message: Message) -> None:
+    for text in [message.meaning, *(field.meaning for field in message.fields)]:
+        assert 2 < len(text) < 100
+        assert not text.endswith(".")
+
+
+@pytest.mark.parametrize("message", INTERFACE.messages, ids=lambda m: m.name)
+def test_every_message_round_trips_any_bits(message: Message) -> None:
+    for byte in (0x00, 0x55, 0xAA, 0x1F):
+        data = bytes([byte]) * message.length
+        values = message.unpack(data)
+        assert message.unpack(message.pack(**values)) == values
+
+
+def test_times_are_in_ms_and_currents_in_tenths_of_a_milliampere() -> None:
+    timing = [m for m in INTERFACE.telemetries if re.search(r"Tim(e|ing)", m.name) and not m.ours]
+    assert len(timing) == 11
+    for message in timing:
+        assert {field.unit for field in message.fields} <= {"ms", "s"}
+    assert INTERFACE.telemetry("PowerStatus").unpack(bytes.fromhex("01 c802 0000 0000"))[
+        "Current"
+    ] == pytest.approx(71.2)
+
+
+def test_published_reset_values() -> None:
+    def resets(name: str) -> dict[str, Value]:
+        return INTERFACE.telecommand(name).reset_values()
+
+    assert resets("setDetectionThresholds")["DetectionThreshold"] == 6
+    assert resets("setStarPixels") == {"MinPixels": 6, "MaxPixels": 60}
+    assert resets("setDetectionVariables")["MaxStars"] == 20
+    assert resets("setDetectionVariables")["MaxInvalidStars"] == 50
+    assert resets("setDetectionVariables")["GridSize"] == 5
+    assert resets("setDetectionRegion")["StepSize"] == 3
+    assert resets("setIDMargin")["Margin"] == pytest.approx(0.001)
+    assert resets("setFocalLength")["FocalLength"] == pytest.approx(6.28)
+    assert resets("setFocalLengthComponents")["Fy"] == pytest.approx(1147.4)
+    assert resets("setPrincipalPoint") == {"Cx": 539.0, "Cy": 175.5}
+    assert resets("setRadialDistortionGains")["K2"] == pytest.approx(-0.12456)
+    assert resets("setTangentalDistortionGains")["P2"] == pytest.approx(0.00624)
+    assert resets("SetFrameRate")["FrameRate"] == 7
+    assert resets("SetDiscardDelay")["Delay"] == 70
+
+
+def test_every_range_flag_is_an_error_flag() -> None:
+    flags = {field.name for field in INTERFACE.telemetry("ErrorFlags").fields}
+    for message in INTERFACE.telecommands:
+        for field in message.fields:
+            assert not field.range_flag or field.range_flag in flags
+    for field in INTERFACE.telemetry("LogStatus").fields:
+        assert not field.flag or field.flag in flags
+
+
+def test_log_status_shows_the_same_bytes_of_flags() -> None:
+    flags = INTERFACE.telemetry("ErrorFlags")
+    for chosen in flags.fields:
+        log = {field.name: field.reset for field in INTERFACE.telemetry("LogStatus").fields}
+        for field in INTERFACE.telemetry("LogStatus").fields:
+            if field.flag == chosen.name:
+                log[field.name] = True
+        packed = flags.pack(**{f.name: f is chosen for f in flags.fields})
+        assert any(packed)
+        assert INTERFACE.telemetry("LogStatus").pack(**log)[16:] == packed
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "flag"),
+    [
+        ("setFocalLength", {"FocalLength": 0.5}, "FocalLengthRangeError"),
+        ("setFocalLength", {"FocalLength": math.nan}, "FocalLengthRangeError"),
+        ("setFocalLengthComponents", {"Fx": 1147.5, "Fy": 1e6}, "FocalLengthRangeError"),
+        ("setPrincipalPoint", {"Cx": 5000.0, "Cy": 175.5}, "PrincipalPointRangeError"),
+        ("setDelayTimerTimeout", {"Time": 1.1}, "DelayTimeSetToLong"),
+        ("CaptureTestPatern", {"TestPaternType": 9}, "TestPatternConfigError"),
+        ("ImageBlockSet", {"BlockNumber": 0, "BlockSize": 4}, "ImageBlockSizeError"),
+        ("ImageBlockSet", {"BlockNumber": 4096, "BlockSize": 2}, "ImageBlockSizeError"),
+        ("setStarPixels", {"MinPixels": 7, "MaxPixels": 6}, "StarPixSetError"),
+        ("setIDMode", {"IdMode": 2}, "SetIDModeError"),
+        ("setTrackingMode", {"RightAscension": 0, "Declination": 1.6}, "DeclinationSetError"),
+        ("setTrackingMode", {"RightAscension": 7, "Declination": 0}, "RightAscensionSetError"),
+        ("WriteTo_IS_Register", {"Reg": 0, "DataH": 1, "DataL": 0}, "ISSetupError"),
+        ("setIDMargin", {"Margin": 0.0}, ""),
+    ],
+)
+def test_a_bad_parameter_names_its_flag(name: str, values: dict[str, float], flag: str) -> None:
+    message = INTERFACE.telecommand(name)
+    received = message.unpack(message.pack(**values))
+    assert [found for _, found in message.violations(received)] == [flag]
+
+
+def test_detection_settings_name_their_flags() -> None:
+    message = INTERFACE.telecommand("setDetectionVariables")
+    wrong = {"GridSize": 4, "MaxStars": 21, "MaxInvalidStars": 0, "MaxNoise": 0}
+    flags = [flag for _, flag in message.violations(wrong)]
+    assert flags == ["CentroidingGridSizeSetError", "MaxStarsSetError", "MaxNoiseSetError"]
+    region = INTERFACE.telecommand("setDetectionRegion")
+    values = region.reset_values() | {"Xstart": 9, "Xend": 8}
+    assert [flag for _, flag in region.violations(values)] == ["ValidImageRangeSetError"]
+
+
+@pytest.mark.parametrize("size", ImageBlockSize)
+def test_the_last_block_of_every_size_ends_with_the_picture(size: ImageBlockSize) -> None:
+    message = INTERFACE.telecommand("ImageBlockSet")
+    last = 1024 * 512 // size.length - 1
+    assert not message.violations({"BlockNumber": last, "BlockSize": size})
+    assert message.violations({"BlockNumber": last + 1, "BlockSize": size})
+
+
+def test_poles_and_both_conventions_of_right_ascension_are_allowed() -> None:
+    message = INTERFACE.telecommand("setTrackingMode")
+    for ra in (-math.pi, 0.0, 2 * math.pi):
+        for dec in (-math.pi / 2, math.pi / 2):
+            data = message.pack(RightAscension=ra, Declination=dec)
+            assert not message.violations(message.unpack(data))
+
+
+def test_stepping_telemetry() -> None:
+    assert {message.name for message in INTERFACE.messages if message.steps} == STEPPING
+
+
+def test_only_the_later_sensors_set_up_is_unsupported() -> None:
+    unsupported = [message.id for message in INTERFACE.messages if not message.supported]
+    assert unsupported == [138]
+    assert INTERFACE.find(138) is None
+
+
+def test_named_numbers() -> None:
+    assert [error.value for error in AckError] == [0, 1, 2, 3, 4]
+    assert TaskStatus(29) is TaskStatus.CALCULATED
+    assert [size.length for size in ImageBlockSize] == [32, 64, 128, 256]
+    assert all(message.kind is Kind.TELECOMMAND for message in INTERFACE.telecommands)

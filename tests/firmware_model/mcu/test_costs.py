@@ -1,0 +1,101 @@
+import pytest
+
+from cubestack.firmware_model.mcu.costs import (
+    CORTEX_M3,
+    Cost,
+    CostError,
+    CostTable,
+    Meter,
+    cortex_m3,
+)
+
+SIMPLE = CostTable(
+    "simple part",
+    1000,
+    {"add": Cost(3, "measured", "bench"), "loop": Cost(5, "assumed", "a guess")},
+)
+
+
+def test_charges_add_up_by_count_and_cost() -> None:
+    meter = Meter(SIMPLE)
+    meter.charge(add=2, loop=10)
+    meter.charge(add=1)
+    assert meter.total == 3 * 3 + 10 * 5
+    assert meter.counts == {"add": 3, "loop": 10}
+
+
+def test_take_gives_the_cycles_since_the_last_take() -> None:
+    meter = Meter(SIMPLE)
+    meter.charge(add=1)
+    assert meter.take() == 3
+    assert meter.take() == 0
+    meter.charge(loop=2)
+    assert meter.take() == 10
+    assert meter.total == 13
+
+
+def test_unknown_operation_is_named_and_nothing_of_it_is_counted() -> None:
+    with pytest.raises(CostError, match=r"'f64_add' is not in the table of simple part.*add, loop"):
+        Meter(SIMPLE).charge(f64_add=1)
+
+
+def test_negative_count_is_refused() -> None:
+    with pytest.raises(CostError, match="'add' cannot happen -1 times"):
+        Meter(SIMPLE).charge(add=-1)
+
+
+def test_phases_split_the_total() -> None:
+    meter = Meter(SIMPLE)
+    with meter.phase("search"):
+        meter.charge(loop=4)
+        with meter.phase("centroid"):
+            meter.charge(add=1)
+        meter.charge(loop=1)
+    with meter.phase("search"):
+        meter.charge(loop=1)
+    meter.charge(add=100)
+    assert meter.phases == {"search": 30, "centroid": 3}
+    assert meter.total == 333
+
+
+def test_phase_ends_when_its_block_fails() -> None:
+    meter = Meter(SIMPLE)
+    with pytest.raises(RuntimeError, match="stop"), meter.phase("search"):
+        raise RuntimeError("stop")
+    meter.charge(add=1)
+    assert meter.phases == {"search": 0}
+
+
+@pytest.mark.parametrize(
+    ("cycles", "provenance", "source", "message"),
+    [
+        (0, "measured", "bench", "at least 1 cycle, not 0"),
+        (1, "guessed", "bench", "measured, published, fitted, assumed, not 'guessed'"),
+        (1, "measured", "", "needs a source"),
+    ],
+)
+def test_untrustworthy_costs_are_refused(
+    cycles: int, provenance: str, source: str, message: str
+) -> None:
+    with pytest.raises(CostError, match=message):
+        Cost(cycles, provenance, source)  # type: ignore[arg-type]
+
+
+def test_the_transfer_loop_is_the_only_fitted_cost_and_reproduces_its_anchor() -> None:
+    fitted = {n: c for n, c in CORTEX_M3.operations.items() if c.provenance == "fitted"}
+    assert set(fitted) == {"transfer_byte"}
+    duration = CORTEX_M3.seconds(fitted["transfer_byte"].cycles * 1024 * 512)
+    assert duration == pytest.approx(0.404, abs=0.0005)
+
+
+def test_wait_states_lengthen_only_their_own_accesses() -> None:
+    quick = cortex_m3(flash_waits=0, ebi_waits=0, gpio_waits=0).operations
+    slow = cortex_m3(flash_waits=3, ebi_waits=10, gpio_waits=1).operations
+    longer = {name: slow[name].cycles - quick[name].cycles for name in quick}
+    assert {name: extra for name, extra in longer.items() if extra} == {
+        "flash_read": 3,
+        "ebi_read": 10,
+        "ebi_write": 10,
+        "port_read": 1,
+        "port_write": 1,
+    }

@@ -1,0 +1,208 @@
+"""The client against a node in memory that the tables drive."""
+
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.interface.aramis import (
+    INTERFACE,
+    AckError,
+    CatalogueState,
+    MeasurementMode,
+    MeasurementOutcome,
+    Reason,
+    SensorState,
+)
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+
+from ...conftest import FakeNode, I2cLink, UartLink
+
+SOLVED = {
+    "Q0": 0.5,
+    "Q1": -0.5,
+    "Q2": 0.5,
+    "Q3": 0.5,
+    "JulianDay": 2_461_366,
+    "Millisecond": 21_600_000,
+    "ImageUptime": 12_345,
+    "FrameCounter": 7,
+    "Outcome": MeasurementOutcome.CONCLUSIVE,
+    "Reason": Reason.CONFIRMED,
+    "Mode": MeasurementMode.AIDED,
+    "Valid": 1,
+    "Matched": 9,
+    "Detected": 12,
+}
+
+
+class FakeAramis(FakeNode):
+    """Keeps the catalogue that is loaded in ``memory``."""
+
+    def __init__(self) -> None:
+        super().__init__(INTERFACE)
+        self.memory = bytearray()
+        self.received: set[int] = set()
+
+    def execute(self, name: str, values: dict[str, Any]) -> None:
+        if name == "BeginCatalogue":
+            self.memory = bytearray(values["Length"])
+            self.received.clear()
+        if name == "CatalogueBlock":
+            start = 128 * values["BlockNumber"]
+            self.memory[start : start + 128] = values["Data"][: len(self.memory) - start]
+            self.received.add(values["BlockNumber"])
+            self.values["UploadStatus"]["BlocksReceived"] = len(self.received)
+        if name == "Activate":
+            self.values["SensorStatus"] = {"State": SensorState.READY, "Catalogue": 1}
+
+
+@pytest.fixture
+def node() -> FakeAramis:
+    return FakeAramis()
+
+
+@pytest.fixture
+def aramis(node: FakeAramis) -> Aramis:
+    return Aramis(NodeClient(UartLink(node), INTERFACE))
+
+
+def test_activation_returns_the_catalogue_s_state(node: FakeAramis, aramis: Aramis) -> None:
+    node.busy = 3
+    assert aramis.activate() is CatalogueState.GOOD
+    node.execute = lambda name, values: None  # type: ignore[method-assign]
+    node.values["SensorStatus"] = {"State": SensorState.ACTIVATING}
+    with pytest.raises(StepFailedError, match="not ready after Activate: ACTIVATING"):
+        aramis.activate()
+
+
+def test_an_attitude_with_everything(node: FakeAramis, aramis: Aramis) -> None:
+    node.values["Attitude"] = dict(SOLVED)
+    found = aramis.attitude()
+    assert found.quaternion is not None
+    np.testing.assert_allclose(found.quaternion, [0.5, -0.5, 0.5, 0.5])
+    assert (found.valid, found.matched, found.detected, found.frame) == (True, 9, 12, 7)
+    assert found.outcome is MeasurementOutcome.CONCLUSIVE
+    assert (found.reason, found.mode) == (Reason.CONFIRMED, MeasurementMode.AIDED)
+    assert found.image_uptime_s == 12.345
+    assert found.julian_date == 2_461_366.25
+
+
+def test_no_attitude_and_no_time(aramis: Aramis) -> None:
+    found = aramis.attitude()
+    assert (found.quaternion, found.valid, found.julian_date) == (None, False, None)
+    assert found.reason is Reason.NOT_MEASURED
+    assert aramis.body_quaternion() is None
+    assert aramis.julian_date() is None
+
+
+def test_a_quaternion_that_is_none_is_a_bad_answer(node: FakeAramis, aramis: Aramis) -> None:
+    node.values["Attitude"] = SOLVED | {"Q3": 2.0}
+    with pytest.raises(BadAnswerError, match="length"):
+        aramis.attitude()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "command", "parameters"),
+    [
+        ({}, "GetAttitude", {}),
+        ({"near": [0.6, 0.0, 0.8]}, "GetAttitudeNearVector", {"X": 0.6, "Y": 0.0, "Z": 0.8}),
+        (
+            {"near_rad": (1.5, -0.5)},
+            "GetAttitudeNearPoint",
+            {"RightAscension": 1.5, "Declination": -0.5},
+        ),
+    ],
+)
+def test_measuring_sends_what_is_known(
+    node: FakeAramis,
+    aramis: Aramis,
+    arguments: dict[str, Any],
+    command: str,
+    parameters: dict[str, float],
+) -> None:
+    node.values["Attitude"] = dict(SOLVED)
+    node.busy = 2
+    assert aramis.measure(**arguments).valid
+    assert node.log[-1][0] == command
+    assert node.log[-1][1] == pytest.approx(parameters)
+
+
+def test_julian_dates_are_split_exactly(node: FakeAramis, aramis: Aramis) -> None:
+    for date, day, millisecond in (
+        (2_461_366.25, 2_461_366, 21_600_000),
+        (2_461_366.0, 2_461_366, 0),
+        (2_461_366.9999999999, 2_461_367, 0),
+    ):
+        aramis.set_time(date)
+        assert node.log[-1] == ("SetSystemTime", {"JulianDay": day, "Millisecond": millisecond})
+
+
+def test_the_latch_up_action_is_off_then_on(node: FakeAramis, aramis: Aramis) -> None:
+    aramis.latch_up_action()
+    assert [values["Step"] for name, values in node.log] == [0, 1]
+
+
+def test_a_full_buffer_is_waited_for_once(node: FakeAramis, aramis: Aramis) -> None:
+    node.refusals.append(AckError.BUFFER_FULL)
+    aramis.deactivate()
+    node.refusals.extend([AckError.BUFFER_FULL] * 2)
+    with pytest.raises(CommandRefusedError, match="BUFFER_FULL"):
+        aramis.deactivate()
+
+
+def test_a_catalogue_arrives_whole(node: FakeAramis, aramis: Aramis) -> None:
+    image = bytes(range(256)) + b"tail"
+    node.values["CatalogueStatus"]["State"] = CatalogueState.GOOD
+    seen: list[tuple[int, int]] = []
+    assert aramis.load_catalogue(image, lambda *done: seen.append(done)) is CatalogueState.GOOD
+    assert bytes(node.memory) == image
+    assert node.log[0] == ("BeginCatalogue", {"Length": 260, "Checksum": crc32(image)})
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_a_refused_or_incomplete_catalogue(node: FakeAramis, aramis: Aramis) -> None:
+    node.values["ErrorFlags"]["UploadError"] = True
+    with pytest.raises(StepFailedError, match="refused"):
+        aramis.load_catalogue(b"x" * 10)
+    node.execute = lambda name, values: None  # type: ignore[method-assign]
+    with pytest.raises(StepFailedError, match="1 blocks arrived of 3"):
+        aramis.load_catalogue(b"x" * 300)
+
+
+def test_stars_by_number_and_a_list_that_is_not_whole(node: FakeAramis, aramis: Aramis) -> None:
+    node.values["DetectionSummary"] = {"Detected": 2}
+    node.records["StarDetails"] = [
+        {"StarNumber": 1, "X": 3.5, "Y": 4.0, "Brightness": 50.0},
+        {
+            "StarNumber": 0,
+            "X": 1.0,
+            "Y": 2.0,
+            "Brightness": 99.0,
+            "Identified": 1,
+            "Hipparcos": 24436,
+        },
+    ]
+    first, second = aramis.stars()
+    assert (first.number, first.hipparcos, second.hipparcos) == (0, 24436, None)
+    assert (second.x_px, second.y_px, second.brightness) == (3.5, 4.0, 50.0)
+    node.records["StarDetails"] = [{"StarNumber": 1}]
+    node._steps.clear()
+    with pytest.raises(BadAnswerError, match="1 stars came of 2"):
+        aramis.stars()
+
+
+def test_phase_times_in_ms(node: FakeAramis, aramis: Aramis) -> None:
+    node.values["PhaseTimes"] = {"Spikes": 355_388, "Total": 519_668}
+    times = aramis.phase_times()
+    assert (times["spikes"], times["total"], times["faces"]) == (355.388, 519.668, 0)
+
+
+def test_a_picture_comes_over_a_uart_only(node: FakeAramis) -> None:
+    link = I2cLink(node, INTERFACE.i2c_address)
+    with pytest.raises(TypeError, match="UART"):
+        Aramis(I2cClient(link, INTERFACE, wait=link.waits.append)).image()

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.clients.cubesense.bench import BenchClient
+from cubestack.host.errors import BadAnswerError, NoAnswerError
+
+
+class Line:
+    """A bench line with a sensor that answers from ``answers``, in pieces of ``chunk`` bytes."""
+
+    def __init__(self, **answers: bytes) -> None:
+        self.answers = answers
+        self.pending = bytearray()
+        self.requests = b""
+        self.chunk = 1000
+        self.silences: list[float] = []
+
+    def write(self, data: bytes) -> None:
+        self.requests += data
+        self.pending += self.answers.get(data.decode("ascii"), b"")
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        size = min(max_bytes, self.chunk)
+        data = bytes(self.pending[:size])
+        del self.pending[:size]
+        if not data:
+            self.silences.append(timeout_s)
+        return data
+
+    def close(self) -> None: ...
+
+
+PICTURE = np.random.default_rng(4).integers(0, 256, (480, 640), np.uint8)
+
+
+@pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"a"), (Camera.SUN, b"q")])
+def test_taking_a_picture(camera: Camera, letter: bytes) -> None:
+    line = Line(a=b"Y", q=b"Y")
+    BenchClient(line).take(camera)
+    assert line.requests == letter
+
+
+@pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"s"), (Camera.SUN, b"w")])
+def test_downloading_a_picture(camera: Camera, letter: bytes) -> None:
+    line = Line(**{letter.decode(): PICTURE.tobytes()})
+    seen: list[tuple[int, int]] = []
+    picture = BenchClient(line).download(camera, lambda *done: seen.append(done))
+    assert line.requests == letter
+    np.testing.assert_array_equal(picture, PICTURE)
+    assert seen[0] == (1000, 307_200)
+    assert seen[-1] == (307_200, 307_200)
+
+
+def test_what_came_before_is_dropped() -> None:
+    line = Line(s=PICTURE.tobytes())
+    line.pending += b"Y" * 5000
+    np.testing.assert_array_equal(BenchClient(line).download(Camera.NADIR), PICTURE)
+
+
+def test_nothing_beyond_the_answer_is_taken() -> None:
+    line = Line(s=PICTURE.tobytes() + b"more")
+    line.chunk = 10**6
+    BenchClient(line).download(Camera.NADIR)
+    assert line.pending == b"more"
+    line = Line(a=b"Yes")
+    BenchClient(line).take(Camera.NADIR)
+    assert line.pending == b"es"
+
+
+def test_silence_and_wrong_answers_are_told() -> None:
+    line = Line(a=b"N", s=bytes(307_199))
+    with pytest.raises(NoAnswerError, match=r"bench letter 'q': 0 bytes of 1 came, .* for 3 s"):
+        BenchClient(line, timeout_s=3.0).take(Camera.SUN)
+    assert line.silences == [0.0, 3.0]
+    with pytest.raises(BadAnswerError, match="'a' answered with b'N', not b'Y'"):
+        BenchClient(line).take(Camera.NADIR)
+    with pytest.raises(NoAnswerError, match="'s': 307199 bytes of 307200 came"):
+        BenchClient(line).download(Camera.NADIR)

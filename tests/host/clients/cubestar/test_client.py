@@ -1,0 +1,211 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.interface.cubestar import (
+    INTERFACE,
+    AckError,
+    MatchMode,
+    TaskStatus,
+)
+from cubestack.host.clients.cubestar.client import COLUMNS, ROWS, Attitude, CubeStar
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+
+
+@pytest.fixture(params=["uart", "i2c"])
+def cubestar(request: pytest.FixtureRequest) -> CubeStar:
+    link = request.getfixturevalue(request.param)
+    if request.param == "uart":
+        return CubeStar(NodeClient(link, INTERFACE))
+    return CubeStar(I2cClient(link, INTERFACE, wait=link.waits.append))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_boresight_is_the_camera_axis_seen_from_the_sky(seed: int) -> None:
+    rotation = Rotation.random(rng=np.random.default_rng(seed))
+    attitude = Attitude(rotation.as_quat(), True, 5, MatchMode.TRACKING, 1, 0.0)
+    expected = rotation.inv().as_matrix() @ [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(attitude.boresight, expected, atol=1e-12)
+    ra, dec = np.deg2rad([attitude.ra_deg, attitude.dec_deg])
+    direction = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
+    np.testing.assert_allclose(direction, expected, atol=1e-9)
+    assert 0.0 <= attitude.ra_deg <= 360.0
+
+
+def test_attitude(cubestar: CubeStar, node: Any) -> None:
+    quaternion = np.array([0.1, -0.2, 0.3, 0.927361849549570])
+    node.values["AttitudeQuaternion"] = {
+        **{f"Q{index}": value for index, value in enumerate(quaternion)},
+        "FrameCounter": 12,
+        "ImageTime": 34_567,
+        "Mode": MatchMode.ASSISTED,
+        "Matched": 9,
+        "Valid": True,
+    }
+    attitude = cubestar.attitude()
+    np.testing.assert_allclose(attitude.quaternion, quaternion, atol=1e-7)
+    assert np.linalg.norm(attitude.quaternion) == pytest.approx(1.0, abs=1e-15)
+    assert (attitude.valid, attitude.matched, attitude.frame) == (True, 9, 12)
+    assert attitude.mode is MatchMode.ASSISTED
+    assert attitude.image_time_s == 34.567
+
+
+def test_a_quaternion_that_is_no_rotation_is_told(cubestar: CubeStar, node: Any) -> None:
+    node.values["AttitudeQuaternion"] = {"Q0": 0.5}
+    with pytest.raises(BadAnswerError, match=r"quaternion has length 0\.5, not 1"):
+        cubestar.attitude()
+    node.values["AttitudeQuaternion"] = {"Q0": np.nan}
+    with pytest.raises(BadAnswerError, match="quaternion has length nan, not 1"):
+        cubestar.attitude()
+
+
+def test_coarse_quaternion(cubestar: CubeStar, node: Any) -> None:
+    node.values["AttitudeData"] = {"Qbar0": 0.6, "Qbar3": -0.8}
+    np.testing.assert_allclose(cubestar.coarse_quaternion(), [0.6, 0, 0, -0.8], atol=5e-5)
+
+
+def test_download(cubestar: CubeStar, node: Any, rng: np.random.Generator) -> None:
+    node.memory[:] = rng.integers(0, 256, node.memory.size)
+    seen: list[tuple[int, int]] = []
+    image = cubestar.download_image(lambda done, total: seen.append((done, total)))
+    assert (image.shape, image.dtype) == ((ROWS, COLUMNS), np.uint8)
+    np.testing.assert_array_equal(image.ravel(), node.memory)
+    assert seen == [(number, 4096) for number in range(1, 4097)]
+
+
+def test_upload_sends_the_lit_blocks_only(
+    cubestar: CubeStar, node: Any, rng: np.random.Generator
+) -> None:
+    node.memory[:] = 9
+    image = np.zeros((ROWS, COLUMNS), np.uint8)
+    image[100:103, 200:260] = rng.integers(1, 256, (3, 60))
+    image[511, 1023] = 1
+    seen: list[tuple[int, int]] = []
+    cubestar.upload_image(image, lambda done, total: seen.append((done, total)))
+    np.testing.assert_array_equal(node.memory, image.ravel())
+    assert seen[-1] == (7, 7)  # columns 200 to 259 reach over two blocks of each row
+
+
+def test_upload_waits_for_a_full_buffer(uart: Any, node: Any) -> None:
+    cubestar = CubeStar(NodeClient(uart, INTERFACE))
+    image = np.zeros((ROWS, COLUMNS), np.uint8)
+    image[0, 0] = 1
+    node.refusals.extend([AckError.OK, AckError.BUFFER_FULL])
+    cubestar.upload_image(image)
+    assert node.memory[0] == 1
+
+
+def test_upload_counts_the_blocks(cubestar: CubeStar, node: Any) -> None:
+    class Forgetful(dict[str, Any]):
+        def __setitem__(self, key: str, value: Any) -> None:
+            super().__setitem__(key, 0)
+
+    node.values["UploadStatus"] = Forgetful(BlocksReceived=0)
+    with pytest.raises(StepFailedError, match="upload: 0 blocks arrived of 4096"):
+        cubestar.upload_image(np.ones((ROWS, COLUMNS), np.uint8))
+
+
+@pytest.mark.parametrize("shape", [(512, 1023), (1024, 512), (512, 1024, 1)])
+def test_upload_refuses_another_picture(cubestar: CubeStar, shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"is uint8 \(512, 1024\), not uint8"):
+        cubestar.upload_image(np.zeros(shape, np.uint8))
+    with pytest.raises(ValueError, match="not float64"):
+        cubestar.upload_image(np.zeros((ROWS, COLUMNS)))  # type: ignore[arg-type]
+
+
+def star(number: int) -> dict[str, Any]:
+    return {
+        "X_Coordinate": 10.0 * number,
+        "Y_Coordinate": 20.0 * number,
+        "X_CorrectedCoordinate": 30.0 * number,
+        "Y_CorrectedCoordinate": 40.0 * number,
+        "StarNumber": number,
+        "Size": 9,
+        "Intensity": 400,
+    }
+
+
+def test_stars_wherever_the_stepping_begins(cubestar: CubeStar, node: Any) -> None:
+    node.values["DetectionSummary"] = {"NumStarsDetected": 4}
+    node.values["NumIdStars"] = {"numIdStars": 2}
+    node.records["StarPositions"] = [star(number) for number in (2, 3, 0, 1)]
+    node.records["HipparcosNumber"] = [
+        {"StarNumber": 3, "Hipparcos": 91_262},
+        {"StarNumber": 1, "Hipparcos": 113_368},
+    ]
+    stars = cubestar.stars()
+    assert [found.number for found in stars] == [0, 1, 2, 3]
+    assert [found.hipparcos for found in stars] == [None, 113_368, None, 91_262]
+    assert (stars[2].x_px, stars[2].y_px) == (20.0, 40.0)
+    assert (stars[2].x_undistorted_px, stars[2].y_undistorted_px) == (60.0, 80.0)
+    assert (stars[2].pixels, stars[2].intensity) == (9, 400)
+
+
+def test_stars_survive_a_lost_answer(cubestar: CubeStar, node: Any) -> None:
+    node.values["DetectionSummary"] = {"NumStarsDetected": 3}
+    node.records["StarPositions"] = [star(number) for number in (0, 1, 1, 2)]
+    assert [found.number for found in cubestar.stars()] == [0, 1, 2]
+
+
+def test_no_stars(cubestar: CubeStar) -> None:
+    assert cubestar.stars() == []
+
+
+def test_an_incomplete_list_of_stars_is_told(cubestar: CubeStar, node: Any) -> None:
+    node.values["DetectionSummary"] = {"NumStarsDetected": 3}
+    node.records["StarPositions"] = [star(0), star(1)]
+    with pytest.raises(BadAnswerError, match="StarPositions: 2 stars of 3 came in 6 reads"):
+        cubestar.stars()
+
+
+def test_capture_tells_a_failure(cubestar: CubeStar, node: Any) -> None:
+    node.values["TaskStatus"] = {"taskStatus": TaskStatus.CAPTURED}
+    cubestar.capture()
+    node.values["TaskStatus"] = {"taskStatus": TaskStatus.CAPTURE_FAILED}
+    with pytest.raises(StepFailedError, match="no picture captured: task status CAPTURE_FAILED"):
+        cubestar.capture()
+    node.values["TaskStatus"] = {"taskStatus": 99}
+    with pytest.raises(BadAnswerError, match="unknown status 99"):
+        cubestar.capture()
+
+
+def test_processing_returns_how_far_it_came(cubestar: CubeStar, node: Any) -> None:
+    node.busy = 3
+    node.values["TaskStatus"] = {"taskStatus": TaskStatus.IDENTIFICATION_FAILED}
+    assert cubestar.capture_and_process() is TaskStatus.IDENTIFICATION_FAILED
+    assert cubestar.process_image() is TaskStatus.IDENTIFICATION_FAILED
+    assert [name for name, _ in node.log] == ["CaptureAndProcess", "ProcessImage"]
+
+
+def test_configure_sends_every_setting(cubestar: CubeStar, node: Any) -> None:
+    cubestar.configure({"Exposure": {"exposure": 100}, "setIDMargin": {"Margin": 0.002}})
+    assert node.log == [("Exposure", {"exposure": 100}), ("setIDMargin", {"Margin": 0.002})]
+    with pytest.raises(CommandRefusedError, match="setIDMargin refused: BAD_PARAMETER"):
+        cubestar.configure({"setIDMargin": {"Margin": 0.0}})
+
+
+def test_phase_times(cubestar: CubeStar, node: Any) -> None:
+    node.values["PhaseTimes"] = {"Idle": 140_000, "Transfer": 404_123, "LoopTotal": 1_000_000}
+    times = cubestar.phase_times()
+    assert list(times) == [
+        "idle",
+        "discard",
+        "capture",
+        "transfer",
+        "detect",
+        "match",
+        "attitude",
+        "loop_total",
+    ]
+    assert (times["idle"], times["transfer"], times["loop_total"]) == (140.0, 404.123, 1000.0)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(5)

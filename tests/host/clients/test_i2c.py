@@ -1,0 +1,72 @@
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.message import InterfaceError, Message
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.errors import CommandRefusedError, NoAnswerError
+
+
+@pytest.fixture
+def client(i2c: Any) -> I2cClient:
+    return I2cClient(i2c, INTERFACE, wait=i2c.waits.append)
+
+
+@pytest.mark.parametrize("message", INTERFACE.telecommands, ids=lambda m: m.name)
+def test_every_telecommand_arrives_with_its_parameters(
+    client: I2cClient, node: Any, message: Message
+) -> None:
+    client.command(message.name, **message.reset_values())
+    assert node.log == [(message.name, message.reset_values())]
+
+
+def test_telemetry_arrives(client: I2cClient, node: Any) -> None:
+    node.values["AttitudeData"] = {"Qbar0": -0.5, "Qbar3": 0.5, "BSVZ": 1.0}
+    answer = client.telemetry("attitudedata")
+    assert (answer["Qbar0"], answer["Qbar3"], answer["BSVZ"]) == (-0.5, 0.5, 1.0)
+
+
+def test_a_telecommand_waits_until_it_is_processed(client: I2cClient, node: Any, i2c: Any) -> None:
+    node.busy = 4
+    client.command("CaptureImage")
+    assert len(i2c.waits) == 4
+
+
+def test_a_telecommand_that_never_ends_is_told(node: Any, i2c: Any) -> None:
+    node.busy = 10**6
+    client = I2cClient(i2c, INTERFACE, wait=i2c.waits.append, processing_timeout_s=0.5)
+    with pytest.raises(NoAnswerError, match=r"not processed within 0.5 s"):
+        client.command("CaptureImage")
+    assert sum(i2c.waits) == pytest.approx(0.5)
+
+
+def test_what_the_node_could_not_refuse_visibly_is_not_sent(client: I2cClient, node: Any) -> None:
+    with pytest.raises(CommandRefusedError, match=r"BAD_PARAMETER \(3\), IdMode is out of range"):
+        client.command("setIDMode", IdMode=7)
+    with pytest.raises(InterfaceError, match="did you mean IdMode"):
+        client.command("setIDMode", IdMod=0)
+    assert node.log == []
+
+
+def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any, sense_i2c: Any) -> None:
+    client = I2cClient(sense_i2c, CUBESENSE, wait=sense_i2c.waits.append)
+    client.command("CaptureAndDetect", Camera=0, Sram=0)
+    for code, text in ((4, r"BUFFER_FULL \(4\)"), (99, r"unknown code \(99\)")):
+        sense.values["TcmdProcessed"] = {"Error": code}
+        with pytest.raises(CommandRefusedError, match=f"CaptureAndDetect refused: {text}"):
+            client.command("CaptureAndDetect", Camera=0, Sram=0)
+
+
+def test_telemetry_is_asked_for_again(client: I2cClient, i2c: Any) -> None:
+    i2c.failures = 2
+    assert client.telemetry("TcmdProcessed") == {"Processed": 1}
+
+
+def test_a_silent_address_is_named(i2c: Any) -> None:
+    client = I2cClient(i2c, INTERFACE, 0x55, wait=i2c.waits.append)
+    with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags .* address 0x55 in 3 attempts"):
+        client.telemetry("ErrorFlags")
+    with pytest.raises(NoAnswerError, match=r"telecommand Reset not acknowledged .* 0x55"):
+        client.command("Reset")

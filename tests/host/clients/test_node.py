@@ -1,0 +1,170 @@
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import InterfaceError, Message
+from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
+from cubestack.host.clients.node import MAX_READS, NodeClient
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError
+
+
+@pytest.fixture
+def client(uart: Any) -> NodeClient:
+    return NodeClient(uart, INTERFACE)
+
+
+@pytest.mark.parametrize("message", INTERFACE.telecommands, ids=lambda m: m.name)
+def test_every_telecommand_arrives_with_its_parameters(
+    client: NodeClient, node: Any, message: Message
+) -> None:
+    client.command(message.name, **message.reset_values())
+    assert node.log == [(message.name, message.reset_values())]
+
+
+@pytest.mark.parametrize(
+    "message", [m for m in INTERFACE.telemetries if m.supported], ids=lambda m: m.name
+)
+@given(data=st.data())
+def test_every_telemetry_frame_arrives(message: Message, data: st.DataObject) -> None:
+    raw = data.draw(st.binary(min_size=message.length, max_size=message.length))
+
+    class OneFrame:
+        def __init__(self) -> None:
+            self.pending = [b""]  # nothing before the request
+
+        def write(self, request: bytes) -> None:
+            assert request == encode_frame(bytes([message.id]))
+            self.pending.append(encode_frame(raw))
+
+        def read(self, max_bytes: int, timeout_s: float) -> bytes:
+            return self.pending.pop(0)
+
+        def close(self) -> None: ...
+
+    answer = NodeClient(OneFrame(), INTERFACE).telemetry(message.name)
+    assert str(answer) == str(message.unpack(raw))  # as text, because NaN differs from itself
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 7, 4096])
+def test_answers_may_come_in_pieces_behind_noise(
+    client: NodeClient, uart: Any, node: Any, chunk: int
+) -> None:
+    uart.chunk = chunk
+    uart.mangle = lambda data: b"\xff\x00\x1f\x1f" + data
+    node.values["PowerStatus"] = {"Current": 177.3}
+    assert client.telemetry("powerstatus")["Current"] == pytest.approx(177.3)
+
+
+def test_a_late_answer_is_not_taken_for_the_next_one(client: NodeClient, uart: Any) -> None:
+    uart.pending += encode_frame(b"\x07")
+    assert client.telemetry("TcmdProcessed") == {"Processed": 1}
+
+
+@pytest.mark.parametrize("code", [error for error in AckError if error])
+def test_a_refusal_names_the_telecommand_and_the_error(
+    client: NodeClient, node: Any, code: AckError
+) -> None:
+    node.refusals.append(code)
+    with pytest.raises(CommandRefusedError) as caught:
+        client.command("DetectStars")
+    assert str(caught.value) == f"telecommand DetectStars refused: {code.name} ({code.value})"
+    assert caught.value.code is code
+
+
+def test_a_value_beyond_its_range_is_the_nodes_to_refuse(client: NodeClient) -> None:
+    with pytest.raises(CommandRefusedError, match=r"setIDMode refused: BAD_PARAMETER \(3\)"):
+        client.command("setIDMode", IdMode=7)
+
+
+def test_an_unknown_error_code_is_told(client: NodeClient, uart: Any) -> None:
+    uart.mangle = lambda _data: encode_frame(b"\x63")
+    with pytest.raises(CommandRefusedError, match=r"unknown code \(99\)"):
+        client.command("DetectStars")
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("Expsure", {"exposure": 1}, "no telecommand 'Expsure'; did you mean Exposure?"),
+        ("Exposure", {"exposre": 1}, "no field 'exposre'; did you mean exposure?"),
+        ("Exposure", {"exposure": 70_000}, "70000 does not fit; u16 carries 0 to 65535 lines"),
+    ],
+)
+def test_what_the_tables_lack_is_never_sent(
+    client: NodeClient, node: Any, name: str, parameters: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InterfaceError) as caught:
+        client.command(name, **parameters)
+    assert message in str(caught.value)
+    assert node.log == []
+
+
+def test_telemetry_is_asked_for_again(client: NodeClient, node: Any) -> None:
+    node.lost = 2
+    assert client.telemetry("Identification")["InterfaceVersion"] == 0
+
+
+def test_silence_names_the_telemetry(client: NodeClient, node: Any, uart: Any) -> None:
+    node.lost = 3
+    uart.silences.clear()
+    with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags within 1 s in 3 attempts"):
+        client.telemetry("ErrorFlags")
+    assert [silence for silence in uart.silences if silence] == [1.0, 1.0, 1.0]
+
+
+def test_the_unsupported_frame_gets_no_answer(client: NodeClient) -> None:
+    with pytest.raises(NoAnswerError, match="CameraSetup"):
+        client.telemetry("CameraSetup")
+
+
+def test_telecommands_are_never_repeated(client: NodeClient, node: Any) -> None:
+    node.lost = 1
+    with pytest.raises(TimeoutError, match="no acknowledge of telecommand CaptureImage within 1 s"):
+        client.command("CaptureImage")
+    assert [name for name, _ in node.log] == ["CaptureImage"]
+
+
+def test_answers_of_a_wrong_length_are_told(client: NodeClient, uart: Any) -> None:
+    uart.mangle = lambda _data: encode_frame(b"abc")
+    with pytest.raises(BadAnswerError, match="telemetry Quaternion has 3 bytes, not 8"):
+        client.telemetry("Quaternion")
+    with pytest.raises(BadAnswerError, match="acknowledge of telecommand Reset has 3 bytes, not 1"):
+        client.command("Reset")
+
+
+def test_a_babbling_line_ends_as_no_answer(client: NodeClient, uart: Any) -> None:
+    class Babble:
+        reads = 0
+
+        def write(self, data: bytes) -> None: ...
+
+        def read(self, max_bytes: int, timeout_s: float) -> bytes:
+            self.reads += 1
+            return b"\x55"
+
+        def close(self) -> None: ...
+
+    line = Babble()
+    assert NodeClient(line, INTERFACE, retries=0).request(b"\x80") is None
+    assert line.reads == 2 * MAX_READS
+
+
+def test_processing_is_polled(client: NodeClient, node: Any, uart: Any) -> None:
+    node.busy = 5
+    client.command("DetectStars")
+    client.wait_processed(1.0)
+    assert uart.silences.count(0.01) == 5
+    client.command("DetectStars")
+    with pytest.raises(NoAnswerError, match=r"not processed within 0.03 s"):
+        client.wait_processed(0.03)
+
+
+def test_a_with_block_closes_the_transport(uart: Any) -> None:
+    closed = []
+    uart.close = lambda: closed.append(True)
+    with NodeClient(uart, INTERFACE) as client:
+        client.command("Reset")
+    assert closed == [True]

@@ -1,0 +1,135 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.interface.codec.field import InterfaceError
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.errors import NoAnswerError
+
+
+class Slave:
+    """A slave that keeps to the protocol's description, behind smbus2's ``i2c_rdwr``."""
+
+    def __init__(self) -> None:
+        self.content: dict[int, bytes] = {}
+        self.written: list[bytes] = []
+        self.failures: list[int] = []  # numbers of the transfers that are not acknowledged
+        self.transfers = 0
+        self.longest = 0
+        self._rest = b""
+
+    def i2c_rdwr(self, *messages: Any) -> None:
+        number, self.transfers = self.transfers, self.transfers + 1
+        if number in self.failures or any(message.addr != 0x1C for message in messages):
+            raise OSError(121, "Remote I/O error")
+        for message in messages:
+            if message.flags & 1:
+                self.longest = max(self.longest, message.len)
+                data = self._rest[: message.len].ljust(message.len, b"\xff")
+                self._rest = self._rest[message.len :]
+                for index, byte in enumerate(data):
+                    message.buf[index] = bytes([byte])
+            else:
+                pointer, *values = bytes(message)
+                self._rest = self.content.get(pointer, b"")
+                if values:
+                    self.written.append(bytes(message))
+
+
+@pytest.fixture
+def slave() -> Slave:
+    return Slave()
+
+
+@pytest.fixture
+def waits() -> list[float]:
+    return []
+
+
+@pytest.fixture
+def client(slave: Slave, waits: list[float]) -> RegisterClient:
+    return RegisterClient(slave, REGISTERS, wait=waits.append)
+
+
+def test_measurements_are_signed_with_the_most_significant_byte_first(
+    client: RegisterClient, slave: Slave
+) -> None:
+    slave.content[REGISTERS["NADIR_X"].address] = bytes.fromhex("FB2E")
+    slave.content[REGISTERS["SUN_Y"].address] = bytes.fromhex("04D2")
+    assert client.read("nadir_x") == -12.34
+    assert client.read("SUN_Y") == 12.34
+
+
+def test_configuration_is_one_byte(client: RegisterClient, slave: Slave) -> None:
+    address = REGISTERS["NADIR_THRESHOLD"].address
+    client.write("NADIR_THRESHOLD", 85)
+    client.write("measure", "NADIR_SRAM1")
+    assert slave.written == [bytes([address, 85]), bytes([REGISTERS["MEASURE"].address, 2])]
+    slave.content[address] = b"\x55"
+    assert client.read("NADIR_THRESHOLD") == 85
+
+
+def test_the_picture_comes_in_reads_that_a_bus_driver_takes(
+    client: RegisterClient, slave: Slave
+) -> None:
+    picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
+    slave.content[REGISTERS["IMAGE"].address] = picture
+    seen: list[tuple[int, int]] = []
+    assert client.read_stream("IMAGE", lambda *done: seen.append(done)) == picture
+    assert slave.longest == 8192
+    assert (len(seen), seen[-1]) == (38, (307_200, 307_200))
+
+
+def test_a_broken_stream_begins_anew(
+    client: RegisterClient, slave: Slave, waits: list[float]
+) -> None:
+    picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
+    slave.content[REGISTERS["IMAGE"].address] = picture
+    slave.failures = [7, 20]
+    assert client.read_stream("IMAGE") == picture
+    assert len(waits) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("SUN_TRESHOLD", 1, "no register 'SUN_TRESHOLD'; did you mean SUN_THRESHOLD?"),
+        ("SUN_X", 1, "register SUN_X is read-only"),
+        ("IMAGE", b"", "register IMAGE is read-only"),
+        ("SUN_THRESHOLD", 256, "256 does not fit; u8 carries 0 to 255"),
+        ("SUN_AUTO", 2, "register SUN_AUTO: 2 is out of range"),
+        ("MEASURE", "MOON", "no choice 'MOON'"),
+        ("MEASURE", 4, "register MEASURE: 4 is out of range"),
+    ],
+)
+def test_what_the_map_lacks_is_never_sent(
+    client: RegisterClient, slave: Slave, name: str, value: object, message: str
+) -> None:
+    with pytest.raises(InterfaceError) as caught:
+        client.write(name, value)
+    assert message in str(caught.value)
+    assert slave.transfers == 0
+
+
+def test_a_command_can_not_be_read(client: RegisterClient) -> None:
+    with pytest.raises(InterfaceError, match="register MEASURE is write-only"):
+        client.read("MEASURE")
+
+
+def test_reads_are_repeated_and_writes_are_not(client: RegisterClient, slave: Slave) -> None:
+    slave.content[0] = b"\x07"
+    slave.failures = [0, 1]
+    assert client.read("SUN_THRESHOLD") == 7
+    slave.failures = [3]
+    with pytest.raises(NoAnswerError, match=r"SUN_THRESHOLD not acknowledged .* 0x1c in 1 attempt"):
+        client.write("SUN_THRESHOLD", 7)
+    assert slave.written == []
+
+
+def test_a_silent_address_is_named(slave: Slave, waits: list[float]) -> None:
+    client = RegisterClient(slave, REGISTERS, 0x33, wait=waits.append)
+    with pytest.raises(NoAnswerError, match=r"register SUN_X .* address 0x33 in 3 attempts"):
+        client.read("SUN_X")
+    assert len(waits) == 2

@@ -1,0 +1,273 @@
+"""The suite on nodes in memory: a good one passes, each fault is found and named."""
+
+import pytest
+
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.interface.cubestar import ResetCause
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.conformance.suite import Check, Outcome, Suite, compare
+from cubestack.host.conformance.tasks import PICTURE_BYTES
+from cubestack.host.conformance.values import read_back, values_to_try
+from cubestack.host.devices.targets import Target
+
+BLOCKS = 4
+
+
+def suite(node, link, **options) -> Suite:
+    interface = node.interface
+    client = NodeClient(link, interface, retries=0)
+    return Suite(Target("fake", interface, client, link), **options)
+
+
+@pytest.fixture
+def good(node, uart, monkeypatch):
+    """A CubeStar in memory that shows its settings, and the error flags of refusals.
+
+    Its pictures are small.
+    """
+    monkeypatch.setitem(PICTURE_BYTES, "CubeStar", 128 * BLOCKS)
+    places = {m.name: read_back(CUBESTAR, m) for m in CUBESTAR.telecommands}
+    for message in CUBESTAR.telemetries:  # after power-up, settings show their reset values
+        node.values[message.name] = {}
+    for name, shown in places.items():
+        for field, (telemetry, place) in shown.items():
+            node.values[telemetry.name][place.name] = CUBESTAR.telecommand(name).reset_values()[
+                field
+            ]
+    node.values["Identification"]["InterfaceVersion"] = CUBESTAR.version
+    node.values["ExtendedIdentification"]["ResetCause"] = 1
+    node.values["TaskStatus"]["taskStatus"] = node.values["LogStatus"]["Status"] = 1
+    execute, answer = node.execute, node.answer
+
+    def remember(name, values):
+        execute(name, values)
+        perform(name, values)
+        for field, (telemetry, place) in places[name].items():
+            node.values[telemetry.name][place.name] = values[field]
+
+    camera = {}
+
+    def perform(name, values):
+        identification, shown = node.values["ExtendedIdentification"], node.values["CameraRegister"]
+        if name == "StreamDownImage":
+            blocks = node.memory.reshape(-1, 128)[:BLOCKS]
+            uart.later += b"".join(encode_frame(block.tobytes()) for block in blocks)
+        elif name == "UploadBlock":
+            node.values["UploadStatus"]["NextBlock"] = values["BlockNumber"] + 1
+        elif name == "TestWDG":
+            identification["WDGResetCount"] = identification.get("WDGResetCount", 0) + 1
+            identification["ResetCause"] = ResetCause.WATCHDOG
+        elif name == "ClearWDGResetCounter":
+            identification["WDGResetCount"] = 0
+        elif name == "SelectCameraRegister":
+            shown["Address"], shown["Valid"] = values["Address"], 1
+        elif name == "WriteCameraRegister":
+            camera[values["Address"]] = values["Value"]
+        shown["Value"] = camera.get(shown.get("Address"), 0)
+
+    def flag(payload):
+        reply = answer(payload)
+        if reply == b"\x03" and payload[0] < 128:
+            message = CUBESTAR.find(payload[0])
+            for _, name in message.violations(message.unpack(payload[1:])):
+                if name:
+                    node.values["ErrorFlags"][name] = 1
+        return reply
+
+    monkeypatch.setattr(node, "execute", remember)
+    monkeypatch.setattr(node, "answer", flag)
+    return node
+
+
+def failures(run: Suite) -> dict[str, str]:
+    return {check.name: check.detail for check in run.run() if check.outcome is Outcome.FAILED}
+
+
+def test_good_node_passes(good, uart):
+    run = suite(good, uart, allow_write=True)
+    assert failures(run) == {}
+    assert {check.outcome for check in run.checks} == {Outcome.PASSED}
+    names = [check.name for check in run.checks]
+    assert len(set(names)) == len(names)
+    for message in CUBESTAR.messages:
+        if message.supported:
+            assert f"{message.kind.value} {message.name}" in names
+
+
+def test_nothing_is_sent_without_permission(good, uart):
+    run = suite(good, uart)
+    assert failures(run) == {}
+    assert good.log == []
+    skipped = [check for check in run.checks if check.outcome is Outcome.SKIPPED]
+    assert "telecommand Exposure" in {check.name for check in skipped}
+    assert all("--allow-write" in check.detail for check in skipped)
+
+
+def test_settings_are_put_back(good, uart):
+    before = {name: dict(values) for name, values in good.values.items()}
+    suite(good, uart, allow_write=True).run()
+    after = {name: dict(values) for name, values in good.values.items()}
+    for changing in ("ErrorFlags", "UploadStatus", "ExtendedIdentification", "CameraRegister"):
+        after[changing] = before[changing]
+    assert {k: v for k, v in after.items() if v} == {k: v for k, v in before.items() if v}
+
+
+@pytest.mark.parametrize(
+    ("payload", "reply", "check", "detail"),
+    [
+        (b"\x80", bytes(7), "telemetry Identification", "has 7 bytes, not 8"),
+        (b"\x80", None, "telemetry Identification", "no answer"),
+        (b"\x80", bytes(8), "telemetry Identification", "InterfaceVersion is 0, declared 3"),
+        (b"\x9b", b"\x09", "telemetry IDMode", "field Mode is 9: not allowed"),
+        (b"\x07\0", b"\0", "telecommand Exposure: wrong lengths", "(OK), declared WRONG_LENGTH"),
+        (b"\x07\0", None, "telecommand Exposure: wrong lengths", "no acknowledge"),
+        (b"\x00", b"\0", "unknown telecommand IDs", "ID 0: acknowledged with 00"),
+        (b"\x10", b"\x03", "telecommand CaptureImage", "refused: BAD_PARAMETER"),
+    ],
+)
+def test_fault_is_found(good, uart, monkeypatch, payload, reply, check, detail):
+    answer = good.answer
+    monkeypatch.setattr(good, "answer", lambda p: reply if p == payload else answer(p))
+    found = failures(suite(good, uart, allow_write=True))
+    assert detail in found[check]
+
+
+def test_setting_that_does_not_stick_is_found(good, uart, monkeypatch):
+    execute = good.execute
+    monkeypatch.setattr(
+        good, "execute", lambda name, values: None if name == "Exposure" else execute(name, values)
+    )
+    found = failures(suite(good, uart, allow_write=True))
+    assert list(found) == ["telecommand Exposure"]
+    assert "is read back" in found["telecommand Exposure"]
+
+
+def without(name):
+    """A node on which a telecommand has no effect."""
+
+    def spoil(node, _uart):
+        execute = node.execute
+        node.execute = lambda n, values: None if n == name else execute(n, values)
+
+    return spoil
+
+
+def with_another_block(node, uart):
+    execute = node.execute
+
+    def do(name, values):
+        execute(name, values)
+        if name == "StreamDownImage":
+            uart.later[10] ^= 1
+
+    node.execute = do
+
+
+def with_a_short_block(node, uart):
+    execute = node.execute
+
+    def do(name, values):
+        execute(name, values)
+        if name == "StreamDownImage":
+            uart.later[:] = encode_frame(bytes(127)) + uart.later
+
+    node.execute = do
+
+
+@pytest.mark.parametrize(
+    ("spoil", "check", "detail"),
+    [
+        (without("StreamDownImage"), "StreamDownImage", "ended after 0 of 4 frames"),
+        (with_another_block, "StreamDownImage", "block 0 of the stream is another one"),
+        (with_a_short_block, "StreamDownImage", "block 0 has 127 bytes, declared 128"),
+        (without("UploadBlock"), "UploadBlock", "after one block {'NextBlock': 4, "),
+        (without("TestWDG"), "TestWDG", "WDGResetCount was 0, is 0"),
+        (without("WriteCameraRegister"), "WriteCameraRegister", "0x1 was written to 0x8527"),
+        (without("SelectCameraRegister"), "WriteCameraRegister", "of the camera is not read"),
+    ],
+)
+def test_task_that_is_not_done_is_found(good, uart, spoil, check, detail):
+    spoil(good, uart)
+    assert detail in failures(suite(good, uart, allow_write=True))[f"telecommand {check}"]
+
+
+def test_missing_flag_is_found(good, uart, monkeypatch):
+    telemetry = good.telemetry
+    monkeypatch.setattr(
+        good, "telemetry", lambda name: {} if name == "ErrorFlags" else telemetry(name)
+    )
+    found = failures(suite(good, uart, allow_write=True))
+    assert found
+    assert all("is not set in ErrorFlags" in detail for detail in found.values())
+
+
+def test_answer_to_an_unknown_telemetry_is_found(good, uart, monkeypatch):
+    answer = good.answer
+    unknown = next(i for i in range(128, 256) if CUBESTAR.find(i) is None)
+    monkeypatch.setattr(good, "answer", lambda p: b"\1" if p == bytes([unknown]) else answer(p))
+    assert failures(suite(good, uart)) == {f"unknown telemetry ID {unknown}": "answered with 01"}
+
+
+def test_deaf_decoder_is_found(good, uart, monkeypatch):
+    write = uart.write
+    monkeypatch.setattr(uart, "write", lambda data: write(data) if data[:1] == b"\x1f" else None)
+    found = failures(suite(good, uart))
+    assert set(found) == {"framing: noise before a frame"}
+
+
+@pytest.mark.parametrize(("late", "failed"), [(1, False), (3, True)])
+def test_late_answers_are_found_and_hiccups_forgiven(good, uart, monkeypatch, late, failed):
+    """The clock of the suite jumps during some answers to one frame."""
+    run, now_s, left = suite(good, uart), [0.0], [late]
+    monkeypatch.setattr(run, "now_s", lambda: now_s[0])
+    answer = good.answer
+
+    def slow(payload):
+        if payload == b"\x87" and left[0]:
+            left[0] -= 1
+            now_s[0] += 0.1
+        return answer(payload)
+
+    monkeypatch.setattr(good, "answer", slow)
+    assert ("times of answers" in failures(run)) is failed
+
+
+@pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
+def test_values_to_try_are_allowed_and_differ(interface):
+    for message in interface.telecommands:
+        tried = list(values_to_try(message))
+        assert tried
+        assert all(not message.violations(values) for values in tried)
+        assert all(tried.count(values) == 1 for values in tried)
+
+
+def test_masks_are_read_back_by_camera_and_area():
+    for number in (1, 2):
+        places = read_back(CUBESENSE, CUBESENSE.telecommand(f"Mask{number}"))
+        shown = {name: (frame.name, place.name) for name, (frame, place) in places.items()}
+        assert shown == {
+            name: (f"Masks{number}", f"{name}1") for name in ("XMin", "XMax", "YMin", "YMax")
+        }
+
+
+def test_measurements_are_no_settings():
+    assert read_back(CUBESTAR, CUBESTAR.telecommand("setTrackingMode")) == {}
+
+
+def runs(*checks: Check) -> Suite:
+    made = Suite(Target("x", CUBESTAR, None))
+    made.checks = list(checks)
+    return made
+
+
+def test_comparison_shows_the_first_difference():
+    one = Check("a", Outcome.PASSED, "", ("Gain=1",))
+    assert compare(runs(one), runs(one)) is None
+    other = Check("a", Outcome.PASSED, "", ("Gain=2",))
+    assert compare(runs(one), runs(other)) == "a: Gain=1 on x, Gain=2 on x"
+    failed = Check("a", Outcome.FAILED, "why", ("Gain=1",))
+    assert compare(runs(one), runs(failed)) == "a: passed on x, failed on x (why)"
+    assert compare(runs(one), runs()) == "a: only on x"

@@ -1,0 +1,80 @@
+"""An emulated device for a driver: its ports, its scene, its time."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.host.devices.emulated import open_cubestar_device
+
+ASK = bytes([0x1F, 0x7F, 128, 0x1F, 0xFF])
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def device() -> Iterator[Any]:
+    device = open_cubestar_device(seed=4)
+    yield device
+    device.close()
+
+
+def test_a_read_waits_for_all_its_bytes_or_the_timeout(device: Any) -> None:
+    with device.serial(timeout=0.5) as port:
+        assert port.write(ASK) == len(ASK)
+        assert port.read(3)[:2] == b"\x1f\x7f"
+        began = device.time_s
+        rest = port.read(1000)
+        assert rest[-2:] == b"\x1f\xff"
+        assert device.time_s - began == pytest.approx(0.5, abs=1e-9)
+        assert port.read() == b""
+    assert not port.is_open
+
+
+def test_what_arrived_can_be_counted_and_dropped(device: Any) -> None:
+    port = device.serial(timeout=None)
+    port.write(ASK)
+    assert port.in_waiting == 0
+    device.wait(0.1)
+    assert port.in_waiting == 12
+    port.reset_input_buffer()
+    assert port.in_waiting == 0
+
+
+def test_the_client_takes_the_line_back(device: Any) -> None:
+    assert device.client.client.telemetry("Identification")["NodeType"] == 5
+    port = device.serial()
+    port.write(ASK)
+    assert port.read(2) == b"\x1f\x7f"
+    assert device.client.client.telemetry("Identification")["NodeType"] == 5
+
+
+def test_i2c_and_serial_reach_the_same_device(device: Any) -> None:
+    with device.smbus() as bus:
+        assert bus.read_i2c_block_data(0x1A, 128, 1) == [5]
+
+
+def test_another_scene_is_seen_at_once(device: Any, tmp_path: Any) -> None:
+    device.scene = SkyScene.pointing(10, 60)
+    assert device.client.capture_and_process().name == "CALCULATED"
+    assert device.client.attitude().ra_deg == pytest.approx(10, abs=0.05)
+    path = tmp_path / "none.toml"
+    with pytest.raises(ValueError, match=r"none\.toml"):
+        device.scene = path
+
+
+def test_a_program_that_hangs_is_ended(device: Any) -> None:
+    with pytest.raises(subprocess.TimeoutExpired):
+        device.run(sys.executable, "-c", "import time; time.sleep(60)", timeout_s=0.3)
+    done = device.run(sys.executable, "-c", "print('{port}')")
+    assert done.stdout.endswith("/tty\n")
+
+
+def test_a_program_that_is_none(device: Any) -> None:
+    with pytest.raises(FileNotFoundError):
+        device.run("/no/such/program")
+    assert device.client.client.telemetry("Identification")["NodeType"] == 5

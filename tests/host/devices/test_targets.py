@@ -1,0 +1,88 @@
+"""Texts that name targets: what opens, and what is said of those that do not."""
+
+import io
+
+import pytest
+
+from cubestack.firmware_model.formats.recording import (
+    BusMessage,
+    BusTransfer,
+    LineBytes,
+    RecordingWriter,
+)
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.devices.targets import open_target
+from cubestack.host.errors import HostError, RecordingMismatchError, TargetError
+
+
+@pytest.mark.parametrize(
+    ("text", "device", "error"),
+    [
+        ("/dev/null0", None, r"/dev/null0 does not tell .* give --device \(cubestar, cubesense"),
+        ("/dev/null0", "cubestr", "no device 'cubestr'; known: cubestar"),
+        ("i2c:x:0x1a", "cubestar", r"i2c:x:0x1a: must be i2c:BUS:ADDR"),
+        ("i2c:7:0x99", "cubestar", "0x08 to 0x77"),
+        ("i2c:7:0x33", None, "give --device"),
+        ("usb://x", "cubestar", "no transport usb://"),
+    ],
+)
+def test_text_that_names_nothing(text, device, error):
+    with pytest.raises(TargetError, match=error):
+        open_target(text, device)
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("./no_such_port", "can not open ./no_such_port: No such file"),
+        ("i2c:250:0x1a", "can not open /dev/i2c-250: No such file"),
+        ("recorded:no_such.rec", "can not open no_such.rec: No such file"),
+        ("tcp://127.0.0.1:1", "can not open tcp://127.0.0.1:1: Connection refused"),
+        ("rfc2217://127.0.0.1:1", "can not open rfc2217://127.0.0.1:1: Connection refused"),
+    ],
+)
+def test_target_that_does_not_open(text, error):
+    with pytest.raises(HostError, match=error):
+        open_target(text, "cubestar")
+
+
+def write(path, events) -> None:
+    stream = io.StringIO()
+    writer = RecordingWriter(stream, "cubesense", {"uart": 57_600, "bench_uart": 115_200})
+    for event in events:
+        writer.write(event)
+    path.write_text(stream.getvalue())
+
+
+def test_recording_tells_its_device(tmp_path):
+    path = tmp_path / "a.rec"
+    write(path, [LineBytes(0, "uart", "host", encode_frame(b"\x80"), 1),
+                 LineBytes(9, "uart", "device", encode_frame(bytes(8)), 1)])  # fmt: skip
+    target = open_target(f"recorded:{path}")
+    assert target.interface.name == "CubeSense"
+    assert target.node.telemetry("Identification")["NodeType"] == 0
+    assert target.bench is not None
+    target.close()
+
+
+def test_recording_of_a_bus(tmp_path):
+    path = tmp_path / "a.rec"
+    messages = (BusMessage(0x1B, b"\x80", False), BusMessage(0x1B, bytes(8), True))
+    write(path, [BusTransfer(0, "i2c", 9, messages)])
+    target = open_target(f"recorded:{path}")
+    assert isinstance(target.node, I2cClient)
+    assert target.node.telemetry("Identification")["NodeType"] == 0
+
+
+def test_recording_of_a_bus_on_which_nothing_was_said(tmp_path):
+    path = tmp_path / "a.rec"
+    path.write_text('{"recording":1,"device":"cubesense","lines":{}}\n')
+    with pytest.raises(RecordingMismatchError, match="the recording ends after 0 transfers"):
+        open_target(f"recorded:{path}").node.telemetry("Identification")
+
+
+def test_bench_of_a_device_without_one(tmp_path):
+    port = tmp_path / "tty"
+    with pytest.raises(HostError):
+        open_target(str(port), "cubestar", bench="x")

@@ -1,0 +1,187 @@
+import json
+import re
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.cli.main import main
+from cubestack.host.export.interface import FORMATS, render
+
+DOCUMENTS = Path(__file__).parents[3] / "docs"
+DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE, ARAMIS], ids=lambda i: i.name)
+COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+TIMEOUT_S = 120
+
+PROGRAM = """
+#include <stdio.h>
+#include "cubestar.h"
+
+int main(void)
+{
+    uint8_t in[32], out[32] = {0};
+    size_t size = fread(in, 1, sizeof in, stdin);
+    float fx = cubestar_get_f32(in, CUBESTAR_TC_setFocalLengthComponents_Fx_OFFSET);
+    int x = cubestar_get_i16(in, CUBESTAR_TLM_Quaternion_Qbar1_OFFSET);
+    unsigned wide = (unsigned)cubestar_get_u32(in, 4);
+    printf("%u %.9g %d %u %g\\n", (unsigned)size, (double)fx, x, wide,
+           x / (double)CUBESTAR_TLM_Quaternion_Qbar1_SCALE);
+    printf("%d %d %d %d\\n", CUBESTAR_TLM_AttitudeData, CUBESTAR_TLM_AttitudeData_LENGTH,
+           CUBESTAR_TASK_STATUS_CALCULATED,
+           !!(in[CUBESTAR_TLM_ErrorFlags_UART_ProtocolError_OFFSET]
+              & CUBESTAR_TLM_ErrorFlags_UART_ProtocolError_MASK));
+    cubestar_put_u8(out, 0, cubestar_get_u8(in, 0));
+    cubestar_put_i16(out, 1, cubestar_get_i16(in, 1));
+    cubestar_put_u32(out, 3, cubestar_get_u32(in, 3));
+    cubestar_put_f32(out, 7, cubestar_get_f32(in, 7));
+    for (size_t i = 0; i < 11; i++)
+        printf("%02x", (unsigned)out[i]);
+    return 0;
+}
+"""
+
+
+SENSE_PROGRAM = """
+#include <stdio.h>
+#include "cubesense.h"
+
+int main(void)
+{
+    const uint8_t in[6] = {0xd2, 0x04, 0xc9, 0xfd, 2, 7};
+    printf("%d %d %d\\n", cubesense_get_i16(in, CUBESENSE_TLM_Result1_Alpha_OFFSET),
+           cubesense_get_i16(in, CUBESENSE_TLM_Result1_Beta_OFFSET),
+           in[CUBESENSE_TLM_Result1_Detect_OFFSET] == CUBESENSE_DETECT_RESULT_SUCCESS);
+    printf("%x %x %d %c %d\\n", CUBESENSE_REGISTER_I2C_ADDRESS, CUBESENSE_REGISTER_NADIR_X,
+           CUBESENSE_REGISTER_NADIR_X_SCALE, CUBESENSE_BENCH_TAKE_NADIR,
+           CUBESENSE_BENCH_SEND_SUN_LENGTH);
+    return 0;
+}
+"""
+
+
+def compile_and_run(folder: Path, interface: Interface, program: str, data: bytes) -> list[str]:
+    (folder / f"{interface.name.lower()}.h").write_text(render(interface, "c"))
+    (folder / "main.c").write_text(program)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]
+    command = [str(COMPILER), *flags, "main.c", "-o", "main"]
+    subprocess.run(command, cwd=folder, check=True, timeout=TIMEOUT_S)
+    run = subprocess.run(
+        [folder / "main"], input=data, stdout=subprocess.PIPE, check=True, timeout=TIMEOUT_S
+    )
+    return run.stdout.decode().splitlines()
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_c_header_compiles_and_agrees_with_the_tables(tmp_path: Path) -> None:
+    data = bytes.fromhex("0102 f0c2 8090a0b0 0000c03f 99aabbcc")
+    first, second, copied = compile_and_run(tmp_path, INTERFACE, PROGRAM, data)
+    fx = struct.unpack("<f", data[:4])[0]
+    assert first.split() == [str(len(data)), f"{fx:.9g}", "-15632", str(0xB0A09080), "-1.5632"]
+    assert second == "177 18 29 0"
+    assert copied == data[:11].hex()
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_c_header_of_a_device_with_registers_and_letters(tmp_path: Path) -> None:
+    lines = compile_and_run(tmp_path, CUBESENSE, SENSE_PROGRAM, b"")
+    assert lines == ["1234 -567 1", "1c 48 100 a 307200"]
+
+
+@DEVICES
+def test_c_header_defines_every_name_once_and_has_every_message(interface: Interface) -> None:
+    upper = interface.name.upper()
+    pattern = rf"(?:#define|^   ) ({upper}_\w+)"
+    names = re.findall(pattern, render(interface, "c"), re.MULTILINE)
+    assert len(names) == len(set(names))
+    for message in interface.messages:
+        name = f"{upper}_{'TLM' if message.id & 0x80 else 'TC'}_{message.name}"
+        assert {name, *(f"{name}_{field.name}_OFFSET" for field in message.fields)} <= set(names)
+    for register in interface.registers or ():
+        assert f"{upper}_REGISTER_{register.name}" in names
+
+
+@DEVICES
+def test_the_document_is_the_generated_one(interface: Interface) -> None:
+    device = interface.name.lower()
+    text = (DOCUMENTS / f"registers-{device}.md").read_text(encoding="utf-8")
+    assert text == render(interface, "markdown"), (
+        f"docs/registers-{device}.md is stale: "
+        f"cubestack registers {device} --format markdown > docs/registers-{device}.md"
+    )
+
+
+@DEVICES
+@pytest.mark.parametrize("form", FORMATS)
+def test_every_format_names_every_message_and_field(interface: Interface, form: str) -> None:
+    text = render(interface, form).replace(f"{interface.name.upper()}_", " ")
+    words = set(re.findall(r"\w+", text))
+    for message in interface.messages:
+        if form == "c":
+            kind = "TLM" if message.id & 0x80 else "TC"
+            assert {f"{kind}_{message.name}_{f.name}_OFFSET" for f in message.fields} <= words
+        else:
+            assert {message.name, *(field.name for field in message.fields)} <= words
+
+
+def test_json_carries_the_whole_declaration() -> None:
+    content = json.loads(render(INTERFACE, "json"))
+    assert (content["name"], content["i2c_address"], content["baud"]) == ("CubeStar", 0x1A, 57_600)
+    messages = {(entry["kind"], entry["id"]): entry for entry in content["messages"]}
+    assert len(messages) == len(INTERFACE.messages)
+    margin = messages["telecommand", 27]["fields"][0]
+    assert margin["scale"] == 10_000
+    assert margin["minimum"] == pytest.approx(0.0001)
+    assert messages["telemetry", 138]["supported"] is False
+    assert messages["telemetry", 151]["steps"] is True
+    assert messages["telecommand", 100]["ours"] is True
+
+
+def test_json_carries_registers_and_letters_where_there_are_any() -> None:
+    content = json.loads(render(CUBESENSE, "json"))
+    registers = {entry["field"]["name"]: entry for entry in content["registers"]["registers"]}
+    assert content["registers"]["i2c_address"] == 0x1C
+    assert registers["NADIR_X"]["access"] == "ro"
+    assert (registers["NADIR_X"]["length"], registers["NADIR_X"]["field"]["scale"]) == (2, 100)
+    assert content["bench"]["baud"] == 115_200
+    letters = {entry["letter"]: entry for entry in content["bench"]["letters"]}
+    assert (letters["a"]["answer"], letters["s"]["length"]) == ("59", 307_200)
+    confidences = {entry["name"]: entry["confidence"] for entry in content["messages"]}
+    assert confidences["Result1"] == "MEDIUM"
+    assert confidences["Details1"] is None
+    assert not {"registers", "bench"} & json.loads(render(INTERFACE, "json")).keys()
+
+
+@pytest.mark.parametrize("form", ["table", "markdown"])
+def test_readers_find_registers_letters_and_what_is_ours(form: str) -> None:
+    text = render(CUBESENSE, form)
+    assert "which registers there are, and their addresses, are ours" in text
+    assert "0x48" in text
+    assert "layout only declared somewhere" in text
+    assert re.search(r"\ba\b.*TAKE_NADIR.*'Y'", text)
+
+
+@DEVICES
+def test_the_command_lists_a_device(
+    interface: Interface, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["registers", interface.name.lower()]) == 0
+    assert capsys.readouterr().out == render(interface, "table")
+
+
+def test_table_tells_ranges_resets_and_flags() -> None:
+    text = render(INTERFACE, "table")
+    assert "declination of the boresight [rad]; -1.5708 to 1.5708; else DeclinationSetError" in text
+    assert "focal length [mm]; 1 to 100; reset 6.28 mm; else FocalLengthRangeError" in text
+    assert "at most, by BlockSize, 16383 for 0, 8191 for 1, 4095 for 2, 2047 for 3" in text
+    assert "our extension" in text
+
+
+def test_an_unknown_format_is_told() -> None:
+    with pytest.raises(ValueError, match="no format 'xml'; known: table, markdown, c, json"):
+        render(INTERFACE, "xml")

@@ -1,0 +1,62 @@
+"""CubeSense's pictures: the lens drawn back into the picture, and what the marks point at."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cubestack.emulator.camera.ov7620.fisheye import LENSES
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.clients.cubesense.client import direction
+from cubestack.host.pictures.earth_sun import annotate_nadir, annotate_sun, limb, pixel
+
+BACKGROUND = 34
+
+
+@pytest.mark.parametrize("camera", Camera)
+def test_pixels_are_those_of_the_camera_s_own_lens(camera: Camera) -> None:
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(-60, 60, (50, 2))
+    vectors = np.array([direction(*pair) for pair in angles])
+    seen = np.array([LENSES[camera].project(vector) for vector in vectors])
+    np.testing.assert_allclose(pixel(camera, vectors), seen, atol=0.01)
+
+
+def test_the_limb_is_a_cone_around_its_axis() -> None:
+    rim = limb(5.0, -20.0, 63.5)
+    middle = limb(5.0, -20.0, 1e-6)
+    assert np.ptp(middle, axis=0).max() < 1e-3
+    np.testing.assert_allclose(
+        middle[0], pixel(Camera.NADIR, direction(5.0, -20.0)[None])[0], atol=1e-3
+    )
+    assert 150 < np.linalg.norm(rim - middle[0], axis=1).mean() < 190
+
+
+def test_nadir_picture_marks_edges_and_works_without_a_fit(tmp_path: Path) -> None:
+    picture = np.full((480, 640), BACKGROUND, np.uint8)
+    edges = np.array([[100.0, 50.0]])
+    annotate_nadir(picture, edges, None, tmp_path / "edges.png")
+    annotate_nadir(picture, edges, (0.0, 0.0, 63.5), tmp_path / "both.png")
+    marked, fitted = (np.asarray(Image.open(tmp_path / f"{n}.png")) for n in ("edges", "both"))
+    assert marked.shape == (960, 1280, 3)
+    assert np.any(marked[92:112, 192:212, 0] > 200)
+    assert np.count_nonzero(fitted != marked) > 1000
+
+
+@pytest.mark.parametrize("at", [(5, 5), (600, 20), (320, 470), (639, 479)])
+def test_sun_picture_shows_its_window_twice(tmp_path: Path, at: tuple[int, int]) -> None:
+    picture = np.full((480, 640), BACKGROUND, np.uint8)
+    picture[at[1], at[0]] = 255
+    annotate_sun(picture, at, (0.0, 0.0), tmp_path / "sun.png")
+    drawn = np.asarray(Image.open(tmp_path / "sun.png"))
+    white = np.all(drawn == 255, axis=2)
+    assert white.sum() > 16 * 16 / 2  # the pixel of the enlarged one, its marks left out
+
+
+def test_sun_that_was_not_found_has_no_window(tmp_path: Path) -> None:
+    annotate_sun(
+        np.full((480, 640), BACKGROUND, np.uint8), (0x3FF, 0x1FF), None, tmp_path / "s.png"
+    )
+    drawn = np.asarray(Image.open(tmp_path / "s.png"))
+    assert np.count_nonzero(drawn != BACKGROUND) < 200  # the boresight's cross alone

@@ -1,0 +1,107 @@
+"""A recording as a target: it answers what it has, and names what differs."""
+
+import pytest
+from smbus2 import i2c_msg
+
+from cubestack.firmware_model.formats.recording import (
+    BusMessage,
+    BusTransfer,
+    LineBytes,
+    Recording,
+)
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import NoAnswerError, RecordingMismatchError
+from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
+
+IDENTIFICATION = bytes([4, 2, 3, 9, 1, 0, 2, 0])
+
+
+def line(*exchanges: tuple[bytes, bytes]) -> Recording:
+    events = []
+    for number, (request, answer) in enumerate(exchanges):
+        start_ps = number * 10_000
+        events.append(LineBytes(start_ps, "uart", "host", encode_frame(request), 1))
+        if answer:
+            events.append(LineBytes(start_ps + 500, "uart", "device", encode_frame(answer), 1))
+    return Recording("a.rec", "cubesense", {"uart": 57_600}, tuple(events))
+
+
+def client(recording: Recording) -> NodeClient:
+    return NodeClient(RecordedTransport(recording, INTERFACE), INTERFACE, retries=0)
+
+
+def test_host_program_runs_on_a_recording():
+    node = client(line((b"\x80", IDENTIFICATION), (b"\x28\x09", b"\0"), (b"\x80", IDENTIFICATION)))
+    assert node.telemetry("Identification")["FirmwareVersionMajor"] == 3
+    node.command("DetectionThreshold1", Threshold=9)
+    assert node.telemetry("Identification")["FirmwareVersionMinor"] == 9
+
+
+def test_other_parameter_is_named():
+    node = client(line((b"\x80", IDENTIFICATION), (b"\x28\x09", b"\0")))
+    node.telemetry("Identification")
+    with pytest.raises(
+        RecordingMismatchError,
+        match=r"recorded:a\.rec: uart: byte 8 from the host, telecommand DetectionThreshold1, "
+        r"field Threshold: 0x0a, recorded 0x09",
+    ):
+        node.command("DetectionThreshold1", Threshold=10)
+
+
+def test_end_of_the_recording_is_named():
+    node = client(line((b"\x80", IDENTIFICATION)))
+    node.telemetry("Identification")
+    with pytest.raises(RecordingMismatchError, match="the recording ends before it"):
+        node.telemetry("Identification")
+
+
+def test_recorded_silence_is_silence():
+    with pytest.raises(NoAnswerError):
+        client(line((b"\x80", b""), (b"\x80", IDENTIFICATION))).telemetry("Identification")
+
+
+def test_port_that_was_not_recorded():
+    with pytest.raises(RecordingMismatchError, match=r"has no line 'bench_uart'; it has: uart"):
+        RecordedTransport(line(), INTERFACE, "bench_uart")
+
+
+def bus(*transfers: tuple[bytes, bytes, int]) -> RecordedI2c:
+    events = tuple(
+        BusTransfer(
+            number,
+            "i2c",
+            number,
+            (BusMessage(0x1B, written, False), BusMessage(0x1B, read, True)),
+            errno,
+        )
+        for number, (written, read, errno) in enumerate(transfers)
+    )
+    return RecordedI2c(Recording("a.rec", "cubesense", {}, events), INTERFACE)
+
+
+def test_i2c_client_runs_on_a_recording():
+    node = I2cClient(bus((b"\x80", IDENTIFICATION, 0)), INTERFACE, retries=0)
+    assert node.telemetry("Identification")["FirmwareVersionMajor"] == 3
+    with pytest.raises(RecordingMismatchError, match="the recording ends after 1 transfers"):
+        node.telemetry("Identification")
+
+
+@pytest.mark.parametrize(
+    ("messages", "text"),
+    [
+        ([i2c_msg.write(0x1B, [0x81]), i2c_msg.read(0x1B, 8)], "81, recorded 80"),
+        ([i2c_msg.write(0x1B, [0x80])], "has 1 messages, recorded 2"),
+        ([i2c_msg.write(0x1C, [0x80]), i2c_msg.read(0x1B, 8)], "write at 0x1c, recorded a write"),
+    ],
+)
+def test_other_transfer_is_named(messages, text):
+    with pytest.raises(RecordingMismatchError, match=text):
+        bus((b"\x80", IDENTIFICATION, 0)).i2c_rdwr(*messages)
+
+
+def test_recorded_failure_fails():
+    with pytest.raises(OSError, match="failed when it was recorded"):
+        bus((b"\x80", b"", 6)).i2c_rdwr(i2c_msg.write(0x1B, [0x80]), i2c_msg.read(0x1B, 8))

@@ -1,0 +1,308 @@
+"""The shell on nodes in memory: every name completes, every line gives rows and data."""
+
+import contextlib
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.field import InterfaceError
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.devices.targets import Target
+from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
+from cubestack.host.shell.language import Shell, ShellError
+from cubestack.host.shell.names import has_side_effect
+from cubestack.host.shell.values import parse_value, parse_values
+
+
+class Bus:
+    """Registers that hold what is written, one byte each, or zeros."""
+
+    def __init__(self) -> None:
+        self.held: dict[int, int] = {}
+        self._pointer = 0
+
+    def i2c_rdwr(self, *messages) -> None:
+        for message in messages:
+            if message.flags & 1:
+                for index in range(message.len):
+                    value = self.held.get(self._pointer, 0) if index == 0 else 0
+                    message.buf[index] = bytes([value])
+                continue
+            self._pointer, *data = bytes(message)
+            if data:
+                self.held[self._pointer] = data[0]
+
+
+class BenchLine:
+    def __init__(self) -> None:
+        self.answers = {b"q": b"Y", b"s": bytes(100)}
+        self._pending = b""
+
+    def write(self, data: bytes) -> None:
+        self._pending += self.answers.get(data, b"")
+
+    def read(self, max_bytes: int, _timeout_s: float) -> bytes:
+        data, self._pending = self._pending[:max_bytes], self._pending[max_bytes:]
+        return data
+
+    def close(self) -> None:
+        pass
+
+
+class Controls:
+    faults = ("latch-up SRAM1", "latch-up SRAM2", "camera sun")
+    fault_parameters: ClassVar = {"latch-up": ("extra_ma", "at_s"), "camera": ("for_s",)}
+    channels = ("SRAM1", "SRAM2")
+
+    def __init__(self) -> None:
+        self.calls: list[object] = []
+
+    def fault(self, words: list[str]) -> None:
+        self.calls.append(words)
+
+    def fault_log(self) -> list[str]:
+        return [f"0.1 s {' '.join(call)}" for call in self.calls]
+
+    def scene(self, path) -> None:
+        self.calls.append(path)
+
+    def currents(self) -> dict[str, float]:
+        return {"total": 71.94}
+
+    def switch(self, channel: str, on: bool) -> None:
+        self.calls.append((channel, on))
+
+    def time_s(self) -> float:
+        return 1.5
+
+    def advance(self, seconds: float) -> None:
+        self.calls.append(seconds)
+
+
+@pytest.fixture
+def shell(node, uart) -> Shell:
+    return Shell(Target("fake", CUBESTAR, NodeClient(uart, CUBESTAR), uart))
+
+
+@pytest.fixture
+def sense_shell(sense, sense_uart) -> Shell:
+    registers = RegisterClient(Bus(), CUBESENSE.registers, wait=lambda _s: None)
+    client = NodeClient(sense_uart, CUBESENSE)
+    return Shell(Target("fake", CUBESENSE, client, sense_uart, registers, BenchLine(), Controls()))
+
+
+def test_every_telemetry_is_read(shell):
+    for message in CUBESTAR.telemetries:
+        if message.supported:
+            result = shell.execute(f"read {message.name}")
+            assert [name for name, _ in result.rows] == [f.name for f in message.fields]
+            assert list(result.data["values"]) == [f.name for f in message.fields]
+
+
+def test_values_have_units(sense, sense_shell):
+    sense.values["Power"]["Current3V3"] = 21.5
+    assert sense_shell.execute("read power current3v3").rows == [("Current3V3", "21.5 mA")]
+
+
+def test_telecommand_by_place_and_by_name(node, shell):
+    shell.execute("write setDetectionThresholds 0x10 StarThreshold=9")
+    assert node.log == [("setDetectionThresholds", {"DetectionThreshold": 16, "StarThreshold": 9})]
+
+
+def test_messages_by_number(node, shell, sense_shell):
+    assert shell.execute("read 128").data == shell.execute("read Identification").data
+    assert shell.execute("read 0x80 NodeType").rows == [("NodeType", "0")]
+    shell.execute("write 21 0x10 9")
+    assert node.log == [("setDetectionThresholds", {"DetectionThreshold": 16, "StarThreshold": 9})]
+    assert shell.execute("watch 128 2 0").data["name"] == "Identification"
+    sense_shell.execute("write @0x08 30")
+    assert sense_shell.execute("read @8").data["values"] == {"NADIR_THRESHOLD": 30}
+
+
+@pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
+def test_every_number_that_is_listed_means_its_name(interface):
+    registers = interface.registers and RegisterClient(Bus(), interface.registers)
+    shell = Shell(Target("fake", interface, NodeClient(BenchLine(), interface), None, registers))
+    listed = shell.execute("list")
+    assert [name for _, name in listed.rows] == listed.data["names"]
+    assert len({number for number, _ in listed.rows}) == len(listed.rows)
+    for number, name in listed.rows:
+        assert shell.execute(f"list {number}").data["name"] == name
+
+
+def test_choices_by_name(sense, sense_shell):
+    sense_shell.execute("write CaptureAndDetect nadir SRAM2")
+    assert sense.log == [("CaptureAndDetect", {"Camera": 1, "Sram": 1})]
+
+
+def test_registers_keep_what_is_written(sense_shell):
+    sense_shell.execute("write SUN_THRESHOLD 30")
+    assert sense_shell.execute("read SUN_THRESHOLD").data["values"] == {"SUN_THRESHOLD": 30}
+    with pytest.raises(InterfaceError, match="out of range"):
+        sense_shell.execute("write SUN_AUTO 7")
+
+
+def test_refusal_is_the_clients(sense, sense_shell):
+    with pytest.raises(CommandRefusedError, match="BAD_PARAMETER"):
+        sense_shell.execute("write Reset Target=9")
+
+
+def test_dump_reads_all_that_changes_nothing(sense, sense_shell):
+    sense.execute("StartImageDownload", {"Sram": 0, "Size": 4})
+    frames = sense_shell.execute("dump").data["telemetry"]
+    assert set(frames) == {m.name for m in CUBESENSE.telemetries if not has_side_effect(m)}
+    assert sense.log == []
+    assert "Result1ThenSram1" not in frames
+
+
+def test_watch_reads_again(sense, sense_shell):
+    rows = []
+    sense_shell.on_row = rows.append
+    result = sense_shell.execute("watch Identification 3 0.1")
+    assert len(rows) == len(result.data["readings"]) == 3
+
+
+def test_bench_letters(sense_shell):
+    assert sense_shell.execute("bench q").rows == [("TAKE_SUN", "'Y'")]
+    assert sense_shell.execute("bench s").rows == [("SEND_NADIR", "100 bytes of 307200")]
+
+
+def test_raw_bytes(shell):
+    answer = shell.execute("raw 1f 7f 83 1fff").rows[0][1]
+    assert answer.startswith("1f 7f")
+    assert answer.endswith("1f ff")
+    assert shell.execute("raw 00").rows == [("", "(nothing)")]
+
+
+def test_image(node, shell, tmp_path):
+    node.memory[:] = np.arange(node.memory.size) % 251
+    shell.execute(f"image {tmp_path}/a.png")
+    assert (np.asarray(Image.open(tmp_path / "a.png")).ravel() == node.memory).all()
+    with pytest.raises(TargetError, match="sends no picture 'x'"):
+        shell.execute(f"image {tmp_path}/a.png x")
+
+
+def test_controls(sense_shell):
+    controls = sense_shell.target.controls
+    sense_shell.execute("fault latch-up SRAM1")
+    assert sense_shell.execute("fault log").rows == [("", "0.1 s latch-up SRAM1")]
+    sense_shell.execute("power SRAM2 off")
+    assert sense_shell.execute("power").rows == [("total", "71.9 mA")]
+    assert sense_shell.execute("time 0.5").rows == [("time", "1.500000 s")]
+    assert controls.calls == [["latch-up", "SRAM1"], ("SRAM2", False), 0.5]
+
+
+@pytest.mark.parametrize("command", ["scene x.toml", "fault", "power", "time"])
+def test_controls_of_a_device_that_is_not_emulated(shell, command):
+    with pytest.raises(ShellError, match="fake is not emulated here: use emulated:DEVICE"):
+        shell.execute(command)
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("raed x", "no command 'raed'; did you mean read"),
+        ("read", r"read: 0 words; usage: read NAME \[FIELD\]"),
+        ("read Identifcation", "nothing is called 'Identifcation'; did you mean Identification"),
+        ("read threshold", "nothing is called 'threshold'; did you mean Detection"),
+        ("read zzzzz", "nothing is called 'zzzzz'; list shows what there is"),
+        ("read 250", r"no telemetry has number 250; near: \d+ \(\w+\), \d+"),
+        ("read 37", "no telemetry has number 37; near: 128"),
+        ("write 128", "no telecommand has number 128; near: "),
+        ("list 999", "no telemetry or telecommand has number 999"),
+        ("read @5", "no register at '@5'; registers are @ADDRESS, over I2C"),
+        ("write Identification", "write: nothing is called 'Identification'"),
+        ("read Identification NodTyp", "did you mean NodeType"),
+        ("read 'x", "No closing quotation"),
+        ("raw xyz", "'xyz' is not hexadecimal bytes"),
+        ("raw", "usage: raw HEX"),
+        ("bench q", "CubeStar has no bench protocol"),
+        ("image a.jpg", r"a\.jpg must end in \.png"),
+        ("watch Identification never", "'never' is not a number of at least 1"),
+        ("watch Identification nan", "'nan' is not a number"),
+        ("write setIDMode x=1", "setIDMode has no field 'x'"),
+        ("write setIDMode 1 2", "setIDMode has 1 fields, not 2"),
+        ("write setIDMode 1 IdMode=1", "IdMode is given twice"),
+        ("write setDelayTimerTimeout many", "'many' is not a number"),
+    ],
+)
+def test_line_that_makes_no_sense(node, shell, line, text):
+    with pytest.raises(ValueError, match=text) as raised:
+        shell.execute(line)
+    assert "\n" not in str(raised.value)
+    assert node.log == []
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("read @0x99", r"near: @0x\w\w \(\w+\), @0x"),
+        ("write @x 1", "no register at '@x'; as in @0x05"),
+    ],
+)
+def test_addresses_that_are_none(sense_shell, line, text):
+    with pytest.raises(ShellError, match=text):
+        sense_shell.execute(line)
+
+
+@given(st.text(max_size=40))
+def test_any_line_runs_or_is_refused(line):
+    target = Target("fake", ARAMIS, NodeClient(BenchLine(), ARAMIS, retries=0), BenchLine())
+    shell = Shell(target)
+    with contextlib.suppress(ValueError, NoAnswerError):
+        shell.execute(line)
+    shell.complete(line)
+
+
+@pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
+def test_every_name_completes(interface):
+    registers = interface.registers and RegisterClient(Bus(), interface.registers)
+    shell = Shell(Target("fake", interface, NodeClient(BenchLine(), interface), None, registers))
+    for message in interface.telemetries:
+        if message.supported:
+            assert message.name in shell.complete(f"read {message.name[:3].lower()}")
+            assert shell.complete(f"read {message.name} ") == [f.name for f in message.fields]
+    for message in interface.telecommands:
+        if message.supported:
+            assert message.name in shell.complete(f"write {message.name[:3]}")
+            found = {word.partition("=")[0] for word in shell.complete(f"write {message.name} ")}
+            assert found == {f.name for f in message.fields}
+    for register in interface.registers or ():
+        assert register.name in shell.complete(f"list {register.name[:4].lower()}")
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("", ["read", "write", "watch", "dump", "list", "image", "bench", "raw", "scene", "fault",
+              "power", "time", "help"]),
+        ("wa", ["watch"]),
+        ("bench ", ["a", "q", "s", "w"]),
+        ("fault ", ["latch-up", "camera", "log"]),
+        ("fault latch-up ", ["SRAM1", "SRAM2", "extra_ma=", "at_s="]),
+        ("fault latch-up SRAM1 extra_ma=5 ", ["at_s="]),
+        ("power ", ["SRAM1", "SRAM2"]),
+        ("power SRAM1 ", ["on", "off"]),
+        ("write CaptureAndDetect Camera=", ["Camera=SUN", "Camera=NADIR"]),
+        ("write CaptureAndDetect Camera=SUN ", ["Sram=SRAM1", "Sram=SRAM2"]),
+        ("dump ", []),
+    ],
+)  # fmt: skip
+def test_completion(sense_shell, line, found):
+    assert sense_shell.complete(line) == found
+
+
+def test_values_as_they_are_typed():
+    field = CUBESTAR.telecommand("setDelayTimerTimeout").fields[0]
+    for text, value in (("12", 12), ("0x1f", 31), ("0b11", 3), ("1.5", 1.5), ("on", 1)):
+        assert parse_value(field, text) == value
+    upload = CUBESTAR.telecommand("UploadBlock")
+    assert parse_values(upload, ["1", "00ff"]) == {"BlockNumber": 1, "Data": b"\0\xff"}

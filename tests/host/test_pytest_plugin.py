@@ -1,0 +1,90 @@
+"""The plugin in a pytest of its own, as a user's project would have it."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+
+PLUGIN = "cubestack.host.pytest_plugin"
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    """Runs pytest on the text of a test file."""
+    # An installation that is older than the entry point has to be told.
+    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+
+    def run(text: str, *options: str) -> "subprocess.CompletedProcess[str]":
+        (tmp_path / "test_it.py").write_text("import pytest\n" + text)
+        plugin = [] if installed else ["-p", PLUGIN]
+        return subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "--strict-markers", *plugin, *options],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+
+    return run
+
+
+def test_a_failed_test_tells_what_the_faults_did(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text('seed = 2\n[[fault]]\nkind = "latch-up"\n')
+    done = run(
+        "pytestmark = pytest.mark.cubestack(seed=3)\n"
+        "@pytest.mark.cubestack(faults='plan.toml')\n"
+        "def test_it(cubestar):\n"
+        "    cubestar.wait(0.01)\n"
+        "    assert (cubestar.seed, cubestar.faults.seed) == (0, 0)\n",
+        "--junitxml=report.xml",
+    )
+    assert done.returncode == 1
+    assert "assert (3, 2) == (0, 0)" in done.stdout
+    assert "virtual time 0.010000000 s, seed 3\n0.000000000 s latch-up memory: 300" in done.stdout
+    report = (tmp_path / "report.xml").read_text()
+    assert 'name="cubestack.cubestar.virtual_time_s" value="0.010000000"' in report
+    assert 'name="cubestack.cubestar.fault_events" value="1"' in report
+
+
+def test_seeds_come_from_the_command_line(run: Run) -> None:
+    text = "def test_it(cubestar):\n    assert cubestar.seed == 8\n"
+    assert run(text, "--cubestack-seed=8").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("marker", "message"),
+    [
+        ("(3)", "marker cubestack takes scene, seed, faults by name, nothing else"),
+        ("(sead=3)", "marker cubestack takes scene, seed, faults by name, nothing else"),
+        ("(faults='seed = -1')", "seed must be a whole number from 0, not -1"),
+        ("(faults='none.toml')", "none.toml: No such file or directory"),
+    ],
+)
+def test_what_a_marker_gets_wrong(run: Run, marker: str, message: str) -> None:
+    done = run(f"@pytest.mark.cubestack{marker}\ndef test_it(cubestar): pass\n")
+    assert done.returncode == 1
+    assert message in done.stdout
+
+
+def test_the_plugin_costs_nothing_before_it_is_used(run: Run) -> None:
+    text = (
+        "import sys\n"
+        "def test_it():\n"
+        "    heavy = {'numpy', 'amaranth', 'simpy', 'cubestack.emulator'}\n"
+        "    assert not heavy & set(sys.modules)\n"
+    )
+    assert run(text, "-p", "no:hypothesispytest", "-p", "no:cacheprovider").returncode == 0
+
+
+def test_the_entry_point_leads_to_the_plugin() -> None:
+    root: Any = Path(__file__).parents[2]
+    assert f'cubestack = "{PLUGIN}"' in (root / "pyproject.toml").read_text()

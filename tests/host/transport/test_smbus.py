@@ -1,0 +1,165 @@
+"""CubeSMBus: every method of smbus2's SMBus, without a device file."""
+
+import errno
+import inspect
+from typing import Any
+
+import pytest
+from smbus2 import SMBus, i2c_msg
+
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.ports.direct import DirectI2c
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.formats.linux_i2c import MessageFlag
+from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.transport.smbus import CubeSMBus
+
+ADDRESS = 0x1A
+
+
+class Echo:
+    """Answers with what was written last, again and again."""
+
+    def __init__(self) -> None:
+        self.written = bytearray()
+        self.log: list[bytes] = []
+        self._position = 0
+
+    def i2c_start(self, read: bool) -> None:
+        self._position = 0
+        if not read:
+            self.written = bytearray()
+
+    def i2c_write(self, byte: int) -> bool:
+        self.written.append(byte)
+        return byte != 0xEE
+
+    def i2c_read(self) -> int:
+        self._position += 1
+        return self.written[(self._position - 1) % len(self.written)] if self.written else 0xFF
+
+    def i2c_stop(self) -> None:
+        self.log.append(bytes(self.written))
+
+
+@pytest.fixture
+def echo() -> Echo:
+    return Echo()
+
+
+@pytest.fixture
+def bus(echo: Echo) -> CubeSMBus:
+    kernel = Kernel()
+    wire = I2cBus(kernel)
+    wire.attach(ADDRESS, echo)
+    return CubeSMBus(link=DirectI2c(kernel, wire))
+
+
+def test_every_method_that_reaches_the_bus_is_ours() -> None:
+    for name, theirs in inspect.getmembers(SMBus, inspect.isfunction):
+        if name.startswith("_") and name not in ("_set_address", "_get_funcs"):
+            continue
+        ours = getattr(CubeSMBus, name)
+        assert ours is not theirs, name
+        assert list(inspect.signature(ours).parameters) == list(
+            inspect.signature(theirs).parameters
+        ), name
+    assert CubeSMBus.pec is not SMBus.pec
+
+
+def test_transactions(bus: Any, echo: Echo) -> None:
+    assert bus.read_byte_data(ADDRESS, 0x42) == 0x42
+    assert bus.read_byte(ADDRESS) == 0x42
+    assert bus.read_word_data(ADDRESS, 0x42) == 0x4242
+    assert bus.read_i2c_block_data(ADDRESS, 7, 5) == [7] * 5
+    assert bus.read_block_data(ADDRESS, 3) == [3] * 3
+    assert bus.process_call(ADDRESS, 0x10, 0x3020) == 0x2010
+    assert bus.block_process_call(ADDRESS, 2, [9, 8]) == [2, 9]
+    echo.log.clear()
+    bus.write_quick(ADDRESS)
+    bus.write_byte(ADDRESS, 5)
+    bus.write_byte_data(ADDRESS, 5, 0x1FF)
+    bus.write_word_data(ADDRESS, 5, 0x1234)
+    bus.write_block_data(ADDRESS, 5, [1, 2])
+    bus.write_i2c_block_data(ADDRESS, 5, [1, 2])
+    written = ["", "05", "05ff", "053412", "05020102", "050102"]
+    assert [data.hex() for data in echo.log] == written
+
+
+def test_combined_transfers(bus: Any) -> None:
+    write, read = i2c_msg.write(ADDRESS, [1, 2, 3]), i2c_msg.read(ADDRESS, 5)
+    bus.i2c_rdwr(write, read)
+    assert list(read) == [1, 2, 3, 1, 2]
+    block = i2c_msg.read(ADDRESS, 33)
+    block.flags |= MessageFlag.RECEIVE_LENGTH
+    block.buf[0] = b"\1"
+    bus.i2c_rdwr(i2c_msg.write(ADDRESS, [2, 7]), block)
+    assert list(block) == [2, 7, 2]
+
+
+def test_errors_are_those_of_the_driver(bus: Any) -> None:
+    for call, code in (
+        (lambda: bus.read_byte(0x30), errno.ENXIO),
+        (lambda: bus.write_byte(ADDRESS, 0xEE), errno.EIO),
+        (lambda: bus.read_byte(0x80), errno.EINVAL),
+        (lambda: bus.i2c_rdwr(i2c_msg.read(ADDRESS, 9000)), errno.EINVAL),
+    ):
+        with pytest.raises(OSError, match=r"\[Errno") as raised:
+            call()
+        assert raised.value.errno == code
+    assert bus.read_byte_data(ADDRESS, 1) == 1
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda bus: bus.write_block_data(ADDRESS, 0, [0] * 33),
+        lambda bus: bus.write_i2c_block_data(ADDRESS, 0, [0] * 33),
+        lambda bus: bus.block_process_call(ADDRESS, 0, [0] * 33),
+        lambda bus: bus.read_i2c_block_data(ADDRESS, 0, 33),
+    ],
+)
+def test_blocks_too_long(bus: Any, call: Any) -> None:
+    with pytest.raises(ValueError, match="at most 32 bytes, not 33"):
+        call(bus)
+
+
+def test_packet_error_codes(bus: Any, echo: Echo) -> None:
+    bus.pec = 1
+    assert bus.pec == 1
+    bus.write_byte(ADDRESS, 5)
+    assert len(echo.log[-1]) == 2
+    with pytest.raises(OSError, match="Bad message"):
+        bus.read_byte_data(ADDRESS, 5)
+    bus.enable_pec(False)
+    assert bus.read_byte_data(ADDRESS, 5) == 5
+
+
+def test_a_closed_bus(bus: Any) -> None:
+    with bus:
+        bus.read_byte(ADDRESS)
+    with pytest.raises(PortClosedError, match=r"call open\(\) first"):
+        bus.read_byte(ADDRESS)
+    bus.close()
+
+
+def test_no_bus_yet() -> None:
+    bus = CubeSMBus()
+    assert bus.fd is None
+    with pytest.raises(TypeError, match="a number or a path"):
+        bus.open(1.5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("bus", [199, "/dev/i2c-199", "/no/such/socket"])
+def test_nobody_serves(bus: int | str) -> None:
+    with pytest.raises(PortOpenError, match=r"no emulation serves .*(199|socket)"):
+        CubeSMBus(bus)
+
+
+def test_the_bus_of_the_program_around(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CUBESTACK_I2C_BUS", "5")
+    monkeypatch.setenv("CUBESTACK_I2C_SOCKET", "/of/run")
+    with pytest.raises(PortOpenError, match="/of/run"):
+        CubeSMBus(5)
+    with pytest.raises(PortOpenError, match="i2c-6"):
+        CubeSMBus(6)
