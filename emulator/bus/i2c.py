@@ -16,7 +16,7 @@ import simpy
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["CurrentTarget", "I2cBus", "I2cDisturbance", "I2cMessage", "I2cNackError", "I2cTarget"]
+__all__ = ["CurrentTarget", "I2cBus", "I2cError", "I2cFaultHook", "I2cMessage", "I2cTarget"]
 
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
@@ -55,7 +55,7 @@ class I2cMessage:
         return self.read > 0 or self.probe_read
 
 
-class I2cNackError(OSError):
+class I2cError(OSError):
     """A transfer failed; errno as on Linux.
 
     ENXIO: no acknowledge of an address; EIO: of a byte; ETIMEDOUT: the clock was held low too long;
@@ -79,8 +79,8 @@ class I2cTarget(Protocol):
         """The transfer ended, or went on with another target."""
 
 
-class I2cDisturbance(Protocol):
-    """Stands between a host and the targets; each hook may wait, or raise I2cNackError."""
+class I2cFaultHook(Protocol):
+    """Stands between a host and the targets; each hook may wait, or raise I2cError."""
 
     def before_start(self) -> Generator[simpy.Event, Any, None]:
         """A host is about to begin a transfer."""
@@ -121,7 +121,7 @@ class I2cBus:
 
     Attributes:
         bit_ps: time of one bit.
-        disturbance: what is on the wires, if anything.
+        fault_hook: what is on the wires, if anything.
     """
 
     def __init__(self, env: Kernel, hz: int = 100_000) -> None:
@@ -133,7 +133,7 @@ class I2cBus:
         self._general = _GeneralCall()
         self._taken = False
         self._turns: deque[simpy.Event] = deque()
-        self.disturbance: I2cDisturbance | None = None
+        self.fault_hook: I2cFaultHook | None = None
         self.bit_ps = PS_PER_S // hz
 
     def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
@@ -165,7 +165,7 @@ class I2cBus:
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         """Perform one transfer, behind those already under way.
 
-        Read data lands in the messages. Raises I2cNackError, after the stop condition.
+        Read data lands in the messages. Raises I2cError, after the stop condition.
         """
         if self._taken:
             yield from self._take_turn()
@@ -196,21 +196,21 @@ class I2cBus:
 
     def _transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         addressed: I2cTarget | None = None
-        failure: I2cNackError | None = None
-        if self.disturbance is not None:
-            yield from self.disturbance.before_start()
+        failure: I2cError | None = None
+        if self.fault_hook is not None:
+            yield from self.fault_hook.before_start()
         try:
             for message in messages:
                 yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
-                if self.disturbance is not None:
-                    yield from self.disturbance.after_address(message.address)
+                if self.fault_hook is not None:
+                    yield from self.fault_hook.after_address(message.address)
                 target = self._find(message)
                 if addressed is not None and addressed is not target:
                     addressed.i2c_stop()
                 addressed = target
                 target.i2c_start(message.reading)
                 yield from self._bytes(target, message)
-        except I2cNackError as error:
+        except I2cError as error:
             failure = error
         yield self._env.timeout(self.bit_ps)
         if addressed is not None:
@@ -224,7 +224,7 @@ class I2cBus:
             return self._general
         target = self._targets.get(address)
         if target is None:
-            raise I2cNackError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
+            raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
         return target
 
     def _bytes(self, target: I2cTarget, message: I2cMessage) -> Generator[simpy.Event, Any, None]:
@@ -234,18 +234,18 @@ class I2cBus:
             while len(message.data) < wanted:
                 byte = yield from self._next_byte(target, message.address)
                 yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
-                if self.disturbance is not None:
-                    yield from self.disturbance.after_byte(message.address, read=True)
+                if self.fault_hook is not None:
+                    yield from self.fault_hook.after_byte(message.address, read=True)
                 if message.block and not message.data:
                     wanted += _block_length(byte, message.address)
                 message.data.append(byte)
             return
         for byte in message.data:
             yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
-            if self.disturbance is not None:
-                yield from self.disturbance.after_byte(message.address, read=False)
+            if self.fault_hook is not None:
+                yield from self.fault_hook.after_byte(message.address, read=False)
             if not target.i2c_write(byte):
-                raise I2cNackError(
+                raise I2cError(
                     errno.EIO, f"I2C device {message.address:#04x} refused byte {byte:#04x}"
                 )
 
@@ -254,7 +254,7 @@ class I2cBus:
         give_up_ps = self._env.now + LONGEST_STRETCH_PS
         while (byte := target.i2c_read()) is None:
             if self._env.now >= give_up_ps:
-                raise I2cNackError(
+                raise I2cError(
                     errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s"
                 )
             yield self._env.timeout(self.bit_ps)
@@ -263,7 +263,7 @@ class I2cBus:
 
 def _block_length(byte: int, address: int) -> int:
     if not 1 <= byte <= MAX_BLOCK_BYTES:
-        raise I2cNackError(
+        raise I2cError(
             errno.EPROTO,
             f"I2C device {address:#04x} sent block length {byte}, not 1..{MAX_BLOCK_BYTES}",
         )

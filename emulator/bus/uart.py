@@ -13,7 +13,7 @@ import simpy
 from cubestack.emulator.bus.line_format import LineFormat, LineSampler
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["BITS_PER_BYTE", "Disturbance", "Uart", "UartTap"]
+__all__ = ["BITS_PER_BYTE", "FaultHook", "Uart", "UartTap"]
 
 BITS_PER_BYTE = 10  # start bit, 8 data bits, stop bit
 
@@ -31,7 +31,7 @@ class UartTap(Protocol):
         """The device has dropped a character."""
 
 
-class Disturbance(Protocol):
+class FaultHook(Protocol):
     """Stands in a line between its two ends, and hands on what it likes, when it likes."""
 
     def to_host(
@@ -61,7 +61,7 @@ class Uart:
         taps: who else listens.
         host_taps: told of every byte at its end on the line to the device, and when it began;
             before anything disturbs it.
-        disturbance: what is in the line, if anything.
+        fault_hook: what is in the line, if anything.
         framing_errors: characters that the device dropped.
     """
 
@@ -83,7 +83,7 @@ class Uart:
         self.line: Callable[[bytes, int, int], None] = lambda _data, _first_ps, _byte_ps: None
         self.taps: list[UartTap] = []
         self.host_taps: list[Callable[[int, int], None]] = []
-        self.disturbance: Disturbance | None = None
+        self.fault_hook: FaultHook | None = None
         self.framing_errors = 0
         self._silence_ps = silence_bytes * self.byte_ps
         self._incoming: deque[tuple[int, LineFormat]] = deque()
@@ -99,10 +99,10 @@ class Uart:
             return
         start = max(self._env.now, self._sending_until)
         self._sending_until = start + len(data) * self.byte_ps
-        if self.disturbance is None:
+        if self.fault_hook is None:
             self.line(data, start + self.byte_ps, self.byte_ps)
         else:
-            self.disturbance.to_host(data, start + self.byte_ps, self.byte_ps, self.line)
+            self.fault_hook.to_host(data, start + self.byte_ps, self.byte_ps, self.line)
         for tap in self.taps:
             tap.device_sent(data, start + self.byte_ps, self.byte_ps)
 
@@ -187,10 +187,10 @@ class Uart:
     def _hear(self, byte: int, start_ps: int) -> None:
         for tell in self.host_taps:
             tell(byte, start_ps)
-        if self.disturbance is None:
+        if self.fault_hook is None:
             self._receive(byte, start_ps)
         else:
-            self.disturbance.to_device(byte, start_ps, self._receive)
+            self.fault_hook.to_device(byte, start_ps, self._receive)
 
     def _receive(self, byte: int, start_ps: int) -> None:
         for tap in self.taps:

@@ -6,7 +6,7 @@ from typing import Any
 
 import simpy
 
-from cubestack.emulator.bus.i2c import LONGEST_STRETCH_PS, I2cBus, I2cNackError
+from cubestack.emulator.bus.i2c import LONGEST_STRETCH_PS, I2cBus, I2cError
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injection import Injection, Report
 from cubestack.emulator.faults.table import (
@@ -34,7 +34,7 @@ class LineFaults:
         self._injections: list[Injection] = []
         self._host_free_ps = 0
         self._device_free_ps = 0
-        uart.disturbance = self
+        uart.fault_hook = self
 
     def prepare(self, injection: Injection) -> None:
         """Know of a fault ahead, and after its end: a byte is judged by when it began."""
@@ -53,7 +53,7 @@ class LineFaults:
     def to_host(
         self, data: bytes, first_ps: int, byte_ps: int, line: Callable[[bytes, int, int], None]
     ) -> None:
-        """See Disturbance."""
+        """See FaultHook."""
         last_ps = first_ps + (len(data) - 1) * byte_ps
         near = any(
             injection.start_ps <= last_ps
@@ -72,7 +72,7 @@ class LineFaults:
                 line(bytes([arrived]), arrival_ps, byte_ps)
 
     def to_device(self, byte: int, start_ps: int, hear: Callable[[int, int], None]) -> None:
-        """See Disturbance."""
+        """See FaultHook."""
         arrived, delay_ps = self._disturb(byte, start_ps, "to-device")
         if arrived is None:
             return
@@ -123,7 +123,7 @@ class BusFaults:
         self._env = env
         self._report = report
         self._injections: list[Injection] = []
-        bus.disturbance = self
+        bus.fault_hook = self
 
     def prepare(self, injection: Injection) -> None:
         """Know of a fault ahead."""
@@ -137,7 +137,7 @@ class BusFaults:
         self._injections.remove(injection)
 
     def before_start(self) -> Steps:
-        """See I2cDisturbance. EBUSY: a line was low for longer than a host waits."""
+        """See I2cFaultHook. EBUSY: a line was low for longer than a host waits."""
         give_up_ps = self._env.now + LONGEST_STRETCH_PS
         while (held := self._stuck()) is not None:
             line, injection = held
@@ -145,16 +145,16 @@ class BusFaults:
             until_ps = give_up_ps if injection.end_ps is None else injection.end_ps
             yield self._env.timeout(min(until_ps, give_up_ps) - self._env.now)
             if self._env.now >= give_up_ps:
-                raise I2cNackError(errno.EBUSY, f"I2C line {line} was low for over 1 s")
+                raise I2cError(errno.EBUSY, f"I2C line {line} was low for over 1 s")
 
     def after_address(self, address: int) -> Steps:
-        """See I2cDisturbance."""
+        """See I2cFaultHook."""
         yield from self._lines_free(address)
         if self._nack("address"):
-            raise I2cNackError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
+            raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
 
     def after_byte(self, address: int, read: bool) -> Steps:
-        """See I2cDisturbance."""
+        """See I2cFaultHook."""
         yield from self._lines_free(address)
         for injection in self._acting():
             fault = injection.fault
@@ -165,7 +165,7 @@ class BusFaults:
                 if stretch_ps > LONGEST_STRETCH_PS:
                     raise _timeout(address)
         if not read and self._nack("byte"):
-            raise I2cNackError(errno.EIO, f"I2C device {address:#04x} refused a byte")
+            raise I2cError(errno.EIO, f"I2C device {address:#04x} refused a byte")
 
     def _acting(self) -> list[Injection]:
         return [injection for injection in self._injections if injection.active(self._env.now)]
@@ -183,7 +183,7 @@ class BusFaults:
             line, injection = held
             self._report(self._env.now, injection, f"{line} is low in a transfer")
             if line == "SDA":
-                raise I2cNackError(errno.EAGAIN, "I2C arbitration lost: SDA is held low")
+                raise I2cError(errno.EAGAIN, "I2C arbitration lost: SDA is held low")
             until_ps = give_up_ps if injection.end_ps is None else injection.end_ps
             yield self._env.timeout(min(until_ps, give_up_ps) - self._env.now)
             if self._env.now >= give_up_ps:
@@ -198,7 +198,5 @@ class BusFaults:
         return False
 
 
-def _timeout(address: int) -> I2cNackError:
-    return I2cNackError(
-        errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s"
-    )
+def _timeout(address: int) -> I2cError:
+    return I2cError(errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s")

@@ -7,7 +7,7 @@ from typing import Any
 
 import simpy
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Function
 
@@ -136,7 +136,7 @@ class I2cAdapter:
     def _try(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, int]:
         try:
             yield from self._bus.transfer(messages)
-        except I2cNackError as error:
+        except I2cError as error:
             number = error.errno or errno.EIO
             return -self._errors.get(number, number)
         return 0

@@ -26,7 +26,14 @@ from cubestack.emulator.i2cdev.seccomp.notify import Listener, read_memory
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor, descriptor_range
 from cubestack.emulator.ports.serial_port import poll_now
 
-__all__ = ["Program", "Route", "RouteError", "bus_environment", "start_filtered", "start_preloaded"]
+__all__ = [
+    "GuestProcess",
+    "Route",
+    "RouteError",
+    "bus_environment",
+    "start_filtered",
+    "start_preloaded",
+]
 
 Route = Literal["seccomp", "preload"]
 
@@ -49,7 +56,7 @@ def bus_environment(bus: int, path: str) -> dict[str, str]:
     return {"CUBESTACK_I2C_BUS": str(bus), "CUBESTACK_I2C_SOCKET": path}
 
 
-class Program:
+class GuestProcess:
     """A running program; as a port of the pump it wakes it when the program ends.
 
     Attributes:
@@ -105,7 +112,7 @@ class Program:
 
 def start_filtered(
     command: Sequence[str], environment: dict[str, str], node: DeviceNode, files: Files
-) -> tuple[Program, Supervisor]:
+) -> tuple[GuestProcess, Supervisor]:
     """Start ``command`` under a supervisor, which must be served from now on.
 
     Raises RouteError when the kernel, or whoever runs this container, does not allow it.
@@ -133,10 +140,12 @@ def start_filtered(
         process.wait()
         raise RouteError(answer[1:].decode() or "the launcher failed")
     supervisor = Supervisor(Listener(descriptors[0]), abi, node, numbers, files)
-    return Program(process, command[0], adopts=True), supervisor
+    return GuestProcess(process, command[0], adopts=True), supervisor
 
 
-def start_preloaded(command: Sequence[str], environment: dict[str, str], library: Path) -> Program:
+def start_preloaded(
+    command: Sequence[str], environment: dict[str, str], library: Path
+) -> GuestProcess:
     """Start ``command`` with the shim ``library``; the socket that it will use must be served.
 
     Raises RouteError when nothing can be loaded into it.
@@ -151,7 +160,7 @@ def start_preloaded(command: Sequence[str], environment: dict[str, str], library
     process = subprocess.Popen(
         command, env=os.environ | environment | {"LD_PRELOAD": preload}, close_fds=False
     )
-    return Program(process, command[0])
+    return GuestProcess(process, command[0])
 
 
 def _check_access(process: "subprocess.Popen[bytes]") -> None:

@@ -11,7 +11,7 @@ from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.i2cdev.guest_process import (
-    Program,
+    GuestProcess,
     Route,
     RouteError,
     bus_environment,
@@ -21,11 +21,11 @@ from cubestack.emulator.i2cdev.guest_process import (
 from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers, wait_precisely
 from cubestack.emulator.i2cdev.preload.shim import shim_library
 from cubestack.emulator.i2cdev.remote import RemoteBus
-from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, Turns
+from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, I2cScheduler
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import Endpoint
-from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import Kernel
 
 __all__ = ["HostBus", "attached_bus", "emulated_bus", "run_program"]
@@ -131,7 +131,7 @@ def _emulate(
     pace: Literal["real", "fast"],
     say: Callable[[str], None],
 ) -> None:
-    turns = Turns(
+    turns = I2cScheduler(
         "program and bus",
         bus.kernel,
         adapter,
@@ -140,7 +140,7 @@ def _emulate(
         fast=pace == "fast",
         always_asleep=run.hands_over,
     )
-    pump = Pump(
+    pump = RealtimeScheduler(
         bus.kernel,
         [turns, run],
         lambda: adapter.busy or bus.busy(),
@@ -179,7 +179,7 @@ class _Run:
 
     congested = False
 
-    def __init__(self, program: Program, supervisor: Supervisor | None) -> None:
+    def __init__(self, program: GuestProcess, supervisor: Supervisor | None) -> None:
         self.name = program.name
         self.ports: list[Endpoint] = [supervisor, program] if supervisor else [program]
         self.on_end: Callable[[], None] = lambda: None
@@ -229,7 +229,7 @@ class _Run:
 
 def _start(
     command: Sequence[str], number: int, bus: HostBus, route: Route | None
-) -> tuple[Program, Supervisor | None, str]:
+) -> tuple[GuestProcess, Supervisor | None, str]:
     """The program, its supervisor if it has one, and the route with the reason for it."""
     environment = bus_environment(number, bus.path)
     refused = ""

@@ -22,7 +22,7 @@ from cubestack.emulator.i2cdev.pacing import Watch
 from cubestack.emulator.ports.serial_port import Endpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
 
-__all__ = ["AHEAD_PS", "MAX_DEBT_NS", "SPIN_NS", "TURNAROUND_NS", "Turns"]
+__all__ = ["AHEAD_PS", "MAX_DEBT_NS", "SPIN_NS", "TURNAROUND_NS", "I2cScheduler"]
 
 AHEAD_PS = 2 * PS_PER_MS
 """How far virtual time may be ahead of wall time during a transfer, when it is paced."""
@@ -46,7 +46,7 @@ VISIT_NS = 5_000_000
 PS_PER_NS = 1000
 
 
-class Turns:
+class I2cScheduler:
     """Ports that lead to one bus, as one port of the pump.
 
     Attributes:

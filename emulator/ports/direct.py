@@ -71,7 +71,7 @@ class DirectI2c:
     def i2c_rdwr(self, *messages: Any) -> None:
         """Perform one combined transfer of smbus2 ``i2c_msg`` objects.
 
-        Raises OSError: I2cNackError when something is not acknowledged, EOPNOTSUPP for a message
+        Raises OSError: I2cError when something is not acknowledged, EOPNOTSUPP for a message
         with other flags than that for reading.
         """
         plain = [_to_plain(message) for message in messages]

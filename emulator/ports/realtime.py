@@ -13,7 +13,14 @@ from typing import Literal
 from cubestack.emulator.ports.serial_port import Endpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["IDLE_S", "LAG_REPORT_S", "LAG_WORTH_SAYING_S", "SLICE_S", "Pump", "wait_ready"]
+__all__ = [
+    "IDLE_S",
+    "LAG_REPORT_S",
+    "LAG_WORTH_SAYING_S",
+    "SLICE_S",
+    "RealtimeScheduler",
+    "wait_ready",
+]
 
 SLICE_S = 0.005
 """Wall time between two looks at the ports while events are worked off."""
@@ -45,7 +52,7 @@ def wait_ready(watched: Watched, timeout_s: float) -> None:
     poller.poll(timeout_s * 1000)
 
 
-class Pump:
+class RealtimeScheduler:
     """Runs an environment against endpoints until it is stopped."""
 
     def __init__(

@@ -11,7 +11,7 @@ from typing import IO, Any, Self
 
 import simpy
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.bus.i2c_tap import BusTap
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.sim.virtual_time import Kernel
@@ -137,7 +137,7 @@ class RecordedBus(BusTap):
         start_ps, errno = self._kernel.now, 0
         try:
             yield from self._bus.transfer(messages)
-        except I2cNackError as error:
+        except I2cError as error:
             errno = error.errno or 0
             raise
         finally:

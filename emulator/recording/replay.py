@@ -10,7 +10,7 @@ from typing import Any
 
 import simpy
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.recording import (
@@ -110,7 +110,7 @@ class Replay:
             errno = 0
             try:
                 yield from bus.transfer(messages)
-            except I2cNackError as error:
+            except I2cError as error:
                 errno = error.errno or 0
             found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
             now_ps = self._kernel.now

@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    from cubestack.emulator.ports.realtime import Pump, wait_ready
+    from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
@@ -122,12 +122,12 @@ def run(args: argparse.Namespace) -> int:
         wait, clock_ns = wait_ready, time.monotonic_ns
         if args.i2c is not None:
             from cubestack.emulator.i2cdev.pacing import sharpen_timers, wait_precisely
-            from cubestack.emulator.i2cdev.scheduler import Turns
+            from cubestack.emulator.i2cdev.scheduler import I2cScheduler
             from cubestack.emulator.i2cdev.server import I2cServer
 
             server = I2cServer(socket_path(args.i2c), adapter)
             stack.callback(server.close)
-            turns = Turns(
+            turns = I2cScheduler(
                 server.name, kernel, adapter, [server], devices_busy, fast=args.pace == "fast"
             )
             stack.callback(turns.close)
@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
             sharpen_timers()
             wait, clock_ns = wait_precisely, turns.clock_ns
 
-        pump = Pump(
+        pump = RealtimeScheduler(
             kernel,
             endpoints,
             lambda: adapter.busy or devices_busy(),

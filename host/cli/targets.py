@@ -13,7 +13,7 @@ from cubestack.host.devices.boards import DEVICES
 from cubestack.host.devices.controls import BoardControls
 from cubestack.host.devices.targets import INTERFACES, Target, interface_of, open_target, with_i2c
 from cubestack.host.errors import TargetError
-from cubestack.host.recording.host_recorder import Tape
+from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.setups import emulated_setup, taped_setup
 
 __all__ = ["add_target_arguments", "open_any_target"]
@@ -58,7 +58,7 @@ def _open_taped(text: str, args: argparse.Namespace) -> Target:
     with ExitStack() as stack:
         tape = None
         if args.record is not None:
-            tape = Tape(create_file(args.record, stack), taped_setup(text))
+            tape = HostRecorder(create_file(args.record, stack), taped_setup(text))
         target = open_target(text, args.device, bench=args.bench, baud=args.baud, tape=tape)
         target.on_close.insert(0, stack.pop_all().close)
         return target

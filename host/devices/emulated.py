@@ -185,14 +185,14 @@ class EmulatedDevice(Generic[C]):
         subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
         """
         from cubestack.emulator.ports.endpoint import PtyEndpoint
-        from cubestack.emulator.ports.realtime import Pump
+        from cubestack.emulator.ports.realtime import RealtimeScheduler
 
         self._client = None
         with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
             port = Path(folder) / "tty"
             endpoint = PtyEndpoint(port, self.board.uart)
             try:
-                pump = Pump(self.board.kernel, [endpoint], self.board.busy, pace=pace)
+                pump = RealtimeScheduler(self.board.kernel, [endpoint], self.board.busy, pace=pace)
                 words = [str(word).replace(PORT, str(port)) for word in command]
                 program = subprocess.Popen(
                     words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

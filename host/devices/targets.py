@@ -31,7 +31,7 @@ from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.errors import PortOpenError, TargetError
-from cubestack.host.recording.host_recorder import Tape
+from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 from cubestack.host.transport.streams import Transport, open_transport
 
@@ -122,7 +122,7 @@ def open_target(
     *,
     bench: str | None = None,
     baud: int | None = None,
-    tape: Tape | None = None,
+    tape: HostRecorder | None = None,
 ) -> Target:
     """Open the target that ``text`` names.
 
@@ -159,7 +159,7 @@ def open_target(
     return target
 
 
-def _open_bench(target: Target, text: str, tape: Tape | None) -> int:
+def _open_bench(target: Target, text: str, tape: HostRecorder | None) -> int:
     """Open the line with the bench protocol; returns its baud rate."""
     if target.interface.bench is None:
         target.close()
@@ -179,7 +179,7 @@ def with_i2c(
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 
 
-def _open_i2c(text: str, device: str | None, tape: Tape | None) -> Target:
+def _open_i2c(text: str, device: str | None, tape: HostRecorder | None) -> Target:
     bus_text, _, address_text = text.removeprefix(I2C).partition(":")
     try:
         number = int(bus_text)

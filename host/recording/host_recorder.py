@@ -21,7 +21,7 @@ from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.clients.i2c import I2cBus
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["Tape"]
+__all__ = ["HostRecorder"]
 
 PS_PER_NS = 1000
 PS_PER_S = 10**12
@@ -29,7 +29,7 @@ BITS_PER_BYTE = 10
 I2C_M_RD = 0x0001
 
 
-class Tape:
+class HostRecorder:
     """Stands between a host tool and its lines and bus."""
 
     def __init__(
@@ -72,7 +72,7 @@ class Tape:
 
 
 class _TapedLine:
-    def __init__(self, tape: Tape, transport: Transport, port: str, byte_ps: int) -> None:
+    def __init__(self, tape: HostRecorder, transport: Transport, port: str, byte_ps: int) -> None:
         self._tape = tape
         self._transport = transport
         self._port = port
@@ -100,7 +100,7 @@ class _TapedLine:
 
 
 class _TapedBus:
-    def __init__(self, tape: Tape, bus: I2cBus) -> None:
+    def __init__(self, tape: HostRecorder, bus: I2cBus) -> None:
         self._tape = tape
         self._bus = bus
 

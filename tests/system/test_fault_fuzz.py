@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.bus.i2c import I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c import I2cError, I2cMessage
 from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
@@ -207,7 +207,7 @@ class Fuzzer:
             messages.append(I2cMessage(address, read=int(self.rng.integers(1, 30))))
         try:
             self.kernel.run(until=self.kernel.process(self.board.i2c_bus.transfer(messages)))
-        except I2cNackError as error:
+        except I2cError as error:
             self.trace.update(b"%d" % (error.errno or 0))
         for message in messages:
             self.trace.update(bytes(message.data))

@@ -10,7 +10,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from cubestack.emulator.boards.cubesense.gpio import Lines
+from cubestack.emulator.boards.cubesense.gpio import GpioPins
 from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.bus.uart import Uart
@@ -117,7 +117,7 @@ class CubeSenseBoard:
         for camera in Camera:
             self._scramble(Sram(camera))
             self._connect(camera)
-        self._lines = Lines(self.kernel, self.cameras, self.power)
+        self._lines = GpioPins(self.kernel, self.cameras, self.power)
         self.power.on_switch = self._supply_switched
         self._commanded: dict[Camera, Action] = dict.fromkeys(Camera, Action.STANDBY)
         self._storing_since_ps: dict[Camera, int] = {}

@@ -17,7 +17,7 @@ from cubestack.firmware_model.interface.cubesense.pins import (
     SRAM_POWER,
 )
 
-__all__ = ["CHANNELS", "Lines"]
+__all__ = ["CHANNELS", "GpioPins"]
 
 #: Load switch of the power table behind each switching pin.
 CHANNELS = {
@@ -31,7 +31,7 @@ _CONTROL = {
 }
 
 
-class Lines:
+class GpioPins:
     """Camera control lines and load switches; see ``emulator.sim.processor.Pins``."""
 
     def __init__(self, env: Kernel, cameras: Mapping[Camera, Ov7620], power: PowerModel) -> None:

@@ -4,7 +4,7 @@ import errno
 
 import pytest
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.sim.virtual_time import Kernel
@@ -68,7 +68,7 @@ def test_a_lost_bus_is_tried_again(kernel, bus, adapter, retries, timeout, tries
         tried.append(kernel.now)
         yield kernel.timeout(1)
         if len(tried) < 4:
-            raise I2cNackError(errno.EAGAIN, "another master was quicker")
+            raise I2cError(errno.EAGAIN, "another master was quicker")
         yield from plain(messages)
 
     bus.transfer = transfer

@@ -1,4 +1,4 @@
-"""Turns with programs, in a made-up wall time: when their answers come."""
+"""I2cScheduler with programs, in a made-up wall time: when their answers come."""
 
 import heapq
 import itertools
@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
 from cubestack.emulator.i2cdev import scheduler as turns
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
-from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, Turns
-from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, I2cScheduler
+from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import Kernel
 
 US = 1000
@@ -96,7 +96,7 @@ class Port:
     def close(self) -> None: ...
 
 
-class Program:
+class GuestProcess:
     """Calls again and again, as often as it has messages.
 
     Attributes:
@@ -150,7 +150,7 @@ class Program:
 
 
 class Bench:
-    """Turns and a pump in a world."""
+    """I2cScheduler and a pump in a world."""
 
     def __init__(
         self,
@@ -168,8 +168,8 @@ class Bench:
         self.adapter = I2cAdapter(self.kernel, bus)
         self.running = 0
         port = Port(self.world)
-        self.turns = Turns("calls", self.kernel, self.adapter, [port], busy, fast=fast)
-        self.pump = Pump(
+        self.turns = I2cScheduler("calls", self.kernel, self.adapter, [port], busy, fast=fast)
+        self.pump = RealtimeScheduler(
             self.kernel,
             [self.turns, port],
             lambda: self.adapter.busy or busy(),
@@ -193,12 +193,12 @@ class Bench:
         ],
         *,
         wait_ns: int = 0,
-    ) -> Program:
+    ) -> GuestProcess:
         """One that starts after ``wait_ns``."""
         self.running += 1
-        return Program(self, wait_ns, think_ns, calls, message)
+        return GuestProcess(self, wait_ns, think_ns, calls, message)
 
-    def quick_and_slow(self, think_ns: int, calls: int) -> Program:
+    def quick_and_slow(self, think_ns: int, calls: int) -> GuestProcess:
         """A program that shows how long the way of a call is, then another one."""
         self.program(think_ns=0, calls=3)
         return self.program(think_ns, calls, wait_ns=1_000 * US)

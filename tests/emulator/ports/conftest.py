@@ -18,7 +18,7 @@ import pytest
 
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.realtime import Pump, wait_ready
+from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
 from cubestack.emulator.ports.serial_port import Endpoint
 from cubestack.emulator.sim.virtual_time import Kernel
 
@@ -194,7 +194,7 @@ def connection_to() -> type[Connection]:
 
 @contextlib.contextmanager
 def _served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
-    pump = Pump(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
+    pump = RealtimeScheduler(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
     thread = threading.Thread(target=pump.run)
     thread.start()
     try:

@@ -14,7 +14,7 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
@@ -170,7 +170,7 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path, terminal_at, connec
         desk.clients["i2c", "stopped"].write(READ_BYTES[:-1])
         got = dict.fromkeys((*SERIAL, "i2c"), 0)
         steps = 0
-        pump = Pump(
+        pump = RealtimeScheduler(
             desk.kernel,
             [*desk.ports.values(), desk.server],
             desk.busy,
@@ -225,7 +225,7 @@ def test_two_lines_of_a_device_at_once(tmp_path, terminal_at):
         clients = [terminal_at(tmp_path / name) for name in ("tty", "tty.bench")]
         for thing in (*ports, *clients):
             stack.callback(thing.close)
-        pump = Pump(
+        pump = RealtimeScheduler(
             kernel,
             ports,
             lambda: node.uart.busy or bench.uart.busy,

@@ -5,7 +5,7 @@ import errno
 import pytest
 from smbus2 import i2c_msg
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cError
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
@@ -136,12 +136,12 @@ def test_every_byte_value_survives(i2c, memory):
 def test_missing_device_is_an_os_error(i2c):
     with pytest.raises(OSError, match="0x30") as raised:
         i2c.i2c_rdwr(i2c_msg.read(0x30, 1))
-    assert isinstance(raised.value, I2cNackError)
+    assert isinstance(raised.value, I2cError)
     assert raised.value.errno == errno.ENXIO
 
 
 def test_bus_works_after_a_refused_byte(i2c, memory):
-    with pytest.raises(I2cNackError, match="refused byte 0x63"):
+    with pytest.raises(I2cError, match="refused byte 0x63"):
         i2c.i2c_rdwr(i2c_msg.write(0x1A, [99]))
     i2c.i2c_rdwr(i2c_msg.write(0x1A, [0, 7]))
     assert memory.registers[0] == 7

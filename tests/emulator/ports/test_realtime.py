@@ -10,7 +10,13 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.realtime import IDLE_S, LAG_REPORT_S, SLICE_S, Pump, wait_ready
+from cubestack.emulator.ports.realtime import (
+    IDLE_S,
+    LAG_REPORT_S,
+    SLICE_S,
+    RealtimeScheduler,
+    wait_ready,
+)
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
 NS_PER_MS = 1_000_000
@@ -82,7 +88,7 @@ class Bench:
 
     def run(self, pace: Any, wall_ms: float) -> "Bench":
         """Let the pump serve for so long on the test's clock."""
-        pump = Pump(
+        pump = RealtimeScheduler(
             self.kernel,
             [self.port],
             lambda: self.busy(),
@@ -261,13 +267,13 @@ def test_busy_device_without_events_does_not_make_the_pump_spin(bench):
 
 
 def test_stop_before_the_start():
-    pump = Pump(Kernel(), [], lambda: False, pace="real")
+    pump = RealtimeScheduler(Kernel(), [], lambda: False, pace="real")
     pump.stop()
     pump.run()
 
 
 def test_stop_from_a_signal_handler(bench):
-    pump = Pump(
+    pump = RealtimeScheduler(
         bench.kernel,
         [],
         lambda: False,
@@ -284,7 +290,7 @@ def test_stop_from_a_signal_handler(bench):
 @pytest.mark.parametrize("pace", ["real", "fast"])
 def test_stop_from_another_thread_while_the_device_is_busy(bench, pace):
     bench.tick(PS_PER_MS)
-    pump = Pump(bench.kernel, [], lambda: True, pace=pace)
+    pump = RealtimeScheduler(bench.kernel, [], lambda: True, pace=pace)
     thread = threading.Thread(target=pump.run)
     thread.start()
     pump.stop()

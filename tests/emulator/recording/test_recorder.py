@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cNackError
+from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.recording.recorder import Recorder
@@ -125,7 +125,7 @@ def test_failed_transfer_is_on_record(tmp_path):
     device, stream = Device(), io.StringIO()
     with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
         bus = recorder.bus(device.kernel, device.bus)
-        with pytest.raises(I2cNackError):
+        with pytest.raises(I2cError):
             device.kernel.run(
                 device.kernel.process(bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))]))
             )
@@ -182,7 +182,7 @@ class Losing:
 
 def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
     device, stream = Device(), io.StringIO()
-    device.uart.disturbance = Losing()
+    device.uart.fault_hook = Losing()
     with Recorder(stream, "cubesense", {"uart": device.uart}):
         device.uart.host_writes(b"abcd")
         device.kernel.run()
@@ -191,7 +191,7 @@ def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
     assert recording.sent("uart", "host")[0] == b"abcd"
     assert recording.sent("uart", "device")[0] == b"bd"
     again = Device()
-    again.uart.disturbance = Losing()
+    again.uart.fault_hook = Losing()
     assert again.replay(recording) == []
     assert len(Device().replay(recording)) == 1
 

@@ -10,7 +10,7 @@ import pytest
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
-from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.formats.linux_i2c import socket_path
@@ -51,7 +51,9 @@ def serving(kind, folder):
             port = make("127.0.0.1", 0, board.uart)
             target = port.name
         stack.callback(port.close)
-        pump = Pump(board.kernel, [port], lambda: board.busy() or adapter.busy, pace="fast")
+        pump = RealtimeScheduler(
+            board.kernel, [port], lambda: board.busy() or adapter.busy, pace="fast"
+        )
         thread = threading.Thread(target=pump.run)
         thread.start()
         stack.callback(thread.join, TIMEOUT_S)

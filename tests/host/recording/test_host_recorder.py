@@ -12,7 +12,7 @@ from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import RecordingMismatchError
-from cubestack.host.recording.host_recorder import Tape
+from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 
 
@@ -33,8 +33,8 @@ def stream() -> io.StringIO:
 
 
 @pytest.fixture
-def tape(stream) -> Tape:
-    made = Tape(stream, clock_ns=Clock())
+def tape(stream) -> HostRecorder:
+    made = HostRecorder(stream, clock_ns=Clock())
     made.begin("cubestar", {"uart": 57_600})
     return made
 

@@ -20,7 +20,7 @@ from .conftest import NADIR_DEG, SUN_DEG
 TURNS = 6
 
 Wire = list[tuple[bytes, int, int]]
-Turns = list[dict[Camera, Measurement]]
+I2cScheduler = list[dict[Camera, Measurement]]
 
 
 def turning(seed: int = 1, **others: Any) -> EarthSunScene:
@@ -29,11 +29,11 @@ def turning(seed: int = 1, **others: Any) -> EarthSunScene:
     )
 
 
-def loop(session: CubeSenseSession, turns: int = TURNS) -> Turns:
+def loop(session: CubeSenseSession, turns: int = TURNS) -> I2cScheduler:
     """Read both results every second; the memories change places from turn to turn."""
     cubesense, kernel = session.cubesense, session.board.kernel
     cubesense.client.pause(0.3)
-    found: Turns = []
+    found: I2cScheduler = []
     for turn in range(turns + 1):
         due = kernel.now + PS_PER_S
         found.append(

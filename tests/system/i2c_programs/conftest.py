@@ -15,7 +15,7 @@ from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.pacing import wait_precisely
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.ports.realtime import Pump
+from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.host.devices.boards import open_board
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
@@ -68,7 +68,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     board.i2c_bus.attach(LATCH, Latch(), general_call=True)
     adapter = I2cAdapter(board.kernel, board.i2c_bus)
     server = I2cServer(path, adapter)
-    pump = Pump(
+    pump = RealtimeScheduler(
         board.kernel,
         [server],
         lambda: board.busy() or adapter.busy,
