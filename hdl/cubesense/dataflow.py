@@ -15,7 +15,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESSING_COMMANDS,
     COMMANDS,
     Action,
-    Command,
+    FpgaCommand,
     actions,
     link_shows_enables,
 )
@@ -73,7 +73,7 @@ class DataflowControl(Component):
             Action.SEND_EDGE: self.send_edge,
             Action.PASS_EDGE: self.pass_edge,
         }
-        commands: tuple[Command, ...] = COMMANDS
+        commands: tuple[FpgaCommand, ...] = COMMANDS
         if self._mcu_addressing:
             commands += ADDRESSING_COMMANDS
             outputs[Action.TAKE_ADDRESS] = self.take_address
@@ -86,7 +86,7 @@ class DataflowControl(Component):
                     m.d.comb += outputs[action].eq(1)
         return m
 
-    def _fits(self, command: Command) -> Value:
+    def _fits(self, command: FpgaCommand) -> Value:
         """Whether the lines are at the levels of a row.
 
         The other enable is no input at all where it makes no difference, so that it can not disturb
@@ -112,7 +112,7 @@ class DataflowControl(Component):
         own = [row for row in rows if getattr(row.actions, self._side) is not Action.STANDBY]
         return Cat(self._fits(row) for row in own).any()
 
-    def _other_matters(self, command: Command) -> bool:
+    def _other_matters(self, command: FpgaCommand) -> bool:
         """Whether this FPGA sees the other enable, and would act otherwise at its other level."""
         shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
         enables = [command.sunen, command.naden]

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from cubestack.host.devices.targets import Controls, Target
-from cubestack.host.shell.result import Command, Result, ShellError, check_count, to_number
+from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
 
 __all__ = ["LOG", "ON_OFF", "ControlCommands"]
 
@@ -24,18 +24,18 @@ class ControlCommands:
         """Use ``target``, which stays its owner's."""
         self._target = target
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[ShellCommand]:
         """What they are called."""
         return [
-            Command(SCENE, "show another scene", self._scene, True),
-            Command(
+            ShellCommand(SCENE, "show another scene", self._scene, True),
+            ShellCommand(
                 FAULT,
                 "let something break; fault clear, fault log",
                 self._fault,
                 True,
             ),
-            Command(POWER, "supply currents, load switches", self._power, True),
-            Command(TIME, "virtual time; let it pass", self._time, True),
+            ShellCommand(POWER, "supply currents, load switches", self._power, True),
+            ShellCommand(TIME, "virtual time; let it pass", self._time, True),
         ]
 
     def _scene(self, words: list[str]) -> Result:

@@ -15,7 +15,7 @@ from cubestack.host.shell.controls import ControlCommands
 from cubestack.host.shell.lines import LineCommands
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.registers import RegisterCommands
-from cubestack.host.shell.result import Command, Result, ShellError
+from cubestack.host.shell.result import Result, ShellCommand, ShellError
 
 __all__ = ["Result", "Shell", "ShellError"]
 
@@ -37,7 +37,7 @@ class Shell:
             *self._registers.commands(),
             *LineCommands(target).commands(),
             *ControlCommands(target).commands(),
-            Command("help", "this list", self._help),
+            ShellCommand("help", "this list", self._help),
         ]
         self.commands = {command.name: command for command in commands}
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from cubestack.host.devices.targets import Target
 from cubestack.host.shell.picture import download
-from cubestack.host.shell.result import Command, Result, ShellError, check_count
+from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count
 from cubestack.host.transport.streams import Transport
 
 __all__ = ["LineCommands"]
@@ -29,12 +29,12 @@ class LineCommands:
         """Use ``target``, which stays its owner's."""
         self._target = target
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[ShellCommand]:
         """What they are called."""
         return [
-            Command(IMAGE, "download the picture", self._image),
-            Command(BENCH, "a letter of the bench protocol", self._bench),
-            Command(RAW, "send bytes, show what comes", self._raw),
+            ShellCommand(IMAGE, "download the picture", self._image),
+            ShellCommand(BENCH, "a letter of the bench protocol", self._bench),
+            ShellCommand(RAW, "send bytes, show what comes", self._raw),
         ]
 
     def _image(self, words: list[str]) -> Result:

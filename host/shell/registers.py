@@ -10,7 +10,14 @@ from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
 from cubestack.host.shell.names import Names, has_side_effect, number_of
-from cubestack.host.shell.result import Command, Result, ShellError, check_count, plain, to_number
+from cubestack.host.shell.result import (
+    Result,
+    ShellCommand,
+    ShellError,
+    check_count,
+    plain,
+    to_number,
+)
 from cubestack.host.shell.values import parse_value, parse_values
 
 __all__ = ["RegisterCommands"]
@@ -39,14 +46,14 @@ class RegisterCommands:
         self._target = target
         self._names = names
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[ShellCommand]:
         """What they are called."""
         return [
-            Command(READ, "a telemetry frame or register; NAME may be a number", self._read),
-            Command(WRITE, "send a telecommand, write a register", self._write),
-            Command(WATCH, "read again and again", self._watch),
-            Command(DUMP, "read all telemetry that has no side effect", self._dump),
-            Command(LIST, "what there is, or the fields of one", self._list),
+            ShellCommand(READ, "a telemetry frame or register; NAME may be a number", self._read),
+            ShellCommand(WRITE, "send a telecommand, write a register", self._write),
+            ShellCommand(WATCH, "read again and again", self._watch),
+            ShellCommand(DUMP, "read all telemetry that has no side effect", self._dump),
+            ShellCommand(LIST, "what there is, or the fields of one", self._list),
         ]
 
     def _read(self, words: list[str]) -> Result:

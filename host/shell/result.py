@@ -6,7 +6,7 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.field import Value
 
-__all__ = ["Command", "Result", "ShellError", "check_count", "plain", "to_number"]
+__all__ = ["Result", "ShellCommand", "ShellError", "check_count", "plain", "to_number"]
 
 GREATEST = 1e9
 """Of a number on a line."""
@@ -30,7 +30,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Command:
+class ShellCommand:
     """A command of the shell: how it is called, what it does, and what it needs."""
 
     usage: str

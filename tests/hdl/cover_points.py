@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESSING_COMMANDS,
     COMMANDS,
     Action,
-    Command,
+    FpgaCommand,
 )
 
 #: What a writer can be doing when it is stopped. "Reset" is the two clocks after it was started.
@@ -76,7 +76,7 @@ SIDES = ("sun", "nadir")
 Point = tuple[str, ...]
 
 
-def name_of(command: Command) -> str:
+def name_of(command: FpgaCommand) -> str:
     """A row of the command table as its levels: SHIFT EDGE RNW SUNEN NADEN."""
     levels = (command.shift, command.edge, command.rnw, command.sunen, command.naden)
     return "".join("x" if level is None else str(level) for level in levels)
@@ -146,7 +146,7 @@ def _takes(side: str, action: Action, state: str) -> bool:
     return state in states_of(side, action)
 
 
-def _acts(command: Command) -> set[Action]:
+def _acts(command: FpgaCommand) -> set[Action]:
     return {command.actions.sun, command.actions.nadir}
 
 

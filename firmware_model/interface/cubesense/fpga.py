@@ -20,7 +20,7 @@ __all__ = [
     "SUN_THRESHOLD",
     "Action",
     "Actions",
-    "Command",
+    "FpgaCommand",
     "ReadOut",
     "actions",
     "address_bytes",
@@ -51,7 +51,7 @@ class Actions(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Command:
+class FpgaCommand:
     """One row of the command table: levels of the control lines, None for either level.
 
     The two enables are low active.
@@ -75,18 +75,18 @@ _IDLE = Action.STANDBY
 
 #: Table 6.4. The last row is ours: the table leaves it open, table 7.1 has both cameras imaging.
 COMMANDS = (
-    Command(None, None, None, 1, 1, Actions(_IDLE, _IDLE)),
-    Command(0, 0, 0, 0, 1, Actions(Action.STORE, _IDLE)),
-    Command(0, 0, 0, 1, 0, Actions(_IDLE, Action.STORE)),
-    Command(0, 0, 1, 0, 1, Actions(Action.READ, _IDLE)),
-    Command(0, 0, 1, 1, 0, Actions(_IDLE, Action.READ)),
-    Command(0, 1, 1, 0, 1, Actions(Action.EDGE, _IDLE)),
-    Command(0, 1, 1, 1, 0, Actions(_IDLE, Action.EDGE)),
-    Command(1, 0, 0, 0, 0, Actions(Action.SEND_PICTURE, Action.STORE_OTHER)),
-    Command(1, 0, 1, 0, 0, Actions(Action.STORE_OTHER, Action.SEND_PICTURE)),
-    Command(1, 1, 0, 0, 0, Actions(Action.PASS_EDGE, Action.SEND_EDGE)),
-    Command(1, 1, 1, 0, 0, Actions(Action.SEND_EDGE, Action.PASS_EDGE)),
-    Command(0, 0, 0, 0, 0, Actions(Action.STORE, Action.STORE)),
+    FpgaCommand(None, None, None, 1, 1, Actions(_IDLE, _IDLE)),
+    FpgaCommand(0, 0, 0, 0, 1, Actions(Action.STORE, _IDLE)),
+    FpgaCommand(0, 0, 0, 1, 0, Actions(_IDLE, Action.STORE)),
+    FpgaCommand(0, 0, 1, 0, 1, Actions(Action.READ, _IDLE)),
+    FpgaCommand(0, 0, 1, 1, 0, Actions(_IDLE, Action.READ)),
+    FpgaCommand(0, 1, 1, 0, 1, Actions(Action.EDGE, _IDLE)),
+    FpgaCommand(0, 1, 1, 1, 0, Actions(_IDLE, Action.EDGE)),
+    FpgaCommand(1, 0, 0, 0, 0, Actions(Action.SEND_PICTURE, Action.STORE_OTHER)),
+    FpgaCommand(1, 0, 1, 0, 0, Actions(Action.STORE_OTHER, Action.SEND_PICTURE)),
+    FpgaCommand(1, 1, 0, 0, 0, Actions(Action.PASS_EDGE, Action.SEND_EDGE)),
+    FpgaCommand(1, 1, 1, 0, 0, Actions(Action.SEND_EDGE, Action.PASS_EDGE)),
+    FpgaCommand(0, 0, 0, 0, 0, Actions(Action.STORE, Action.STORE)),
 )
 
 #: Rows that a board with address control from the microcontroller has besides, out of those that
@@ -94,10 +94,10 @@ COMMANDS = (
 #: between the two, with an enable low: no other row is crossed, and the address is kept. The
 #: microcontroller may drive the data bus while SHIFT and RNW are both low: no FPGA does then.
 ADDRESSING_COMMANDS = (
-    Command(0, 1, 0, 0, 1, Actions(Action.TAKE_ADDRESS, _IDLE)),
-    Command(0, 1, 0, 1, 0, Actions(_IDLE, Action.TAKE_ADDRESS)),
-    Command(1, 1, 0, 0, 1, Actions(Action.READ_FROM, _IDLE)),
-    Command(1, 1, 0, 1, 0, Actions(_IDLE, Action.READ_FROM)),
+    FpgaCommand(0, 1, 0, 0, 1, Actions(Action.TAKE_ADDRESS, _IDLE)),
+    FpgaCommand(0, 1, 0, 1, 0, Actions(_IDLE, Action.TAKE_ADDRESS)),
+    FpgaCommand(1, 1, 0, 0, 1, Actions(Action.READ_FROM, _IDLE)),
+    FpgaCommand(1, 1, 0, 1, 0, Actions(_IDLE, Action.READ_FROM)),
 )
 
 

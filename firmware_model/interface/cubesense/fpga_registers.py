@@ -24,7 +24,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     FULL_SIZE,
     Action,
     Actions,
-    Command,
+    FpgaCommand,
     ReadOut,
     address_bytes,
 )
@@ -152,7 +152,7 @@ REGISTERS = tuple(
 #: in turn; that row is ours, as are the addresses.
 I2C_COMMANDS = (
     *(command for command in COMMANDS if not command.edge),
-    Command(0, 0, 1, 0, 0, Actions(Action.READ, Action.READ)),
+    FpgaCommand(0, 0, 1, 0, 0, Actions(Action.READ, Action.READ)),
 )
 
 

@@ -13,7 +13,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import Component, In, Out
 from amaranth.utils import ceil_log2
 
-from cubestack.firmware_model.interface.cubesense.fpga import Action, Command, ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import Action, FpgaCommand, ReadOut
 from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     ADDRESSES,
     GROUP_ADDRESS,
@@ -135,7 +135,7 @@ class CubeSenseI2cRegisters(Component):
         m.d.comb += target.value.eq(reduce(or_, selected))
         return m
 
-    def _fits(self, command: Signal, row: Command) -> Value:
+    def _fits(self, command: Signal, row: FpgaCommand) -> Value:
         """Whether the command's bits are at the levels of a row.
 
         The other enable is no input where it makes no difference, so that it can not disturb a
