@@ -18,18 +18,17 @@ def firmware_probes(board: Any) -> dict[str, Probe]:
         "awake": lambda: int(not processor.dozing),
         "resets": lambda: int(processor.resets),
     }
-    state = getattr(board.program, "_state", None)
+    state = getattr(board.program, "state", None)
     if hasattr(state, "task_status"):
-        probes["task"] = lambda: TaskStatus(board.program._state.task_status).name
+        probes["task"] = lambda: TaskStatus(board.program.state.task_status).name
     if hasattr(state, "sensor"):
-        probes["task"] = lambda: SensorState(board.program._state.sensor).name
+        probes["task"] = lambda: SensorState(board.program.state.sensor).name
         probes["measurement"] = lambda: (
-            MeasurementOutcome(board.program._state.measurement.outcome).name
+            MeasurementOutcome(board.program.state.measurement.outcome).name
         )
-    results = getattr(getattr(board.program, "node", None), "_state", None)
-    if hasattr(results, "results"):
+    if hasattr(state, "results"):
         for camera in Camera:
-            probes |= _camera_probes(camera, lambda: board.program.node._state)
+            probes |= _camera_probes(camera, lambda: board.program.state)
     return probes
 
 

@@ -33,11 +33,12 @@ class AramisProgram:
     Attributes:
         link: the satellite's interface; its methods are the UART and I2C interrupts.
         commands: the telecommands.
+        state: what the program remembers; traces read it.
     """
 
     def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
         """Reset: settings from flash, everything else anew."""
-        self._state = state = State(hardware.flash)
+        self.state = state = State(hardware.flash)
         self._camera = Camera(hardware, state, meter)
         self._catalogue = CatalogueStore(hardware, meter)
         self._measuring = Measuring(meter, state, self._camera, self._catalogue)
@@ -66,7 +67,7 @@ class AramisProgram:
         while True:
             if (yield from self._serve()):
                 continue
-            if self._state.looping:
+            if self.state.looping:
                 yield from self._iteration()
             else:
                 yield from self._idle(None)
@@ -84,7 +85,7 @@ class AramisProgram:
 
     def _iteration(self) -> Routine[None]:
         """One turn of the loop, at its time."""
-        state = self._state
+        state = self.state
         now_us: int = yield ReadTimer()
         if now_us < state.loop_due_us:
             yield from self._idle(state.loop_due_us)
@@ -113,11 +114,11 @@ class AramisProgram:
 
     def _reload_due_us(self) -> int | None:
         """When the next reload is to begin, or when one that has begun is to go on; None: never."""
-        if not self._state.active:
+        if not self.state.active:
             return None
         if self._catalogue.loading:
             return 0
-        period_s = int(self._state.settings.get("SetReloadPeriod", "Period"))
+        period_s = int(self.state.settings.get("SetReloadPeriod", "Period"))
         if not period_s or self._catalogue.loaded_us is None:
             return None
         return self._catalogue.loaded_us + 1_000_000 * period_s

@@ -38,13 +38,14 @@ class CubeSenseProgram:
         acquisition: what comes from the FPGAs.
         commands: what jobs do.
         idle: nothing waits to be done.
+        state: what the program remembers; traces read it.
     """
 
     def __init__(self, hardware: CubeSenseHardware, meter: Meter) -> None:
         """Reset: RAM starts with the declared reset values."""
         self.idle = False
         self._hardware = hardware
-        state = State()
+        self.state = state = State()
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
         self.acquisition = acquisition = Acquisition(hardware, meter, self._supply)

@@ -39,6 +39,7 @@ class CubeStarProgram:
         link: the satellite's interface; its methods are the UART and I2C interrupts.
         supply: supply monitor; its ``overcurrent`` is the comparators' interrupt.
         commands: the telecommands.
+        state: what the program remembers; traces read it.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class CubeStarProgram:
     ) -> None:
         """Reset: set up RAM from the retention registers and flash."""
         self._hardware = hardware
-        self._state = state = State(hardware)
+        self.state = state = State(hardware)
         self._phases = Phases(state)
         self.supply = SupplyMonitor(hardware, state)
         self._pictures = pictures_of(layout, hardware, state, meter, self.supply)
@@ -77,7 +78,7 @@ class CubeStarProgram:
         """Run until a reset."""
         yield from self._phases.started()
         yield from self._pictures.start()
-        retained = self._state.retained
+        retained = self.state.retained
         if self._hardware.reset_cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
             yield from self._capture.sensor.power_up()
         while True:
@@ -101,19 +102,19 @@ class CubeStarProgram:
 
     def _reset(self, cause: ResetCause) -> Routine[None]:
         yield Pay()  # so that nothing can happen between the next line and the reset
-        self._state.retained.reset_us = yield ReadTimer()
-        self._state.retain()
+        self.state.retained.reset_us = yield ReadTimer()
+        self.state.retain()
         yield Reset(cause)
 
     def _iteration(self) -> Routine[None]:
         """One turn of the loop; it starts when the last one's second is over."""
-        retained = self._state.retained
+        retained = self.state.retained
         yield from self._wait_until(retained.loop_due_us)
         if not retained.looping:
             return
         started_us: int = yield ReadTimer()
         if started_us > retained.loop_due_us + LATE_US:
-            self._state.raise_flag("TimingError")
+            self.state.raise_flag("TimingError")
             retained.loop_due_us = started_us
         retained.loop_due_us += self._pictures.iteration_us
         retained.delaying = 0
@@ -139,7 +140,7 @@ class CubeStarProgram:
 
         Returns at once when the loop is stopped. Telecommands go before the next iteration.
         """
-        while self._state.retained.looping:
+        while self.state.retained.looping:
             served = yield from self._serve()
             now_us: int = yield ReadTimer()
             if now_us >= due_us and not self.link.queue:
