@@ -81,7 +81,7 @@ def _json(interface: Interface) -> str:
                 "name": message.name,
                 "length": message.length,
                 "meaning": message.meaning,
-                "ours": message.ours,
+                "ours": message.extension,
                 "steps": message.steps,
                 "supported": message.supported,
                 "ordered": message.ordered,
@@ -127,7 +127,7 @@ def _meaning(message: Message) -> str:
     notes = [
         text
         for applies, text in (
-            (message.ours, "our extension"),
+            (message.extension, "our extension"),
             (message.steps, "steps to the next record at each read and wraps"),
             (not message.supported, "not supported"),
         )

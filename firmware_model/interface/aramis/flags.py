@@ -1,10 +1,8 @@
-"""AraMiS' error flags, all ours: one declaration for telemetry ErrorFlags."""
+"""AraMiS' error flags, all assumed: one declaration for telemetry ErrorFlags."""
 
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
-__all__ = ["FLAG_BYTES", "FLAG_NAMES", "flag_fields"]
-
-FLAG_BYTES = 4
+__all__ = ["FLAG_NAMES", "flag_fields"]
 
 #: Name to bit and cause.
 _FLAGS = {
@@ -38,6 +36,4 @@ FLAG_NAMES = frozenset(_FLAGS)
 
 def flag_fields() -> tuple[Field, ...]:
     """Fields of telemetry ErrorFlags."""
-    return tuple(
-        Field(name, "bool1", bit, cause, flag=name) for name, (bit, cause) in _FLAGS.items()
-    )
+    return flags_at((bit, name, cause, name) for name, (bit, cause) in _FLAGS.items())

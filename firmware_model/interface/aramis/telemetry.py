@@ -1,7 +1,7 @@
 """AraMiS' telemetry: the answers of the thesis' use cases, then reports.
 
 AraMiS thesis, section 2.2: an attitude quaternion with the time of its picture, or the reason why
-there is none. IDs and layouts are ours; those from 200 on have no use case behind them.
+there is none. IDs and layouts are assumed; those from 200 on have no use case behind them.
 """
 
 from dataclasses import replace
@@ -16,12 +16,9 @@ from cubestack.firmware_model.interface.aramis.codes import (
     ResetCause,
     SensorState,
 )
-from cubestack.firmware_model.interface.aramis.flags import FLAG_BYTES, flag_fields
-from cubestack.firmware_model.interface.aramis.telecommands import (
-    BLOCK_BYTES,
-    TELECOMMANDS,
-)
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.aramis.flags import flag_fields
+from cubestack.firmware_model.interface.aramis.telecommands import BLOCK_BYTES, TELECOMMANDS
+from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 
 __all__ = ["PHASES", "SETTINGS_SHOWN", "TELEMETRY"]
@@ -47,246 +44,147 @@ PHASES = {
 
 def _quaternion(meaning: str) -> tuple[Field, ...]:
     return tuple(
-        Field(f"Q{index}", "f32", 32 * index, f"{name} part, {meaning}")
+        f32(f"Q{index}", f"{name} part, {meaning}")
         for index, name in enumerate(("x", "y", "z", "scalar"))
     )
 
 
-def _time(offset: int, what: str) -> tuple[Field, ...]:
+def _time(what: str) -> tuple[Field, ...]:
     return (
-        Field("JulianDay", "u32", offset, f"{what}: whole Julian days; 0 while not set", "d"),
-        Field("Millisecond", "u32", offset + 32, f"{what}: since that noon UT", "ms"),
+        u32("JulianDay", f"{what}: whole Julian days; 0 while not set", "d"),
+        u32("Millisecond", f"{what}: since that noon UT", "ms"),
     )
 
 
 _NODE = (
-    Message(
-        128,
-        "Identification",
-        8,
-        "who answers",
-        (
-            Field("NodeType", "u8", 0, "6: AraMiS star tracker"),
-            Field("InterfaceVersion", "u8", 8, "of these tables"),
-            Field("FirmwareVersionMajor", "u8", 16, "of the program"),
-            Field("FirmwareVersionMinor", "u8", 24, "of the program"),
-            Field("RuntimeMilliseconds", "u16", 32, "fraction of RuntimeSeconds", "ms"),
-            Field("RuntimeSeconds", "u16", 48, "since power-up, wraps", "s"),
-        ),
+    Message(128, "Identification", "who answers").of(
+        u8("NodeType", "6: AraMiS star tracker"),
+        u8("InterfaceVersion", "of these tables"),
+        u8("FirmwareVersionMajor", "of the program"),
+        u8("FirmwareVersionMinor", "of the program"),
+        u16("RuntimeMilliseconds", "fraction of RuntimeSeconds", "ms"),
+        u16("RuntimeSeconds", "since power-up, wraps", "s"),
     ),
-    Message(
-        129,
-        "ExtendedIdentification",
-        7,
-        "the unit and its traffic",
-        (
-            Field("SerialNumber", "u16", 0, "of the unit"),
-            Field("ResetCause", "enum8", 16, "why the program started", choices=ResetCause),
-            Field("TcmdCount", "u16", 24, "accepted telecommands, wraps"),
-            Field("TlmCount", "u16", 40, "answered telemetry, wraps"),
-        ),
+    Message(129, "ExtendedIdentification", "the unit and its traffic").of(
+        u16("SerialNumber", "of the unit"),
+        enum8("ResetCause", "why the program started", choices=ResetCause),
+        u16("TcmdCount", "accepted telecommands, wraps"),
+        u16("TlmCount", "answered telemetry, wraps"),
     ),
-    Message(130, "ErrorFlags", FLAG_BYTES, "what went wrong since ClearErrorFlags", flag_fields()),
+    Message(130, "ErrorFlags", "what went wrong since ClearErrorFlags").of(*flag_fields()),
     Message(
         131,
         "TcmdProcessed",
-        4,
         "whether every accepted telecommand is done, and the acknowledge of the latest one",
-        (
-            Field("Processed", "u8", 0, "1: all are done"),
-            Field("Waiting", "u8", 8, "telecommands that wait"),
-            Field("Latest", "u8", 16, "ID of the latest telecommand, accepted or not"),
-            Field("Error", "enum8", 24, "its error code", choices=AckError),
-        ),
+    ).of(
+        u8("Processed", "1: all are done"),
+        u8("Waiting", "telecommands that wait"),
+        u8("Latest", "ID of the latest telecommand, accepted or not"),
+        enum8("Error", "its error code", choices=AckError),
     ),
-    Message(
-        132,
-        "SensorStatus",
-        5,
-        "what the star tracker does",
-        (
-            Field("State", "enum8", 0, "state", choices=SensorState),
-            Field("Catalogue", "enum8", 8, "its catalogue", choices=CatalogueState),
-            Field("CameraSupply", "enum8", 16, "switch of the camera unit", choices=OnOff),
-            Field("Loop", "enum8", 24, "measuring again and again", choices=OnOff),
-            Field("TimeSet", "u8", 32, "1: the clock was set"),
-        ),
+    Message(132, "SensorStatus", "what the star tracker does").of(
+        enum8("State", "state", choices=SensorState),
+        enum8("Catalogue", "its catalogue", choices=CatalogueState),
+        enum8("CameraSupply", "switch of the camera unit", choices=OnOff),
+        enum8("Loop", "measuring again and again", choices=OnOff),
+        u8("TimeSet", "1: the clock was set"),
     ),
-    Message(
-        133,
-        "SystemTime",
-        12,
-        "the clock",
-        (*_time(0, "now"), Field("Uptime", "u32", 64, "since power-up, wraps", "ms")),
+    Message(133, "SystemTime", "the clock").of(
+        *_time("now"),
+        u32("Uptime", "since power-up, wraps", "ms"),
     ),
 )
 
 _RESULTS = (
-    Message(
-        134,
-        "Attitude",
-        38,
-        "the latest attitude, and how the latest measurement ended",
-        (
-            *_quaternion("v_camera = q v_inertial q*"),
-            *_time(128, "mid-exposure of the latest measurement's picture"),
-            Field("ImageUptime", "u32", 192, "the same since power-up, wraps", "ms"),
-            Field("FrameCounter", "u32", 224, "number of that picture since power-up"),
-            Field("Outcome", "enum8", 256, "outcome", choices=MeasurementOutcome),
-            Field("Reason", "enum8", 264, "why", choices=Reason),
-            Field("Mode", "enum8", 272, "mode", choices=MeasurementMode),
-            Field("Valid", "u8", 280, "1: that picture gave the quaternion, else an older one"),
-            Field("Matched", "u8", 288, "stars that the quaternion rests on"),
-            Field("Detected", "u8", 296, "stars in the picture"),
-        ),
+    Message(134, "Attitude", "the latest attitude, and how the latest measurement ended").of(
+        *_quaternion("v_camera = q v_inertial q*"),
+        *_time("mid-exposure of the latest measurement's picture"),
+        u32("ImageUptime", "the same since power-up, wraps", "ms"),
+        u32("FrameCounter", "number of that picture since power-up"),
+        enum8("Outcome", "outcome", choices=MeasurementOutcome),
+        enum8("Reason", "why", choices=Reason),
+        enum8("Mode", "mode", choices=MeasurementMode),
+        u8("Valid", "1: that picture gave the quaternion, else an older one"),
+        u8("Matched", "stars that the quaternion rests on"),
+        u8("Detected", "stars in the picture"),
     ),
-    Message(
-        135,
-        "BodyAttitude",
-        26,
-        "the latest attitude of the spacecraft",
-        (
-            *_quaternion("v_body = q v_inertial q*"),
-            *_time(128, "mid-exposure of the latest measurement's picture"),
-            Field("Reason", "enum8", 192, "why", choices=Reason),
-            Field("Valid", "u8", 200, "as in Attitude"),
-        ),
+    Message(135, "BodyAttitude", "the latest attitude of the spacecraft").of(
+        *_quaternion("v_body = q v_inertial q*"),
+        *_time("mid-exposure of the latest measurement's picture"),
+        enum8("Reason", "why", choices=Reason),
+        u8("Valid", "as in Attitude"),
     ),
-    Message(
-        136,
-        "Boresight",
-        9,
-        "direction of the latest attitude",
-        (
-            Field("RightAscension", "f32", 0, "of the boresight, -pi to pi", "rad"),
-            Field("Declination", "f32", 32, "of the boresight", "rad"),
-            Field("Valid", "u8", 64, "as in Attitude"),
-        ),
+    Message(136, "Boresight", "direction of the latest attitude").of(
+        f32("RightAscension", "of the boresight, -pi to pi", "rad"),
+        f32("Declination", "of the boresight", "rad"),
+        u8("Valid", "as in Attitude"),
     ),
 )
 
 _REPORTS = (
-    Message(
-        200,
-        "PhaseTimes",
-        4 * len(PHASES),
-        "time of each step of the latest measurement",
-        tuple(
-            Field(name, "u32", 32 * index, meaning, "us")
-            for index, (name, meaning) in enumerate(PHASES.items())
-        ),
+    Message(200, "PhaseTimes", "time of each step of the latest measurement").of(
+        *(u32(name, meaning, "us") for name, meaning in PHASES.items())
+    ),
+    Message(201, "CatalogueStatus", "the catalogue and its errors").of(
+        enum8("State", "state", choices=CatalogueState),
+        u16("Stars", "in the catalogue"),
+        u32("Triangles", "in the catalogue"),
+        u32("Bytes", "of its image", "bytes"),
+        f32("FieldOfView", "longest side of a triangle", "deg"),
+        f32("Epoch", "Julian year of its directions"),
+        u16("Loads", "from flash since power-up"),
+        u16("Failures", "of them without a good catalogue"),
+        u16("Corrected", "words corrected in the latest one"),
+        u16("Lost", "words with more than one wrong bit in the latest one"),
+        u32("CorrectedTotal", "words corrected since power-up"),
+        u16("RamErrors", "times that RAM was found damaged"),
+        u16("LoadTime", "of the latest one", "ms"),
+    ),
+    Message(202, "UploadStatus", "loading a catalogue").of(
+        u16("Blocks", "that the image has"),
+        u16("BlocksReceived", "different ones since BeginCatalogue"),
+        u16("NextBlock", "first one that is missing"),
+    ),
+    Message(203, "ImageBlock", "the block that ImageBlockSet selected").of(
+        Field(f"bytes{BLOCK_BYTES}", "Block", "pixels, row after row")
+    ),
+    Message(204, "CameraRegister", "the register that SelectCameraRegister read").of(
+        u8("Address", "register's address"),
+        u16("Value", "its value"),
+        u8("Valid", "1: the sensor answered"),
+    ),
+    Message(205, "LoopStatus", "measuring again and again").of(
+        enum8("Running", "the loop", choices=OnOff),
+        u16("Period", "of the loop", "ms"),
+        u32("Iterations", "since power-up"),
+        u16("LateIterations", "that began more than 10 ms after their time"),
+    ),
+    Message(206, "DetectionSummary", "the latest picture").of(
+        u8("Detected", "stars"),
+        u8("Mean", "level of the last five pictures", "DN"),
+        u8("Threshold", "pixels above it are bright", "DN"),
+        u8("Pictures", "that mean and threshold rest on"),
+    ),
+    Message(207, "IdentificationSummary", "the latest identification").of(
+        u16("Candidates", "triangles left when matching ended"),
+        u8("Pivots", "pivot triangles of the last triple"),
+        u16("Triples", "triples of stars tried"),
+        u8("Expected", "catalogue stars in the field; 0 without verification"),
+        u8("Matched", "stars identified"),
+    ),
+    Message(208, "StarDetails", "a star of the latest picture, the brightest first", steps=True).of(
+        u8("StarNumber", "from 0"),
+        f32("X", "centroid's column; 0 is the middle of the first pixel", "px"),
+        f32("Y", "centroid's row", "px"),
+        f32("Brightness", "sum of its grey levels", "DN"),
+        u8("Identified", "1: Hipparcos says which star it is"),
+        u32("Hipparcos", "its number in the catalogue"),
     ),
     Message(
-        201,
-        "CatalogueStatus",
-        35,
-        "the catalogue and its errors",
-        (
-            Field("State", "enum8", 0, "state", choices=CatalogueState),
-            Field("Stars", "u16", 8, "in the catalogue"),
-            Field("Triangles", "u32", 24, "in the catalogue"),
-            Field("Bytes", "u32", 56, "of its image", "bytes"),
-            Field("FieldOfView", "f32", 88, "longest side of a triangle", "deg"),
-            Field("Epoch", "f32", 120, "Julian year of its directions"),
-            Field("Loads", "u16", 152, "from flash since power-up"),
-            Field("Failures", "u16", 168, "of them without a good catalogue"),
-            Field("Corrected", "u16", 184, "words corrected in the latest one"),
-            Field("Lost", "u16", 200, "words with more than one wrong bit in the latest one"),
-            Field("CorrectedTotal", "u32", 216, "words corrected since power-up"),
-            Field("RamErrors", "u16", 248, "times that RAM was found damaged"),
-            Field("LoadTime", "u16", 264, "of the latest one", "ms"),
-        ),
-    ),
-    Message(
-        202,
-        "UploadStatus",
-        6,
-        "loading a catalogue",
-        (
-            Field("Blocks", "u16", 0, "that the image has"),
-            Field("BlocksReceived", "u16", 16, "different ones since BeginCatalogue"),
-            Field("NextBlock", "u16", 32, "first one that is missing"),
-        ),
-    ),
-    Message(
-        203,
-        "ImageBlock",
-        BLOCK_BYTES,
-        "the block that ImageBlockSet selected",
-        (Field("Block", f"bytes{BLOCK_BYTES}", 0, "pixels, row after row"),),
-    ),
-    Message(
-        204,
-        "CameraRegister",
-        4,
-        "the register that SelectCameraRegister read",
-        (
-            Field("Address", "u8", 0, "register's address"),
-            Field("Value", "u16", 8, "its value"),
-            Field("Valid", "u8", 24, "1: the sensor answered"),
-        ),
-    ),
-    Message(
-        205,
-        "LoopStatus",
-        9,
-        "measuring again and again",
-        (
-            Field("Running", "enum8", 0, "the loop", choices=OnOff),
-            Field("Period", "u16", 8, "of the loop", "ms"),
-            Field("Iterations", "u32", 24, "since power-up"),
-            Field("LateIterations", "u16", 56, "that began more than 10 ms after their time"),
-        ),
-    ),
-    Message(
-        206,
-        "DetectionSummary",
-        4,
-        "the latest picture",
-        (
-            Field("Detected", "u8", 0, "stars"),
-            Field("Mean", "u8", 8, "level of the last five pictures", "DN"),
-            Field("Threshold", "u8", 16, "pixels above it are bright", "DN"),
-            Field("Pictures", "u8", 24, "that mean and threshold rest on"),
-        ),
-    ),
-    Message(
-        207,
-        "IdentificationSummary",
-        7,
-        "the latest identification",
-        (
-            Field("Candidates", "u16", 0, "triangles left when matching ended"),
-            Field("Pivots", "u8", 16, "pivot triangles of the last triple"),
-            Field("Triples", "u16", 24, "triples of stars tried"),
-            Field("Expected", "u8", 40, "catalogue stars in the field; 0 without verification"),
-            Field("Matched", "u8", 48, "stars identified"),
-        ),
-    ),
-    Message(
-        208,
-        "StarDetails",
-        18,
-        "a star of the latest picture, the brightest first",
-        (
-            Field("StarNumber", "u8", 0, "from 0"),
-            Field("X", "f32", 8, "centroid's column; 0 is the middle of the first pixel", "px"),
-            Field("Y", "f32", 40, "centroid's row", "px"),
-            Field("Brightness", "f32", 72, "sum of its grey levels", "DN"),
-            Field("Identified", "u8", 104, "1: Hipparcos says which star it is"),
-            Field("Hipparcos", "u32", 112, "its number in the catalogue"),
-        ),
-        steps=True,
-    ),
-    Message(
-        209,
-        "SupplyStatus",
-        3,
-        "the camera unit's supply; whoever asks decides what a latch-up is",
-        (
-            Field("Switch", "enum8", 0, "switch", choices=OnOff),
-            Field("Current", "u16", 8, "present current", "mA", scale=10),
-        ),
+        209, "SupplyStatus", "the camera unit's supply; whoever asks decides what a latch-up is"
+    ).of(
+        enum8("Switch", "switch", choices=OnOff),
+        u16("Current", "present current", "mA", scale=10),
     ),
 )
 
@@ -309,20 +207,15 @@ SETTINGS_SHOWN = {name: command for command, (_, name) in _SHOWN.items()}
 
 def _setting(command: Message) -> Message:
     number, name = _SHOWN[command.name]
-    return Message(
-        number,
-        name,
-        command.length,
-        f"parameters of telecommand {command.name}",
-        command.fields,
-        ours=True,
+    return Message(number, name, f"parameters of telecommand {command.name}", extension=True).of(
+        *command.fields
     )
 
 
 TELEMETRY = (
     *_NODE,
     *_RESULTS,
-    *(replace(message, ours=True) for message in _REPORTS),
+    *(replace(message, extension=True) for message in _REPORTS),
     *sorted(
         (_setting(command) for command in TELECOMMANDS if command.name in _SHOWN),
         key=lambda message: message.id,

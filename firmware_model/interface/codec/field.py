@@ -1,7 +1,7 @@
 """One field of a telecommand or telemetry frame: its bits, scale, limits and meaning.
 
 Byte order, rounding and saturation are part of the declaration (CubeSpace family of nodes,
-interface version 3; the order is published, rounding and saturation are ours):
+interface version 3; the order is published, rounding and saturation are assumed):
 
 - Fields are little-endian: bit 0 of a message is the lowest bit of its first byte.
 - ``scale`` is what the printed tables divide by: value = raw / scale.
@@ -14,13 +14,29 @@ interface version 3; the order is published, rounding and saturation are ours):
 import math
 import re
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from copy import copy
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from enum import IntEnum
-from typing import SupportsFloat
+from functools import partial
+from typing import Self, SupportsFloat
 
-__all__ = ["Choices", "Field", "InterfaceError", "Value", "suggestion"]
+__all__ = [
+    "Choices",
+    "Field",
+    "InterfaceError",
+    "Value",
+    "bool1",
+    "enum8",
+    "f32",
+    "flags_at",
+    "i16",
+    "suggestion",
+    "u8",
+    "u16",
+    "u32",
+]
 
 #: A field's value: bool for bool1, bytes for bytesN, a number for all others.
 Value = int | float | bool | bytes
@@ -60,12 +76,11 @@ def _round_half_away(value: float) -> int:
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a message.
+    """A field of a message; u8, u16, ... below make one of their type.
 
     Attributes:
-        name: printed name.
         type: bool1, u8, u16, u32, i16, f32, enum8, or bytesN (N bytes).
-        bit_offset: first bit; a multiple of 8 except for bool1.
+        name: printed name.
         meaning: one phrase for a reader.
         unit: unit of the value, empty for pure numbers.
         scale: raw counts for one unit.
@@ -76,11 +91,12 @@ class Field:
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.
         reset: value after power-up; None takes zero.
+        gap: unused bits between the field before and this one.
+        bit_offset: first bit in its message, which places it; 0 outside of one.
     """
 
-    name: str
     type: str
-    bit_offset: int
+    name: str
     meaning: str
     unit: str = ""
     scale: float = 1.0
@@ -91,13 +107,15 @@ class Field:
     range_flag: str = ""
     flag: str = ""
     reset: Value | None = None
+    gap: int = 0
+    bit_offset: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""
         if self.type not in _WIDTHS and not _BYTES.fullmatch(self.type):
             raise InterfaceError(f"field {self.name}: no type {self.type!r}; {_known_types()}")
-        if self.bit_offset < 0 or (self.type != "bool1" and self.bit_offset % 8):
-            raise InterfaceError(f"field {self.name}: bit offset {self.bit_offset} is no byte's")
+        if self.gap < 0:
+            raise InterfaceError(f"field {self.name}: a gap has no {self.gap} bits")
         if not self.scale > 0:
             raise InterfaceError(f"field {self.name}: scale must be positive, not {self.scale}")
         if self.reset is None:
@@ -108,6 +126,21 @@ class Field:
         """Width in bits."""
         match = _BYTES.fullmatch(self.type)
         return 8 * int(match[1]) if match else _WIDTHS[self.type]
+
+    def within(self, minimum: float | None, maximum: float | None, flag: str = "") -> Self:
+        """This field with its limits, in ``unit``, and the error flag that others raise."""
+        return replace(self, minimum=minimum, maximum=maximum, range_flag=flag)
+
+    def behind(self, end: int) -> Self:
+        """This field, placed after a field that ends before bit ``end``, and after its own gap.
+
+        A bool1 takes the next bit, all other types begin with the next byte.
+        """
+        placed, start = copy(self), end + self.gap
+        if self.type != "bool1":
+            start = -(-start // 8) * 8
+        object.__setattr__(placed, "bit_offset", start)
+        return placed
 
     @property
     def raw_range(self) -> tuple[int, int]:
@@ -196,6 +229,23 @@ class Field:
                 f"field {self.name}: has {len(value)} bytes, must have {self.bits // 8}"
             )
         return int.from_bytes(value, "little")
+
+
+u8, u16, u32 = partial(Field, "u8"), partial(Field, "u16"), partial(Field, "u32")
+i16, f32 = partial(Field, "i16"), partial(Field, "f32")
+bool1, enum8 = partial(Field, "bool1"), partial(Field, "enum8")
+
+
+def flags_at(flags: Iterable[tuple[int, str, str, str]]) -> tuple[Field, ...]:
+    """A block of bool1 that show error flags: bit in the block, name, meaning, flag's name.
+
+    The bits ascend; those between are unused.
+    """
+    fields, end = [], 0
+    for bit, name, meaning, flag in flags:
+        fields.append(bool1(name, meaning, flag=flag, gap=bit - end))
+        end = bit + 1
+    return tuple(fields)
 
 
 def _known_types() -> str:

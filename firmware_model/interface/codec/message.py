@@ -5,6 +5,7 @@ telemetry frame; both have a fixed length. Firmware decodes with these declarati
 with them, and documentation is generated from them.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
@@ -58,41 +59,38 @@ class Message:
     Attributes:
         id: ID byte on the wire; its bit 7 tells the kind.
         name: printed name.
-        length: bytes of parameters or data.
         meaning: one phrase for a reader.
-        fields: in order of their offsets.
+        fields: in order of their offsets, each placed behind the one before.
         ordered: pairs of field names of which the first must not exceed the second.
-        ours: an extension of this project.
+        extension: added by this project to the published interface.
         steps: each read returns the next of several records, and wraps.
         supported: False when the node treats the ID as unknown.
-        confidence: how well the layout is known; None when it is printed, or ours.
+        confidence: how well the layout is known; None when it is printed, or an extension.
+        length: bytes of parameters or data.
     """
 
     id: int
     name: str
-    length: int
     meaning: str
     fields: tuple[Field, ...] = ()
     ordered: tuple[tuple[str, str], ...] = ()
-    ours: bool = False
+    extension: bool = False
     steps: bool = False
     supported: bool = True
     confidence: Confidence | None = None
+    length: int = dataclasses.field(default=0, init=False)
 
     def __post_init__(self) -> None:
-        """Check the declaration; raises InterfaceError."""
+        """Place the fields and check the declaration; raises InterfaceError."""
         if not 0 <= self.id <= 255:
             raise InterfaceError(f"message {self.name}: ID {self.id} is not a byte")
-        taken = 0
-        for field in self.fields:
-            mask = ((1 << field.bits) - 1) << field.bit_offset
-            if mask >> (8 * self.length):
-                raise InterfaceError(
-                    f"message {self.name}: field {field.name} exceeds its {self.length} bytes"
-                )
-            if taken & mask:
-                raise InterfaceError(f"message {self.name}: field {field.name} overlaps another")
-            taken |= mask
+        placed: list[Field] = []
+        end = 0
+        for one in self.fields:
+            placed.append(one.behind(end))
+            end = placed[-1].bit_offset + one.bits
+        object.__setattr__(self, "fields", tuple(placed))
+        object.__setattr__(self, "length", (end + 7) // 8)
         names = [field.name for field in self.fields]
         if len(set(names)) != len(names):
             raise InterfaceError(f"message {self.name}: two fields of one name")
@@ -106,6 +104,10 @@ class Message:
                 raise InterfaceError(
                     f"message {self.name}: the reset value of {wrong[0][0].name} is out of range"
                 )
+
+    def of(self, *fields: Field, ordered: tuple[tuple[str, str], ...] = ()) -> "Message":
+        """This message with ``fields``, one behind the other, and what holds between them."""
+        return dataclasses.replace(self, fields=fields, ordered=ordered)
 
     @property
     def kind(self) -> Kind:

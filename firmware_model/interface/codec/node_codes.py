@@ -12,4 +12,4 @@ class AckError(IntEnum):
     INVALID_ID = 1
     WRONG_LENGTH = 2
     BAD_PARAMETER = 3
-    BUFFER_FULL = 4  # ours: the published list ends at 3
+    BUFFER_FULL = 4  # an extension: the published list ends at 3

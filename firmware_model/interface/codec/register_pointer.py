@@ -2,7 +2,7 @@
 
 A host writes the address of a register, then either one data byte in the same transfer, or it reads
 the value after a repeated start or in a transfer of its own (CubeSense thesis, section 6.4.3).
-Values of two bytes are signed. What is ours, because the text leaves it open:
+Values of two bytes are signed. What is assumed, because the text leaves it open:
 
 - The most significant byte comes first.
 - Writing the address latches the value, so that both bytes belong together; the pointer stays, and
@@ -32,7 +32,7 @@ class PointerRegister:
     Attributes:
         address: the pointer's value.
         access: what the host may do.
-        field: name, type, meaning, unit, scale and limits; its offset is 0. A ``bytesN`` is a
+        field: name, type, meaning, unit, scale and limits; whole bytes. A ``bytesN`` is a
             stream, anything else a number.
     """
 
@@ -44,8 +44,8 @@ class PointerRegister:
         """Check the declaration; raises InterfaceError."""
         if not 0 <= self.address <= 255:
             raise InterfaceError(f"register {self.name}: address {self.address} is not a byte")
-        if self.field.bit_offset or self.field.bits % 8:
-            raise InterfaceError(f"register {self.name}: must be whole bytes at offset 0")
+        if self.field.bits % 8:
+            raise InterfaceError(f"register {self.name}: must be whole bytes")
         if self.writable and self.length != 1:
             raise InterfaceError(f"register {self.name}: a host writes one byte, not {self.length}")
 
@@ -79,7 +79,7 @@ class PointerRegister:
         return self.writable and self.field.allows(value, {})
 
     def encode(self, value: object, *, saturate: bool = True) -> bytes:
-        """The bytes of a number, most significant first; see ``Field.encode`` for the errors."""
+        """The bytes of a number, most significant first; InterfaceError as ``Field.encode``."""
         if self.streams:
             raise InterfaceError(f"register {self.name} is a stream and carries no number")
         return self.field.encode(value, saturate=saturate).to_bytes(self.length, "big")

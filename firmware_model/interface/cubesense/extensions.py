@@ -1,6 +1,6 @@
 """CubeSense's telemetry of our own, IDs from 220 on: what a measurement rests on, its times."""
 
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubesense.codes import (
     EDGE_UNIT,
@@ -17,19 +17,17 @@ def _details(camera: Camera) -> Message:
     return Message(
         220 + camera,
         f"Details{camera + 1}",
-        16,
         f"what the latest measurement of camera {camera + 1} rests on",
-        (
-            Field("X", "i16", 0, "centre from the boresight, undistorted column", "px", 100),
-            Field("Y", "i16", 16, "centre from the boresight, undistorted row", "px", 100),
-            Field("Radius", "u16", 32, "fitted circle, undistorted; 0 for the Sun", "px", 100),
-            Field("Points", "u8", 48, "edges of the fit, or Sun pixels of the mean"),
-            Field("Sram", "u8", 56, "memory that held the picture", choices=Sram),
-            Field("FirstX", "u16", 64, "first Sun pixel's column; 0 for the nadir camera", "px"),
-            Field("FirstY", "u16", 80, "first Sun pixel's row; 0 for the nadir camera", "px"),
-            Field("PixelsRead", "u32", 96, "pixels that the processor read from the FPGA"),
-        ),
-        ours=True,
+        extension=True,
+    ).of(
+        i16("X", "centre from the boresight, undistorted column", "px", 100),
+        i16("Y", "centre from the boresight, undistorted row", "px", 100),
+        u16("Radius", "fitted circle, undistorted; 0 for the Sun", "px", 100),
+        u8("Points", "edges of the fit, or Sun pixels of the mean"),
+        u8("Sram", "memory that held the picture", choices=Sram),
+        u16("FirstX", "first Sun pixel's column; 0 for the nadir camera", "px"),
+        u16("FirstY", "first Sun pixel's row; 0 for the nadir camera", "px"),
+        u32("PixelsRead", "pixels that the processor read from the FPGA"),
     )
 
 
@@ -44,38 +42,32 @@ def _times(camera: Camera) -> Message:
     return Message(
         222 + camera,
         f"PhaseTimes{camera + 1}",
-        4 * len(phases),
         f"times of the latest measurement of camera {camera + 1}",
-        tuple(
-            Field(name, "u32", 32 * index, meaning, "us")
-            for index, (name, meaning) in enumerate(phases)
-        ),
-        ours=True,
-    )
+        extension=True,
+    ).of(*(u32(name, meaning, "us") for name, meaning in phases))
 
 
 def _edges(part: int) -> Message:
     first = part * EDGES_PER_FRAME + 1
     last = first + EDGES_PER_FRAME - 1
     coordinates = [
-        Field(
+        i16(
             f"{axis}{first + index}",
-            "i16",
-            8 + 32 * index + 16 * offset,
             f"{line} of edge {first + index} in the picture; 0 where there is none",
             "px",
             EDGE_UNIT,
         )
         for index in range(EDGES_PER_FRAME)
-        for offset, (axis, line) in enumerate((("X", "column"), ("Y", "row")))
+        for axis, line in (("X", "column"), ("Y", "row"))
     ]
     return Message(
         225 + part,
         f"NadirEdges{part + 1}",
-        1 + 4 * EDGES_PER_FRAME,
         f"edges {first} to {last} that the latest search in the nadir picture found",
-        (Field("Count", "u8", 0, "edges found in all, false ones left out"), *coordinates),
-        ours=True,
+        extension=True,
+    ).of(
+        u8("Count", "edges found in all, false ones left out"),
+        *coordinates,
     )
 
 
@@ -83,12 +75,7 @@ EXTENSIONS = (
     *(_details(camera) for camera in Camera),
     *(_times(camera) for camera in Camera),
     Message(
-        224,
-        "NadirSearchMode",
-        1,
-        "how the nadir camera's edges are looked for",
-        (Field("Search", "u8", 0, "way of the search", choices=NadirSearch),),
-        ours=True,
-    ),
+        224, "NadirSearchMode", "how the nadir camera's edges are looked for", extension=True
+    ).of(u8("Search", "way of the search", choices=NadirSearch)),
     *(_edges(part) for part in range(2)),
 )

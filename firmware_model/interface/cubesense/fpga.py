@@ -73,7 +73,7 @@ class FpgaCommand:
 
 _IDLE = Action.STANDBY
 
-#: Table 6.4. The last row is ours: the table leaves it open, table 7.1 has both cameras imaging.
+#: Table 6.4. The last row is assumed: the table leaves it open, table 7.1 has both cameras imaging.
 COMMANDS = (
     FpgaCommand(None, None, None, 1, 1, Actions(_IDLE, _IDLE)),
     FpgaCommand(0, 0, 0, 0, 1, Actions(Action.STORE, _IDLE)),
@@ -90,7 +90,7 @@ COMMANDS = (
 )
 
 #: Rows that a board with address control from the microcontroller has besides, out of those that
-#: table 6.4 leaves open; section 9.2.2 wishes for it, the protocol is ours. Only SHIFT moves
+#: table 6.4 leaves open; section 9.2.2 wishes for it, the protocol is assumed. Only SHIFT moves
 #: between the two, with an enable low: no other row is crossed, and the address is kept. The
 #: microcontroller may drive the data bus while SHIFT and RNW are both low: no FPGA does then.
 ADDRESSING_COMMANDS = (
@@ -132,7 +132,7 @@ SUN_THRESHOLD = 200
 #: So many bright pixels in one row make the first of them the first Sun pixel; figure 6.15.
 SUN_RUN = 3
 
-#: x and y, read as the first Sun pixel's, of a picture that has none; ours.
+#: x and y, read as the first Sun pixel's, of a picture that has none; assumed.
 SUN_NOT_FOUND = (0x3FF, 0x1FF)
 
 

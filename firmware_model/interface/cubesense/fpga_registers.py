@@ -1,7 +1,7 @@
 """CubeSense's FPGAs behind an I2C bus of their own: addresses, registers, commands.
 
 CubeSense thesis, section 9.2.1: two wires in place of the microcontroller's control and data pins.
-It names no registers; all of them are ours. A transfer is as usual: the write address, a register
+It names no registers; all are assumed. A transfer is as usual: the write address, a register
 number, then bytes to that register and those after it; or a read address, and bytes from where
 the transfer before stopped. After DATA comes DATA again, else the next number; numbers have four
 bits, the upper four are ignored.
@@ -17,7 +17,7 @@ bits, the upper four are ignored.
 from enum import IntEnum, IntFlag
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import u8
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.firmware_model.interface.cubesense.fpga import (
     COMMANDS,
@@ -109,7 +109,7 @@ _RO, _RW = RegisterAccess.READ_ONLY, RegisterAccess.READ_WRITE
 def _register(
     register: Register, access: RegisterAccess, meaning: str, reset: int = 0
 ) -> PointerRegister:
-    return PointerRegister(register, access, Field(register.name, "u8", 0, meaning, reset=reset))
+    return PointerRegister(register, access, u8(register.name, meaning, reset=reset))
 
 
 #: All registers, by number. What WHO_AM_I resets to is the side's own.
@@ -149,7 +149,7 @@ REGISTERS = tuple(
 )
 
 #: Table 6.4 without its edge rows. Each memory is read over its own FPGA's address, so both may be
-#: in turn; that row is ours, as are the addresses.
+#: in turn; that row is assumed, as are the addresses.
 I2C_COMMANDS = (
     *(command for command in COMMANDS if not command.edge),
     FpgaCommand(0, 0, 1, 0, 0, Actions(Action.READ, Action.READ)),

@@ -2,7 +2,7 @@
 
 CubeSense thesis, section 3.2 and table 3.3 (two data lines for each camera and one more control
 line, a switch for each memory, eight data lines and six control lines for both FPGAs, analogue
-inputs for the 3.3 V supply and both memories) and table 6.3. Names are ours where table 6.3 has
+inputs for the 3.3 V supply and both memories) and table 6.3. Names are assumed where table 6.3 has
 none; so are the third line of each camera, which switches its supply, the monitor of the 5 V
 supply, which the node protocol reports, and the monitors' scale.
 """

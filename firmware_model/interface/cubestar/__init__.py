@@ -24,15 +24,11 @@ from cubestack.firmware_model.interface.cubestar.extensions import (
     EXTENSION_TELEMETRY,
     UPLOAD_BLOCK_BYTES,
 )
-from cubestack.firmware_model.interface.cubestar.processing_telecommands import (
-    PROCESSING_TELECOMMANDS,
-)
-from cubestack.firmware_model.interface.cubestar.star_telemetry import STAR_TELEMETRY
 from cubestack.firmware_model.interface.cubestar.telecommands import (
-    DEVICE_TELECOMMANDS,
     IMAGE_BYTES,
+    PUBLISHED_TELECOMMANDS,
 )
-from cubestack.firmware_model.interface.cubestar.telemetry import NODE_TELEMETRY
+from cubestack.firmware_model.interface.cubestar.telemetry import PUBLISHED_TELEMETRY
 
 __all__ = [
     "IMAGE_BYTES",
@@ -55,9 +51,7 @@ INTERFACE = Interface(
     version=3,
     i2c_address=0x1A,
     baud=57_600,
-    telecommands=DEVICE_TELECOMMANDS + PROCESSING_TELECOMMANDS + EXTENSION_TELECOMMANDS,
-    telemetries=tuple(
-        sorted(NODE_TELEMETRY + STAR_TELEMETRY + EXTENSION_TELEMETRY, key=lambda m: m.id)
-    ),
+    telecommands=PUBLISHED_TELECOMMANDS + EXTENSION_TELECOMMANDS,
+    telemetries=tuple(sorted(PUBLISHED_TELEMETRY + EXTENSION_TELEMETRY, key=lambda m: m.id)),
     ack_errors=AckError,
 )

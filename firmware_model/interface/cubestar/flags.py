@@ -1,18 +1,15 @@
 """CubeStar's error flags: one declaration for telemetry ErrorFlags and LogStatus.
 
 CubeSpace family of nodes, interface version 3. The two frames show the same ten bytes of flags; a
-few names are printed differently in the second. The causes are ours to word: the published tables
+few names are printed differently in the second. The causes are worded here: the published tables
 give names only. Some belong to hardware that this node does not have, or that does not fail here.
 """
 
 from dataclasses import dataclass
 
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
-__all__ = ["FLAG_BYTES", "NEVER_RAISED", "ErrorFlag", "flag_fields"]
-
-#: Length of the block of flags.
-FLAG_BYTES = 10
+__all__ = ["NEVER_RAISED", "ErrorFlag", "flag_fields"]
 
 
 @dataclass(frozen=True)
@@ -127,15 +124,14 @@ _FLAGS = (
 NEVER_RAISED = {flag.name: flag.never for flag in _FLAGS if flag.never}
 
 
-def flag_fields(first_bit: int = 0, *, log_names: bool = False) -> tuple[Field, ...]:
-    """Fields of the block of flags from bit ``first_bit`` on, with LogStatus' names if asked."""
-    return tuple(
-        Field(
-            (flag.log_name or flag.name) if log_names else flag.name,
-            "bool1",
-            first_bit + flag.bit,
+def flag_fields(*, log_names: bool = False) -> tuple[Field, ...]:
+    """Fields of the block of flags, with LogStatus' names if asked."""
+    return flags_at(
+        (
+            flag.bit,
+            flag.log_name if log_names and flag.log_name else flag.name,
             f"{flag.cause} (not on this node: {flag.never})" if flag.never else flag.cause,
-            flag=flag.name,
+            flag.name,
         )
         for flag in _FLAGS
     )

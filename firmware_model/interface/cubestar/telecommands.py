@@ -1,162 +1,106 @@
-"""CubeStar's published telecommands, first part: the node, optics, sensor and picture.
+"""CubeStar's published telecommands.
 
 CubeSpace family of nodes, interface version 3: IDs, names and layouts. Units, limits and reset
-values are ours where the tables print none; the reset values of the optics are those of
-the CubeStar thesis, section 5.4 and figure 5.12.
+values are assumed where the tables print none; the reset values are those of the CubeStar thesis,
+sections 4.1, 4.3, 5.3 and 5.4 and figure 5.12 (optics).
 """
 
+import math
+
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar.codes import (
+    GridSize,
+    IdMode,
     ImageBlockSize,
     TestPattern,
 )
 
-__all__ = ["DEVICE_TELECOMMANDS", "IMAGE_BYTES"]
+__all__ = ["IMAGE_BYTES", "PUBLISHED_TELECOMMANDS"]
 
 #: Bytes of a picture: one for each pixel, row after row.
 IMAGE_BYTES = COLUMNS * ROWS
 
-
-def _focal_length(name: str, offset: int, meaning: str, reset: float) -> Field:
-    return Field(
-        name,
-        "f32",
-        offset,
-        meaning,
-        "px",
-        minimum=100.0,
-        maximum=10_000.0,
-        range_flag="FocalLengthRangeError",
-        reset=reset,
-    )
+LARGEST_AREA = 240
+"""The list of visited pixels must fit the free half of the external SRAM at every setting."""
 
 
-def _gain(name: str, offset: int, meaning: str, limit: float, reset: float) -> Field:
-    return Field(name, "f32", offset, meaning, minimum=-limit, maximum=limit, reset=reset)
+def _focal_length(name: str, meaning: str, reset: float) -> Field:
+    return f32(name, meaning, "px", reset=reset).within(100.0, 10_000.0, "FocalLengthRangeError")
+
+
+def _gain(name: str, meaning: str, limit: float, reset: float) -> Field:
+    return f32(name, meaning, reset=reset).within(-limit, limit)
+
+
+def _edge(name: str, meaning: str, maximum: int, reset: int) -> Field:
+    return u16(name, meaning, "px", reset=reset).within(None, maximum, "ValidImageRangeSetError")
 
 
 _SYSTEM = (
-    Message(1, "TogglePowerSW", 0, "toggle the load switch of the imager and the frame buffer"),
-    Message(2, "Reset", 0, "restart the program; settings and counters return to power-up values"),
-    Message(3, "MCUReset", 0, "reset the microcontroller, as its system-request reset does"),
-    Message(
-        4,
-        "setDelayTimerTimeout",
-        1,
-        "delay between Trigger and the first capture",
-        (
-            Field(
-                "Time",
-                "u8",
-                0,
-                "delay",
-                "s",
-                scale=10,
-                maximum=1.0,
-                range_flag="DelayTimeSetToLong",
-            ),
-        ),
+    Message(1, "TogglePowerSW", "toggle the load switch of the imager and the frame buffer"),
+    Message(2, "Reset", "restart the program; settings and counters return to power-up values"),
+    Message(3, "MCUReset", "reset the microcontroller, as its system-request reset does"),
+    Message(4, "setDelayTimerTimeout", "delay between Trigger and the first capture").of(
+        u8("Time", "delay", "s", scale=10, maximum=1.0, range_flag="DelayTimeSetToLong")
     ),
-    Message(5, "ClearWDGResetCounter", 0, "set the count of watchdog resets to zero"),
-    Message(6, "ClearErrorFlags", 0, "clear all flags of telemetry ErrorFlags"),
+    Message(5, "ClearWDGResetCounter", "set the count of watchdog resets to zero"),
+    Message(6, "ClearErrorFlags", "clear all flags of telemetry ErrorFlags"),
 )
 
 _OPTICS = (
-    Message(
-        7,
-        "Exposure",
-        2,
-        "exposure of the image sensor",
-        (
-            Field(
-                "exposure",
-                "u16",
-                0,
-                "exposure in line times (132.2 us at 10 MHz); 0: the longest the frame rate allows",
-                "lines",
-            ),
-        ),
+    Message(7, "Exposure", "exposure of the image sensor").of(
+        u16(
+            "exposure",
+            "exposure in line times (132.2 us at 10 MHz); 0: the longest the frame rate allows",
+            "lines",
+        )
     ),
     Message(
         8,
         "setFocalLength",
-        4,
         "focal length that turns undistorted pixels into unit vectors (pixel pitch 5.6 um)",
-        (
-            Field(
-                "FocalLength",
-                "f32",
-                0,
-                "focal length",
-                "mm",
-                minimum=1.0,
-                maximum=100.0,
-                range_flag="FocalLengthRangeError",
-                reset=6.28,
-            ),
-        ),
+    ).of(
+        f32("FocalLength", "focal length", "mm", reset=6.28).within(
+            1.0, 100.0, "FocalLengthRangeError"
+        )
     ),
     Message(
         9,
         "setFocalLengthComponents",
-        8,
         "focal lengths that normalise distorted pixels in the distortion model",
-        (
-            _focal_length("Fx", 0, "along the rows", 1147.5),
-            _focal_length("Fy", 32, "along the columns", 1147.4),
-        ),
+    ).of(
+        _focal_length("Fx", "along the rows", 1147.5),
+        _focal_length("Fy", "along the columns", 1147.4),
     ),
     Message(
         10,
         "setPrincipalPoint",
-        8,
         "principal point and centre of distortion; it may lie outside of the picture",
-        (
-            Field(
-                "Cx",
-                "f32",
-                0,
-                "column, 0 is the middle of the first pixel",
-                "px",
-                minimum=-COLUMNS,
-                maximum=2 * COLUMNS - 1,
-                range_flag="PrincipalPointRangeError",
-                reset=539.0,
-            ),
-            Field(
-                "Cy",
-                "f32",
-                32,
-                "row, 0 is the middle of the first pixel",
-                "px",
-                minimum=-ROWS,
-                maximum=2 * ROWS - 1,
-                range_flag="PrincipalPointRangeError",
-                reset=175.5,
-            ),
+    ).of(
+        f32("Cx", "column, 0 is the middle of the first pixel", "px", reset=539.0).within(
+            -COLUMNS, 2 * COLUMNS - 1, "PrincipalPointRangeError"
+        ),
+        f32("Cy", "row, 0 is the middle of the first pixel", "px", reset=175.5).within(
+            -ROWS, 2 * ROWS - 1, "PrincipalPointRangeError"
         ),
     ),
     Message(
         11,
         "setRadialDistortionGains",
-        8,
         "radial coefficients, distorted to undistorted (equations 4.1.3 and 4.1.4)",
-        (
-            _gain("K1", 0, "of the squared radius", 100.0, 0.32358),
-            _gain("K2", 32, "of its square", 100.0, -0.12456),
-        ),
+    ).of(
+        _gain("K1", "of the squared radius", 100.0, 0.32358),
+        _gain("K2", "of its square", 100.0, -0.12456),
     ),
     Message(
         12,
         "setTangentalDistortionGains",
-        8,
         "tangential coefficients, distorted to undistorted (equations 4.1.3 and 4.1.4)",
-        (
-            _gain("P1", 0, "along the columns", 10.0, -0.00414),
-            _gain("P2", 32, "along the rows", 10.0, 0.00624),
-        ),
+    ).of(
+        _gain("P1", "along the columns", 10.0, -0.00414),
+        _gain("P2", "along the rows", 10.0, 0.00624),
     ),
 )
 
@@ -164,86 +108,142 @@ _IMAGE = (
     Message(
         13,
         "WriteTo_IS_Register",
-        3,
         "write an image sensor register on the page that SetCameraRegisterPage selects",
-        (
-            Field("Reg", "u8", 0, "low byte of the register's address"),
-            Field(
-                "DataH",
-                "u8",
-                8,
-                "must be 0: this sensor's registers have 8 bits",
-                maximum=0,
-                range_flag="ISSetupError",
-            ),
-            Field("DataL", "u8", 16, "value to write"),
+    ).of(
+        u8("Reg", "low byte of the register's address"),
+        u8("DataH", "must be 0: this sensor's registers have 8 bits").within(
+            None, 0, "ISSetupError"
         ),
+        u8("DataL", "value to write"),
     ),
     Message(
         14,
         "ReadFrom_IS_Register",
-        1,
         "read an image sensor register on the selected page into telemetry IS_Register",
-        (Field("Reg", "u8", 0, "low byte of the register's address"),),
-    ),
+    ).of(u8("Reg", "low byte of the register's address")),
     Message(
         15,
         "CaptureTestPatern",
-        1,
         "write a pattern to the picture memory (the sensor's own patterns are not published)",
-        (
-            Field(
-                "TestPaternType",
-                "enum8",
-                0,
-                "pattern: column, row, or their sum, modulo 256",
-                choices=TestPattern,
-                range_flag="TestPatternConfigError",
-            ),
-        ),
+    ).of(
+        enum8(
+            "TestPaternType",
+            "pattern: column, row, or their sum, modulo 256",
+            choices=TestPattern,
+            range_flag="TestPatternConfigError",
+        )
     ),
-    Message(16, "CaptureImage", 0, "capture a picture and transfer it to the processor"),
+    Message(16, "CaptureImage", "capture a picture and transfer it to the processor"),
     Message(
-        17,
-        "UploadImage",
-        0,
-        "begin an upload: clear the picture memory, which UploadBlock then fills",
+        17, "UploadImage", "begin an upload: clear the picture memory, which UploadBlock then fills"
     ),
-    Message(
-        18,
-        "ImageBlockSet",
-        3,
-        "select the block that telemetry ImageBlock returns",
-        (
-            Field(
-                "BlockNumber",
-                "u16",
-                0,
-                "block of the picture, row after row",
-                maximum=IMAGE_BYTES // ImageBlockSize.BYTES_32.length - 1,
-                maximum_by=(
-                    "BlockSize",
-                    {size: IMAGE_BYTES // size.length - 1 for size in ImageBlockSize},
-                ),
-                range_flag="ImageBlockSizeError",
-            ),
-            Field(
+    Message(18, "ImageBlockSet", "select the block that telemetry ImageBlock returns").of(
+        u16(
+            "BlockNumber",
+            "block of the picture, row after row",
+            maximum=IMAGE_BYTES // ImageBlockSize.BYTES_32.length - 1,
+            maximum_by=(
                 "BlockSize",
-                "enum8",
-                16,
-                "size; a shorter one fills the front of ImageBlock, 256 bytes come as two reads",
-                choices=ImageBlockSize,
-                range_flag="ImageBlockSizeError",
-                reset=ImageBlockSize.BYTES_128,
+                {size: IMAGE_BYTES // size.length - 1 for size in ImageBlockSize},
             ),
+            range_flag="ImageBlockSizeError",
+        ),
+        enum8(
+            "BlockSize",
+            "size; a shorter one fills the front of ImageBlock, 256 bytes come as two reads",
+            choices=ImageBlockSize,
+            range_flag="ImageBlockSizeError",
+            reset=ImageBlockSize.BYTES_128,
         ),
     ),
     Message(
         19,
         "StreamDownImage",
-        0,
         "send the whole picture as telemetry ImageBlock frames, 128 bytes each, without requests",
     ),
 )
 
-DEVICE_TELECOMMANDS = _SYSTEM + _OPTICS + _IMAGE
+_DETECTION = (
+    Message(
+        20, "setDetectionRegion", "part of the picture that is searched, both ends included"
+    ).of(
+        u8("StepSize", "look at every n-th pixel of every n-th row", "px", reset=3).within(
+            1, 32, "ValidImageRangeSetError"
+        ),
+        _edge("Xstart", "first column", COLUMNS - 1, 0),
+        _edge("Xend", "last column", COLUMNS - 1, COLUMNS - 1),
+        _edge("Ystart", "first row", ROWS - 1, 0),
+        _edge("Yend", "last row", ROWS - 1, ROWS - 1),
+        ordered=(("Xstart", "Xend"), ("Ystart", "Yend")),
+    ),
+    Message(
+        21,
+        "setDetectionThresholds",
+        "pixel values that make a star; higher than the threshold counts",
+    ).of(
+        u8("DetectionThreshold", "for a pixel of the search", "DN", reset=6),
+        u8("StarThreshold", "for a neighbour while growing", "DN", reset=6),
+    ),
+    Message(22, "setStarPixels", "number of pixels of a star").of(
+        u8("MinPixels", "fewer are noise", "px", minimum=1, range_flag="StarPixSetError", reset=6),
+        u8("MaxPixels", "more are an invalid star", "px", reset=60).within(
+            1, LARGEST_AREA, "StarPixSetError"
+        ),
+        ordered=(("MinPixels", "MaxPixels"),),
+    ),
+    Message(23, "setDetectionVariables", "centroiding window, and when the search stops").of(
+        u8(
+            "GridSize",
+            "side of the centroiding window",
+            "px",
+            choices=GridSize,
+            range_flag="CentroidingGridSizeSetError",
+            reset=GridSize.GRID_5,
+        ),
+        u8("MaxStars", "stars found", reset=20).within(2, 20, "MaxStarsSetError"),
+        u8("MaxInvalidStars", "more areas than this were too large", reset=50),
+        u8("MaxNoise", "more areas than this were too small", reset=255).within(
+            1, None, "MaxNoiseSetError"
+        ),
+    ),
+    Message(24, "DetectStars", "detect stars in the picture memory"),
+)
+
+_IDENTIFICATION = (
+    Message(25, "setIDMode", "how the next picture's stars are identified").of(
+        enum8(
+            "IdMode",
+            "tracking starts with an assisted match from setTrackingMode until the first fix",
+            choices=IdMode,
+            range_flag="SetIDModeError",
+            reset=IdMode.LOST_IN_SPACE,
+        )
+    ),
+    Message(26, "setTrackingMode", "rough boresight for the assisted match").of(
+        f32("RightAscension", "right ascension of the boresight", "rad").within(
+            -math.pi, 2 * math.pi, "RightAscensionSetError"
+        ),
+        f32("Declination", "declination of the boresight", "rad").within(
+            -math.pi / 2, math.pi / 2, "DeclinationSetError"
+        ),
+    ),
+    Message(27, "setIDMargin", "tolerance of the distance between two stars").of(
+        u8("Margin", "tolerance", "rad", scale=10_000, minimum=0.0001, reset=0.001)
+    ),
+    Message(28, "IDStars", "identify the detected stars"),
+    Message(29, "SelectBestStars", "select the three identified stars of highest confidence"),
+    Message(30, "EstimateAttitude", "estimate the attitude from the identified stars"),
+)
+
+_OPERATION = (
+    Message(31, "ReadConfig", "restore the settings that SaveConfig stored"),
+    Message(32, "SaveConfig", "store the settings in flash"),
+    Message(33, "ClearConfig", "erase the stored settings and return to the reset values"),
+    Message(34, "TestSRAM", "test the picture memory; the picture is lost"),
+    Message(35, "TestWDG", "stop serving the watchdog, so that it resets the processor"),
+    Message(36, "CaptureAndProcess", "capture a picture, then detect, identify and estimate"),
+    Message(37, "ProcessImage", "detect, identify and estimate with the picture in memory"),
+    Message(38, "Trigger", "start the 1 s loop; it runs until StopLoop or Reset"),
+)
+
+PUBLISHED_TELECOMMANDS = _SYSTEM + _OPTICS + _IMAGE + _DETECTION + _IDENTIFICATION + _OPERATION

@@ -1,11 +1,26 @@
-"""CubeStar's published telemetry, first part: the node, its supply, camera, and settings.
+"""CubeStar's published telemetry.
 
-CubeSpace family of nodes, interface version 3: IDs, names and layouts. Units are ours where the
-tables print none: times in ms, currents in 0.1 mA. IDs are as on the wire, bit 7 set.
+CubeSpace family of nodes, interface version 3: IDs, names and layouts; IDs are as on the wire, bit
+7 set. Assumed where the tables leave it open: times in ms, currents in 0.1 mA; star numbers count
+the detected stars from 0; Identity and CatNum are the index in the onboard star list; centroids of
+telemetry 170 to 172 in 0.02 px, magnitudes there are measured brightness in DN (no catalogue
+magnitude is on board); confidence is the share of the other identified stars whose distance
+agrees, in percent or as a fraction; the unit vectors of telemetry 176, printed as plain i16, have
+the scale of all others. Quaternions turn inertial vectors into camera vectors,
+v_camera = q v_inertial q*, with the scalar in Qbar3. Angles are in rad.
 """
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
-from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.field import (
+    Field,
+    bool1,
+    enum8,
+    f32,
+    i16,
+    u8,
+    u16,
+    u32,
+)
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar.codes import (
     IdMode,
@@ -14,239 +29,353 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     SwitchState,
     TaskStatus,
 )
-from cubestack.firmware_model.interface.cubestar.flags import FLAG_BYTES, flag_fields
+from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 
-__all__ = ["NODE_TELEMETRY", "times"]
+__all__ = ["PUBLISHED_TELEMETRY"]
 
-
-def times(*names_and_meanings: tuple[str, str], start: int = 0) -> tuple[Field, ...]:
-    """u16 fields in ms, one after the other from bit ``start`` on."""
-    return tuple(
-        Field(name, "u16", start + 16 * index, meaning, "ms")
-        for index, (name, meaning) in enumerate(names_and_meanings)
-    )
+_UNIT_VECTOR_SCALE = 10_000
 
 
-def _currents(offset: int) -> tuple[Field, ...]:
+def _times(*names_and_meanings: tuple[str, str]) -> tuple[Field, ...]:
+    """u16 fields in ms, one after the other."""
+    return tuple(u16(name, meaning, "ms") for name, meaning in names_and_meanings)
+
+
+def _currents() -> tuple[Field, ...]:
     return (
-        Field("Current", "u16", offset, "present current of frame buffer and imager", "mA", 10),
-        Field("MaxCurrent", "u16", offset + 16, "largest since power-up", "mA", 10),
-        Field("MinCurrent", "u16", offset + 32, "smallest since power-up", "mA", 10),
+        u16("Current", "present current of frame buffer and imager", "mA", 10),
+        u16("MaxCurrent", "largest since power-up", "mA", 10),
+        u16("MinCurrent", "smallest since power-up", "mA", 10),
     )
 
 
-def _switch(name: str, offset: int) -> Field:
-    return Field(name, "u8", offset, "load switch of imager and frame buffer", choices=SwitchState)
+def _switch(name: str) -> Field:
+    return u8(name, "load switch of imager and frame buffer", choices=SwitchState)
 
 
-def _task(name: str, offset: int) -> Field:
-    return Field(name, "enum8", offset, "what the node last did", choices=TaskStatus)
+def _task(name: str) -> Field:
+    return enum8(name, "what the node last did", choices=TaskStatus)
 
 
-def _temperature(name: str, offset: int) -> Field:
-    return Field(name, "i16", offset, "temperature of the processor", "degC", 100)
+def _temperature(name: str) -> Field:
+    return i16(name, "temperature of the processor", "degC", 100)
 
+
+def _scaled(meaning: str, *names: str, unit: str = "") -> tuple[Field, ...]:
+    """i16/10000 fields, one after the other."""
+    return tuple(i16(name, meaning, unit, _UNIT_VECTOR_SCALE) for name in names)
+
+
+def _star_number() -> Field:
+    return u8("StarNumber", "number of the detected star, from 0")
+
+
+def _identity(name: str) -> Field:
+    return u16(name, "index in the onboard star list; 65535: not identified")
+
+
+def _percent(name: str) -> Field:
+    return u8(name, "confidence of the identification", "%")
+
+
+def _selected_star(number: int) -> Message:
+    """One of the three stars of highest confidence."""
+    prefix = f"S{number}"
+    return Message(
+        169 + number, f"Star{number}Details", f"selected star {number}: centroid, vectors, identity"
+    ).of(
+        u16(f"{prefix}CentX", "measured column", "px", 50),
+        u16(f"{prefix}CentY", "measured row", "px", 50),
+        u16(f"{prefix}Mag", "brightness, sum over the centroiding window", "DN"),
+        *_scaled("camera unit vector", *(f"{prefix}VB{axis}" for axis in "XYZ")),
+        *_scaled("inertial unit vector", *(f"{prefix}VI{axis}" for axis in "XYZ")),
+        _percent(f"{prefix}Conf"),
+        _identity(f"{prefix}CatNum"),
+    )
+
+
+_QUATERNION = (
+    *_scaled("vector part, inertial to camera", "Qbar0", "Qbar1", "Qbar2"),
+    *_scaled("scalar part", "Qbar3"),
+)
 
 _NODE = (
-    Message(
-        128,
-        "Identification",
-        8,
-        "what the node is, and its uptime",
-        (
-            Field("NodeType", "u8", 0, "type of node"),
-            Field("InterfaceVersion", "u8", 8, "version of this interface"),
-            Field("FirmwareVersionMajor", "u8", 16, "firmware version, major"),
-            Field("FirmwareVersionMinor", "u8", 24, "firmware version, minor"),
-            Field("RuntimeMilliseconds", "u16", 32, "uptime, part below one second", "ms"),
-            Field("RuntimeSeconds", "u16", 48, "uptime, whole seconds, modulo 65536", "s"),
-        ),
+    Message(128, "Identification", "what the node is, and its uptime").of(
+        u8("NodeType", "type of node"),
+        u8("InterfaceVersion", "version of this interface"),
+        u8("FirmwareVersionMajor", "firmware version, major"),
+        u8("FirmwareVersionMinor", "firmware version, minor"),
+        u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
+        u16("RuntimeSeconds", "uptime, whole seconds, modulo 65536", "s"),
+    ),
+    Message(129, "ExtendedIdentification", "serial number and counters").of(
+        u16("SerialNumber", "serial number"),
+        _temperature("Temperature"),
+        enum8("ResetCause", "why the processor started", choices=ResetCause),
+        u16("WDGResetCount", "resets by the watchdog"),
+        u16("TcmdCount", "telecommands accepted, modulo 65536"),
+        u16("TlmCount", "telemetry requests answered, modulo 65536"),
+    ),
+    Message(130, "ErrorFlags", "errors since ClearErrorFlags; a flag stays up until then").of(
+        *flag_fields()
     ),
     Message(
-        129,
-        "ExtendedIdentification",
-        11,
-        "serial number and counters",
-        (
-            Field("SerialNumber", "u16", 0, "serial number"),
-            _temperature("Temperature", 16),
-            Field("ResetCause", "enum8", 32, "why the processor started", choices=ResetCause),
-            Field("WDGResetCount", "u16", 40, "resets by the watchdog"),
-            Field("TcmdCount", "u16", 56, "telecommands accepted, modulo 65536"),
-            Field("TlmCount", "u16", 72, "telemetry requests answered, modulo 65536"),
-        ),
-    ),
-    Message(
-        130,
-        "ErrorFlags",
-        FLAG_BYTES,
-        "errors since ClearErrorFlags; a flag stays up until then",
-        flag_fields(),
-    ),
-    Message(
-        131,
-        "TcmdProcessed",
-        1,
-        "acknowledge: whether the last telecommand has been processed",
-        (Field("Processed", "u8", 0, "1: processed, 0: not yet"),),
-    ),
-    Message(132, "TaskStatus", 1, "what the node last did", (_task("taskStatus", 0),)),
-    Message(
-        133,
-        "StartAndLoopTime",
-        6,
-        "times of the main loop",
-        times(
+        131, "TcmdProcessed", "acknowledge: whether the last telecommand has been processed"
+    ).of(u8("Processed", "1: processed, 0: not yet")),
+    Message(132, "TaskStatus", "what the node last did").of(_task("taskStatus")),
+    Message(133, "StartAndLoopTime", "times of the main loop").of(
+        *_times(
             ("StartupTime", "from reset to the main loop"),
             ("LoopTime", "latest iteration without the wait for the next"),
             ("MaxLoopTime", "longest iteration"),
-        ),
+        )
     ),
-    Message(
-        134,
-        "SRAMTestResults",
-        1,
-        "result of TestSRAM",
-        (Field("TestResult", "u8", 0, "latest result", choices=MemoryTest),),
+    Message(134, "SRAMTestResults", "result of TestSRAM").of(
+        u8("TestResult", "latest result", choices=MemoryTest)
     ),
-    Message(
-        135,
-        "PowerStatus",
-        7,
-        "switched supply of imager and frame buffer",
-        (_switch("Status", 0), *_currents(8)),
+    Message(135, "PowerStatus", "switched supply of imager and frame buffer").of(
+        _switch("Status"),
+        *_currents(),
     ),
 )
 
 _CAMERA = (
-    Message(
-        136,
-        "Exposure",
-        2,
-        "exposure that is set",
-        (Field("exposure", "u16", 0, "line times; 0: the longest the frame rate allows", "lines"),),
+    Message(136, "Exposure", "exposure that is set").of(
+        u16("exposure", "line times; 0: the longest the frame rate allows", "lines")
     ),
-    Message(
-        137,
-        "ImageSetup",
-        6,
-        "part of the sensor that is read; fixed on this sensor",
-        (
-            Field("FirstLine", "u16", 0, "first row", "px", reset=0),
-            Field("Width", "u16", 16, "columns", "px", reset=COLUMNS),
-            Field("Height", "u16", 32, "rows", "px", reset=ROWS),
-        ),
+    Message(137, "ImageSetup", "part of the sensor that is read; fixed on this sensor").of(
+        u16("FirstLine", "first row", "px", reset=0),
+        u16("Width", "columns", "px", reset=COLUMNS),
+        u16("Height", "rows", "px", reset=ROWS),
     ),
     Message(
         138,
         "CameraSetup",
-        14,
         "registers of a later image sensor; this node answers as to an unknown ID",
-        tuple(
-            Field(name, "u16", 16 * index, "register of the later sensor")
+        supported=False,
+    ).of(
+        *(
+            u16(name, "register of the later sensor")
             for index, name in enumerate(
                 ("Line", "Misc1", "Misc2", "Clock", "Chain", "Ctrl", "Clamp")
             )
-        ),
-        supported=False,
+        )
+    ),
+    Message(139, "FocalLengthDetails", "focal lengths that are set").of(
+        f32("FocalLength", "focal length of the unit vectors", "mm"),
+        f32("Fx", "of the distortion model, along the rows", "px"),
+        f32("Fy", "of the distortion model, along the columns", "px"),
+    ),
+    Message(140, "PrincipalPoint", "principal point that is set").of(
+        f32("Cx", "column", "px"),
+        f32("Cy", "row", "px"),
     ),
     Message(
-        139,
-        "FocalLengthDetails",
-        12,
-        "focal lengths that are set",
-        (
-            Field("FocalLength", "f32", 0, "focal length of the unit vectors", "mm"),
-            Field("Fx", "f32", 32, "of the distortion model, along the rows", "px"),
-            Field("Fy", "f32", 64, "of the distortion model, along the columns", "px"),
-        ),
+        141, "DistortionCoef", "distortion coefficients that are set, distorted to undistorted"
+    ).of(
+        f32("K1", "radial, of the squared radius"),
+        f32("K2", "radial, of its square"),
+        f32("P1", "tangential, along the columns"),
+        f32("P2", "tangential, along the rows"),
     ),
-    Message(
-        140,
-        "PrincipalPoint",
-        8,
-        "principal point that is set",
-        (Field("Cx", "f32", 0, "column", "px"), Field("Cy", "f32", 32, "row", "px")),
+    Message(142, "IS_Register", "image sensor register that ReadFrom_IS_Register selected").of(
+        u8("DataH", "always 0: this sensor's registers have 8 bits"),
+        u8("DataL", "value"),
     ),
-    Message(
-        141,
-        "DistortionCoef",
-        16,
-        "distortion coefficients that are set, distorted to undistorted",
-        (
-            Field("K1", "f32", 0, "radial, of the squared radius"),
-            Field("K2", "f32", 32, "radial, of its square"),
-            Field("P1", "f32", 64, "tangential, along the columns"),
-            Field("P2", "f32", 96, "tangential, along the rows"),
-        ),
+    Message(143, "ImageBlock", "block that ImageBlockSet selected").of(
+        Field("bytes128", "Block", "pixels, row after row; zero behind a shorter block")
     ),
-    Message(
-        142,
-        "IS_Register",
-        2,
-        "image sensor register that ReadFrom_IS_Register selected",
-        (
-            Field("DataH", "u8", 0, "always 0: this sensor's registers have 8 bits"),
-            Field("DataL", "u8", 8, "value"),
-        ),
-    ),
-    Message(
-        143,
-        "ImageBlock",
-        128,
-        "block that ImageBlockSet selected",
-        (Field("Block", "bytes128", 0, "pixels, row after row; zero behind a shorter block"),),
-    ),
-    Message(
-        144,
-        "CameraTiming",
-        6,
-        "times of the image sensor's use",
-        times(
+    Message(144, "CameraTiming", "times of the image sensor's use").of(
+        *_times(
             ("SetupTime", "writing the set-up"),
             ("ExposureUpdateTime", "writing the exposure"),
             ("CaptureTime", "from enable until the picture is stored"),
-        ),
+        )
+    ),
+)
+
+_DETECTION = (
+    Message(145, "DetectionRegion", "part of the picture that is searched, both ends included").of(
+        u8("StepSize", "every n-th pixel of every n-th row", "px"),
+        u16("Xstart", "first column", "px"),
+        u16("Xend", "last column", "px"),
+        u16("Ystart", "first row", "px"),
+        u16("Yend", "last row", "px"),
+    ),
+    Message(146, "DetectionThresholdValues", "thresholds in use").of(
+        u8("DarkThreshold", "dark level of the latest picture", "DN"),
+        u8("DetectionThreshold", "for a pixel of the search", "DN"),
+        u8("StarThreshold", "for a neighbour while growing", "DN"),
+    ),
+    Message(147, "StarPixels", "number of pixels of a star").of(
+        u8("MinPixels", "fewer are noise", "px"),
+        u8("MaxPixels", "more are an invalid star", "px"),
+    ),
+    Message(148, "StarGrid", "centroiding window").of(u8("GridSize", "side of the window", "px")),
+    Message(149, "MaxStars", "when the search stops").of(
+        u8("maxStars", "stars found"),
+        u8("maxInvalidStars", "areas that were too large"),
+        u8("maxNoise", "areas that were too small"),
+    ),
+    Message(150, "DetectionSummary", "counts of the latest detection").of(
+        u8("NumStarsDetected", "stars detected"),
+        u8("NumInvalidStars", "areas that were too large"),
+        u8("AmountOfNoise", "areas that were too small"),
+        u8("ImageDarkValue", "mean of the searched pixels below the threshold", "DN"),
+    ),
+    Message(151, "StarPositions", "next detected star", steps=True).of(
+        f32("X_Coordinate", "measured column", "px"),
+        f32("Y_Coordinate", "measured row", "px"),
+        f32("X_CorrectedCoordinate", "column without distortion", "px"),
+        f32("Y_CorrectedCoordinate", "row without distortion", "px"),
+        _star_number(),
+        u8("Size", "pixels of the area", "px"),
+        u16("Intensity", "sum over the centroiding window", "DN"),
+    ),
+    Message(152, "BodyUnitVectors", "next detected star's direction in the camera", steps=True).of(
+        *_scaled("camera unit vector", "VbX", "VbY", "VbZ"),
+        _star_number(),
+    ),
+    Message(
+        153, "DetectionTimingOne", "longest times of the detection's steps since the last reset"
+    ).of(
+        *_times(
+            ("MaxStarSearchTime", "search and growing"),
+            ("MaxCentroidFindTime", "centroids"),
+            ("MaxCorrectionTime", "distortion"),
+            ("MaxVectorCalTime", "unit vectors"),
+        )
+    ),
+    Message(154, "DetectionTimingTwo", "times of the whole detection since the last reset").of(
+        *_times(("StarDetectionTime", "latest"), ("MaxStarDetectionTime", "longest"))
+    ),
+)
+
+_IDENTIFICATION = (
+    Message(155, "IDMode", "identification mode that is set").of(
+        enum8("Mode", "mode", choices=IdMode)
+    ),
+    Message(156, "IDMargin", "tolerance of the distance between two stars").of(
+        u8("Margin", "tolerance", "rad", 10_000)
+    ),
+    Message(157, "NumIdStars", "stars identified").of(u8("numIdStars", "stars identified")),
+    Message(158, "IDStarsDetails", "next identified star", steps=True).of(
+        _star_number(),
+        _identity("Identity"),
+        u8("ValidationVotes", "other stars whose distance agrees"),
+        _percent("Confidence"),
+    ),
+    Message(
+        159, "InertialUnitVectors", "next identified star's catalogue direction", steps=True
+    ).of(
+        *_scaled("inertial unit vector", "ViX", "ViY", "ViZ"),
+        _star_number(),
+        _identity("Identity"),
+        _percent("Confidence"),
+    ),
+    Message(
+        160, "IDTimingOne", "longest times of the identification's first steps since the last reset"
+    ).of(
+        *_times(
+            ("MaxModeSelectionTime", "choice of mode and star list"),
+            ("MaxDistanceCalTime", "distances of the measured pairs"),
+            ("MaxVoteRoundOneTime", "catalogue search and votes"),
+            ("MaxFindIDTime", "choice of the top identities"),
+        )
+    ),
+    Message(
+        161, "IDTimingTwo", "longest times of the identification's last steps since the last reset"
+    ).of(
+        *_times(
+            ("MaxVoteRoundTwoTime", "verification votes"),
+            ("MaxSelectID", "choice of the stars to keep"),
+            ("MaxAlgoCompletionTime", "completion"),
+        )
+    ),
+    Message(162, "IDTimingThree", "times of the whole identification since the last reset").of(
+        *_times(("StarIdentificationTime", "latest"), ("MaxStarIdentificationTime", "longest"))
+    ),
+    Message(163, "BestStarSelectionTime", "times of SelectBestStars since the last reset").of(
+        *_times(("LatestTime", "latest"), ("MaxTime", "longest"))
+    ),
+)
+
+_ATTITUDE = (
+    Message(164, "Quaternion", "attitude, inertial to camera").of(*_QUATERNION),
+    Message(165, "SphereicalCoordinates", "direction of the boresight").of(
+        f32("Declination", "declination", "rad"),
+        f32("RightAscension", "right ascension, -pi to pi", "rad"),
+    ),
+    Message(166, "AttitudeTiming", "times of the attitude estimate since the last reset").of(
+        *_times(("LatestTime", "latest"), ("MaxTime", "longest"))
+    ),
+    Message(167, "PerformanceParameters", "outcome of the latest picture").of(
+        u8("NumStarsDetected", "stars detected"),
+        u8("StarImageNoise", "areas that were too small"),
+        u8("InvalidStars", "areas that were too large"),
+        u8("NumberOfStarsID", "stars identified"),
+        enum8("Idmode", "identification mode that is set", choices=IdMode),
+        u8("ImageDarkValue", "mean of the searched pixels below the threshold", "DN"),
+        bool1("ImageCaptureSuccess", "a picture was stored"),
+        bool1("DetectionSuccess", "stars were detected"),
+        bool1("IdentificationSuccess", "stars were identified"),
+        bool1("AttitudeSuccess", "an attitude was estimated"),
+        bool1("ProcessingTimeError", "processing took longer than 500 ms"),
+        bool1("MaxStarsDetected", "detection stopped at the limit of stars"),
+        bool1("LessThanThreeStarsInFoV", "fewer than three stars in the field"),
+        bool1("CommsError", "an error flag of the UART or I2C is up"),
+    ),
+    Message(168, "TimingSummary", "latest times").of(
+        *_times(
+            ("ImageCaptureTime", "capture and transfer"),
+            ("DetectionTime", "detection"),
+            ("IdentificationTime", "identification"),
+        )
+    ),
+    Message(169, "BestStarIndex", "stars that SelectBestStars chose").of(
+        *(u8(f"Star{n}Index", "number of the detected star; 255: none") for n in (1, 2, 3))
+    ),
+    _selected_star(1),
+    _selected_star(2),
+    _selected_star(3),
+    Message(176, "StarDetails", "next detected star: position, direction, identity", steps=True).of(
+        _star_number(),
+        f32("CCx", "column without distortion", "px"),
+        f32("CCy", "row without distortion", "px"),
+        *_scaled("camera unit vector", "Vbx", "Vby", "Vbz"),
+        _identity("ID"),
+        u8("ValidationVote", "other stars whose distance agrees"),
+        f32("confidance", "confidence of the identification, 0 to 1"),
+    ),
+    Message(177, "AttitudeData", "attitude and boresight").of(
+        *_QUATERNION,
+        *_scaled("right ascension, -pi to pi", "RightAscension", unit="rad"),
+        *_scaled("declination", "Declination", unit="rad"),
+        *_scaled("boresight, inertial unit vector", "BSVX", "BSVY", "BSVZ"),
     ),
 )
 
 _LOG = (
-    Message(
-        173,
-        "DelayTime",
-        1,
-        "delay between Trigger and the first capture",
-        (Field("Timeout", "u8", 0, "delay", "s", 10),),
+    Message(173, "DelayTime", "delay between Trigger and the first capture").of(
+        u8("Timeout", "delay", "s", 10)
     ),
-    Message(
-        174,
-        "LogStatus",
-        26,
-        "state and errors in one frame",
-        (
-            _temperature("Temp", 0),
-            Field("Runtime", "u32", 16, "uptime", "s"),
-            Field("WDGcounter", "u16", 48, "resets by the watchdog"),
-            _task("Status", 64),
-            _switch("SW", 72),
-            *_currents(80),
-            *flag_fields(128, log_names=True),
-        ),
+    Message(174, "LogStatus", "state and errors in one frame").of(
+        _temperature("Temp"),
+        u32("Runtime", "uptime", "s"),
+        u16("WDGcounter", "resets by the watchdog"),
+        _task("Status"),
+        _switch("SW"),
+        *_currents(),
+        *flag_fields(log_names=True),
     ),
-    Message(
-        175,
-        "Results",
-        6,
-        "counts of the latest picture",
-        (
-            Field("DarkValue", "u8", 0, "mean of the searched pixels below the threshold", "DN"),
-            Field("Detected", "u8", 8, "stars detected"),
-            Field("Invalid", "u8", 16, "areas that were too large"),
-            Field("Noise", "u8", 24, "areas that were too small"),
-            Field("IDMode", "u8", 32, "identification mode that is set", choices=IdMode),
-            Field("ID", "u8", 40, "stars identified"),
-        ),
+    Message(175, "Results", "counts of the latest picture").of(
+        u8("DarkValue", "mean of the searched pixels below the threshold", "DN"),
+        u8("Detected", "stars detected"),
+        u8("Invalid", "areas that were too large"),
+        u8("Noise", "areas that were too small"),
+        u8("IDMode", "identification mode that is set", choices=IdMode),
+        u8("ID", "stars identified"),
     ),
 )
 
-NODE_TELEMETRY = _NODE + _CAMERA + _LOG
+PUBLISHED_TELEMETRY = _NODE + _CAMERA + _DETECTION + _IDENTIFICATION + _ATTITUDE + _LOG

@@ -9,11 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    CaptureResult,
-    DetectResult,
-)
+from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
 
 __all__ = ["CameraSettings", "Mask", "Measurement", "Power", "direction"]
 

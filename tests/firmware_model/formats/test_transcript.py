@@ -4,12 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.formats.recording import (
-    BusMessage,
-    BusTransfer,
-    LineBytes,
-    Recording,
-)
+from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.formats.transcript import (
     name_answer_byte,
     name_bus_byte,

@@ -3,12 +3,7 @@
 import pytest
 from smbus2 import i2c_msg
 
-from cubestack.firmware_model.formats.recording import (
-    BusMessage,
-    BusTransfer,
-    LineBytes,
-    Recording,
-)
+from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.i2c import I2cClient

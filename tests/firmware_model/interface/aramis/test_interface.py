@@ -35,8 +35,8 @@ USE_CASES = {
 
 def test_every_use_case_has_its_telecommands_and_they_are_no_extensions() -> None:
     named = [name for names in USE_CASES.values() for name in names]
-    assert named == [m.name for m in INTERFACE.telecommands if not m.ours]
-    assert {m.id >= 100 for m in INTERFACE.telecommands if m.ours} == {True}
+    assert named == [m.name for m in INTERFACE.telecommands if not m.extension]
+    assert {m.id >= 100 for m in INTERFACE.telecommands if m.extension} == {True}
 
 
 def test_the_node_has_its_address_and_rate() -> None:

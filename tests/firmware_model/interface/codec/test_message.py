@@ -1,46 +1,40 @@
 from collections.abc import Callable
+from dataclasses import replace
 from enum import IntEnum
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
-from cubestack.firmware_model.interface.codec.message import (
-    Field,
-    Interface,
-    InterfaceError,
-    Kind,
-    Message,
-)
+from cubestack.firmware_model.interface.codec.field import InterfaceError, bool1, i16, u8, u16, u32
+from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 from cubestack.firmware_model.interface.cubestar.codes import AckError
 
-MIXED = Message(
-    200,
-    "Mixed",
-    8,
-    "",
-    (
-        Field("a", "u8", 0, ""),
-        Field("b", "bool1", 8, ""),
-        Field("c", "bool1", 15, ""),
-        Field("d", "i16", 16, "", scale=100),
-        Field("e", "u32", 32, ""),
-    ),
+MIXED = Message(200, "Mixed", "").of(
+    u8("a", ""),
+    bool1("b", ""),
+    bool1("c", "", gap=6),
+    i16("d", "", scale=100),
+    u32("e", ""),
 )
 
-WINDOW = Message(
-    20,
-    "Window",
-    2,
-    "",
-    (
-        Field("low", "u8", 0, "", minimum=1, range_flag="LowError", reset=1),
-        Field("high", "u8", 8, "", maximum=9, range_flag="HighError", reset=9),
-    ),
+WINDOW = Message(20, "Window", "").of(
+    u8("low", "", minimum=1, range_flag="LowError", reset=1),
+    u8("high", "", maximum=9, range_flag="HighError", reset=9),
     ordered=(("low", "high"),),
 )
+
+
+def test_fields_stand_one_behind_the_other_and_begin_with_a_byte_unless_they_are_bits() -> None:
+    assert [field.bit_offset for field in MIXED.fields] == [0, 8, 15, 16, 32]
+    assert MIXED.length == 8
+    odd = Message(201, "Odd", "").of(bool1("a", ""), bool1("b", ""), u16("c", ""), bool1("d", ""))
+    assert [field.bit_offset for field in odd.fields] == [0, 1, 8, 24]
+    assert odd.length == 4
+    assert Message(202, "Part", "").of(odd.fields[3]).length == 1  # a field has no fixed place
 
 
 def test_bytes_are_little_endian_and_bits_count_from_the_lowest() -> None:
@@ -90,7 +84,7 @@ def test_violations_name_the_flag(values: tuple[int, int], flags: list[str]) -> 
         (lambda: WINDOW.pack(low=1, hihg=2), "Window has no field 'hihg'; did you mean high?"),
         (lambda: WINDOW.pack(low=1), "Window needs a value for high"),
         (lambda: WINDOW.field("q"), "Window has no field 'q'; known: low, high"),
-        (lambda: Message(2, "Reset", 0, "").pack(now=1), "Reset has no field 'now'; it has no"),
+        (lambda: Message(2, "Reset", "").pack(now=1), "Reset has no field 'now'; it has no"),
         (lambda: WINDOW.unpack(b"abc"), "Window has 2 bytes, not 3"),
     ],
 )
@@ -108,23 +102,20 @@ def test_fields_are_found_in_any_case() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((1, "M", 1, "", (Field("a", "u16", 0, ""),)), "field a exceeds its 1 bytes"),
-        (
-            (1, "M", 2, "", (Field("a", "u16", 0, ""), Field("b", "bool1", 3, ""))),
-            "field b overlaps another",
-        ),
-        (
-            (1, "M", 2, "", (Field("a", "u8", 0, ""), Field("a", "u8", 8, ""))),
-            "two fields of one name",
-        ),
-        ((256, "M", 0, ""), "ID 256 is not a byte"),
-        ((1, "M", 1, "", (Field("a", "u8", 0, "", minimum=1),)), "reset value of a"),
-        ((1, "M", 1, "", (Field("a", "u8", 0, ""),), (("a", "z"),)), "no field 'z'"),
+        ((1, u8("a", ""), u8("a", "")), "two fields of one name"),
+        ((256,), "ID 256 is not a byte"),
+        ((1, u8("a", "", minimum=1)), "reset value of a"),
+        ((1, u8("a", "", maximum_by=("z", {}))), "no field 'z'"),
     ],
 )
-def test_wrong_declarations_are_refused(arguments: tuple[object, ...], message: str) -> None:
+def test_wrong_declarations_are_refused(arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(InterfaceError, match=message):
-        Message(*arguments)  # type: ignore[arg-type]
+        Message(arguments[0], "M", "").of(*arguments[1:])
+
+
+def test_an_order_is_one_of_its_own_fields() -> None:
+    with pytest.raises(InterfaceError, match="no field 'z'"):
+        Message(1, "M", "").of(u8("a", ""), ordered=(("a", "z"),))
 
 
 NODE = Interface("Node", 1, 0x1A, 57_600, (WINDOW,), (MIXED,), AckError)
@@ -144,7 +135,7 @@ def test_unknown_messages_get_a_suggestion() -> None:
 
 
 def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
-    later = Message(201, "Later", 0, "", supported=False)
+    later = Message(201, "Later", "", supported=False)
     node = Interface("Node", 1, 0x1A, 57_600, (), (later,), AckError)
     assert node.telemetry("Later") is later
     assert node.find(201) is None
@@ -155,8 +146,8 @@ def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
     [
         ((MIXED,), (), "Mixed: ID 200 is no telecommand's"),
         ((), (WINDOW,), "Window: ID 20 is no telemetry's"),
-        ((WINDOW, Message(20, "Other", 0, "")), (), "Other: ID 20 is taken"),
-        ((WINDOW, Message(21, "window", 0, "")), (), "two telecommands of one name"),
+        ((WINDOW, Message(20, "Other", "")), (), "Other: ID 20 is taken"),
+        ((WINDOW, Message(21, "window", "")), (), "two telecommands of one name"),
     ],
 )
 def test_wrong_interfaces_are_refused(
@@ -170,19 +161,8 @@ def test_choices_are_those_of_messages_and_registers_but_not_the_error_codes() -
     class Level(IntEnum):
         LOW = 0
 
-    error = Message(201, "Last", 1, "", (Field("error", "u8", 0, "", choices=AckError),))
-    register = PointerRegister(
-        0, RegisterAccess.READ_WRITE, Field("level", "u8", 0, "", choices=Level)
-    )
-    node = Interface(
-        "Node",
-        1,
-        0x1A,
-        57_600,
-        (),
-        (error,),
-        AckError,
-        registers=PointerMap(0x1C, (register,)),
-    )
-    assert node.choices == (Level,)
-    assert Interface("Node", 1, 0x1A, 57_600, (), (error,), AckError).choices == ()
+    error = Message(201, "Last", "").of(u8("error", "", choices=AckError))
+    register = PointerRegister(0, RegisterAccess.READ_WRITE, u8("level", "", choices=Level))
+    bare = Interface("Node", 1, 0x1A, 57_600, (), (error,), AckError)
+    assert bare.choices == ()
+    assert replace(bare, registers=PointerMap(0x1C, (register,))).choices == (Level,)

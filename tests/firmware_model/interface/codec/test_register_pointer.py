@@ -13,10 +13,10 @@ _RW, _RO, _WO = (
     RegisterAccess.READ_ONLY,
     RegisterAccess.WRITE_ONLY,
 )
-LEVEL = PointerRegister(0x10, _RW, Field("LEVEL", "u8", 0, "", maximum=9))
-CENTRE = PointerRegister(0x20, _RO, Field("CENTRE", "i16", 0, "", "px", 100))
-START = PointerRegister(0x30, _WO, Field("START", "u8", 0, ""))
-STREAM = PointerRegister(0x40, _RO, Field("STREAM", "bytes5", 0, ""))
+LEVEL = PointerRegister(0x10, _RW, Field("u8", "LEVEL", "", maximum=9))
+CENTRE = PointerRegister(0x20, _RO, Field("i16", "CENTRE", "", "px", 100))
+START = PointerRegister(0x30, _WO, Field("u8", "START", ""))
+STREAM = PointerRegister(0x40, _RO, Field("bytes5", "STREAM", ""))
 MAP = PointerMap(0x1C, (STREAM, LEVEL, CENTRE, START))
 
 
@@ -59,13 +59,12 @@ def test_lookup() -> None:
         (lambda: MAP["LEVL"], "no register 'LEVL'; did you mean LEVEL?"),
         (lambda: CENTRE.decode(b"a"), "register CENTRE has 2 bytes, not 1"),
         (lambda: STREAM.encode(1), "register STREAM is a stream"),
-        (lambda: PointerRegister(256, _RO, Field("A", "u8", 0, "")), "address 256 is not a byte"),
-        (lambda: PointerRegister(0, _RO, Field("A", "u8", 8, "")), "whole bytes at offset 0"),
-        (lambda: PointerRegister(0, _RO, Field("A", "bool1", 0, "")), "whole bytes at offset 0"),
-        (lambda: PointerRegister(0, _RW, Field("A", "i16", 0, "")), "writes one byte, not 2"),
+        (lambda: PointerRegister(256, _RO, Field("u8", "A", "")), "address 256 is not a byte"),
+        (lambda: PointerRegister(0, _RO, Field("bool1", "A", "")), "must be whole bytes"),
+        (lambda: PointerRegister(0, _RW, Field("i16", "A", "")), "writes one byte, not 2"),
         (lambda: PointerMap(1, (LEVEL, LEVEL)), "both have address 0x10"),
         (
-            lambda: PointerMap(1, (LEVEL, PointerRegister(0, _RO, Field("level", "u8", 0, "")))),
+            lambda: PointerMap(1, (LEVEL, PointerRegister(0, _RO, Field("u8", "level", "")))),
             "two registers are called",
         ),
     ],

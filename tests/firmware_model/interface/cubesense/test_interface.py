@@ -75,7 +75,7 @@ def by_id() -> dict[int, Message]:
 def test_layout_is_the_known_one(entry: str) -> None:
     kind, number, length, types, confidence = entry.split()
     message = by_id()[int(number) + (0x80 if kind == "TLM" else 0)]
-    assert (message.length, message.ours) == (int(length), False)
+    assert (message.length, message.extension) == (int(length), False)
     # Signed mantissas are ours: the description has an unsigned one and no sign.
     signless = [
         "u16" if field.name.startswith("Mantissa") else field.type for field in message.fields
@@ -95,7 +95,7 @@ def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
     for entry in LAYOUTS.strip().splitlines():
         kind, number = entry.split()[:2]
         known.add(int(number) + (0x80 if kind == "TLM" else 0))
-    ours = {message.id for message in INTERFACE.messages if message.ours}
+    ours = {message.id for message in INTERFACE.messages if message.extension}
     assert by_id().keys() - ours == known
     assert ours <= set(range(100, 128)) | set(range(220, 256))
     assert all(by_id()[identifier].confidence is None for identifier in ours)

@@ -49,7 +49,7 @@ def by_id() -> dict[int, Message]:
 def test_layout_is_the_printed_one(entry: str) -> None:
     number, name, length, *fields = entry.split()
     message = by_id()[int(number)]
-    assert (message.name, message.length, message.ours) == (name, int(length), False)
+    assert (message.name, message.length, message.extension) == (name, int(length), False)
     assert len(message.fields) == len(fields)
     for field, printed in zip(message.fields, fields, strict=True):
         layout, _, scale = printed.partition("/")
@@ -60,7 +60,7 @@ def test_layout_is_the_printed_one(entry: str) -> None:
 
 def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
     printed = {int(entry.split()[0]) for entry in re.split(r"\n(?=\d)", PRINTED.strip())}
-    ours = {message.id for message in INTERFACE.messages if message.ours}
+    ours = {message.id for message in INTERFACE.messages if message.extension}
     assert printed == set(range(1, 39)) | set(range(128, 178))
     assert ours == by_id().keys() - printed
     assert ours <= set(range(100, 128)) | set(range(200, 256))
@@ -82,7 +82,9 @@ def test_every_message_round_trips_any_bits(message: Message) -> None:
 
 
 def test_times_are_in_ms_and_currents_in_tenths_of_a_milliampere() -> None:
-    timing = [m for m in INTERFACE.telemetries if re.search(r"Tim(e|ing)", m.name) and not m.ours]
+    timing = [
+        m for m in INTERFACE.telemetries if re.search(r"Tim(e|ing)", m.name) and not m.extension
+    ]
     assert len(timing) == 11
     for message in timing:
         assert {field.unit for field in message.fields} <= {"ms", "s"}

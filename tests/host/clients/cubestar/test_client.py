@@ -6,12 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.interface.cubestar import (
-    INTERFACE,
-    AckError,
-    MatchMode,
-    TaskStatus,
-)
+from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError, MatchMode, TaskStatus
 from cubestack.host.clients.cubestar.client import COLUMNS, ROWS, Attitude, CubeStar
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
