@@ -7,11 +7,12 @@ is not printed either: we take that all do but the mode select register, whose e
 published firmware uses without a sync.
 """
 
+from functools import partial
+
 from cubestack.firmware_model.interface.cameras.registers import (
     BitField,
     CameraRegister,
     CameraRegisterMap,
-    RegisterAccess,
 )
 
 __all__ = [
@@ -42,129 +43,114 @@ SYNC_APPLY = 0x03
 #: Value of EXPOSURE_RULE that asks for the longest exposure the frame rate allows.
 LONGEST_EXPOSURE = 0x0002
 
-_RW = RegisterAccess.READ_WRITE
+
+_stored = partial(CameraRegister, modelled=False)
+
+_REGISTERS = (
+    CameraRegister(
+        0x8100,
+        "MODE_SELECT",
+        0x00,
+        "enable and output depth; acts as soon as it is written",
+        assumed="reset value",
+    ).of(
+        BitField("ENABLE", 0, 1, "1 gathers images, 0 rests"),
+        BitField(
+            "OUTPUT_DEPTH",
+            5,
+            2,
+            "1 is 8 bits; the eight wired lines carry the same bits at every depth",
+            modelled=False,
+        ),
+    ),
+    CameraRegister(
+        0x8102,
+        "HARDWARE_FEATURES",
+        0x00,
+        "image processing in hardware",
+        needs_sync=True,
+        assumed="reset value; positions of all bits but HISTOGRAM_REMAP",
+    ).of(
+        BitField("SHARPENING", 0, 1, "sharpens edges", modelled=False),
+        BitField("DEFECT_CORRECTION", 1, 1, "interpolates the pixels known as defective"),
+        BitField("FPN_CORRECTION", 2, 1, "removes most of the fixed pattern"),
+        BitField("DARK_SUBTRACTION", 3, 1, "subtracts the mean of the dark rows"),
+        BitField(
+            "HISTOGRAM_REMAP",
+            6,
+            1,
+            "condenses 12 bits into 8; the model gives the upper 8 bits either way",
+            modelled=False,
+        ),
+    ),
+    _stored(
+        0x840B,
+        "LINEARITY",
+        0,
+        "barriers of the high dynamic range response; all zero is linear",
+        width=0x841F - 0x840B + 1,
+        needs_sync=True,
+        assumed="reset value; the model is linear whatever is written",
+    ),
+    CameraRegister(
+        0x8444,
+        "EXPOSURE_RULE",
+        0x0000,
+        "0x0002 is the longest exposure that the frame rate allows; else EXPOSURE counts",
+        width=2,
+        needs_sync=True,
+        assumed="reset value; the second address, printed as 0x8545 in one place",
+    ),
+    CameraRegister(
+        0x8500,
+        "SYNC",
+        0x00,
+        "0x03 makes written values take effect; reads as 0",
+        assumed="reset value; what it reads as; other values do nothing",
+    ),
+    _stored(
+        0x8502,
+        "FIRMWARE_FEATURES",
+        0x00,
+        "image processing in the sensor's own software, which fails below 20 MHz",
+        needs_sync=True,
+        assumed="reset value; which of bits 6 and 4 is which",
+    ).of(
+        BitField("AUTO_DYNAMIC_RANGE", 4, 1, "with BARRIER_UPDATE"),
+        BitField("AUTO_EXPOSURE", 5, 1, "sets the exposure by itself"),
+        BitField("BARRIER_UPDATE", 6, 1, "with AUTO_DYNAMIC_RANGE"),
+        BitField("AUTOVIEW", 7, 1, "updates the histogram remap"),
+    ),
+    CameraRegister(
+        0x8518,
+        "CLOCKS_PER_SECOND",
+        27_000_000,
+        "input clock in Hz that FRAMES_PER_SECOND is reckoned with",
+        width=4,
+        needs_sync=True,
+    ),
+    CameraRegister(
+        0x851C,
+        "FRAMES_PER_SECOND",
+        30,
+        "frame rate in 1/s at an input clock of CLOCKS_PER_SECOND",
+        width=2,
+        needs_sync=True,
+    ),
+    CameraRegister(
+        0x8526,
+        "EXPOSURE",
+        512,
+        "exposure in line times of 1322 clocks",
+        width=2,
+        needs_sync=True,
+        assumed="reset value",
+    ),
+)
 
 REGISTERS = CameraRegisterMap(
     camera="MLX75412",
     i2c_address=0x2C,  # 0101_100: image sensor zero
     address_bytes=2,
-    registers=(
-        CameraRegister(
-            0x8100,
-            "MODE_SELECT",
-            1,
-            _RW,
-            0x00,
-            "enable and output depth; acts as soon as it is written",
-            fields=(
-                BitField("ENABLE", 0, 1, "1 gathers images, 0 rests"),
-                BitField(
-                    "OUTPUT_DEPTH",
-                    5,
-                    2,
-                    "1 is 8 bits; the eight wired lines carry the same bits at every depth",
-                    modelled=False,
-                ),
-            ),
-            assumed="reset value",
-        ),
-        CameraRegister(
-            0x8102,
-            "HARDWARE_FEATURES",
-            1,
-            _RW,
-            0x00,
-            "image processing in hardware",
-            fields=(
-                BitField("SHARPENING", 0, 1, "sharpens edges", modelled=False),
-                BitField("DEFECT_CORRECTION", 1, 1, "interpolates the pixels known as defective"),
-                BitField("FPN_CORRECTION", 2, 1, "removes most of the fixed pattern"),
-                BitField("DARK_SUBTRACTION", 3, 1, "subtracts the mean of the dark rows"),
-                BitField(
-                    "HISTOGRAM_REMAP",
-                    6,
-                    1,
-                    "condenses 12 bits into 8; the model gives the upper 8 bits either way",
-                    modelled=False,
-                ),
-            ),
-            needs_sync=True,
-            assumed="reset value; positions of all bits but HISTOGRAM_REMAP",
-        ),
-        CameraRegister(
-            0x840B,
-            "LINEARITY",
-            0x841F - 0x840B + 1,
-            _RW,
-            0,
-            "barriers of the high dynamic range response; all zero is linear",
-            needs_sync=True,
-            modelled=False,
-            assumed="reset value; the model is linear whatever is written",
-        ),
-        CameraRegister(
-            0x8444,
-            "EXPOSURE_RULE",
-            2,
-            _RW,
-            0x0000,
-            "0x0002 is the longest exposure that the frame rate allows; else EXPOSURE counts",
-            needs_sync=True,
-            assumed="reset value; the second address, printed as 0x8545 in one place",
-        ),
-        CameraRegister(
-            0x8500,
-            "SYNC",
-            1,
-            _RW,
-            0x00,
-            "0x03 makes written values take effect; reads as 0",
-            assumed="reset value; what it reads as; other values do nothing",
-        ),
-        CameraRegister(
-            0x8502,
-            "FIRMWARE_FEATURES",
-            1,
-            _RW,
-            0x00,
-            "image processing in the sensor's own software, which fails below 20 MHz",
-            fields=(
-                BitField("AUTO_DYNAMIC_RANGE", 4, 1, "with BARRIER_UPDATE", modelled=False),
-                BitField("AUTO_EXPOSURE", 5, 1, "sets the exposure by itself", modelled=False),
-                BitField("BARRIER_UPDATE", 6, 1, "with AUTO_DYNAMIC_RANGE", modelled=False),
-                BitField("AUTOVIEW", 7, 1, "updates the histogram remap", modelled=False),
-            ),
-            needs_sync=True,
-            modelled=False,
-            assumed="reset value; which of bits 6 and 4 is which",
-        ),
-        CameraRegister(
-            0x8518,
-            "CLOCKS_PER_SECOND",
-            4,
-            _RW,
-            27_000_000,
-            "input clock in Hz that FRAMES_PER_SECOND is reckoned with",
-            needs_sync=True,
-        ),
-        CameraRegister(
-            0x851C,
-            "FRAMES_PER_SECOND",
-            2,
-            _RW,
-            30,
-            "frame rate in 1/s at an input clock of CLOCKS_PER_SECOND",
-            needs_sync=True,
-        ),
-        CameraRegister(
-            0x8526,
-            "EXPOSURE",
-            2,
-            _RW,
-            512,
-            "exposure in line times of 1322 clocks",
-            needs_sync=True,
-            assumed="reset value",
-        ),
-    ),
+    registers=_REGISTERS,
 )

@@ -5,11 +5,12 @@ appendix A. Registers are written over SCCB, an I2C dialect, with one address by
 addresses are ignored. Reset values and what the model leaves out are said in each register.
 """
 
+from functools import partial
+
 from cubestack.firmware_model.interface.cameras.registers import (
     BitField,
     CameraRegister,
     CameraRegisterMap,
-    RegisterAccess,
 )
 
 __all__ = [
@@ -47,231 +48,105 @@ def window_row(row: int) -> int:
     return _WINDOW_TOP + row // _ROWS_A_COUNT
 
 
-_RW = RegisterAccess.READ_WRITE
 _PICTURE = "reset value; the Y output of the model has no such processing"
+
+_stored = partial(CameraRegister, modelled=False)
+
+_REGISTERS = (
+    CameraRegister(0x00, "GAIN", 0x00, "amplification of all pixels").of(
+        BitField("FINE", 0, 4, "gain (1 + FINE / 16), times the two others"),
+        BitField("DOUBLE", 4, 1, "1 doubles the gain"),
+        BitField("DOUBLE_AGAIN", 5, 1, "1 doubles it again"),
+    ),
+    _stored(
+        0x01,
+        "BLUE_GAIN",
+        0x80,
+        "gain of the blue channel",
+        assumed="a monochrome picture does not depend on it",
+    ),
+    _stored(
+        0x02,
+        "RED_GAIN",
+        0x80,
+        "gain of the red channel",
+        assumed="a monochrome picture does not depend on it",
+    ),
+    _stored(0x03, "SATURATION", 0x80, "saturation of colours", assumed="reset value"),
+    _stored(0x06, "BRIGHTNESS", 0x80, "brightness", assumed=_PICTURE),
+    _stored(0x07, "SHARPNESS", 0xC6, "enhancement of edges", assumed=_PICTURE),
+    _stored(0x0C, "BLUE_BIAS", 0x24, "bias of the white balance, blue", assumed="reset value"),
+    _stored(0x0D, "RED_BIAS", 0x24, "bias of the white balance, red", assumed="reset value"),
+    CameraRegister(
+        0x10,
+        "EXPOSURE",
+        0x7F,
+        "exposure in two line times",
+        assumed="reset value; that 0 counts as 1",
+    ),
+    _stored(
+        0x11, "CLOCK_DIVIDER", 0x00, "divides the pixel clock", assumed="the model's clock is fixed"
+    ).of(
+        BitField("PRESCALER", 0, 6, "pixel clock / (PRESCALER + 1)"),
+        BitField("SYNC_POLARITY", 6, 2, "polarity of the sync outputs"),
+    ),
+    CameraRegister(0x12, "COMMON_A", 0x24, "reset, mirror, automatic functions").of(
+        BitField("AUTO_WHITE_BALANCE", 2, 1, "1 adjusts the colours", modelled=False),
+        BitField("AUTO_GAIN", 5, 1, "1 adjusts GAIN, if AUTO_ADJUST is set"),
+        BitField("MIRROR", 6, 1, "1 sends every line from its right end"),
+        BitField("RESET", 7, 1, "1 resets all registers, and itself"),
+    ),
+    CameraRegister(0x13, "COMMON_B", 0x01, "automatic functions as a whole").of(
+        BitField("AUTO_ADJUST", 0, 1, "1 lets the automatic functions act")
+    ),
+    _stored(
+        0x14, "COMMON_C", 0x04, "size of the picture", assumed="the model always sends full size"
+    ).of(BitField("QVGA", 5, 1, "1 sends 320 x 240 pixels")),
+    CameraRegister(0x17, "HSTART", window_column(0), "first column of the window"),
+    CameraRegister(0x18, "HSTOP", window_column(640), "column behind the window"),
+    CameraRegister(
+        0x19,
+        "VSTART",
+        window_row(0),
+        "first row of the window",
+        assumed="reset value: the whole picture",
+    ),
+    CameraRegister(0x1A, "VSTOP", window_row(480), "row behind the window"),
+    CameraRegister(
+        0x28,
+        "COMMON_H",
+        0x20,
+        "scan and black-and-white mode",
+        assumed="position of BLACK_AND_WHITE; the model always scans all rows",
+    ).of(
+        BitField("PROGRESSIVE", 5, 1, "1 scans all rows, 0 interlaces", modelled=False),
+        BitField("BLACK_AND_WHITE", 6, 1, "1 sends brightness only"),
+    ),
+    CameraRegister(0x29, "COMMON_I", 0x00, "control of the exposure").of(
+        BitField("MANUAL_EXPOSURE", 7, 1, "1 takes EXPOSURE as it is written")
+    ),
+    _stored(
+        0x2A,
+        "FRAME_RATE_HIGH",
+        0x00,
+        "adjustment of the frame rate",
+        assumed="the model's frame has 525 lines of 858 clocks",
+    ),
+    _stored(
+        0x2B,
+        "FRAME_RATE_LOW",
+        0x00,
+        "adjustment of the frame rate, low byte",
+        assumed="the model's frame has 525 lines of 858 clocks",
+    ),
+    _stored(
+        0x2D, "COMMON_J", 0x81, "band filter against the flicker of lamps", assumed="reset value"
+    ),
+)
 
 REGISTERS = CameraRegisterMap(
     camera="OV7620",
     i2c_address=0x21,  # SCCB 0x42 to write, 0x43 to read
     address_bytes=1,
-    registers=(
-        CameraRegister(
-            0x00,
-            "GAIN",
-            1,
-            _RW,
-            0x00,
-            "amplification of all pixels",
-            fields=(
-                BitField("FINE", 0, 4, "gain (1 + FINE / 16), times the two others"),
-                BitField("DOUBLE", 4, 1, "1 doubles the gain"),
-                BitField("DOUBLE_AGAIN", 5, 1, "1 doubles it again"),
-            ),
-        ),
-        CameraRegister(
-            0x01,
-            "BLUE_GAIN",
-            1,
-            _RW,
-            0x80,
-            "gain of the blue channel",
-            modelled=False,
-            assumed="a monochrome picture does not depend on it",
-        ),
-        CameraRegister(
-            0x02,
-            "RED_GAIN",
-            1,
-            _RW,
-            0x80,
-            "gain of the red channel",
-            modelled=False,
-            assumed="a monochrome picture does not depend on it",
-        ),
-        CameraRegister(
-            0x03,
-            "SATURATION",
-            1,
-            _RW,
-            0x80,
-            "saturation of colours",
-            modelled=False,
-            assumed="reset value",
-        ),
-        CameraRegister(
-            0x06, "BRIGHTNESS", 1, _RW, 0x80, "brightness", modelled=False, assumed=_PICTURE
-        ),
-        CameraRegister(
-            0x07,
-            "SHARPNESS",
-            1,
-            _RW,
-            0xC6,
-            "enhancement of edges",
-            modelled=False,
-            assumed=_PICTURE,
-        ),
-        CameraRegister(
-            0x0C,
-            "BLUE_BIAS",
-            1,
-            _RW,
-            0x24,
-            "bias of the white balance, blue",
-            modelled=False,
-            assumed="reset value",
-        ),
-        CameraRegister(
-            0x0D,
-            "RED_BIAS",
-            1,
-            _RW,
-            0x24,
-            "bias of the white balance, red",
-            modelled=False,
-            assumed="reset value",
-        ),
-        CameraRegister(
-            0x10,
-            "EXPOSURE",
-            1,
-            _RW,
-            0x7F,
-            "exposure in two line times",
-            assumed="reset value; that 0 counts as 1",
-        ),
-        CameraRegister(
-            0x11,
-            "CLOCK_DIVIDER",
-            1,
-            _RW,
-            0x00,
-            "divides the pixel clock",
-            fields=(
-                BitField("PRESCALER", 0, 6, "pixel clock / (PRESCALER + 1)", modelled=False),
-                BitField("SYNC_POLARITY", 6, 2, "polarity of the sync outputs", modelled=False),
-            ),
-            modelled=False,
-            assumed="the model's clock is fixed",
-        ),
-        CameraRegister(
-            0x12,
-            "COMMON_A",
-            1,
-            _RW,
-            0x24,
-            "reset, mirror, automatic functions",
-            fields=(
-                BitField("AUTO_WHITE_BALANCE", 2, 1, "1 adjusts the colours", modelled=False),
-                BitField("AUTO_GAIN", 5, 1, "1 adjusts GAIN, if AUTO_ADJUST is set"),
-                BitField("MIRROR", 6, 1, "1 sends every line from its right end"),
-                BitField("RESET", 7, 1, "1 resets all registers, and itself"),
-            ),
-        ),
-        CameraRegister(
-            0x13,
-            "COMMON_B",
-            1,
-            _RW,
-            0x01,
-            "automatic functions as a whole",
-            fields=(BitField("AUTO_ADJUST", 0, 1, "1 lets the automatic functions act"),),
-        ),
-        CameraRegister(
-            0x14,
-            "COMMON_C",
-            1,
-            _RW,
-            0x04,
-            "size of the picture",
-            fields=(BitField("QVGA", 5, 1, "1 sends 320 x 240 pixels", modelled=False),),
-            modelled=False,
-            assumed="the model always sends full size",
-        ),
-        CameraRegister(
-            0x17,
-            "HSTART",
-            1,
-            _RW,
-            window_column(0),
-            "first column of the window",
-        ),
-        CameraRegister(
-            0x18,
-            "HSTOP",
-            1,
-            _RW,
-            window_column(640),
-            "column behind the window",
-        ),
-        CameraRegister(
-            0x19,
-            "VSTART",
-            1,
-            _RW,
-            window_row(0),
-            "first row of the window",
-            assumed="reset value: the whole picture",
-        ),
-        CameraRegister(
-            0x1A,
-            "VSTOP",
-            1,
-            _RW,
-            window_row(480),
-            "row behind the window",
-        ),
-        CameraRegister(
-            0x28,
-            "COMMON_H",
-            1,
-            _RW,
-            0x20,
-            "scan and black-and-white mode",
-            fields=(
-                BitField("PROGRESSIVE", 5, 1, "1 scans all rows, 0 interlaces", modelled=False),
-                BitField("BLACK_AND_WHITE", 6, 1, "1 sends brightness only"),
-            ),
-            assumed="position of BLACK_AND_WHITE; the model always scans all rows",
-        ),
-        CameraRegister(
-            0x29,
-            "COMMON_I",
-            1,
-            _RW,
-            0x00,
-            "control of the exposure",
-            fields=(BitField("MANUAL_EXPOSURE", 7, 1, "1 takes EXPOSURE as it is written"),),
-        ),
-        CameraRegister(
-            0x2A,
-            "FRAME_RATE_HIGH",
-            1,
-            _RW,
-            0x00,
-            "adjustment of the frame rate",
-            modelled=False,
-            assumed="the model's frame has 525 lines of 858 clocks",
-        ),
-        CameraRegister(
-            0x2B,
-            "FRAME_RATE_LOW",
-            1,
-            _RW,
-            0x00,
-            "adjustment of the frame rate, low byte",
-            modelled=False,
-            assumed="the model's frame has 525 lines of 858 clocks",
-        ),
-        CameraRegister(
-            0x2D,
-            "COMMON_J",
-            1,
-            _RW,
-            0x81,
-            "band filter against the flicker of lamps",
-            modelled=False,
-            assumed="reset value",
-        ),
-    ),
+    registers=_REGISTERS,
 )

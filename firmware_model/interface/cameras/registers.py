@@ -6,7 +6,7 @@ lowest address.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 __all__ = [
@@ -65,28 +65,39 @@ class CameraRegister:
     Attributes:
         address: of its first, most significant byte.
         name: unique within the map.
-        width: number of addresses that it takes.
-        access: what the control bus may do.
         reset: value after power-up and reset, unsigned.
         meaning: what the value does.
         fields: declared bits; none when the value is one number.
+        width: number of addresses that it takes.
+        access: what the control bus may do.
         needs_sync: a written value waits for the sync register before it takes effect.
-        modelled: False when the camera model stores the value and does nothing with it.
+        modelled: False when the camera model stores the value, with all its fields, and does
+            nothing with it.
         assumed: what here is our choice because nothing is published; empty when all is published.
         unit_bits: bits behind one address.
     """
 
     address: int
     name: str
-    width: int
-    access: RegisterAccess
     reset: int
     meaning: str
     fields: tuple[BitField, ...] = ()
+    width: int = 1
+    access: RegisterAccess = RegisterAccess.READ_WRITE
     needs_sync: bool = False
     modelled: bool = True
     assumed: str = ""
     unit_bits: int = 8
+
+    def __post_init__(self) -> None:
+        """Pass ``modelled`` on to the fields."""
+        if not self.modelled:
+            fields = tuple(replace(field, modelled=False) for field in self.fields)
+            object.__setattr__(self, "fields", fields)
+
+    def of(self, *fields: BitField) -> "CameraRegister":
+        """This register with ``fields``."""
+        return replace(self, fields=fields)
 
     @property
     def addresses(self) -> range:

@@ -10,13 +10,12 @@ from cubestack.firmware_model.interface.cameras.registers import (
     RegisterAccess,
 )
 
-RW = RegisterAccess.READ_WRITE
-MODE = CameraRegister(
-    0x10, "MODE", 1, RW, 1, "", (BitField("ON", 0, 1, ""), BitField("ODD", 1, 1, "", False))
+MODE = CameraRegister(0x10, "MODE", 1, "").of(
+    BitField("ON", 0, 1, ""), BitField("ODD", 1, 1, "", False)
 )
-RATE = CameraRegister(0x11, "RATE", 2, RW, 0x0203, "", needs_sync=True)
-FANCY = CameraRegister(0x13, "FANCY", 1, RW, 0, "", modelled=False)
-CHIP = CameraRegister(0x14, "CHIP", 1, RegisterAccess.READ_ONLY, 0x42, "")
+RATE = CameraRegister(0x11, "RATE", 0x0203, "", width=2, needs_sync=True)
+FANCY = CameraRegister(0x13, "FANCY", 0, "", modelled=False)
+CHIP = CameraRegister(0x14, "CHIP", 0x42, "", access=RegisterAccess.READ_ONLY)
 
 
 @pytest.fixture

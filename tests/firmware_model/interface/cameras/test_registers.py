@@ -8,19 +8,12 @@ from cubestack.firmware_model.interface.cameras.registers import (
     BitField,
     CameraRegister,
     CameraRegisterMap,
-    RegisterAccess,
     UnknownRegisterError,
 )
 
-GAIN = CameraRegister(0x10, "GAIN", 2, RegisterAccess.READ_WRITE, 5, "amplifies")
-CONTROL = CameraRegister(
-    0x12,
-    "CONTROL",
-    1,
-    RegisterAccess.READ_WRITE,
-    0,
-    "switches",
-    fields=(BitField("ON", 0, 1, "runs"), BitField("DEPTH", 5, 2, "bits")),
+GAIN = CameraRegister(0x10, "GAIN", 5, "amplifies", width=2)
+CONTROL = CameraRegister(0x12, "CONTROL", 0, "switches").of(
+    BitField("ON", 0, 1, "runs"), BitField("DEPTH", 5, 2, "bits")
 )
 
 
@@ -31,13 +24,8 @@ def registers(*declared: CameraRegister) -> CameraRegisterMap:
 def test_lookup_by_name_and_by_any_address_of_the_register() -> None:
     table = registers(CONTROL, GAIN)
     assert table["GAIN"] is GAIN
-    assert [table.at(a) for a in (0x0F, 0x10, 0x11, 0x12, 0x13)] == [
-        None,
-        GAIN,
-        GAIN,
-        CONTROL,
-        None,
-    ]
+    owners = [table.at(address) for address in range(0x0F, 0x14)]
+    assert owners == [None, GAIN, GAIN, CONTROL, None]
     assert list(table) == [GAIN, CONTROL]  # in the order of addresses
     assert len(table) == 2
 
