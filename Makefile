@@ -14,7 +14,7 @@ SIMULATOR ?= icarus
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run test test-hdl mutants lint bench clean
+.PHONY: help venv run test test-hdl mutants lint bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -23,6 +23,7 @@ help:
 	@echo "make mutants   set up, then count the wrong gates that the gateware's benches notice; takes long"
 	@echo "make lint      ruff and mypy"
 	@echo "make bench     measure the cost of the hot paths"
+	@echo "make bench-engines  compare the simulators that can run the gateware"
 	@echo "make clean     remove .venv, out and caches"
 
 venv: .venv/ready-run
@@ -55,6 +56,9 @@ lint: .venv/ready-dev
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench
+
+bench-engines: .venv/ready-dev
+	@$(BIN)/python -m tests.benchmarks.engines
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

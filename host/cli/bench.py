@@ -18,8 +18,7 @@ aramis_solve_ms   AraMiS: one solve, from the picture to the attitude
 i2c_ROUTE_fast    byte reads a second of a program below `cubestack run`, by either route
 i2c_ROUTE_real    the same at 400 kHz in the wire's time, which would be 10 256
 
---engines measures something else: the compiled engine beside a Verilator library, cocotb on Icarus
-Verilog and Amaranth's simulator, on every top (docs/engines.md).
+What compares the engines that can run the FPGA designs is `make bench-engines` (docs/engines.md).
 """
 
 import argparse
@@ -34,7 +33,6 @@ from cubestack.firmware_model.interface.aramis import MeasurementMode
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.cli.aramis_session import aramis_catalogue, open_aramis
-from cubestack.host.cli.bench_engines import bench_engines
 from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.cli.terminal import console
 
@@ -64,17 +62,10 @@ print(100 / times[len(times) // 2])
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument(
-        "--engines",
-        action="store_true",
-        help="compare the engines that can run the FPGA designs, on every top, instead",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and report."""
-    if args.engines:
-        return bench_engines(as_json=args.json)
     from cubestack.emulator.rtl.benchmark import (
         PAIR_STORES,
         cold_build_s,

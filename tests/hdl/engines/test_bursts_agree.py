@@ -15,8 +15,8 @@ from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps
 from cubestack.emulator.rtl.cxxrtl.variants import members, variant_text
 from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.emulator.rtl.workloads import WORKLOADS
 from cubestack.hdl.flow.generate import rtlil_text
+from tests.benchmarks.engines.workloads import WORKLOADS
 
 from .board_events import BOARDS
 

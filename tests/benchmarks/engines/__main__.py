@@ -1,65 +1,74 @@
-"""The table of `cubestack bench --engines`: each engine on each top, in one run."""
+"""How fast each engine is on each top, as a table or as JSON.
 
+examples, from the project's folder:
+  make bench-engines
+  python -m tests.benchmarks.engines --json
+
+Exit code 2 when an engine fails or stores something else than the cameras sent.
+"""
+
+import argparse
 import json
+import sys
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE
 from rich.table import Table
 
+from cubestack.emulator.rtl.cxxrtl.build import CompilerError
 from cubestack.host.cli.terminal import console, progress_bar, say
+from tests.benchmarks.engines import speeds
+from tests.benchmarks.engines.icarus import CocotbError
+from tests.benchmarks.engines.speeds import ENGINES, Speed
+from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
 
-if TYPE_CHECKING:
-    from cubestack.emulator.rtl.engine_speeds import Speed
 
-__all__ = ["bench_engines"]
-
-
-def bench_engines(*, as_json: bool) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Measure and report; 2 when an engine fails, which is said."""
-    from cubestack.emulator.rtl.cocotb_icarus import CocotbError
-    from cubestack.emulator.rtl.cxxrtl.build import CompilerError
-    from cubestack.emulator.rtl.engine_speeds import ENGINES, absent, measure, prepare
-    from cubestack.emulator.rtl.workloads import WORKLOADS, WrongPictureError
-
-    missing = absent()
-    speeds: list[Speed] = []
+    parser = argparse.ArgumentParser(
+        prog="engines", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    args = parser.parse_args(argv)
+    missing = speeds.absent()
+    found: list[Speed] = []
     try:
         with progress_bar() as bar:
             task = bar.add_task("building", total=len(WORKLOADS))
             with ThreadPoolExecutor(2) as pool:
-                for _ in pool.map(prepare, WORKLOADS):
+                for _ in pool.map(speeds.prepare, WORKLOADS):
                     bar.advance(task)
             task = bar.add_task("measuring", total=len(WORKLOADS) * (len(ENGINES) - len(missing)))
             for top in WORKLOADS:
-                for speed in measure(top):
-                    speeds.append(speed)
+                for speed in speeds.measure(top):
+                    found.append(speed)
                     bar.advance(task)
     except (CompilerError, CocotbError, WrongPictureError) as error:
         say(f"error: {error}")
         return 2
-    if as_json:
-        print(json.dumps(_report(speeds, missing)))
+    if args.json:
+        print(json.dumps(_report(found, missing)))
         return 0
-    console.print(_table(speeds, [name for name in ENGINES if name not in missing]))
+    console.print(_table(found, [name for name in ENGINES if name not in missing]))
     for name, what in missing.items():
         say(f"{name} is absent: install {what}")
     return 0
 
 
-def _by_top(speeds: list["Speed"]) -> dict[str, dict[str, float]]:
+def _by_top(found: list[Speed]) -> dict[str, dict[str, float]]:
     tops: dict[str, dict[str, float]] = {}
-    for top, engine, clocks_per_s in speeds:
+    for top, engine, clocks_per_s in found:
         tops.setdefault(top, {})[engine] = clocks_per_s
     return tops
 
 
-def _report(speeds: list["Speed"], missing: dict[str, str]) -> dict[str, object]:
+def _report(found: list[Speed], missing: dict[str, str]) -> dict[str, object]:
     """Clocks a second, and how many times as many the compiled engine makes as each other one."""
     return {
         "clocks_per_s": {
             top: {name: round(rate) for name, rate in rates.items()}
-            for top, rates in _by_top(speeds).items()
+            for top, rates in _by_top(found).items()
         },
         "ratio": {
             top: {
@@ -67,13 +76,13 @@ def _report(speeds: list["Speed"], missing: dict[str, str]) -> dict[str, object]
                 for name, rate in rates.items()
                 if name != "compiled" and "compiled" in rates
             }
-            for top, rates in _by_top(speeds).items()
+            for top, rates in _by_top(found).items()
         },
         "absent": missing,
     }
 
 
-def _table(speeds: list["Speed"], engines: list[str]) -> Table:
+def _table(found: list[Speed], engines: list[str]) -> Table:
     table = Table(
         title="pixel clocks a second, none skipped; x: compiled makes so many times as many",
         box=SIMPLE,
@@ -82,7 +91,7 @@ def _table(speeds: list["Speed"], engines: list[str]) -> Table:
     table.add_column("top", no_wrap=True)
     for name in engines:
         table.add_column(name, justify="right", no_wrap=True)
-    for top, rates in _by_top(speeds).items():
+    for top, rates in _by_top(found).items():
         cells = []
         for name in engines:
             times = rates["compiled"] / rates[name] if "compiled" in rates else 1.0
@@ -97,3 +106,7 @@ def _short(rate: float) -> str:
         if rate >= limit:
             return f"{rate / limit:.1f} {unit}"
     return f"{rate:.0f}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
