@@ -18,14 +18,14 @@ from cubestack.emulator.i2cdev.guest_process import (
     start_filtered,
     start_preloaded,
 )
-from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers, wait_precisely
+from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers
 from cubestack.emulator.i2cdev.preload.shim import shim_library
 from cubestack.emulator.i2cdev.remote import RemoteBus
-from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, I2cScheduler
+from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
 from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.i2cdev.serving import open_scheduler
 from cubestack.emulator.ports.endpoint import Endpoint
-from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import Kernel
 
 __all__ = ["HostBus", "attached_bus", "emulated_bus", "run_program"]
@@ -110,8 +110,8 @@ def run_program(
         for each in early:
             run.signalled(each)
         say(f"/dev/i2c-{number} by way of {reason}")
-        sharpen_timers()
         if bus.adapter is None:
+            sharpen_timers()
             _serve([bus.port, *run.ports], run)
         else:
             _emulate(bus, bus.adapter, run, pace=pace, say=say)
@@ -131,31 +131,22 @@ def _emulate(
     pace: Literal["real", "fast"],
     say: Callable[[str], None],
 ) -> None:
-    turns = I2cScheduler(
-        "program and bus",
+    with open_scheduler(
         bus.kernel,
-        adapter,
-        [bus.port, *run.ports],
+        [run],
         bus.busy,
-        fast=pace == "fast",
-        always_asleep=run.hands_over,
-    )
-    pump = RealtimeScheduler(
-        bus.kernel,
-        [turns, run],
-        lambda: adapter.busy or bus.busy(),
         pace=pace,
+        i2c=adapter,
+        i2c_ports=[bus.port, *run.ports],
+        always_asleep=run.hands_over,
         report=say,
-        clock_ns=turns.clock_ns,
-        wait=wait_precisely,
-    )
-    run.on_end = pump.stop
-    gc.freeze()  # the catalogue need not be looked through for garbage between two transfers
-    try:
-        pump.run()
-    finally:
-        gc.unfreeze()
-        turns.close()
+    ) as scheduler:
+        run.on_end = scheduler.stop
+        gc.freeze()  # the catalogue need not be looked through for garbage between two transfers
+        try:
+            scheduler.run()
+        finally:
+            gc.unfreeze()
 
 
 def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
