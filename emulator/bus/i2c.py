@@ -120,15 +120,16 @@ class I2cBus:
     """One bus with any number of targets.
 
     Attributes:
+        kernel: virtual time.
         bit_ps: time of one bit.
         fault_hook: what is on the wires, if anything.
     """
 
-    def __init__(self, env: Kernel, hz: int = 100_000) -> None:
+    def __init__(self, kernel: Kernel, hz: int = 100_000) -> None:
         """Make an idle bus at ``hz`` bits a second (positive, else ValueError)."""
         if hz <= 0:
             raise ValueError(f"an I2C bus needs a positive bit rate, not {hz} Hz")
-        self._env = env
+        self.kernel = kernel
         self._targets: dict[int, I2cTarget] = {}
         self._general = _GeneralCall()
         self._taken = False
@@ -176,7 +177,7 @@ class I2cBus:
             self._hand_on()
 
     def _take_turn(self) -> Generator[simpy.Event, Any, None]:
-        turn = self._env.event()
+        turn = self.kernel.event()
         self._turns.append(turn)
         try:
             yield turn
@@ -201,7 +202,7 @@ class I2cBus:
             yield from self.fault_hook.before_start()
         try:
             for message in messages:
-                yield self._env.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
+                yield self.kernel.timeout((1 + BITS_PER_BYTE) * self.bit_ps)
                 if self.fault_hook is not None:
                     yield from self.fault_hook.after_address(message.address)
                 target = self._find(message)
@@ -212,7 +213,7 @@ class I2cBus:
                 yield from self._bytes(target, message)
         except I2cError as error:
             failure = error
-        yield self._env.timeout(self.bit_ps)
+        yield self.kernel.timeout(self.bit_ps)
         if addressed is not None:
             addressed.i2c_stop()
         if failure is not None:
@@ -233,7 +234,7 @@ class I2cBus:
             wanted = message.read
             while len(message.data) < wanted:
                 byte = yield from self._next_byte(target, message.address)
-                yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+                yield self.kernel.timeout(BITS_PER_BYTE * self.bit_ps)
                 if self.fault_hook is not None:
                     yield from self.fault_hook.after_byte(message.address, read=True)
                 if message.block and not message.data:
@@ -241,7 +242,7 @@ class I2cBus:
                 message.data.append(byte)
             return
         for byte in message.data:
-            yield self._env.timeout(BITS_PER_BYTE * self.bit_ps)
+            yield self.kernel.timeout(BITS_PER_BYTE * self.bit_ps)
             if self.fault_hook is not None:
                 yield from self.fault_hook.after_byte(message.address, read=False)
             if not target.i2c_write(byte):
@@ -251,13 +252,13 @@ class I2cBus:
 
     def _next_byte(self, target: I2cTarget, address: int) -> Generator[simpy.Event, Any, int]:
         """Wait while ``target`` stretches the clock."""
-        give_up_ps = self._env.now + LONGEST_STRETCH_PS
+        give_up_ps = self.kernel.now + LONGEST_STRETCH_PS
         while (byte := target.i2c_read()) is None:
-            if self._env.now >= give_up_ps:
+            if self.kernel.now >= give_up_ps:
                 raise I2cError(
                     errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s"
                 )
-            yield self._env.timeout(self.bit_ps)
+            yield self.kernel.timeout(self.bit_ps)
         return byte
 
 

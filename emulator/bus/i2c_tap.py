@@ -16,6 +16,7 @@ class BusTap(I2cBus):
     def __init__(self, bus: I2cBus) -> None:
         """Stand in for ``bus``, which keeps its targets and what disturbs it."""
         self._bus = bus
+        self.kernel = bus.kernel
         self.bit_ps = bus.bit_ps
 
     @property

@@ -14,7 +14,6 @@ import simpy
 from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.bus.i2c_tap import BusTap
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.formats.recording import (
     BusMessage,
     BusTransfer,
@@ -47,9 +46,9 @@ class Recorder:
         self._writer = RecordingWriter(stream, device, bauds, setup)
         self._taps = [_Tap(self._writer, port, uart) for port, uart in uarts.items()]
 
-    def bus(self, kernel: Kernel, bus: I2cBus, port: str = "i2c") -> "RecordedBus":
+    def bus(self, bus: I2cBus, port: str = "i2c") -> "RecordedBus":
         """``bus``, with its transfers on record; to be used in its place."""
-        return RecordedBus(kernel, bus, port, self._writer)
+        return RecordedBus(bus, port, self._writer)
 
     def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
         """The device was told so, from outside of its ports; see ``Control``."""
@@ -125,16 +124,15 @@ class _Tap:
 class RecordedBus(BusTap):
     """An I2C bus with its transfers on record."""
 
-    def __init__(self, kernel: Kernel, bus: I2cBus, port: str, writer: RecordingWriter) -> None:
+    def __init__(self, bus: I2cBus, port: str, writer: RecordingWriter) -> None:
         """Stand in for ``bus``."""
-        self._kernel = kernel
         super().__init__(bus)
         self._port = port
         self._writer = writer
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         """See I2cBus."""
-        start_ps, errno = self._kernel.now, 0
+        start_ps, errno = self.kernel.now, 0
         try:
             yield from self._bus.transfer(messages)
         except I2cError as error:
@@ -142,5 +140,5 @@ class RecordedBus(BusTap):
             raise
         finally:
             found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
-            event = BusTransfer(start_ps, self._port, self._kernel.now, found, errno)
+            event = BusTransfer(start_ps, self._port, self.kernel.now, found, errno)
             self._writer.write(event)

@@ -24,12 +24,12 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["Probe", "TracedBus", "VcdTrace"]
+__all__ = ["Probes", "TracedBus", "VcdTrace"]
 
 PS_PER_NS = 1000
 
-Probe = Callable[[], int | str]
-"""Looks at a value: a text, or a number of at most 32 bits."""
+Probes = Callable[[], Mapping[str, int | str]]
+"""Looks at values, always the same ones by name: texts, and numbers of at most 32 bits."""
 
 
 class VcdTrace:
@@ -42,22 +42,22 @@ class VcdTrace:
         kernel: Kernel,
         uarts: Mapping[str, Uart],
         engine: RtlEngine | None = None,
-        probes: Mapping[str, Probe] | None = None,
+        probes: Probes = dict,
     ) -> None:
-        """Trace ``uarts`` and ``probes`` by their names; ``stream`` stays its owner's."""
+        """Trace ``uarts`` and what ``probes`` see, by names; ``stream`` stays its owner's."""
         self._kernel = kernel
         self._engine = engine
         self._device = device
         self._writer = VCDWriter(stream, timescale="1 ns", version="cubestack", date="")
-        self._probes = dict(probes or {})
+        self._probes = probes
         self._variables: dict[str, Any] = {}
         self._last: dict[str, int | str] = {}
         self._pending: list[tuple[int, int, str, int | str]] = []
         self._numbers = count()
         self._written_ns = 0
         self._lag_ps = 2 * max((uart.byte_ps for uart in uarts.values()), default=0)
-        for name, probe in self._probes.items():
-            self._declare(f"firmware.{name}", None if isinstance(probe(), str) else 32)
+        for name, value in probes().items():
+            self._declare(f"firmware.{name}", None if isinstance(value, str) else 32)
         self._pins = self._declare_pins()
         self._taps = [(uart, _LineTap(self, port, uart)) for port, uart in uarts.items()]
         for uart, tap in self._taps:
@@ -116,8 +116,8 @@ class VcdTrace:
         self._flush(self._kernel.now - self._lag_ps)
 
     def _look(self) -> None:
-        for name, probe in self._probes.items():
-            self._change(self._kernel.now, f"firmware.{name}", probe())
+        for name, value in self._probes().items():
+            self._change(self._kernel.now, f"firmware.{name}", value)
         if self._engine is not None:
             # The FPGA may be ahead of the kernel, never behind what it shows.
             time_ps = max(self._engine.now_ps, 0)

@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.camera.common.optics import Optics
     from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
     from cubestack.emulator.scene.sky import Scene
+    from cubestack.emulator.sim.virtual_time import Kernel
     from cubestack.firmware_model.aramis.catalogue.database import Database
 
 __all__ = ["DEFAULT_FIELD_DEG", "AramisSession", "aramis_board", "aramis_catalogue", "open_aramis"]
@@ -45,7 +47,13 @@ def aramis_catalogue(field_deg: float = DEFAULT_FIELD_DEG) -> Database:
 
 
 def aramis_board(
-    path: Path | None, *, seed: int = 0, baud: int = INTERFACE.baud, lens: Optics | None = None
+    path: Path | None,
+    *,
+    seed: int = 0,
+    baud: int = INTERFACE.baud,
+    lens: Optics | None = None,
+    kernel: Kernel | None = None,
+    i2c_bus: I2cBus | None = None,
 ) -> AramisBoard:
     """Power up a star tracker that looks at the scene in ``path``, or at Orion."""
     from cubestack.emulator.boards.aramis.board import AramisBoard
@@ -59,7 +67,9 @@ def aramis_board(
         scene = SkyScene(quaternion_from_pointing(*DEFAULT_POINTING_DEG), optics=lens)
     else:
         scene = load_scene(path, lens)
-    return AramisBoard(scene, aramis_catalogue(), seed=seed, baud=baud)
+    return AramisBoard(
+        scene, aramis_catalogue(), seed=seed, baud=baud, kernel=kernel, i2c_bus=i2c_bus
+    )
 
 
 class AramisSession:

@@ -18,10 +18,8 @@ examples:
 import argparse
 import signal
 import time
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.setup import Option
@@ -34,11 +32,6 @@ from cubestack.host.cli.session import add_engine_arguments, add_layout_argument
 from cubestack.host.cli.terminal import say
 from cubestack.host.devices.boards import DEVICES, open_board
 from cubestack.host.recording.setups import emulated_setup
-
-if TYPE_CHECKING:
-    from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.sim.virtual_time import Kernel
-    from cubestack.host.devices.boards import Opened
 
 __all__ = ["add_arguments", "run"]
 
@@ -81,7 +74,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
+    from cubestack.emulator.bus.i2c import I2cBus
+    from cubestack.emulator.i2cdev.adapter import I2cAdapter
     from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
+    from cubestack.emulator.sim.virtual_time import Kernel
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
@@ -90,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
             if getattr(args, name) is not None:
                 raise ValueError(f"--{name} belongs to one device, and there are several")
     with ExitStack() as stack:
+        kernel = Kernel()
+        i2c_bus = I2cBus(kernel)
         devices = []
         for name in args.devices:
             devices.append(
@@ -101,6 +99,8 @@ def run(args: argparse.Namespace) -> int:
                     baud=args.baud,
                     mcu_addressing=args.mcu_addressing,
                     layout=args.layout,
+                    kernel=kernel,
+                    i2c_bus=i2c_bus,
                 )
             )
             stack.callback(devices[-1].board.close)
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
                 options["layout"] = args.layout.value
             setup = emulated_setup(args.seed, args.scene, args.faults, options)
             record(args, devices[0], stack, setup)
-        kernel, adapter = _joined(devices)
+        adapter = I2cAdapter(kernel, devices[0].board.i2c_bus)  # what records has taken its place
         served = open_ports(args, devices, stack)
         endpoints = [endpoint for _, _, endpoint in served]
 
@@ -150,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
             ports = [
                 f"{endpoint.name} at {line.baud} baud"
                 if not line.suffix
-                else f"{line.name} on {endpoint.name} at {line.baud} baud"
+                else f"{line.title} on {endpoint.name} at {line.baud} baud"
                 for owner, line, endpoint in served
                 if owner is device
             ]
@@ -159,14 +159,3 @@ def run(args: argparse.Namespace) -> int:
             say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
         pump.run()
     return 0
-
-
-def _joined(devices: Sequence["Opened"]) -> tuple["Kernel", "I2cAdapter"]:
-    """What drives all devices, and the master of their one I2C bus."""
-    from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.i2cdev.joined import JoinedKernel, join_buses
-
-    boards = [device.board for device in devices]
-    join_buses(*((board.kernel, board.i2c_bus) for board in boards))
-    kernel = boards[0].kernel if len(boards) == 1 else JoinedKernel([b.kernel for b in boards])
-    return kernel, I2cAdapter(boards[0].kernel, boards[0].i2c_bus)

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from cubestack.host.cli.arguments import whole
 
 if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import SerialLine
     from cubestack.emulator.ports.serial_port import Endpoint
-    from cubestack.host.devices.boards import Opened, SerialLine
+    from cubestack.host.devices.boards import Opened
 
 __all__ = ["add_port_arguments", "open_ports"]
 
@@ -60,7 +61,7 @@ def open_ports(
     Raises ValueError when there are not enough ports from the given one on, PortError when one
     does not open.
     """
-    lines = [(opened, line) for opened in devices for line in opened.lines]
+    lines = [(opened, line) for opened in devices for line in opened.board.lines]
     served = []
     for index, (opened, line) in enumerate(lines):
         endpoint = _open(args, len(devices) > 1, opened, line, index, len(lines))

@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cubestack.emulator.bus.uart import Uart
     from cubestack.emulator.recording.recorder import Recorder
     from cubestack.firmware_model.formats.setup import Setup
     from cubestack.host.devices.boards import Opened
 
-__all__ = ["add_record_arguments", "create_file", "port_uarts", "record"]
+__all__ = ["add_record_arguments", "create_file", "record"]
 
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,13 +28,6 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def port_uarts(opened: Opened) -> dict[str, Uart]:
-    """The device's ends of its serial lines, by the names of ports in recordings."""
-    return {
-        f"{line.suffix[1:]}_uart" if line.suffix else "uart": line.uart for line in opened.lines
-    }
-
-
 def record(
     args: argparse.Namespace, opened: Opened, stack: ExitStack, setup: Setup | None = None
 ) -> Recorder | None:
@@ -44,29 +36,21 @@ def record(
     The board's I2C bus is replaced by one that is listened to. ``setup`` is for the recording's
     header. Returns what records, if anything. Raises ValueError for a file that can not be written.
     """
-    from cubestack.emulator.recording.probes import firmware_probes
     from cubestack.emulator.recording.recorder import Recorder
     from cubestack.emulator.recording.trace import VcdTrace
 
-    board: Any = opened.board
-    device, uarts = opened.title.lower(), port_uarts(opened)
+    board = opened.board
+    device, uarts = opened.title.lower(), board.uarts
     if args.trace is not None:
-        engine = getattr(board, "engine", None)
-        trace = VcdTrace(
-            create_file(args.trace, stack),
-            device,
-            board.kernel,
-            uarts,
-            engine,
-            firmware_probes(board),
-        )
+        stream = create_file(args.trace, stack)
+        trace = VcdTrace(stream, device, board.kernel, uarts, board.engine, board.probes)
         stack.callback(trace.close)
         board.i2c_bus = trace.bus(board.i2c_bus)
     if args.record is None:
         return None
     recorder = Recorder(create_file(args.record, stack), device, uarts, setup)
     stack.callback(recorder.close)
-    board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+    board.i2c_bus = recorder.bus(board.i2c_bus)
     return recorder
 
 

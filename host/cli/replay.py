@@ -24,7 +24,7 @@ from cubestack.firmware_model.formats.setup import Setup
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.fault_plan import add_faults_argument
-from cubestack.host.cli.records import add_record_arguments, port_uarts, record
+from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.cli.session import Engine, add_engine_arguments
 from cubestack.host.cli.terminal import say
 from cubestack.host.devices.boards import DEVICES, Opened, open_board
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         controls = BoardControls(board, recording.device)
         if recorder is not None:
             controls.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
-        replay = Replay(recording, board.kernel, port_uarts(opened), board.i2c_bus, controls.act)
+        replay = Replay(recording, board.kernel, board.uarts, board.i2c_bus, controls.act)
         differences = replay.run(interface)
     if args.json:
         print(json.dumps({"recording": str(args.recording), "differences": differences}))

@@ -141,34 +141,39 @@ def run(args: argparse.Namespace) -> int:
 
 def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     """Power up the devices on one bus."""
+    from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.i2cdev.joined import JoinedKernel, join_buses
     from cubestack.emulator.i2cdev.running import emulated_bus
-    from cubestack.emulator.sim.virtual_time import PS_PER_S
+    from cubestack.emulator.sim.virtual_time import Kernel
 
     names = args.device or ["cubestar"]
     if len(names) > 1 and (args.scene or args.faults):
         raise ValueError("--scene and --faults are of one device, and several are on the bus")
+    kernel = Kernel()
+    bus = I2cBus(kernel, args.hz)
     boards = []
     for name in names:
-        opened = open_board(name, args.scene, seed=args.seed, engine=args.engine, baud=None)
+        opened = open_board(
+            name,
+            args.scene,
+            seed=args.seed,
+            engine=args.engine,
+            baud=None,
+            kernel=kernel,
+            i2c_bus=bus,
+        )
         stack.callback(opened.board.close)
         boards.append(opened.board)
-    first = boards[0]
-    inject_plan(first.faults, args.faults, None if args.quiet else say)
-    bus = first.i2c_bus
-    bus.bit_ps = PS_PER_S // args.hz
-    join_buses(*((board.kernel, board.i2c_bus) for board in boards))
+    inject_plan(boards[0].faults, args.faults, None if args.quiet else say)
     for old, new in args.i2c_addr:
         bus.move(old, new)
-    kernel = JoinedKernel([board.kernel for board in boards]) if boards[1:] else first.kernel
 
     def busy() -> bool:
         return any(board.busy() for board in boards)
 
     while busy() and kernel.now < BOOT_LIMIT_PS:
         kernel.step()
-    adapter = I2cAdapter(first.kernel, bus, address_errno=int(getattr(errno, args.nack_errno)))
+    adapter = I2cAdapter(kernel, bus, address_errno=int(getattr(errno, args.nack_errno)))
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
     host_bus = emulated_bus(kernel, busy, adapter, Path(folder) / f"i2c-{args.bus}")
     stack.callback(host_bus.port.close)

@@ -123,7 +123,7 @@ class CubeSenseSession:
         """Plug clients into ``board``."""
         self.board = board
         self.cubesense = CubeSense(NodeClient(board.serial(), CUBESENSE))
-        self.bench = BenchClient(board.bench_serial())
+        self.bench = BenchClient(board.serial("bench_uart"))
 
 
 @contextmanager

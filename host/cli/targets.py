@@ -90,7 +90,7 @@ def open_emulated(
     recorder = record(argparse.Namespace(record=path, trace=None), opened, stack, setup)
     if recorder is not None:
         controls.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
-    lines = [DirectSerial(board.kernel, line.uart) for line in opened.lines]
+    lines = [DirectSerial(board.kernel, line.uart) for line in board.lines]
     target = Target(text, interface, NodeClient(lines[0], interface), lines[0])
     target.on_close.append(stack.close)
     bus = DirectI2c(board.kernel, board.i2c_bus)

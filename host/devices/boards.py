@@ -5,28 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubesense.bench import BENCH
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 
 if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.bus.i2c import I2cBus
-    from cubestack.emulator.bus.uart import Uart
-    from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.emulator.scene.sky import Scene
     from cubestack.emulator.sim.virtual_time import Kernel
     from cubestack.host.cli.session import Engine
 
+    Place = tuple[Kernel | None, I2cBus | None]
+
 __all__ = [
     "DEVICES",
-    "Board",
     "Opened",
-    "SerialLine",
     "cubesense_scene",
     "cubestar_scene",
     "open_board",
@@ -39,47 +37,12 @@ DEFAULT_MAG_LIMIT = 3.8
 DEFAULT_ANGLES_DEG = {"sun": (20.0, 10.0), "nadir": (-8.0, 12.0)}
 
 
-class Board(Protocol):
-    """What every emulated device has."""
-
-    kernel: Kernel
-    i2c_bus: I2cBus
-
-    @property
-    def faults(self) -> Faults:
-        """Injects faults into it."""
-
-    def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
-
-    def close(self) -> None:
-        """Release what the device holds."""
-
-
-@dataclass(frozen=True)
-class SerialLine:
-    """A serial port of a device.
-
-    Attributes:
-        name: what it speaks.
-        suffix: behind the name of the first line's link.
-        uart: the device's end.
-        baud: of the line.
-    """
-
-    name: str
-    suffix: str
-    uart: Uart
-    baud: int
-
-
 @dataclass(frozen=True)
 class Opened:
     """A device that has been powered up."""
 
     title: str
     board: Board
-    lines: tuple[SerialLine, ...]
 
 
 def open_board(
@@ -91,21 +54,25 @@ def open_board(
     baud: int | None,
     mcu_addressing: bool = False,
     layout: Layout = Layout.COPIED,
+    kernel: Kernel | None = None,
+    i2c_bus: I2cBus | None = None,
 ) -> Opened:
     """Power up ``device`` (a name of ``DEVICES``); ``scene`` None is its default scene.
 
     ``baud`` is of the node protocol's line, None for the published one. ``mcu_addressing`` is an
     option of CubeSense's FPGAs, ``layout`` one of CubeStar; ValueError for another device.
+    ``kernel`` and ``i2c_bus`` are what it shares with other devices, if anything.
     """
+    place = kernel, i2c_bus
     if layout is not Layout.COPIED:
         if device != "cubestar":
             raise ValueError(f"--layout is an option of cubestar, not of {device}")
-        return _cubestar(scene, seed, engine, baud, layout=layout)
+        return _cubestar(scene, seed, engine, baud, place, layout=layout)
     if mcu_addressing:
         if device != "cubesense":
             raise ValueError(f"--mcu-addressing is an option of cubesense, not of {device}")
-        return _cubesense(scene, seed, engine, baud, mcu_addressing=True)
-    return DEVICES[device](scene, seed, engine, baud)
+        return _cubesense(scene, seed, engine, baud, place, mcu_addressing=True)
+    return DEVICES[device](scene, seed, engine, baud, place)
 
 
 def cubestar_scene(path: Path | None) -> Scene:
@@ -134,18 +101,24 @@ def _cubestar(
     seed: int,
     engine: Engine,
     baud: int | None,
+    place: Place,
     *,
     layout: Layout = Layout.COPIED,
 ) -> Opened:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
-    baud = baud or CUBESTAR.baud
-    scene = cubestar_scene(path)
     board = CubeStarBoard(
-        scene, onboard_catalogue(), seed=seed, engine=engine, baud=baud, layout=layout
+        cubestar_scene(path),
+        onboard_catalogue(),
+        seed=seed,
+        engine=engine,
+        baud=baud or CUBESTAR.baud,
+        kernel=place[0],
+        i2c_bus=place[1],
+        layout=layout,
     )
-    return Opened("CubeStar", board, (SerialLine("node protocol", "", board.uart, baud),))
+    return Opened("CubeStar", board)
 
 
 def _cubesense(
@@ -153,34 +126,37 @@ def _cubesense(
     seed: int,
     engine: Engine,
     baud: int | None,
+    place: Place,
     *,
     mcu_addressing: bool = False,
 ) -> Opened:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-    baud = baud or CUBESENSE.baud
     board = CubeSenseBoard(
-        cubesense_scene(path), seed=seed, engine=engine, baud=baud, mcu_addressing=mcu_addressing
+        cubesense_scene(path),
+        seed=seed,
+        engine=engine,
+        baud=baud or CUBESENSE.baud,
+        kernel=place[0],
+        i2c_bus=place[1],
+        mcu_addressing=mcu_addressing,
     )
-    lines = (
-        SerialLine("node protocol", "", board.uart, baud),
-        SerialLine("bench protocol", ".bench", board.bench_uart, BENCH.baud),
-    )
-    return Opened("CubeSense", board, lines)
+    return Opened("CubeSense", board)
 
 
-def _aramis(path: Path | None, seed: int, engine: Engine, baud: int | None) -> Opened:
+def _aramis(path: Path | None, seed: int, engine: Engine, baud: int | None, place: Place) -> Opened:
     from cubestack.host.cli.aramis_session import aramis_board
 
     if engine != "auto":
         raise ValueError(f"aramis has no FPGA: leave --engine {engine} out")
-    baud = baud or ARAMIS.baud
-    board = aramis_board(path, seed=seed, baud=baud)
-    return Opened("AraMiS", board, (SerialLine("node protocol", "", board.uart, baud),))
+    board = aramis_board(
+        path, seed=seed, baud=baud or ARAMIS.baud, kernel=place[0], i2c_bus=place[1]
+    )
+    return Opened("AraMiS", board)
 
 
 #: Devices that can be emulated, by the names of the command line.
-DEVICES: dict[str, Callable[[Path | None, int, Engine, int | None], Opened]] = {
+DEVICES: dict[str, Callable[[Path | None, int, Engine, int | None, Place], Opened]] = {
     "cubestar": _cubestar,
     "cubesense": _cubesense,
     "aramis": _aramis,

@@ -90,7 +90,7 @@ class Fuzzer:
         self.plugs = {"uart": self.board.serial}
         uarts = [self.board.uart]
         if interface.bench is not None:
-            self.plugs["bench"] = self.board.bench_serial
+            self.plugs["bench"] = lambda: self.board.serial("bench_uart")
             uarts.append(self.board.bench_uart)
         self.lines = {name: plug() for name, plug in self.plugs.items()}
         self.addresses = [interface.i2c_address]

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar.layouts import fpga_of
-from cubestack.emulator.recording.probes import firmware_probes
 from cubestack.emulator.recording.trace import VcdTrace
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
@@ -365,7 +364,7 @@ def test_a_trace_shows_the_bus(node: Session) -> None:
         board.kernel,
         {"uart": board.uart},
         board.engine,
-        firmware_probes(board),
+        board.probes,
     )
     node.cubestar.capture()
     blocks(node, range(3))

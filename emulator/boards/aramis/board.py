@@ -7,26 +7,22 @@ flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
 
 from collections import deque
 from fractions import Fraction
-from functools import cached_property
 from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.boards.aramis.ppi import Ppi
+from cubestack.emulator.boards.contract import Board, EngineKind
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
-from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
-from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.seu import flip_bits
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.emulator.sim.no_fpga import NoFpga
-from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.power_tables import Part, PowerTable
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
@@ -36,6 +32,7 @@ from cubestack.firmware_model.aramis.hardware import FrameEnd
 from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
 from cubestack.firmware_model.aramis.program import AramisProgram
 from cubestack.firmware_model.interface.aramis import INTERFACE, ResetCause
+from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS, ROWS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
@@ -48,9 +45,6 @@ BOOT_US = 50_000
 
 CAMERA_BUS_HZ = 100_000
 """Standard mode; the part has no such interface, its program moves two pins (assumed rate)."""
-
-SILENCE_BYTES = 100
-"""Byte times of silence after which the UART gives up a half frame; ours."""
 
 REMEMBERED = 8
 """Frames whose exposure is kept."""
@@ -69,20 +63,17 @@ ARAMIS_POWER = PowerTable(
 )
 
 
-class AramisBoard:
+class AramisBoard(Board):
     """One emulated star tracker.
 
     Attributes:
-        kernel: virtual time.
         camera: image sensor, which looks at the scene.
         ppi: interface between the two.
-        power: supplies; the place for latch-ups.
-        processor: ADSP-BF533 with the running program.
-        uart: the satellite's serial line.
-        i2c_bus: the satellite's I2C bus.
         sdram: external memory, shape (bytes,), uint8.
         catalogue_flash: flash of the coded catalogue, shape (bytes,), uint8.
     """
+
+    random_stream = (0xA7A,)
 
     def __init__(
         self,
@@ -90,8 +81,11 @@ class AramisBoard:
         catalogue: Database | None,
         *,
         seed: int = 0,
-        noise: NoiseTerms | None = None,
+        engine: EngineKind = "auto",
         baud: int = INTERFACE.baud,
+        kernel: Kernel | None = None,
+        i2c_bus: I2cBus | None = None,
+        noise: NoiseTerms | None = None,
         i2c_address: int = INTERFACE.i2c_address,
     ) -> None:
         """Power up.
@@ -100,29 +94,24 @@ class AramisBoard:
             scene: what the camera sees; its lens must be that of an MT9M001.
             catalogue: stars and triangles in flash; None leaves it erased.
             seed: of everything random but the scene: memory at power-up, hot pixels, bit flips.
-            noise: which terms of noise the sensor has, all unless given.
+            engine: there is no FPGA: ValueError for anything but "auto".
             baud: of the satellite's UART.
+            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
+            noise: which terms of noise the sensor has, all unless given.
             i2c_address: 7-bit address on the satellite's bus.
         """
-        self.kernel = Kernel()
-        self._seed = seed
-        self._rng = np.random.default_rng([seed, 0xA7A])
+        if engine != "auto":
+            raise ValueError(f"AraMiS has no FPGA: its engine must be 'auto', not {engine!r}")
+        super().__init__(ARAMIS_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.sdram = np.frombuffer(self._rng.bytes(SDRAM_BYTES), np.uint8).copy()
         self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
         if catalogue is not None:
             coded = flash_image(catalogue.pack())
             self.catalogue_flash[: len(coded)] = coded
-        self.power = PowerModel(self.kernel, ARAMIS_POWER)
         self.camera = Mt9m001(scene, seed=seed, noise=noise)
         self.ppi = Ppi(self.kernel, self.camera)
         self.ppi.on_end = self._frame_ended
-        self.uart = Uart(
-            self.kernel,
-            baud,
-            lambda byte: self.program.link.uart_byte(byte),
-            lambda: self.program.link.uart_silence(),
-            silence_bytes=SILENCE_BYTES,
-        )
+        self._serial_line(baud, lambda: self.program.link)
         self._hardware = _Blackfin(self)
         self._frames: deque[RollingShutter] = deque(maxlen=REMEMBERED)
         self._frame = 0
@@ -145,22 +134,8 @@ class AramisBoard:
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
         )
         self.power.on_switch = self._supply_switched
-        self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
         self._show_camera()
-
-    @cached_property
-    def faults(self) -> Faults:
-        """Injects faults into this board; its camera and processor have none of their own."""
-        sites = Sites(
-            self.kernel,
-            self.processor,
-            {"uart": self.uart},
-            {"i2c": self.i2c_bus},
-            self.power,
-            memories={"sdram": self.sdram, "flash": self.catalogue_flash},
-        )
-        return Faults(sites, self._seed)
 
     @property
     def program(self) -> AramisProgram:
@@ -169,20 +144,28 @@ class AramisBoard:
         assert isinstance(program, AramisProgram)
         return program
 
-    def serial(self) -> DirectSerial:
-        """Host's end of the UART, in this process."""
-        return DirectSerial(self.kernel, self.uart)
+    @property
+    def scene(self) -> Scene:
+        """What the camera sees; see ``Board``."""
+        return self.camera.scene
 
-    def i2c(self) -> DirectI2c:
-        """Host's end of the I2C bus, in this process."""
-        return DirectI2c(self.kernel, self.i2c_bus)
+    @scene.setter
+    def scene(self, scene: object) -> None:
+        if not isinstance(scene, SkyScene | PictureScene):
+            raise TypeError(f"a star tracker sees the sky or a picture, not {scene!r}")
+        self.camera.scene = scene
 
     def busy(self) -> bool:
         """Whether anything is under way that does not wait for the host."""
-        return self.uart.busy or self.ppi.busy or not self.processor.dozing
+        return super().busy() or self.ppi.busy
 
-    def close(self) -> None:
-        """Release nothing: for symmetry with the boards that have an engine."""
+    def probes(self) -> dict[str, int | str]:
+        """What a trace shows: state and latest outcome beside what all boards show."""
+        state = self.program.state
+        return super().probes() | {
+            "task": SensorState(state.sensor).name,
+            "measurement": MeasurementOutcome(state.measurement.outcome).name,
+        }
 
     def truth(self, frame: int | None = None) -> NDArray[np.float64] | None:
         """Attitude (4,) at the mid-exposure of the middle row of a stored frame.
@@ -206,6 +189,10 @@ class AramisBoard:
         """
         target = self.catalogue_flash if memory == "flash" else self.sdram
         return flip_bits(target, rate, self._rng)
+
+    def _sites(self) -> Sites:
+        # Its camera and processor have no faults of their own.
+        return self._common_sites(memories={"sdram": self.sdram, "flash": self.catalogue_flash})
 
     def _frame_ended(self, end: FrameEnd) -> None:
         if end is FrameEnd.STORED and self.ppi.stored is not None:

@@ -4,24 +4,17 @@ CubeSense thesis, figure 3.9 and tables 3.3 and 3.4: two halves of camera, FPGA 
 microcontroller for both, its buses to the satellite, and its switches and current monitors.
 """
 
-from collections.abc import Callable
-from functools import cached_property, lru_cache
-from typing import Literal, Protocol
+from functools import lru_cache
 
-import numpy as np
-
+from cubestack.emulator.boards.contract import Board, EngineKind
 from cubestack.emulator.boards.cubesense.gpio import GpioPins
 from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
-from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
-from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
-from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.rtl.contract import RtlEngine, make_engine
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth
-from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.power_tables import CUBESENSE
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
@@ -29,7 +22,13 @@ from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.bench import BENCH
-from cubestack.firmware_model.interface.cubesense.codes import ROWS, Camera, Sram
+from cubestack.firmware_model.interface.cubesense.codes import (
+    ROWS,
+    Camera,
+    CaptureResult,
+    DetectResult,
+    Sram,
+)
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
@@ -41,9 +40,6 @@ __all__ = ["CubeSenseBoard"]
 
 BOOT_US = 1_000
 """Oscillator start-up and the C library's own start: assumed."""
-
-SILENCE_BYTES = 100
-"""Byte times of silence after which a UART gives up a half frame; ours."""
 
 HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
 """Name of each half's camera and memory in the engine, and of its parts in the power table."""
@@ -58,40 +54,30 @@ def _design(mcu_addressing: bool) -> CubeSensePair:
     return CubeSensePair(mcu_addressing=mcu_addressing)
 
 
-class _UartLink(Protocol):
-    """What the program has behind a serial line."""
-
-    def uart_byte(self, byte: int) -> None: ...
-
-    def uart_silence(self) -> None: ...
-
-
-class CubeSenseBoard:
+class CubeSenseBoard(Board):
     """One emulated CubeSense.
 
     Attributes:
-        kernel: virtual time.
-        engine: both FPGAs and their SRAMs.
         cameras: both image sensors.
-        power: supplies; the place for latch-ups.
         hardware: the processor's peripherals, as its program sees them.
-        processor: PIC18F45K20 with the running program.
-        uart: serial line with the node protocol.
-        bench_uart: serial line with the bench protocol.
-        i2c_bus: the satellite's I2C bus.
+        bench_uart: device's end of the serial line with the bench protocol.
     """
+
+    engine: RtlEngine
 
     def __init__(
         self,
         scene: EarthSunScene,
         *,
         seed: int = 0,
-        engine: Literal["auto", "compiled", "python"] = "auto",
+        engine: EngineKind = "auto",
         baud: int = INTERFACE.baud,
+        kernel: Kernel | None = None,
+        i2c_bus: I2cBus | None = None,
+        mcu_addressing: bool = False,
         bench_baud: int = BENCH.baud,
         i2c_address: int = INTERFACE.i2c_address,
         register_address: int = REGISTERS.i2c_address,
-        mcu_addressing: bool = False,
     ) -> None:
         """Power up.
 
@@ -100,22 +86,22 @@ class CubeSenseBoard:
             seed: of what the memories hold after power-up.
             engine: see ``make_engine``.
             baud: of the serial line with the node protocol.
-            bench_baud: of the one with the bench protocol.
+            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
+            mcu_addressing: FPGAs with the option that lets the processor choose addresses.
+            bench_baud: of the serial line with the bench protocol.
             i2c_address: 7-bit address of the node protocol.
             register_address: 7-bit address of the register-pointer protocol.
-            mcu_addressing: FPGAs with the option that lets the processor choose addresses.
         """
-        self.kernel = Kernel()
-        self._seed = seed
-        self._rng = np.random.default_rng(seed)
+        super().__init__(CUBESENSE, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(_design(mcu_addressing), kind=engine)
         self.cameras = {camera: Ov7620(scene, camera) for camera in Camera}
         self._failed: set[Camera] = set()
-        self.power = PowerModel(self.kernel, CUBESENSE)
-        self.uart = self._serial_line(baud, lambda: self.program.node)
-        self.bench_uart = self._serial_line(bench_baud, lambda: self.program.bench)
+        self._serial_line(baud, lambda: self.program.node)
+        self.bench_uart = self._serial_line(
+            bench_baud, lambda: self.program.bench, "bench_uart", "bench protocol", ".bench"
+        )
         for camera in Camera:
-            self._scramble(Sram(camera))
+            self._scramble(self.engine.memories[HALVES[camera]])
             self._connect(camera)
         self._lines = GpioPins(self.kernel, self.cameras, self.power)
         self.power.on_switch = self._supply_switched
@@ -147,7 +133,6 @@ class CubeSenseBoard:
             other_pins=self._lines,
             on_pin=lambda pin, _level: self._pin_changed(pin),
         )
-        self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.node))
         self.i2c_bus.attach(register_address, CurrentTarget(lambda: self.program.registers))
 
@@ -158,49 +143,35 @@ class CubeSenseBoard:
         assert isinstance(program, CubeSenseProgram)
         return program
 
-    @cached_property
-    def faults(self) -> Faults:
-        """Injects faults into this board."""
-        sites = Sites(
-            self.kernel,
-            self.processor,
-            {"uart": self.uart, "bench": self.bench_uart},
-            {"i2c": self.i2c_bus},
-            self.power,
-            self.engine,
+    @property
+    def scene(self) -> EarthSunScene:
+        """What the cameras see; see ``Board``."""
+        return self.cameras[Camera.SUN].scene
+
+    @scene.setter
+    def scene(self, scene: object) -> None:
+        if not isinstance(scene, EarthSunScene):
+            raise TypeError(f"a Sun and nadir sensor sees Earth and Sun, not {scene!r}")
+        for camera in self.cameras.values():
+            camera.scene = scene
+
+    def probes(self) -> dict[str, int | str]:
+        """What a trace shows: each camera's latest results beside what all boards show."""
+        probes = super().probes()
+        for camera, half in HALVES.items():
+            result = self.program.state.results[camera]
+            probes[f"{half}_capture"] = CaptureResult(result.capture).name
+            probes[f"{half}_detect"] = DetectResult(result.detect).name
+        return probes
+
+    def _sites(self) -> Sites:
+        return self._common_sites(
             controls=("RNW", "EDGE", "SHIFT", *ENABLE),
             cameras={
                 half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")
                 for camera, half in HALVES.items()
             },
         )
-        return Faults(sites, self._seed)
-
-    @property
-    def scene(self) -> EarthSunScene:
-        """What the cameras see; a new one is seen by the next frame that is rendered."""
-        return self.cameras[Camera.SUN].scene
-
-    @scene.setter
-    def scene(self, scene: EarthSunScene) -> None:
-        for camera in self.cameras.values():
-            camera.scene = scene
-
-    def serial(self) -> DirectSerial:
-        """Host's end of the node protocol's UART, in this process."""
-        return DirectSerial(self.kernel, self.uart)
-
-    def bench_serial(self) -> DirectSerial:
-        """Host's end of the bench protocol's UART, in this process."""
-        return DirectSerial(self.kernel, self.bench_uart)
-
-    def i2c(self) -> DirectI2c:
-        """Host's end of the I2C bus, in this process."""
-        return DirectI2c(self.kernel, self.i2c_bus)
-
-    def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
-        return self.uart.busy or self.bench_uart.busy or not self.processor.dozing
 
     def truth(self, camera: Camera) -> SensorTruth | None:
         """What ``camera`` should have measured in the frame that was stored last.
@@ -227,24 +198,6 @@ class CubeSenseBoard:
     def fail_memory(self, sram: Sram) -> None:
         """Let a memory latch up for good: it draws too much whenever it is switched on."""
         self.power.latch_up(sram.name, lasting=True)
-
-    def close(self) -> None:
-        """Release the engine."""
-        self.engine.close()
-
-    def _serial_line(self, baud: int, link: Callable[[], _UartLink]) -> Uart:
-        return Uart(
-            self.kernel,
-            baud,
-            lambda byte: link().uart_byte(byte),
-            lambda: link().uart_silence(),
-            silence_bytes=SILENCE_BYTES,
-        )
-
-    def _scramble(self, sram: Sram) -> None:
-        """What a static RAM holds after power-up."""
-        memory = self.engine.memories[HALVES[Camera(sram)]]
-        memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
 
     def _connect(self, camera: Camera) -> None:
         sensor, half = self.cameras[camera], HALVES[camera]
@@ -305,7 +258,7 @@ class CubeSenseBoard:
             if channel == sram.name:
                 self.engine.power_memory(half, on)
                 if not on:
-                    self._scramble(sram)
+                    self._scramble(self.engine.memories[half])
             elif channel == f"{half}_camera":
                 self.cameras[camera].power(on and camera not in self._failed, self.engine.now_ps)
 

@@ -6,24 +6,19 @@ layouts than the published one are in :mod:`cubestack.emulator.boards.cubestar.l
 """
 
 from collections import deque
-from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.contract import Board, EngineKind
 from cubestack.emulator.boards.cubestar.layouts import BOARDS
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
-from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.common.optics import ROWS
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
-from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
-from cubestack.emulator.rtl.contract import make_engine
-from cubestack.emulator.scene.sky import Scene
-from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
@@ -31,7 +26,7 @@ from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTI
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar.codes import ResetCause
+from cubestack.firmware_model.interface.cubestar.codes import ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
 from cubestack.firmware_model.mcu.requests import CameraTransfer, FlashStore
@@ -44,24 +39,17 @@ BOOT_US = 3_000
 CAMERA_BUS_HZ = 100_000
 """Standard mode; the sources give no rate."""
 
-SILENCE_BYTES = 100
-"""Byte times of silence after which the UART gives up a half frame; ours."""
 
-
-class CubeStarBoard:
+class CubeStarBoard(Board):
     """One emulated CubeStar.
 
     Attributes:
-        kernel: virtual time.
-        engine: FPGA and its SRAM.
         camera: image sensor, which looks at the scene.
-        power: supplies; the place for latch-ups.
-        processor: EFM32GG with the running program.
-        uart: the satellite's serial line.
-        i2c_bus: the satellite's I2C bus.
         stored: exposures of the frames stored last, the newest one at the end; None for a frame
             that was not sent.
     """
+
+    engine: RtlEngine
 
     def __init__(
         self,
@@ -69,10 +57,12 @@ class CubeStarBoard:
         catalogue: StarCatalogue,
         *,
         seed: int = 0,
-        engine: Literal["auto", "compiled", "python"] = "auto",
+        engine: EngineKind = "auto",
         baud: int = INTERFACE.baud,
-        i2c_address: int = INTERFACE.i2c_address,
+        kernel: Kernel | None = None,
+        i2c_bus: I2cBus | None = None,
         layout: Layout = Layout.COPIED,
+        i2c_address: int = INTERFACE.i2c_address,
     ) -> None:
         """Power up.
 
@@ -82,23 +72,15 @@ class CubeStarBoard:
             seed: of everything random but the scene: memories at power-up, undefined frames.
             engine: see ``make_engine``.
             baud: of the satellite's UART.
-            i2c_address: 7-bit address on the satellite's bus.
+            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
             layout: memory layout, with the program that belongs to it.
+            i2c_address: 7-bit address on the satellite's bus.
         """
-        self.kernel = Kernel()
-        self._seed = seed
-        self._rng = np.random.default_rng(seed)
         self._layout = BOARDS[layout]
+        super().__init__(self._layout.power, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(self._layout.wiring(), kind=engine)
         self.camera = Mlx75412(scene, seed=seed)
-        self.power = PowerModel(self.kernel, self._layout.power)
-        self.uart = Uart(
-            self.kernel,
-            baud,
-            lambda byte: self.program.link.uart_byte(byte),
-            lambda: self.program.link.uart_silence(),
-            silence_bytes=SILENCE_BYTES,
-        )
+        self._serial_line(baud, lambda: self.program.link)
         self._hardware = _Efm32gg(self)
         self._scramble(self._hardware.external_ram)
         for memory in self.engine.memories.values():
@@ -125,7 +107,6 @@ class CubeStarBoard:
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
-        self.i2c_bus = I2cBus(self.kernel)
         self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
         self._pins = dict(self._layout.controls)
         self._accesses = False
@@ -144,45 +125,35 @@ class CubeStarBoard:
         """The processor's flash, as a debugger sees it."""
         return self._hardware.flash
 
-    @cached_property
-    def faults(self) -> Faults:
-        """Injects faults into this board."""
-        sites = Sites(
-            self.kernel,
-            self.processor,
-            {"uart": self.uart},
-            {"i2c": self.i2c_bus},
-            self.power,
-            self.engine,
+    @property
+    def scene(self) -> Scene:
+        """What the camera sees; see ``Board``."""
+        return self.camera.scene
+
+    @scene.setter
+    def scene(self, scene: object) -> None:
+        if not isinstance(scene, SkyScene | PictureScene):
+            raise TypeError(f"a star tracker sees the sky or a picture, not {scene!r}")
+        self.camera.scene = scene
+
+    def busy(self) -> bool:
+        """Whether anything is under way that does not wait for the host."""
+        return super().busy() or not self.processor.waiting
+
+    def probes(self) -> dict[str, int | str]:
+        """What a trace shows: the main task's status beside what all boards show."""
+        return super().probes() | {"task": TaskStatus(self.program.state.task_status).name}
+
+    def _sites(self) -> Sites:
+        return self._common_sites(
             controls=tuple(self._layout.controls),
             cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
             memories={"external": self._hardware.external_ram} if self._layout.external_ram else {},
         )
-        return Faults(sites, self._seed)
-
-    def serial(self) -> DirectSerial:
-        """Host's end of the UART, in this process."""
-        return DirectSerial(self.kernel, self.uart)
-
-    def i2c(self) -> DirectI2c:
-        """Host's end of the I2C bus, in this process."""
-        return DirectI2c(self.kernel, self.i2c_bus)
-
-    def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
-        return self.uart.busy or not self.processor.waiting
-
-    def close(self) -> None:
-        """Release the engine."""
-        self.engine.close()
 
     def _camera_changed(self) -> None:
         self.engine.stream_changed()
         self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")
-
-    def _scramble(self, memory: NDArray[np.uint8]) -> None:
-        """What a static RAM holds after power-up."""
-        memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
 
     def truth(self) -> NDArray[np.float64] | None:
         """Attitude (4,) at the mid-exposure of the middle row of the frame stored last.

@@ -173,6 +173,19 @@ def test_address_is_taken_once():
         bus.attach(0x1A, Memory())
 
 
+def test_a_target_moves():
+    target = Memory()
+    _, bus = make(x1A=target)
+    bus.move(0x1A, 0x1A)
+    bus.move(0x1A, 0x2B)
+    assert dict(bus.targets) == {0x2B: target}
+    with pytest.raises(ValueError, match="no I2C device is at address 0x1a"):
+        bus.move(0x1A, 0x2C)
+    with pytest.raises(ValueError, match=r"0x80 is not in 0x08\.\.0x77"):
+        bus.move(0x2B, 0x80)
+    assert dict(bus.targets) == {0x2B: target}
+
+
 def test_bit_rate_must_be_positive():
     with pytest.raises(ValueError, match="positive bit rate, not 0 Hz"):
         make(0)

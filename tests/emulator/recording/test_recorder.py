@@ -56,7 +56,7 @@ class Device:
 def record(path: Path, writes: list[tuple[int, bytes]], transfers: int = 2) -> Recording:
     device, stream = Device(), io.StringIO()
     with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
-        bus = recorder.bus(device.kernel, device.bus)
+        bus = recorder.bus(device.bus)
 
         def talk():
             for _ in range(transfers):
@@ -124,7 +124,7 @@ def test_delay_is_named(tmp_path):
 def test_failed_transfer_is_on_record(tmp_path):
     device, stream = Device(), io.StringIO()
     with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
-        bus = recorder.bus(device.kernel, device.bus)
+        bus = recorder.bus(device.bus)
         with pytest.raises(I2cError):
             device.kernel.run(
                 device.kernel.process(bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))]))

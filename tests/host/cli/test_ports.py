@@ -5,28 +5,27 @@ from contextlib import ExitStack
 
 import pytest
 
+from cubestack.emulator.boards.contract import SerialLine
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.serial_port import PortError
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.host.cli.ports import add_port_arguments, open_ports
-from cubestack.host.cli.records import port_uarts
-from cubestack.host.devices.boards import Opened, SerialLine
+from cubestack.host.devices.boards import Opened
 
 
 class Board:
-    def __init__(self) -> None:
-        self.kernel = Kernel()
+    def __init__(self, lines) -> None:
+        self.lines = lines
 
 
 @pytest.fixture
 def opened() -> Opened:
-    board = Board()
-    lines = [
-        SerialLine(name, suffix, Uart(board.kernel, 9600, lambda _b: None, lambda: None,
-                                      silence_bytes=9), 9600)
-        for name, suffix in (("node protocol", ""), ("bench protocol", ".bench"))
-    ]  # fmt: skip
-    return Opened("CubeSense", board, tuple(lines))
+    uart = Uart(Kernel(), 9600, lambda _b: None, lambda: None, silence_bytes=9)
+    lines = (
+        SerialLine("uart", "node protocol", "", uart),
+        SerialLine("bench_uart", "bench protocol", ".bench", uart),
+    )
+    return Opened("CubeSense", Board(lines))
 
 
 @pytest.fixture
@@ -55,7 +54,7 @@ def test_of_several_devices_the_name_is_what_comes_before_theirs(opened, tmp_pat
     monkeypatch.chdir(tmp_path)
     parser = argparse.ArgumentParser()
     add_port_arguments(parser)
-    other = Opened("CubeStar", opened.board, opened.lines[:1])
+    other = Opened("CubeStar", Board(opened.board.lines[:1]))
     with ExitStack() as stack:
         served = open_ports(parser.parse_args(["--pty", "x_"]), [other, opened], stack)
         names = [port.name for _, _, port in served]
@@ -85,7 +84,3 @@ def test_other_machines_must_be_allowed(ports, kind):
 def test_one_end_only(ports):
     with pytest.raises(argparse.ArgumentError, match="not allowed with"):
         ports("--tcp", "0", "--rfc2217", "0")
-
-
-def test_names_of_ports_in_recordings(opened):
-    assert list(port_uarts(opened)) == ["uart", "bench_uart"]

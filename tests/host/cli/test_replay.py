@@ -33,7 +33,7 @@ def recording(tmp_path):
         record(args, opened, stack, emulated_setup(3, None))
         from cubestack.emulator.ports.direct import DirectSerial
 
-        client = NodeClient(DirectSerial(opened.board.kernel, opened.lines[0].uart), INTERFACE)
+        client = NodeClient(DirectSerial(opened.board.kernel, opened.board.uart), INTERFACE)
         client.telemetry("Configuration")
         client.command("DetectionThreshold1", Threshold=9)
         client.telemetry("Configuration")

@@ -4,7 +4,6 @@ import io
 
 import pytest
 
-from cubestack.emulator.recording.probes import firmware_probes
 from cubestack.emulator.recording.recorder import Recorder
 from cubestack.emulator.recording.replay import Replay
 from cubestack.emulator.recording.trace import VcdTrace
@@ -34,7 +33,7 @@ def recorded(opened, scene, tmp_path) -> Recording:
         Recorder(stream, "cubesense", lines(session.board)) as recorder,
     ):
         board = session.board
-        board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+        board.i2c_bus = recorder.bus(board.i2c_bus)
         session.cubesense.capture_and_detect(Camera.SUN)
         session.cubesense.client.telemetry("Configuration")
         session.bench.take(Camera.NADIR)
@@ -81,7 +80,7 @@ def test_trace_shows_the_measurement(opened, scene):
     with opened(scene, seed=1) as session:
         board = session.board
         trace = VcdTrace(
-            stream, "cubesense", board.kernel, lines(board), board.engine, firmware_probes(board)
+            stream, "cubesense", board.kernel, lines(board), board.engine, board.probes
         )
         session.cubesense.capture_and_detect(Camera.SUN)
         trace.close()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubesense.board import BOOT_US, CubeSenseBoard
-from cubestack.emulator.boards.cubesense.gpio import CHANNELS, Lines
+from cubestack.emulator.boards.cubesense.gpio import CHANNELS, GpioPins
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
@@ -152,7 +152,7 @@ def test_truth_is_of_the_frame_that_was_stored(board: CubeSenseBoard) -> None:
 
 def test_ports_are_separate(board: CubeSenseBoard) -> None:
     let_pass(board, 500)
-    node, bench = board.serial(), board.bench_serial()
+    node, bench = board.serial(), board.serial("bench_uart")
     board.hardware.uart_send(Port.BENCH, b"bench")
     board.hardware.uart_send(Port.NODE, b"node")
     assert bench.read(10, 0.1)[:1] == b"b"
@@ -199,7 +199,7 @@ def test_reset_of_the_processor_releases_every_pin(board: CubeSenseBoard) -> Non
 
 
 def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
-    lines = Lines(board.kernel, board.cameras, board.power)
+    lines = GpioPins(board.kernel, board.cameras, board.power)
     scl, sda = CAMERA_SCL[Camera.SUN], CAMERA_SDA[Camera.SUN]
     assert all(pin in lines for pin in (scl, sda, *SRAM_POWER.values()))
     assert "SUNEN" not in lines

@@ -1,0 +1,134 @@
+"""What all boards have in common: one kernel and one bus for several of them."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.boards.aramis.board import AramisBoard
+from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
+from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.ports.line import HostLine
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+SKY = SkyScene([0, 0, 0, 1], noise=False, mag_limit=1)
+EARTH = EarthSunScene(noise=False)
+WIDE_SKY = SkyScene([0, 0, 0, 1], noise=False, mag_limit=1, optics=aramis_lens())
+
+BOARDS = {
+    CUBESTAR: lambda **place: CubeStarBoard(SKY, onboard_catalogue(), seed=3, **place),
+    CUBESENSE: lambda **place: CubeSenseBoard(EARTH, seed=3, **place),
+    ARAMIS: lambda **place: AramisBoard(WIDE_SKY, None, seed=3, **place),
+}
+"""Makers of all boards, by what they speak."""
+
+
+@pytest.fixture
+def stack() -> Iterator[ExitStack]:
+    with ExitStack() as opened:
+        yield opened
+
+
+def powered(stack: ExitStack, **place: Any) -> dict[Any, Board]:
+    boards = {interface: make(**place) for interface, make in BOARDS.items()}
+    for board in boards.values():
+        stack.callback(board.close)
+    return boards
+
+
+def probed(kernel: Kernel, board: Board, interface: Any) -> list[tuple[int, object]]:
+    """Answers to a telemetry on both ways to a board, asked at once, and when the bytes come."""
+    identifier = interface.telemetries[0].id
+    line, answer = HostLine(board.uart), bytearray()
+    transfer = [
+        I2cMessage(interface.i2c_address, bytearray([identifier])),
+        I2cMessage(interface.i2c_address, read=4),
+    ]
+    found: list[tuple[int, object]] = []
+
+    def host() -> Iterator[Any]:
+        yield kernel.timeout(100 * PS_PER_MS)
+        line.write(encode_frame(bytes([identifier])))
+        yield from board.i2c_bus.transfer(transfer)
+        found.append((kernel.now, bytes(transfer[1].data)))
+        for _ in range(40):
+            yield kernel.timeout(PS_PER_MS)
+            answer.extend(line.take(kernel.now, 100))
+            found.append((kernel.now, bytes(answer)))
+
+    kernel.process(host())
+    return found
+
+
+def test_boards_that_share_a_kernel_do_what_they_do_alone(stack: ExitStack) -> None:
+    """Each on a bus of its own: on one bus they would wait for each other."""
+    alone = []
+    for interface, make in BOARDS.items():
+        board = make()
+        stack.callback(board.close)
+        alone.append(probed(board.kernel, board, interface))
+        board.kernel.advance_to(200 * PS_PER_MS)
+    kernel = Kernel()
+    boards = powered(stack, kernel=kernel)
+    together = [probed(kernel, board, interface) for interface, board in boards.items()]
+    kernel.advance_to(200 * PS_PER_MS)
+    assert together == alone
+    assert all(len(answer) > 8 for (_, answer) in (found[-1] for found in alone))
+
+
+def test_boards_share_a_bus(stack: ExitStack) -> None:
+    kernel = Kernel()
+    bus = I2cBus(kernel)
+    powered(stack, kernel=kernel, i2c_bus=bus)
+    assert sorted(bus.targets) == [0x1A, 0x1B, 0x1C, 0x1D]
+    with pytest.raises(ValueError, match="0x1d is taken already"):
+        BOARDS[ARAMIS](kernel=kernel, i2c_bus=bus)
+
+
+def test_a_bus_of_another_kernel_is_refused() -> None:
+    with pytest.raises(ValueError, match="needs the kernel of that bus"):
+        BOARDS[ARAMIS](i2c_bus=I2cBus(Kernel()))
+
+
+def test_a_kernel_that_is_under_way_is_refused() -> None:
+    kernel = Kernel()
+    kernel.advance_to(5)
+    with pytest.raises(ValueError, match="powered up at time 0, not at 5 ps"):
+        BOARDS[ARAMIS](kernel=kernel)
+
+
+def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
+    boards = powered(stack)
+    for interface, other in ((CUBESTAR, SKY.turned((1, 0, 0))), (ARAMIS, WIDE_SKY)):
+        boards[interface].scene = other
+        assert boards[interface].scene is other
+        with pytest.raises(TypeError, match="sees the sky or a picture, not EarthSunScene"):
+            boards[interface].scene = EARTH
+    with pytest.raises(TypeError, match="sees Earth and Sun, not SkyScene"):
+        boards[CUBESENSE].scene = SKY
+
+
+def test_lines_and_probes(stack: ExitStack) -> None:
+    boards = powered(stack)
+    assert {b.__class__.__name__: [*b.uarts, *b.probes()] for b in boards.values()} == {
+        "CubeStarBoard": ["uart", "awake", "resets", "task"],
+        "CubeSenseBoard": [
+            *("uart", "bench_uart", "awake", "resets"),
+            *("sun_capture", "sun_detect", "nadir_capture", "nadir_detect"),
+        ],
+        "AramisBoard": ["uart", "awake", "resets", "task", "measurement"],
+    }
