@@ -1,6 +1,6 @@
 """What all boards have in common: one kernel and one bus for several of them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from typing import Any
 
@@ -29,12 +29,12 @@ SKY = SkyScene([0, 0, 0, 1], noise=False, mag_limit=1)
 EARTH = EarthSunScene(noise=False)
 WIDE_SKY = SkyScene([0, 0, 0, 1], noise=False, mag_limit=1, optics=aramis_lens())
 
-BOARDS = {
-    CUBESTAR: lambda **place: CubeStarBoard(SKY, onboard_catalogue(), seed=3, **place),
-    CUBESENSE: lambda **place: CubeSenseBoard(EARTH, seed=3, **place),
-    ARAMIS: lambda **place: AramisBoard(WIDE_SKY, None, seed=3, **place),
+BOARDS: dict[str, Callable[..., Board]] = {
+    "cubestar": lambda **place: CubeStarBoard(SKY, onboard_catalogue(), seed=3, **place),
+    "cubesense": lambda **place: CubeSenseBoard(EARTH, seed=3, **place),
+    "aramis": lambda **place: AramisBoard(WIDE_SKY, None, seed=3, **place),
 }
-"""Makers of all boards, by what they speak."""
+INTERFACES = {"cubestar": CUBESTAR, "cubesense": CUBESENSE, "aramis": ARAMIS}
 
 
 @pytest.fixture
@@ -43,15 +43,16 @@ def stack() -> Iterator[ExitStack]:
         yield opened
 
 
-def powered(stack: ExitStack, **place: Any) -> dict[Any, Board]:
-    boards = {interface: make(**place) for interface, make in BOARDS.items()}
+def powered(stack: ExitStack, **place: Any) -> dict[str, Board]:
+    boards = {name: make(**place) for name, make in BOARDS.items()}
     for board in boards.values():
         stack.callback(board.close)
     return boards
 
 
-def probed(kernel: Kernel, board: Board, interface: Any) -> list[tuple[int, object]]:
+def probed(board: Board, name: str) -> list[tuple[int, object]]:
     """Answers to a telemetry on both ways to a board, asked at once, and when the bytes come."""
+    kernel, interface = board.kernel, INTERFACES[name]
     identifier = interface.telemetries[0].id
     line, answer = HostLine(board.uart), bytearray()
     transfer = [
@@ -77,14 +78,14 @@ def probed(kernel: Kernel, board: Board, interface: Any) -> list[tuple[int, obje
 def test_boards_that_share_a_kernel_do_what_they_do_alone(stack: ExitStack) -> None:
     """Each on a bus of its own: on one bus they would wait for each other."""
     alone = []
-    for interface, make in BOARDS.items():
+    for name, make in BOARDS.items():
         board = make()
         stack.callback(board.close)
-        alone.append(probed(board.kernel, board, interface))
+        alone.append(probed(board, name))
         board.kernel.advance_to(200 * PS_PER_MS)
     kernel = Kernel()
     boards = powered(stack, kernel=kernel)
-    together = [probed(kernel, board, interface) for interface, board in boards.items()]
+    together = [probed(board, name) for name, board in boards.items()]
     kernel.advance_to(200 * PS_PER_MS)
     assert together == alone
     assert all(len(answer) > 8 for (_, answer) in (found[-1] for found in alone))
@@ -96,39 +97,39 @@ def test_boards_share_a_bus(stack: ExitStack) -> None:
     powered(stack, kernel=kernel, i2c_bus=bus)
     assert sorted(bus.targets) == [0x1A, 0x1B, 0x1C, 0x1D]
     with pytest.raises(ValueError, match="0x1d is taken already"):
-        BOARDS[ARAMIS](kernel=kernel, i2c_bus=bus)
+        BOARDS["aramis"](kernel=kernel, i2c_bus=bus)
 
 
 def test_a_bus_of_another_kernel_is_refused() -> None:
     with pytest.raises(ValueError, match="needs the kernel of that bus"):
-        BOARDS[ARAMIS](i2c_bus=I2cBus(Kernel()))
+        BOARDS["aramis"](i2c_bus=I2cBus(Kernel()))
 
 
 def test_a_kernel_that_is_under_way_is_refused() -> None:
     kernel = Kernel()
     kernel.advance_to(5)
     with pytest.raises(ValueError, match="powered up at time 0, not at 5 ps"):
-        BOARDS[ARAMIS](kernel=kernel)
+        BOARDS["aramis"](kernel=kernel)
 
 
 def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
     boards = powered(stack)
-    for interface, other in ((CUBESTAR, SKY.turned((1, 0, 0))), (ARAMIS, WIDE_SKY)):
-        boards[interface].scene = other
-        assert boards[interface].scene is other
+    for name, other in (("cubestar", SKY.turned((1, 0, 0))), ("aramis", WIDE_SKY)):
+        boards[name].scene = other
+        assert boards[name].scene is other
         with pytest.raises(TypeError, match="sees the sky or a picture, not EarthSunScene"):
-            boards[interface].scene = EARTH
+            boards[name].scene = EARTH
     with pytest.raises(TypeError, match="sees Earth and Sun, not SkyScene"):
-        boards[CUBESENSE].scene = SKY
+        boards["cubesense"].scene = SKY
 
 
 def test_lines_and_probes(stack: ExitStack) -> None:
     boards = powered(stack)
-    assert {b.__class__.__name__: [*b.uarts, *b.probes()] for b in boards.values()} == {
-        "CubeStarBoard": ["uart", "awake", "resets", "task"],
-        "CubeSenseBoard": [
+    assert {name: [*board.uarts, *board.probes()] for name, board in boards.items()} == {
+        "cubestar": ["uart", "awake", "resets", "task"],
+        "cubesense": [
             *("uart", "bench_uart", "awake", "resets"),
             *("sun_capture", "sun_detect", "nadir_capture", "nadir_detect"),
         ],
-        "AramisBoard": ["uart", "awake", "resets", "task", "measurement"],
+        "aramis": ["uart", "awake", "resets", "task", "measurement"],
     }
