@@ -92,8 +92,7 @@ def test_probes_and_transfers():
     kernel, stream, state = Kernel(), io.StringIO(), {"task": "IDLE", "n": 0}
     bus = I2cBus(kernel)
     bus.attach(0x1A, Target())
-    probes = {"task": lambda: state["task"], "n": lambda: state["n"]}
-    trace = VcdTrace(stream, "board", kernel, {}, None, probes)
+    trace = VcdTrace(stream, "board", kernel, {}, None, lambda: state)
     traced = trace.bus(bus)
 
     def run():
