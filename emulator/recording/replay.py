@@ -13,6 +13,7 @@ import simpy
 from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.formats.byte_names import name_answer_byte, name_bus_byte
 from cubestack.firmware_model.formats.recording import (
     BusMessage,
     BusTransfer,
@@ -21,7 +22,6 @@ from cubestack.firmware_model.formats.recording import (
     LineError,
     Recording,
 )
-from cubestack.firmware_model.formats.transcript import name_answer_byte, name_bus_byte
 from cubestack.firmware_model.interface.codec.message import Interface
 
 __all__ = ["Replay"]

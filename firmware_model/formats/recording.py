@@ -55,7 +55,7 @@ class LineBytes:
     byte_ps: int
 
     def to_json(self) -> dict[str, object]:
-        """See the module's text."""
+        """These bytes as the object of a recording's line."""
         return {
             "ps": self.time_ps,
             "port": self.port,
@@ -73,7 +73,7 @@ class LineError:
     port: str
 
     def to_json(self) -> dict[str, object]:
-        """See the module's text."""
+        """This error as the object of a recording's line."""
         return {"ps": self.time_ps, "port": self.port, "error": "framing"}
 
 
@@ -97,7 +97,7 @@ class BusTransfer:
     errno: int = 0
 
     def to_json(self) -> dict[str, object]:
-        """See the module's text."""
+        """This transfer as the object of a recording's line."""
         messages = [
             {"address": m.address, "read" if m.read else "write": m.data.hex()}
             for m in self.messages
@@ -121,7 +121,7 @@ class Control:
     text: str = ""
 
     def to_json(self) -> dict[str, object]:
-        """See the module's text."""
+        """This act as the object of a recording's line."""
         event: dict[str, object] = {"ps": self.time_ps, "control": list(self.words)}
         return event | ({"text": self.text} if self.text else {})
 

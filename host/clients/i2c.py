@@ -54,7 +54,7 @@ class I2cClient(Client):
         self._retries = retries
 
     def command(self, name: str, **parameters: object) -> None:
-        """See Client; returns once the node has processed the telecommand."""
+        """Send a telecommand and wait until the node has processed it; errors as ``Client``'s."""
         message = self.interface.telecommand(name)
         data = message.pack(**parameters)
         self._check(message, data)
@@ -70,7 +70,7 @@ class I2cClient(Client):
         self._check_error(message, int(values.get("Error", 0)))
 
     def telemetry(self, name: str) -> dict[str, Value]:
-        """See Client. A frame that steps may skip a record when a transfer broke off."""
+        """Read a telemetry frame; one that steps may skip a record when a transfer broke off."""
         message = self.interface.telemetry(name)
         for attempt in range(1 + self._retries):
             if attempt:
@@ -89,7 +89,7 @@ class I2cClient(Client):
         )
 
     def pause(self, seconds: float) -> None:
-        """See Client."""
+        """Let time pass on the node's side."""
         self._wait(seconds)
 
     def close(self) -> None:

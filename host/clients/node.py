@@ -45,7 +45,7 @@ class NodeClient(Client):
         self._unread: Iterator[int] = iter(b"")
 
     def command(self, name: str, **parameters: object) -> None:
-        """See Client."""
+        """Send a telecommand and read its acknowledge; errors as ``Client``'s."""
         message = self.interface.telecommand(name)
         answer = self.request(bytes([message.id]) + message.pack(**parameters))
         if answer is None:
@@ -59,7 +59,7 @@ class NodeClient(Client):
         self._check_error(message, answer[0])
 
     def telemetry(self, name: str) -> dict[str, Value]:
-        """See Client. A frame that steps may skip a record when an answer was lost."""
+        """Ask for a telemetry frame; one that steps may skip a record when an answer was lost."""
         message = self.interface.telemetry(name)
         answer = None
         for _ in range(1 + self._retries):
@@ -115,11 +115,11 @@ class NodeClient(Client):
         return None
 
     def pause(self, seconds: float) -> None:
-        """See Client. Ends early when the node sends something."""
+        """Let time pass; ends early when the node sends something, which is lost."""
         self._transport.read(READ_BYTES, seconds)
 
     def close(self) -> None:
-        """See Client."""
+        """Close the transport."""
         self._transport.close()
 
     def _drop_input(self) -> None:

@@ -6,8 +6,8 @@ field. Waiting costs no time. The format is that of ``firmware_model.formats.rec
 
 from typing import Any
 
+from cubestack.firmware_model.formats.byte_names import name_bus_byte, name_request_byte
 from cubestack.firmware_model.formats.recording import Recording
-from cubestack.firmware_model.formats.transcript import name_bus_byte, name_request_byte
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.errors import RecordingMismatchError
 
@@ -15,7 +15,7 @@ __all__ = ["RecordedI2c", "RecordedTransport"]
 
 
 class RecordedTransport:
-    """A serial line of a recording; see ``host.transport.streams.Transport``."""
+    """A serial line of a recording, as a ``Transport``."""
 
     def __init__(self, recording: Recording, interface: Interface, port: str = "uart") -> None:
         """Stand at the beginning; RecordingMismatchError for a port that was not recorded."""
@@ -30,7 +30,7 @@ class RecordedTransport:
         self._written = self._read = 0
 
     def write(self, data: bytes) -> None:
-        """See Transport; raises RecordingMismatchError when something else was recorded."""
+        """Take what the host sends; RecordingMismatchError when something else was recorded."""
         for offset, byte in enumerate(data):
             index = self._written + offset
             if index < len(self._expected) and self._expected[index] == byte:
@@ -45,7 +45,7 @@ class RecordedTransport:
         self._written += len(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """See Transport: what the device said before the host's next byte."""
+        """What the device said before the host's next byte, at most ``max_bytes``."""
         end = len(self._answers)
         if self._written < len(self._write_times):
             next_ps = self._write_times[self._written]
@@ -56,7 +56,7 @@ class RecordedTransport:
         return data
 
     def close(self) -> None:
-        """See Transport."""
+        """Nothing: a recording holds no port."""
 
 
 class RecordedI2c:

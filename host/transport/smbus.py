@@ -81,7 +81,7 @@ class CubeSMBus(SMBus):
             self.open(bus)
 
     def open(self, bus: int | str) -> None:
-        """See SMBus, and above."""
+        """Open another bus, named as in the constructor; raises PortOpenError."""
         if not isinstance(bus, int | str):
             raise TypeError(f"a bus is a number or a path, not {bus!r}")
         link = _SocketLink(_find_socket(bus))
@@ -90,14 +90,14 @@ class CubeSMBus(SMBus):
         self.funcs = self._get_funcs()
 
     def close(self) -> None:
-        """See SMBus."""
+        """Close the bus; ``open`` may follow."""
         if self._link is not None:
             self._link.close()
         self._link = self.fd = self.address = self._addressed = None
         self._pec = 0
 
     def __enter__(self) -> Self:
-        """See SMBus."""
+        """Close the bus at the end of a ``with`` block."""
         return self
 
     def __exit__(
@@ -106,11 +106,11 @@ class CubeSMBus(SMBus):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """See SMBus."""
+        """Close the bus."""
         self.close()
 
     def enable_pec(self, enable: bool = True) -> None:
-        """See SMBus."""
+        """Let transactions carry a packet error code, or not."""
         self._ioctl(Ioctl.PEC, int(enable))
         self._pec = int(enable)
 
@@ -119,66 +119,66 @@ class CubeSMBus(SMBus):
     # --- transactions -------------------------------------------------------------------------
 
     def write_quick(self, i2c_addr: int, force: bool | None = None) -> None:
-        """See SMBus."""
+        """SMBus quick command: the address with its write bit."""
         self._transact(i2c_addr, force, WRITE, 0, SmbusSize.QUICK)
 
     def read_byte(self, i2c_addr: int, force: bool | None = None) -> int:
-        """See SMBus."""
+        """SMBus receive byte."""
         return self._transact(i2c_addr, force, READ, 0, SmbusSize.BYTE)[0]
 
     def write_byte(self, i2c_addr: int, value: int, force: bool | None = None) -> None:
-        """See SMBus."""
+        """SMBus send byte."""
         self._transact(i2c_addr, force, WRITE, value, SmbusSize.BYTE)
 
     def read_byte_data(self, i2c_addr: int, register: int, force: bool | None = None) -> int:
-        """See SMBus."""
+        """SMBus read byte: of a register."""
         return self._transact(i2c_addr, force, READ, register, SmbusSize.BYTE_DATA)[0]
 
     def write_byte_data(
         self, i2c_addr: int, register: int, value: int, force: bool | None = None
     ) -> None:
-        """See SMBus."""
+        """SMBus write byte: to a register."""
         data = bytes([value & 0xFF])
         self._transact(i2c_addr, force, WRITE, register, SmbusSize.BYTE_DATA, data)
 
     def read_word_data(self, i2c_addr: int, register: int, force: bool | None = None) -> int:
-        """See SMBus."""
+        """SMBus read word: 16 bits of a register, low byte first."""
         return _word(self._transact(i2c_addr, force, READ, register, SmbusSize.WORD_DATA))
 
     def write_word_data(
         self, i2c_addr: int, register: int, value: int, force: bool | None = None
     ) -> None:
-        """See SMBus."""
+        """SMBus write word: 16 bits to a register, low byte first."""
         self._transact(i2c_addr, force, WRITE, register, SmbusSize.WORD_DATA, _bytes(value))
 
     def process_call(
         self, i2c_addr: int, register: int, value: int, force: bool | None = None
     ) -> int:
-        """See SMBus."""
+        """SMBus process call: write a word, read one back."""
         size = SmbusSize.PROCESS_CALL
         return _word(self._transact(i2c_addr, force, WRITE, register, size, _bytes(value)))
 
     def read_block_data(self, i2c_addr: int, register: int, force: bool | None = None) -> list[int]:
-        """See SMBus."""
+        """SMBus block read: the device sends how many bytes there are."""
         return _block(self._transact(i2c_addr, force, READ, register, SmbusSize.BLOCK_DATA))
 
     def write_block_data(
         self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
     ) -> None:
-        """See SMBus."""
+        """SMBus block write: 1 to 32 bytes behind their number."""
         self._transact(i2c_addr, force, WRITE, register, SmbusSize.BLOCK_DATA, _counted(data))
 
     def block_process_call(
         self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
     ) -> list[int]:
-        """See SMBus."""
+        """SMBus block process call: write a block, read one back."""
         size = SmbusSize.BLOCK_PROCESS_CALL
         return _block(self._transact(i2c_addr, force, WRITE, register, size, _counted(data)))
 
     def read_i2c_block_data(
         self, i2c_addr: int, register: int, length: int, force: bool | None = None
     ) -> list[int]:
-        """See SMBus."""
+        """Read ``length`` bytes of a register, at most 32; ValueError for more."""
         if length > MAX_BLOCK_BYTES:
             raise ValueError(f"a block has at most {MAX_BLOCK_BYTES} bytes, not {length}")
         size = SmbusSize.I2C_BLOCK_DATA
@@ -188,11 +188,11 @@ class CubeSMBus(SMBus):
     def write_i2c_block_data(
         self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
     ) -> None:
-        """See SMBus."""
+        """Write at most 32 bytes to a register; ValueError for more."""
         self._transact(i2c_addr, force, WRITE, register, SmbusSize.I2C_BLOCK_DATA, _counted(data))
 
     def i2c_rdwr(self, *i2c_msgs: Any) -> None:
-        """See SMBus."""
+        """One combined transfer of smbus2's ``i2c_msg``s, which take what is read."""
         messages = [_plain(message) for message in i2c_msgs]
         data = self._call(Call.RDWR, pack_rdwr(messages))
         for message, part in zip(i2c_msgs, split_rdwr(messages, data), strict=True):

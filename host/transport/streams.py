@@ -47,14 +47,14 @@ class SerialTransport:
             raise PortOpenError(f"can not open {port}: {_reason(error)}") from error
 
     def write(self, data: bytes) -> None:
-        """See Transport."""
+        """Send all of ``data``; raises PortClosedError."""
         try:
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
             raise PortClosedError(f"{self.name}: {_reason(error)}") from error
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """See Transport."""
+        """What is there, once a byte has come; raises PortClosedError."""
         try:
             self._set_timeout(timeout_s)
             first: bytes = self._port.read(1)
@@ -66,7 +66,7 @@ class SerialTransport:
         return first + rest
 
     def close(self) -> None:
-        """See Transport."""
+        """Close the port."""
         self._port.close()
 
     def _set_timeout(self, timeout_s: float) -> None:
@@ -99,14 +99,14 @@ class TcpTransport:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def write(self, data: bytes) -> None:
-        """See Transport."""
+        """Send all of ``data``; raises PortClosedError."""
         try:
             self._socket.sendall(data)
         except OSError as error:
             raise PortClosedError(f"{self.name}: {_reason(error)}") from error
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """See Transport."""
+        """What is there, once a byte has come; PortClosedError, also when the other side ends."""
         try:
             if not select.select([self._socket], [], [], timeout_s)[0]:
                 return b""
@@ -118,7 +118,7 @@ class TcpTransport:
         return data
 
     def close(self) -> None:
-        """See Transport."""
+        """Close the connection."""
         self._socket.close()
 
 

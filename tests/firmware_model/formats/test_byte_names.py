@@ -4,13 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
-from cubestack.firmware_model.formats.transcript import (
+from cubestack.firmware_model.formats.byte_names import (
     name_answer_byte,
     name_bus_byte,
     name_request_byte,
     payload_offset,
 )
+from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 
