@@ -6,10 +6,7 @@ TARGET is a serial port, tcp://HOST:PORT or rfc2217://HOST:PORT, of a real board
 
 import sys
 
-from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.clients.cubestar.client import CubeStar
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.transport.streams import open_transport
+import cubestack
 
 
 def step(number: int, text: str, good: bool) -> None:
@@ -19,11 +16,12 @@ def step(number: int, text: str, good: bool) -> None:
         sys.exit(1)
 
 
-with NodeClient(open_transport(sys.argv[1], INTERFACE.baud), INTERFACE) as client:
-    cubestar = CubeStar(client)
+with cubestack.connect(sys.argv[1], "cubestar") as cubestar:
+    client = cubestar.client
+    interface = client.interface
 
     identity = client.telemetry("Identification")
-    same = identity["InterfaceVersion"] == INTERFACE.version
+    same = identity["InterfaceVersion"] == interface.version
     step(1, f"node type {identity['NodeType']}, interface {identity['InterfaceVersion']}", same)
 
     client.command("Reset")

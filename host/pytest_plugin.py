@@ -1,10 +1,10 @@
-"""pytest fixtures ``cubestar`` and ``cubesense``: an emulated device for the tests of a driver.
+"""pytest fixtures: for each registered device one of its name, emulated, for tests of a driver.
 
 ::
 
-    def test_my_driver(cubestar):
-        driver = MyDriver(cubestar.serial())
-        cubestar.faults.inject("uart-corrupt", rate=0.01)
+    def test_my_driver(sensor):
+        driver = MyDriver(sensor.serial())
+        sensor.faults.inject("uart-corrupt", rate=0.01)
         assert driver.attitude().valid
 
 Marker ``cubestack(scene=…, seed=…, faults=…)`` sets a device up: ``scene`` and ``faults`` are
@@ -15,18 +15,20 @@ events go into the JUnit report; what the faults did is shown below a test that 
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
+from cubestack.host.devices.registry import device_names
 
-    from cubestack.host.clients.cubesense.client import CubeSense
-    from cubestack.host.clients.cubestar.client import CubeStar
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator
+
+    from cubestack.host.devices.device import Engine
     from cubestack.host.devices.emulated import EmulatedDevice
 
-__all__ = ["cubesense", "cubestar"]
+__all__: list[str] = []
 
 MARKER = "cubestack"
 KEYS = ("scene", "seed", "faults")
@@ -50,54 +52,49 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker."""
+    """Declare the marker, and a fixture for each device."""
     config.addinivalue_line(
         "markers", f"{MARKER}(scene, seed, faults): set up the emulated device of this test"
     )
+    fixtures = ModuleType("cubestack_fixtures")
+    for name in device_names():
+        setattr(fixtures, name, _fixture(name))
+    config.pluginmanager.register(fixtures, "cubestack-fixtures")
 
 
-@pytest.fixture
-def cubestar(request: pytest.FixtureRequest) -> Iterator[EmulatedDevice[CubeStar]]:
-    """An emulated CubeStar; see ``EmulatedDevice``."""
-    from cubestack.host.devices.emulated import open_cubestar_device
+def _fixture(name: str) -> Any:
+    """The fixture of a device."""
 
-    yield from _powered(request, "cubestar", open_cubestar_device)
+    def powered(request: pytest.FixtureRequest) -> Iterator[EmulatedDevice[Any, Any]]:
+        yield from _powered(request, name)
 
-
-@pytest.fixture
-def cubesense(request: pytest.FixtureRequest) -> Iterator[EmulatedDevice[CubeSense]]:
-    """An emulated CubeSense; see ``EmulatedDevice``."""
-    from cubestack.host.devices.emulated import open_cubesense_device
-
-    yield from _powered(request, "cubesense", open_cubesense_device)
+    powered.__doc__ = f"An emulated {name}; see ``cubestack.EmulatedDevice``."
+    return pytest.fixture(powered, name=name)
 
 
-def _powered(
-    request: pytest.FixtureRequest, name: str, open_device: Callable[..., Any]
-) -> Iterator[Any]:
+def _powered(request: pytest.FixtureRequest, name: str) -> Iterator[EmulatedDevice[Any, Any]]:
     """Power a device up as the test's marker says, and down after it."""
     from cubestack.emulator.faults.plan import load_plan, parse_plan
+    from cubestack.host.devices.emulated import open_device
+    from cubestack.host.devices.registry import device
 
     options = _options(request.node)
     config = request.config
     seed = options.get("seed", config.getoption("--cubestack-seed"))
-    engine = config.getoption("--cubestack-engine")
-    device = open_device(options.get("scene"), seed=seed, engine=engine)
-    try:
+    engine: Engine = config.getoption("--cubestack-engine") if device(name).has_fpga else "auto"
+    with open_device(name, options.get("scene"), seed=seed, engine=engine) as opened:
         plan = options.get("faults")
         if plan is not None:
             text = isinstance(plan, str) and ("\n" in plan or "=" in plan)
-            device.faults.load(parse_plan(plan) if text else load_plan(Path(plan)))
-        request.node.stash.setdefault(_DEVICES, {})[name] = device
-        yield device
+            opened.faults.load(parse_plan(plan) if text else load_plan(Path(plan)))
+        request.node.stash.setdefault(_DEVICES, {})[name] = opened
+        yield opened
         for key, value in (
             ("seed", seed),
-            ("virtual_time_s", f"{device.time_s:.9f}"),
-            ("fault_events", device.faults.events),
+            ("virtual_time_s", f"{opened.time_s:.9f}"),
+            ("fault_events", opened.faults.events),
         ):
             request.node.user_properties.append((f"{MARKER}.{name}.{key}", value))
-    finally:
-        device.close()
 
 
 def _options(item: pytest.Item) -> dict[str, Any]:

@@ -6,17 +6,17 @@ telecommand is sent at all. Exit code 0 when all passed, 1 when something failed
 or differs.
 
 examples:
-  cubestack conformance emulated:cubestar --allow-write
-  cubestack conformance /dev/ttyUSB0 --device cubesense
-  cubestack conformance /dev/ttyUSB0 --device cubesense \\
-      --compare emulated:cubesense
+  cubestack conformance emulated:{first} --allow-write
+  cubestack conformance /dev/ttyUSB0 --device {second}
+  cubestack conformance /dev/ttyUSB0 --device {second} \\
+      --compare emulated:{second}
 """
 
 import argparse
 import json
 from collections import Counter
 
-from cubestack.host.cli.targets import TARGETS, add_target_arguments, open_any_target
+from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.conformance.suite import Check, Outcome, Suite, compare
 
 __all__ = ["add_arguments", "run"]
@@ -28,13 +28,12 @@ DETAIL_COLUMNS = 100
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("target", metavar="TARGET", help=TARGETS)
+    add_target_arguments(parser)
     parser.add_argument(
         "--allow-write", action="store_true", help="send telecommands, write registers"
     )
     parser.add_argument("--compare", metavar="TARGET", help="show the first difference to another")
     parser.add_argument("--json", action="store_true", help="one object for each check")
-    add_target_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

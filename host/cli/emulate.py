@@ -1,17 +1,15 @@
 """Serve emulated devices until Ctrl-C; any program can open their ports.
 
-A CubeSense has two serial lines: the node protocol on PATH or PORT, the bench
-protocol on PATH.bench or PORT + 1. Several devices take ports one after the
-other, and share one I2C bus.
+A device with a second serial line serves it on PATH.bench or PORT + 1. Several
+devices take ports one after the other, and share one virtual time and I2C bus.
 
 examples:
-  cubestack emulate cubestar --pty ./ttyCUBESTAR
+  cubestack emulate {first} --pty ./tty
       then, in a second terminal:
-      .venv/bin/python examples/plain_pyserial.py ./ttyCUBESTAR
-  cubestack emulate cubestar --scene sky.toml --tcp 4000 --pace fast
-  cubestack emulate cubestar --tcp 4000 --layout two-boards
-  cubestack emulate cubesense --pty ./ttyCUBESENSE --record session.jsonl
-  cubestack emulate cubestar cubesense aramis --i2c 7
+      .venv/bin/python examples/plain_pyserial.py ./tty
+  cubestack emulate {first} --scene sky.toml --tcp 4000 --pace fast
+  cubestack emulate {second} --pty ./tty --record session.jsonl
+  cubestack emulate {first} {second} {third} --i2c 7
       then: cubestack run --attach -- i2cdetect -y 7
 """
 
@@ -20,17 +18,22 @@ import signal
 import time
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
-from cubestack.firmware_model.formats.setup import Option
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.board_options import (
+    add_board_arguments,
+    add_engine_arguments,
+    chosen_options,
+    tell_notices,
+)
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import add_record_arguments, record
-from cubestack.host.cli.session import add_engine_arguments, add_layout_argument, tell_layout
-from cubestack.host.cli.terminal import say
-from cubestack.host.devices.boards import DEVICES, open_board
+from cubestack.host.cli.terminal import progress, say
+from cubestack.host.devices.emulated import EmulatedDevice, power_up
+from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.recording.setups import emulated_setup
 
 __all__ = ["add_arguments", "run"]
@@ -39,13 +42,17 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument(
-        "devices", nargs="+", choices=DEVICES, metavar="device", help=", ".join(DEVICES)
+        "devices",
+        nargs="+",
+        choices=device_names(),
+        metavar="device",
+        help=", ".join(device_names()),
     )
     parser.add_argument(
         "--scene",
         type=Path,
         metavar="FILE",
-        help="TOML scene of the one device; default: Orion, or Earth and Sun",
+        help=f"TOML scene of the one device; default: {_default_scenes()}",
     )
     add_port_arguments(parser)
     parser.add_argument(
@@ -57,12 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_faults_argument(parser)
     add_engine_arguments(parser)
-    add_layout_argument(parser)
-    parser.add_argument(
-        "--mcu-addressing",
-        action="store_true",
-        help="cubesense: FPGAs that let the processor choose addresses (telecommand 100)",
-    )
+    add_board_arguments(parser)
     parser.add_argument(
         "--pace",
         choices=("real", "fast"),
@@ -74,10 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
     from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
-    from cubestack.emulator.sim.virtual_time import Kernel
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
@@ -86,38 +86,36 @@ def run(args: argparse.Namespace) -> int:
             if getattr(args, name) is not None:
                 raise ValueError(f"--{name} belongs to one device, and there are several")
     with ExitStack() as stack:
-        kernel = Kernel()
-        i2c_bus = I2cBus(kernel)
-        devices = []
+        opened: list[EmulatedDevice[Any, Any]] = []
         for name in args.devices:
-            devices.append(
-                open_board(
-                    name,
-                    args.scene,
-                    seed=args.seed,
-                    engine=args.engine,
-                    baud=args.baud,
-                    mcu_addressing=args.mcu_addressing,
-                    layout=args.layout,
-                    kernel=kernel,
-                    i2c_bus=i2c_bus,
-                )
+            found = device(name)
+            options = chosen_options(args, found)
+            found.prepare(progress)
+            first = opened[0].board if opened else None
+            emulated = power_up(
+                found,
+                args.scene,
+                seed=args.seed,
+                engine=args.engine,
+                baud=args.baud,
+                kernel=None if first is None else first.kernel,
+                i2c_bus=None if first is None else first.i2c_bus,
+                **options,
             )
-            stack.callback(devices[-1].board.close)
-        tell_layout(args.layout, say)
-        if len(devices) == 1:
-            inject_plan(devices[0].board.faults, args.faults, say)
-            options: dict[str, Option] = {"mcu_addressing": True} if args.mcu_addressing else {}
-            if args.layout is not Layout.COPIED:
-                options["layout"] = args.layout.value
+            stack.callback(emulated.close)
+            opened.append(emulated)
+            tell_notices(found, options, say)
+        if len(opened) == 1:
+            inject_plan(emulated.faults, args.faults, say)
             setup = emulated_setup(args.seed, args.scene, args.faults, options)
-            record(args, devices[0], stack, setup)
-        adapter = I2cAdapter(kernel, devices[0].board.i2c_bus)  # what records has taken its place
-        served = open_ports(args, devices, stack)
+            record(args, emulated, stack, setup)
+        kernel = emulated.board.kernel
+        adapter = I2cAdapter(kernel, emulated.board.i2c_bus)
+        served = open_ports(args, opened, stack)
         endpoints = [endpoint for _, _, endpoint in served]
 
         def devices_busy() -> bool:
-            return any(device.board.busy() for device in devices)
+            return any(one.board.busy() for one in opened)
 
         wait, clock_ns = wait_ready, time.monotonic_ns
         if args.i2c is not None:
@@ -146,16 +144,20 @@ def run(args: argparse.Namespace) -> int:
         )
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: pump.stop())
-        for device in devices:
+        for one in opened:
             ports = [
                 f"{endpoint.name} at {line.baud} baud"
                 if not line.suffix
                 else f"{line.title} on {endpoint.name} at {line.baud} baud"
                 for owner, line, endpoint in served
-                if owner is device
+                if owner is one
             ]
-            say(f"{device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
+            say(f"{one.device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
         if args.i2c is not None:
             say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
         pump.run()
     return 0
+
+
+def _default_scenes() -> str:
+    return ", or ".join(dict.fromkeys(device.default_scene_title for device in devices()))

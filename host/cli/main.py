@@ -8,8 +8,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.metadata import version
 
 from cubestack.host.cli.arguments import Parser
+from cubestack.host.devices.registry import device_names
 
 __all__ = ["main"]
 
@@ -38,20 +40,30 @@ def make_parser() -> Parser:
     parser = Parser(
         prog="cubestack",
         description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
-        epilog="Try: cubestack measure cubestar --mag-limit 3.8, or cubestack COMMAND --help",
+        epilog=_with_names(
+            "Try: cubestack measure {first}, or cubestack COMMAND --help"
+        ),
     )
+    parser.add_argument("--version", action="version", version=f"cubestack {version('cubestack')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = import_module(f"cubestack.host.cli.{name}")
         command = commands.add_parser(
             name,
             help=summary,
-            description=module.__doc__,
+            description=_with_names(module.__doc__ or ""),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         module.add_arguments(command)
         command.set_defaults(run=module.run)
     return parser
+
+
+def _with_names(text: str) -> str:
+    """Put names of registered devices into the examples of a help text."""
+    for place, name in zip(("{first}", "{second}", "{third}"), device_names(), strict=False):
+        text = text.replace(place, name)
+    return text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -6,14 +6,15 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import whole
+from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.devices.registry import device_names
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
     from cubestack.emulator.ports.serial_port import Endpoint
-    from cubestack.host.devices.boards import Opened
 
 __all__ = ["add_port_arguments", "open_ports"]
 
@@ -29,7 +30,7 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="PATH",
         help="link to a pseudo-terminal, of several devices what comes before their names; "
-        "default: ./ttyCUBESTAR, ./ttyCUBESENSE, ./ttyARAMIS",
+        "default: " + ", ".join(f"./tty{name.upper()}" for name in device_names()),
     )
     where.add_argument(
         "--tcp", type=whole(0, LAST_PORT), metavar="PORT", help="serial line on a local TCP port"
@@ -54,8 +55,8 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def open_ports(
-    args: argparse.Namespace, devices: Sequence[Opened], stack: ExitStack
-) -> list[tuple[Opened, SerialLine, Endpoint]]:
+    args: argparse.Namespace, devices: Sequence[EmulatedDevice[Any, Any]], stack: ExitStack
+) -> list[tuple[EmulatedDevice[Any, Any], SerialLine, Endpoint]]:
     """A port for each serial line of each device, in order; ``stack`` closes them.
 
     Raises ValueError when there are not enough ports from the given one on, PortError when one
@@ -73,7 +74,7 @@ def open_ports(
 def _open(
     args: argparse.Namespace,
     several: bool,
-    opened: Opened,
+    opened: EmulatedDevice[Any, Any],
     line: SerialLine,
     index: int,
     count: int,
@@ -83,14 +84,14 @@ def _open(
 
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     if first is None:
-        name = opened.title.upper()
+        name = opened.device.title.upper()
         if args.pty is None:
             path = Path(f"tty{name}")
         else:
             path = args.pty.with_name(args.pty.name + name) if several else args.pty
         return PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
     if first and first + count - 1 > LAST_PORT:
-        raise ValueError(f"{opened.title} needs {count} ports from {first} on")
+        raise ValueError(f"{opened.device.title} needs {count} ports from {first} on")
     kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
     port = first and first + index  # 0 lets the system choose each one
     return kind(args.listen, port, line.uart, allow_remote=args.allow_remote)

@@ -7,7 +7,7 @@ came at the same time, 1 when one differs: the first one of each port is named
 with its field.
 
 examples:
-  cubestack emulate cubesense --record run.rec
+  cubestack emulate {second} --record run.rec
   cubestack replay run.rec
   cubestack replay run.rec --trace run.vcd
 """
@@ -18,18 +18,19 @@ import argparse
 import json
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
+from typing import Any
 
 from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.formats.setup import Setup
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.board_options import add_engine_arguments
 from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.records import add_record_arguments, record
-from cubestack.host.cli.session import Engine, add_engine_arguments
 from cubestack.host.cli.terminal import say
-from cubestack.host.devices.boards import DEVICES, Opened, open_board
-from cubestack.host.devices.controls import BoardControls
-from cubestack.host.devices.targets import interface_of
+from cubestack.host.devices.controls import EmulatedControls
+from cubestack.host.devices.device import Engine
+from cubestack.host.devices.emulated import EmulatedDevice, power_up
+from cubestack.host.devices.registry import device, device_names
 from cubestack.host.recording.setups import setup_for, written
 
 __all__ = ["add_arguments", "run"]
@@ -51,24 +52,23 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.recording.replay import Replay
 
     recording = load_recording(args.recording)
-    interface = interface_of(recording.device, str(args.recording))
-    if recording.device not in DEVICES:
+    if recording.device not in device_names():
         raise ValueError(f"{args.recording}: {recording.device} can not be emulated")
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
     with ExitStack() as stack:
         opened = _open(recording, setup, args.engine)
-        stack.callback(opened.board.close)
+        stack.callback(opened.close)
         if setup.faults is not None:
             from cubestack.emulator.faults.plan import parse_plan
 
-            opened.board.faults.load(parse_plan(setup.faults.text, setup.faults.name))
+            opened.faults.load(parse_plan(setup.faults.text, setup.faults.name))
         recorder = record(args, opened, stack, setup)
         board = opened.board
-        controls = BoardControls(board, recording.device)
+        controls = EmulatedControls(opened)
         if recorder is not None:
             controls.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
         replay = Replay(recording, board.kernel, board.uarts, board.i2c_bus, controls.act)
-        differences = replay.run(interface)
+        differences = replay.run(opened.device.interface)
     if args.json:
         print(json.dumps({"recording": str(args.recording), "differences": differences}))
     else:
@@ -77,20 +77,19 @@ def run(args: argparse.Namespace) -> int:
     return int(bool(differences))
 
 
-def _open(recording: Recording, setup: Setup, engine: Engine) -> Opened:
+def _open(recording: Recording, setup: Setup, engine: Engine) -> EmulatedDevice[Any, Any]:
     """The device, made as ``setup`` says."""
-    options = dict(setup.options)
-    mcu_addressing = options.pop("mcu_addressing", False)
-    layout = Layout(options.pop("layout", Layout.COPIED.value))
-    if options:
-        raise ValueError(f"{recording.name}: its setup has an unknown option {min(options)!r}")
+    found = device(recording.device)
+    options: dict[str, Any] = dict(setup.options)
+    unknown = options.keys() - {option.name for option in found.options}
+    if unknown:
+        raise ValueError(f"{recording.name}: its setup has an unknown option {min(unknown)!r}")
     with nullcontext() if setup.scene is None else written(setup.scene) as scene:
-        return open_board(
-            recording.device,
+        return power_up(
+            found,
             scene,
             seed=setup.seed,
             engine=engine,
             baud=recording.bauds.get("uart"),
-            mcu_addressing=bool(mcu_addressing),
-            layout=layout,
+            **options,
         )

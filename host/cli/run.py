@@ -8,7 +8,7 @@ examples:
   cubestack run -- i2cdetect -y 7
   cubestack run -- i2cget -y 7 0x1a 0x83
   cubestack run --bus 1 --pace fast -- python3 flight_software.py
-  cubestack run --device cubestar --device cubesense --hz 400000 -- ./program
+  cubestack run --device {first} --device {second} --hz 400000 -- ./program
   cubestack run --attach -- i2cdump -y 7 0x1a      on the bus of `emulate --i2c 7`
 """
 
@@ -20,18 +20,15 @@ import shutil
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
-from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
-from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.board_options import add_engine_arguments
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
-from cubestack.host.cli.session import add_engine_arguments
 from cubestack.host.cli.terminal import say
-from cubestack.host.devices.boards import DEVICES, open_board
+from cubestack.host.devices.emulated import EmulatedDevice, open_device
+from cubestack.host.devices.registry import device_names, devices
 
 if TYPE_CHECKING:
     from cubestack.emulator.i2cdev.running import HostBus
@@ -42,14 +39,6 @@ DEFAULT_BUS = 7
 STANDARD_HZ = 100_000
 BOOT_LIMIT_PS = 10**12
 """Virtual time within which the devices have started; the program starts after them."""
-
-ADDRESSES = {
-    "cubestar": CUBESTAR.i2c_address,
-    "cubesense": CUBESENSE.i2c_address,
-    "cubesense-registers": REGISTERS.i2c_address,
-    "aramis": ARAMIS.i2c_address,
-}
-"""What is where at first."""
 
 NACK_ERRORS = ("ENXIO", "EREMOTEIO", "EIO", "ETIMEDOUT")
 """What Linux's drivers report, each its own, when nobody acknowledges an address."""
@@ -70,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--device",
         action="append",
-        choices=DEVICES,
-        help="a device on the bus; may be given again (default cubestar)",
+        choices=device_names(),
+        help=f"a device on the bus; may be given again (default {device_names()[0]})",
     )
     parser.add_argument(
         "--i2c-addr",
@@ -79,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_move,
         default=[],
         metavar="NAME=0xNN",
-        help="other address: cubestar, cubesense, cubesense-registers, aramis, or the old one",
+        help=f"other address: {', '.join(_addresses())}, or the old one",
     )
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
@@ -141,35 +130,29 @@ def run(args: argparse.Namespace) -> int:
 
 def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     """Power up the devices on one bus."""
-    from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
     from cubestack.emulator.i2cdev.running import emulated_bus
-    from cubestack.emulator.sim.virtual_time import Kernel
+    from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-    names = args.device or ["cubestar"]
+    names = args.device or device_names()[:1]
     if len(names) > 1 and (args.scene or args.faults):
         raise ValueError("--scene and --faults are of one device, and several are on the bus")
-    kernel = Kernel()
-    bus = I2cBus(kernel, args.hz)
-    boards = []
+    opened: list[EmulatedDevice[Any, Any]] = []
     for name in names:
-        opened = open_board(
-            name,
-            args.scene,
-            seed=args.seed,
-            engine=args.engine,
-            baud=None,
-            kernel=kernel,
-            i2c_bus=bus,
+        beside = opened[0] if opened else None
+        opened.append(
+            open_device(name, args.scene, seed=args.seed, engine=args.engine, beside=beside)
         )
-        stack.callback(opened.board.close)
-        boards.append(opened.board)
-    inject_plan(boards[0].faults, args.faults, None if args.quiet else say)
+        stack.callback(opened[-1].close)
+    board = opened[0].board
+    inject_plan(opened[0].faults, args.faults, None if args.quiet else say)
+    kernel, bus = board.kernel, board.i2c_bus
+    bus.bit_ps = PS_PER_S // args.hz
     for old, new in args.i2c_addr:
         bus.move(old, new)
 
     def busy() -> bool:
-        return any(board.busy() for board in boards)
+        return any(one.board.busy() for one in opened)
 
     while busy() and kernel.now < BOOT_LIMIT_PS:
         kernel.step()
@@ -180,12 +163,23 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     return host_bus
 
 
+def _addresses() -> dict[str, int]:
+    """What is where at first: each device's node, and its registers behind another address."""
+    found = {}
+    for device in devices():
+        found[device.name] = device.interface.i2c_address
+        if device.interface.registers is not None:
+            found[f"{device.name}-registers"] = device.interface.registers.i2c_address
+    return found
+
+
 def _move(text: str) -> tuple[int, int]:
     """Type of a pair of I2C addresses; the first one may be a name."""
+    addresses = _addresses()
     name, _, new = text.partition("=")
     try:
-        return ADDRESSES[name] if name in ADDRESSES else int(name, 0), int(new, 0)
+        return addresses[name] if name in addresses else int(name, 0), int(new, 0)
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not NAME=0xNN, as in cubestar=0x2a; names: {', '.join(ADDRESSES)}"
+            f"{text!r} is not NAME=0xNN, as in {min(addresses)}=0x2a; names: {', '.join(addresses)}"
         ) from None

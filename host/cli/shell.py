@@ -6,12 +6,12 @@ lists the commands. With -c or a script file, the first command that fails ends
 the run: exit code 1 when the device failed, 2 when the command makes no sense.
 
 examples:
-  cubestack shell emulated:cubesense
-  cubestack shell ./ttyCUBESTAR --device cubestar -c 'read Identification'
-  cubestack shell emulated:cubesense --json -c 'write CaptureOnly SUN SRAM1 TOP;
+  cubestack shell emulated:{second}
+  cubestack shell ./tty --device {first} -c 'read Identification'
+  cubestack shell emulated:{second} --json -c 'write CaptureOnly SUN SRAM1 TOP;
       time 0.5; read Result1'
   cubestack shell i2c:7:0x1b --script commands.txt
-  cubestack shell /dev/ttyUSB0 --device cubesense --record bench.rec
+  cubestack shell /dev/ttyUSB0 --device {second} --record bench.rec
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from cubestack.host.cli.targets import TARGETS, add_target_arguments, open_any_target
+from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.cli.terminal import say
 from cubestack.host.errors import HostError
 from cubestack.host.shell.language import Result, Shell
@@ -37,7 +37,7 @@ HISTORY_LINES = 1000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("target", metavar="TARGET", help=TARGETS)
+    add_target_arguments(parser)
     source = parser.add_mutually_exclusive_group()
     source.add_argument(
         "-c",
@@ -48,7 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     source.add_argument("--script", type=Path, metavar="FILE", help="one command a line")
     parser.add_argument("--json", action="store_true", help="one object for each command")
-    add_target_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

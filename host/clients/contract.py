@@ -12,7 +12,7 @@ from typing import Self
 from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
 
-__all__ = ["POLL_PERIOD_S", "Client", "Progress"]
+__all__ = ["POLL_PERIOD_S", "Client", "DeviceClient", "Progress"]
 
 #: Called with (pieces done, pieces in all) during a transfer.
 Progress = Callable[[int, int], None]
@@ -73,6 +73,40 @@ class Client(ABC):
 
     def __enter__(self) -> Self:
         """Use the client in a ``with`` block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
+
+
+class DeviceClient:
+    """A device as a program uses it, through any client of its node.
+
+    Attributes:
+        client: its messages by name.
+    """
+
+    def __init__(self, client: Client) -> None:
+        """Use ``client``, whose interface must be the device's."""
+        self.client = client
+        self._on_close = client.close
+
+    def close_with(self, callback: Callable[[], None]) -> None:
+        """Let ``close`` release what ``callback`` does, in place of the client alone."""
+        self._on_close = callback
+
+    def close(self) -> None:
+        """Release the port."""
+        self._on_close()
+
+    def __enter__(self) -> Self:
+        """Use the device in a ``with`` block."""
         return self
 
     def __exit__(

@@ -8,10 +8,11 @@ from typing import Any
 
 from cubestack.firmware_model.formats.recording import Control
 from cubestack.firmware_model.formats.setup import Document
+from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.errors import TargetError
 from cubestack.host.recording.setups import read_document, written
 
-__all__ = ["BoardControls"]
+__all__ = ["EmulatedControls"]
 
 CLEAR = "clear"
 """Ends all faults."""
@@ -20,22 +21,22 @@ TIMES = ("at_s", "for_s")
 """When a fault begins, and how long it lasts."""
 
 
-class BoardControls:
-    """See ``host.devices.targets.Controls``.
+class EmulatedControls:
+    """Faults, scene, load switches and time of an emulated device, in a shell's words.
 
     Attributes:
         on_act: told of what was done: the words of the shell, and the text of a file that they
             name.
     """
 
-    def __init__(self, board: Any, device: str) -> None:
-        """Control ``board``, a ``device`` of ``host.devices.boards``."""
-        self.on_act: Callable[[tuple[str, ...], str], None] = lambda _words, _text: None
-        self._board = board
-        self._device = device
-        self.channels = tuple(board.power.table.channels)
+    def __init__(self, emulated: EmulatedDevice[Any, Any]) -> None:
+        """Control ``emulated``."""
         from cubestack.emulator.faults.table import FAULTS
 
+        self.on_act: Callable[[tuple[str, ...], str], None] = lambda _words, _text: None
+        self._emulated = emulated
+        board = self._board = emulated.board
+        self.channels = tuple(board.power.table.channels)
         kinds = board.faults.kinds()
         self.faults = (
             *(f"{kind} {target}" for kind, targets in kinds.items() for target in targets),
@@ -61,7 +62,7 @@ class BoardControls:
                 raise TargetError(f"nothing does {' '.join(control.words)!r}")
 
     def fault(self, words: list[str]) -> None:
-        """See Controls."""
+        """Let something break; ValueError for what is not in ``faults``."""
         if words == [CLEAR]:
             self._board.faults.clear()
         else:
@@ -69,7 +70,7 @@ class BoardControls:
         self.on_act(("fault", *words), "")
 
     def fault_log(self) -> list[str]:
-        """See Controls."""
+        """A line for each thing that faults have done, with its virtual time."""
         return [str(event) for event in self._board.faults.log]
 
     def _inject(self, words: list[str]) -> None:
@@ -89,7 +90,7 @@ class BoardControls:
         )
 
     def scene(self, path: Path) -> None:
-        """See Controls."""
+        """Show the scene in a file; ValueError for one that is none."""
         try:
             self._show(path)
         except FileNotFoundError:
@@ -97,38 +98,29 @@ class BoardControls:
         self.on_act(("scene", str(path)), read_document(path).text)
 
     def _show(self, path: Path) -> None:
-        if self._device == "cubestar":
-            from cubestack.emulator.scene.sky import load_scene
-
-            self._board.camera.scene = load_scene(path)
-        elif self._device == "cubesense":
-            from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
-
-            self._board.scene = load_earth_sun_scene(path)
-        else:
-            raise TargetError(f"the scene of {self._device} can not be changed while it runs")
+        self._emulated.scene = path
 
     def currents(self) -> dict[str, float]:
-        """See Controls."""
+        """Supply currents in mA: all, and each channel's."""
         power = self._board.power
         return {"total": power.current_ma()} | {
             channel: power.current_ma(channel) for channel in self.channels
         }
 
     def switch(self, channel: str, on: bool) -> None:
-        """See Controls."""
+        """Switch a channel; ValueError for an unknown one."""
         if channel not in self.channels:
             raise TargetError(f"no channel {channel!r}; known: {', '.join(self.channels)}")
         self._board.power.switch(channel, on)
         self.on_act(("power", channel, "on" if on else "off"), "")
 
     def time_s(self) -> float:
-        """See Controls."""
-        return float(self._board.kernel.now / 1e12)
+        """Virtual time."""
+        return self._emulated.time_s
 
     def advance(self, seconds: float) -> None:
-        """See Controls."""
-        self._board.kernel.advance_to(self._board.kernel.now + round(seconds * 1e12))
+        """Let virtual time pass."""
+        self._emulated.wait(seconds)
 
 
 def _seconds(text: str) -> float:

@@ -1,12 +1,12 @@
-"""An emulated device in a test of a driver: virtual time, scene, faults, and all its ports.
+"""An emulated device that is powered up: virtual time, scene, faults, and all its ports.
 
+- ``client``: this project's client on the serial line.
 - ``serial()``: pyserial's interface in virtual time, for drivers in Python; repeatable to the byte.
 - ``smbus()``: smbus2's interface, likewise.
 - ``run()``: any program, on a pseudo-terminal.
 - ``run_on_i2c()``: any program that opens /dev/i2c-N.
-- ``client``: this project's own, to look at the device beside the driver.
 
-Only one host is at the serial line at a time: plugging one in takes out the one before.
+Only one host is at a serial line at a time: plugging one in takes out the one before.
 """
 
 from __future__ import annotations
@@ -14,160 +14,86 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Generic, Literal, Self
 
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.clients.cubesense.client import CubeSense
-from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.boards import cubesense_scene, cubestar_scene
+from cubestack.host.devices.device import BoardT, ClientT, Device, Engine
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.devices.registry import devices
+from cubestack.host.devices.virtual_serial import PS_PER_S, VirtualSerial
 from cubestack.host.transport.smbus import CubeSMBus
 
 if TYPE_CHECKING:
+    from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.faults.injector import Faults
-    from cubestack.emulator.ports.direct import DirectSerial
-    from cubestack.host.cli.session import Engine
+    from cubestack.emulator.ports.realtime import RealtimeScheduler
+    from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["EmulatedDevice", "VirtualSerial", "open_cubesense_device", "open_cubestar_device"]
+__all__ = ["EmulatedDevice", "check_options", "open_device", "power_up"]
 
-PS_PER_S = 10**12
 PORT = "{port}"
 """What ``run`` replaces in a command by the path of the serial port."""
 
-C = TypeVar("C", CubeStar, CubeSense)
 
-
-class VirtualSerial:
-    """A serial port with the part of pyserial's interface that drivers use, in virtual time.
-
-    Attributes:
-        timeout: longest wait for all bytes of a read, in s of virtual time; None waits for ever.
-        port: a name for messages.
-        baudrate: of the line.
-    """
-
-    def __init__(self, line: DirectSerial, baudrate: int, timeout: float | None = None) -> None:
-        """Plug in."""
-        self._line = line
-        self._ahead = bytearray()
-        self.timeout = timeout
-        self.baudrate = baudrate
-        self.port = self.name = "emulated"
-        self.is_open = True
-
-    @property
-    def in_waiting(self) -> int:
-        """Bytes that have arrived."""
-        self._ahead += self._line.read(1 << 16, 0.0)
-        return len(self._ahead)
-
-    def read(self, size: int = 1) -> bytes:
-        """Read ``size`` bytes, or what came within ``timeout``."""
-        left_s = LONGEST_S if self.timeout is None else self.timeout
-        while self.in_waiting < size:
-            began_ps = self._line.now_ps
-            piece = self._line.read(1 << 16, left_s)
-            left_s -= (self._line.now_ps - began_ps) / PS_PER_S
-            if not piece:
-                break
-            self._ahead += piece
-        data = bytes(self._ahead[:size])
-        del self._ahead[:size]
-        return data
-
-    def write(self, data: bytes) -> int:
-        """Start sending."""
-        self._line.write(bytes(data))
-        return len(data)
-
-    def flush(self) -> None:
-        """Nothing is held back."""
-
-    def reset_input_buffer(self) -> None:
-        """Drop what has arrived."""
-        if self.in_waiting:
-            self._ahead.clear()
-
-    def reset_output_buffer(self) -> None:
-        """Nothing is held back."""
-
-    def close(self) -> None:
-        """Take the plug out."""
-        self._line.close()
-        self.is_open = False
-
-    def __enter__(self) -> VirtualSerial:
-        """Use it in a ``with`` block."""
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        """Close."""
-        self.close()
-
-
-LONGEST_S = 3600.0
-"""What "for ever" is: nothing of a device takes as long."""
-
-
-class EmulatedDevice(Generic[C]):
+class EmulatedDevice(Generic[BoardT, ClientT]):
     """A powered-up device.
 
     Attributes:
+        device: what it is.
         board: the emulated board, with all its parts.
-        faults: injects faults.
         seed: of everything random.
     """
 
-    def __init__(self, board: Any, device: type[C], interface: Any, seed: int) -> None:
+    def __init__(self, device: Device[BoardT, ClientT], board: BoardT, seed: int) -> None:
         """Take over ``board``."""
+        self.device = device
         self.board = board
-        self.faults: Faults = board.faults
         self.seed = seed
-        self._device: type[C] = device
-        self._interface = interface
-        self._client: C | None = None
+        self._client: ClientT | None = None
 
     @property
-    def client(self) -> C:
+    def client(self) -> ClientT:
         """This project's client on the serial line; plugged in again after any other host."""
         if self._client is None:
-            line = self.board.serial()
-            self._client = self._device(NodeClient(line, self._interface))
+            self._client = self.device.client(
+                NodeClient(self.board.serial(), self.device.interface)
+            )
         return self._client
+
+    @property
+    def faults(self) -> Faults:
+        """Injects faults into it."""
+        return self.board.faults
 
     @property
     def time_s(self) -> float:
         """Virtual time since power-up."""
-        return float(self.board.kernel.now / PS_PER_S)
+        return self.board.kernel.now / PS_PER_S
 
     def wait(self, seconds: float) -> None:
         """Let virtual time pass."""
-        self.board.kernel.advance_to(self.board.kernel.now + int(seconds * PS_PER_S))
+        self.board.kernel.advance_to(self.board.kernel.now + round(seconds * PS_PER_S))
 
     @property
     def scene(self) -> Any:
-        """What the cameras see; a scene of the emulator, or the path of a scene file."""
-        return self._looks_at.scene
+        """What the cameras see; a scene, the path of a scene file, or None for the default one."""
+        return self.board.scene
 
     @scene.setter
     def scene(self, scene: Any) -> None:
-        load = cubestar_scene if self._device is CubeStar else cubesense_scene
-        self._looks_at.scene = _seen(scene, load)
-
-    @property
-    def _looks_at(self) -> Any:
-        return self.board.camera if self._device is CubeStar else self.board
+        self.board.scene = self.device.scene(scene)
 
     # --- ports ----------------------------------------------------------------------------------
 
-    def serial(self, timeout: float | None = 1.0) -> VirtualSerial:
-        """The serial line with pyserial's interface."""
-        self._client = None
-        return VirtualSerial(self.board.serial(), self._interface.baud, timeout)
+    def serial(self, timeout: float | None = 1.0, line: str = "uart") -> VirtualSerial:
+        """A serial line with pyserial's interface; ``timeout`` in s of virtual time."""
+        if line == self.board.lines[0].name:
+            self._client = None
+        port = self.board.serial(line)
+        return VirtualSerial(port, self.board.uarts[line].form.baud, timeout)
 
     def smbus(self) -> CubeSMBus:
         """The I2C bus with smbus2's interface."""
@@ -190,15 +116,17 @@ class EmulatedDevice(Generic[C]):
         self._client = None
         with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
             port = Path(folder) / "tty"
-            endpoint = PtyEndpoint(port, self.board.uart)
+            endpoint = PtyEndpoint(port, self.board.lines[0].uart)
             try:
-                pump = RealtimeScheduler(self.board.kernel, [endpoint], self.board.busy, pace=pace)
+                scheduler = RealtimeScheduler(
+                    self.board.kernel, [endpoint], self.board.busy, pace=pace
+                )
                 words = [str(word).replace(PORT, str(port)) for word in command]
                 program = subprocess.Popen(
                     words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
                 )
-                watch = _Watch(program, timeout_s, pump)
-                pump.run()
+                watch = _Watch(program, timeout_s, scheduler)
+                scheduler.run()
                 return watch.result()
             finally:
                 endpoint.close()
@@ -221,14 +149,29 @@ class EmulatedDevice(Generic[C]):
         """Power down."""
         self.board.close()
 
+    def __enter__(self) -> Self:
+        """Use it in a ``with`` block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Power down."""
+        self.close()
+
 
 class _Watch:
-    """Waits for a program in a thread of its own, and ends the pump after it."""
+    """Waits for a program in a thread of its own, and ends the scheduler after it."""
 
-    def __init__(self, program: subprocess.Popen[str], timeout_s: float, pump: Any) -> None:
+    def __init__(
+        self, program: subprocess.Popen[str], timeout_s: float, scheduler: RealtimeScheduler
+    ) -> None:
         self._program = program
         self._timeout_s = timeout_s
-        self._pump = pump
+        self._scheduler = scheduler
         self._outcome: subprocess.CompletedProcess[str] | Exception | None = None
         self._thread = threading.Thread(target=self._wait, daemon=True)
         self._thread.start()
@@ -244,7 +187,7 @@ class _Watch:
                 program.kill()
             self._outcome = error
         finally:
-            self._pump.stop()
+            self._scheduler.stop()
 
     def result(self) -> subprocess.CompletedProcess[str]:
         """What became of it."""
@@ -255,39 +198,86 @@ class _Watch:
         return self._outcome
 
 
-def _seen(scene: Any, load: Callable[[Path | None], Any]) -> Any:
-    """``scene``, which may be the path of one; None is the default."""
-    if scene is None:
-        return load(None)
-    return load(Path(scene)) if isinstance(scene, str | Path) else scene
+def check_options(device: Device[Any, Any], options: Mapping[str, object]) -> None:
+    """Refuse board options that ``device`` does not have, or a value that one does not take.
+
+    Raises ValueError with what would be right.
+    """
+    own = {option.name: option for option in device.options}
+    for name, value in options.items():
+        if name not in own:
+            owners = [
+                one.name for one in devices() for option in one.options if option.name == name
+            ]
+            whose = f"an option of {', '.join(owners)}, not" if owners else "no option"
+            raise ValueError(f"{name} is {whose} of {device.name}")
+        choices = own[name].choices or (False, True)
+        if value not in choices:
+            known = ", ".join(map(str, choices))
+            raise ValueError(f"{name} of {device.name} must be one of {known}, not {value!r}")
 
 
-def open_cubestar_device(
-    scene: str | Path | Any | None = None,
+def power_up(
+    device: Device[BoardT, ClientT],
+    scene: Any = None,
     *,
     seed: int = 0,
     engine: Engine = "auto",
-    layout: str = Layout.COPIED.value,
-) -> EmulatedDevice[CubeStar]:
-    """Power up a CubeStar; without ``scene`` it looks at Orion.
+    baud: int | None = None,
+    kernel: Kernel | None = None,
+    i2c_bus: I2cBus | None = None,
+    **options: Any,
+) -> EmulatedDevice[BoardT, ClientT]:
+    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board.
 
-    ``layout`` is the name of a memory layout.
+    ``kernel`` and ``i2c_bus`` are those of another board that it stands beside, if any.
     """
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-
-    seen = _seen(scene, cubestar_scene)
-    board = CubeStarBoard(
-        seen, onboard_catalogue(), seed=seed, engine=engine, layout=Layout(layout)
+    board = device.open_board(
+        device.scene(scene),
+        seed=seed,
+        engine=engine,
+        baud=baud,
+        kernel=kernel,
+        i2c_bus=i2c_bus,
+        **options,
     )
-    return EmulatedDevice(board, CubeStar, CUBESTAR, seed)
+    return EmulatedDevice(device, board, seed)
 
 
-def open_cubesense_device(
-    scene: str | Path | Any | None = None, *, seed: int = 0, engine: Engine = "auto"
-) -> EmulatedDevice[CubeSense]:
-    """Power up a CubeSense; without ``scene`` both Sun and Earth are in view."""
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+def open_device(
+    name: str,
+    scene: Any = None,
+    *,
+    seed: int = 0,
+    engine: Engine = "auto",
+    baud: int | None = None,
+    beside: EmulatedDevice[Any, Any] | None = None,
+    **options: Any,
+) -> EmulatedDevice[Any, Any]:
+    """Power up a registered device.
 
-    board = CubeSenseBoard(_seen(scene, cubesense_scene), seed=seed, engine=engine)
-    return EmulatedDevice(board, CubeSense, CUBESENSE, seed)
+    Args:
+        name: of the device, such as ``"cubestar"``.
+        scene: what its cameras see: a scene, the path of a scene file, or None for the default.
+        seed: of everything random.
+        engine: how its FPGA is run.
+        baud: of its first serial line; None for the published rate.
+        beside: another device, whose virtual time and I2C bus it shares.
+        options: of this device's board; see ``cubestack emulate --help``.
+
+    Raises:
+        TargetError: nobody registered that name.
+        ValueError: a scene or an option that makes no sense; the text says which.
+    """
+    device = registered(name)
+    check_options(device, options)
+    return power_up(
+        device,
+        scene,
+        seed=seed,
+        engine=engine,
+        baud=baud,
+        kernel=None if beside is None else beside.board.kernel,
+        i2c_bus=None if beside is None else beside.board.i2c_bus,
+        **options,
+    )

@@ -7,40 +7,49 @@ rfc2217://HOST:PORT         a serial port on TCP whose rate the client sets
 i2c:BUS[:ADDR]              /dev/i2c-BUS, or the emulated bus where there is no such file; 7-bit
                             address of the node (default: the device's)
 recorded:FILE               a recording, which answers like the device did
+emulated:DEVICE             a device that is powered up in this process; time passes while the host
+                            waits
 ==========================  ===================================================================
-
-``emulated:DEVICE`` is opened by ``host.cli.targets``, as it needs the emulator.
 """
+
+from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
-
-if TYPE_CHECKING:
-    from smbus2 import SMBus
+from typing import TYPE_CHECKING, Any, Protocol
 
 from cubestack.firmware_model.formats.recording import load_recording
-from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.clients.contract import Client
 from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.devices.controls import EmulatedControls
+from cubestack.host.devices.device import Device
+from cubestack.host.devices.emulated import open_device
+from cubestack.host.devices.records import create_file, start_recorder
+from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.errors import PortOpenError, TargetError
 from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
+from cubestack.host.recording.setups import emulated_setup, taped_setup
 from cubestack.host.transport.streams import Transport, open_transport
 
-__all__ = ["INTERFACES", "Controls", "Target", "interface_of", "open_target", "with_i2c"]
+if TYPE_CHECKING:
+    from smbus2 import SMBus
 
-#: Interface of each device, by the name that the command line uses.
-INTERFACES = {interface.name.lower(): interface for interface in (CUBESTAR, CUBESENSE, ARAMIS)}
+__all__ = ["FORMS", "Controls", "Target", "connect", "device_of", "open_target", "with_i2c"]
 
-I2C, RECORDED = "i2c:", "recorded:"
+I2C, RECORDED, EMULATED = "i2c:", "recorded:", "emulated:"
+
+FORMS = (
+    "a serial port, tcp://HOST:PORT, rfc2217://HOST:PORT, i2c:BUS:ADDR, emulated:DEVICE, "
+    "recorded:FILE"
+)
+"""What a target may be, for the help."""
 
 
 class Controls(Protocol):
@@ -83,12 +92,13 @@ class Target:
 
     Attributes:
         name: as the user wrote it.
-        interface: the device's.
+        interface: of its messages.
         node: client of the node protocol.
         line: the serial line under it; None on I2C.
         registers: client of the register-pointer protocol; None where it is not within reach.
         bench: serial line with the bench protocol; None where it is not within reach.
         controls: None for a device that is not emulated here.
+        device: what it is; None for an interface that nobody registered.
     """
 
     name: str
@@ -98,6 +108,7 @@ class Target:
     registers: RegisterClient | None = None
     bench: Transport | None = None
     controls: Controls | None = None
+    device: Device[Any, Any] | None = None
     on_close: list[Callable[[], None]] = field(default_factory=list)
 
     def close(self) -> None:
@@ -106,14 +117,12 @@ class Target:
             callback()
 
 
-def interface_of(device: str | None, target: str) -> Interface:
-    """The interface of ``device``; TargetError when it is not given or unknown."""
-    known = ", ".join(INTERFACES)
-    if device is None:
+def device_of(name: str | None, target: str) -> Device[Any, Any]:
+    """The device called ``name``; TargetError when none is given, or it is unknown."""
+    if name is None:
+        known = ", ".join(device_names())
         raise TargetError(f"{target} does not tell which device it is: give --device ({known})")
-    if device.lower() not in INTERFACES:
-        raise TargetError(f"no device {device!r}; known: {known}")
-    return INTERFACES[device.lower()]
+    return device(name)
 
 
 def open_target(
@@ -122,34 +131,94 @@ def open_target(
     *,
     bench: str | None = None,
     baud: int | None = None,
-    tape: HostRecorder | None = None,
+    scene: Path | None = None,
+    seed: int = 0,
+    record: Path | None = None,
 ) -> Target:
     """Open the target that ``text`` names.
 
     Args:
-        text: see the module's text.
-        device: name of the device; not needed for recordings and default I2C addresses.
+        text: one of the forms in the module's text.
+        device: name of the device; not needed for emulated devices, recordings and default I2C
+            addresses.
         bench: another serial line, with the bench protocol.
         baud: of the node protocol's line; None for the published one.
-        tape: records what is said; not for recordings.
+        scene: scene file of an emulated device; None for its default.
+        seed: of an emulated device.
+        record: file for a recording of what is said; of an emulated device, at its pins.
 
     Raises:
         TargetError: the text names nothing, or the device is not told.
         TransportError: it does not open.
         RecordingError: a file is no recording.
+        ValueError: a scene file that is none, or a file that can not be written.
     """
-    if text.startswith(RECORDED):
-        return _open_recorded(text)
+    if text.startswith(EMULATED):
+        if bench is not None:
+            raise TargetError(f"{text} has its bench protocol already: leave out --bench")
+        return _open_emulated(text, baud, scene, seed, record)
+    if scene is not None:
+        raise TargetError(f"--scene is for emulated:DEVICE, not for {text}")
+    with ExitStack() as stack:
+        tape = None
+        if record is not None:
+            tape = HostRecorder(create_file(record, stack), taped_setup(text))
+        if text.startswith(RECORDED):
+            target = _open_recorded(text)
+        else:
+            target = _open_real(text, device, bench, baud, tape)
+        target.on_close.insert(0, stack.pop_all().close)
+        return target
+
+
+def _open_emulated(
+    text: str, baud: int | None, scene: Path | None, seed: int, record: Path | None
+) -> Target:
+    """Power a device up in this process."""
+    name = text.removeprefix(EMULATED).lower()
+    if name not in device_names():
+        known = ", ".join(EMULATED + one for one in device_names())
+        raise TargetError(f"no device {name!r} can be emulated; known: {known}")
+    emulated = open_device(name, scene, seed=seed, baud=baud)
+    board, interface = emulated.board, emulated.device.interface
+    with ExitStack() as stack:
+        stack.callback(emulated.close)
+        controls = EmulatedControls(emulated)
+        if record is not None:
+            setup = emulated_setup(seed, scene)
+            recorder = start_recorder(emulated, create_file(record, stack), setup)
+            stack.callback(recorder.close)
+            controls.on_act = lambda words, said: recorder.control(board.kernel.now, words, said)
+        lines = [board.serial(line.name) for line in board.lines]
+        target = Target(text, interface, NodeClient(lines[0], interface), lines[0])
+        bus = board.i2c()
+        target.registers = with_i2c(target, bus, bus.wait)
+        if interface.bench is not None and len(lines) > 1:
+            target.bench = lines[1]
+        target.controls, target.device = controls, emulated.device
+        target.on_close.append(stack.pop_all().close)
+        return target
+
+
+def _open_real(
+    text: str,
+    name: str | None,
+    bench: str | None,
+    baud: int | None,
+    tape: HostRecorder | None,
+) -> Target:
+    """Open a device on a serial line or an I2C bus."""
     if text.startswith(I2C):
-        target = _open_i2c(text, device, tape)
+        target = _open_i2c(text, name, tape)
         bauds: dict[str, int] = {}
     else:
-        interface = interface_of(device, text)
-        baud = baud or interface.baud
+        found = device_of(name, text)
+        baud = baud or found.interface.baud
         line = open_transport(text, baud)
         if tape is not None:
             line = tape.line(line, "uart", baud)
-        target = Target(text, interface, NodeClient(line, interface), line)
+        target = Target(text, found.interface, NodeClient(line, found.interface), line)
+        target.device = found
         target.on_close.append(line.close)
         bauds = {"uart": baud}
     if bench is not None:
@@ -171,6 +240,20 @@ def _open_bench(target: Target, text: str, tape: HostRecorder | None) -> int:
     return baud
 
 
+def connect(text: str, device: str | None = None, *, baud: int | None = None) -> Any:
+    """The client of the device that ``text`` names, such as ``"/dev/ttyUSB0"``.
+
+    Its class is the device's own. ``device`` is needed where the text does not tell it. Closing it
+    closes the port. Raises what ``open_target`` does.
+    """
+    target = open_target(text, device, baud=baud)
+    if target.device is None:
+        raise TargetError(f"{text}: no registered device")
+    client = target.device.client(target.node)
+    client.close_with(target.close)
+    return client
+
+
 def with_i2c(
     target: Target, bus: I2cBus, wait: Callable[[float], None] = time.sleep
 ) -> RegisterClient | None:
@@ -179,7 +262,7 @@ def with_i2c(
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 
 
-def _open_i2c(text: str, device: str | None, tape: HostRecorder | None) -> Target:
+def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
     bus_text, _, address_text = text.removeprefix(I2C).partition(":")
     try:
         number = int(bus_text)
@@ -188,20 +271,22 @@ def _open_i2c(text: str, device: str | None, tape: HostRecorder | None) -> Targe
         number, address = -1, None
     if number < 0 or (address is not None and not 0x08 <= address <= 0x77):
         raise TargetError(f"{text}: must be i2c:BUS:ADDR, as in i2c:7:0x1a (0x08 to 0x77)")
-    if device is None:
-        found = [name for name, known in INTERFACES.items() if address in _addresses(known)]
-        device = found[0] if found else None
-    interface = interface_of(device, text)
+    if name is None:
+        found = [known.name for known in devices() if address in _addresses(known.interface)]
+        name = found[0] if found else None
+    owner = device_of(name, text)
+    interface = owner.interface
     opened = _open_bus(number)
     bus: I2cBus = opened if tape is None else tape.bus(opened)
     own = None if address in _addresses(interface)[1:] else address
     target = Target(text, interface, I2cClient(bus, interface, own))
     target.registers = with_i2c(target, bus)
+    target.device = owner
     target.on_close.append(opened.close)
     return target
 
 
-def _open_bus(number: int) -> "SMBus":
+def _open_bus(number: int) -> SMBus:
     """The device file of bus ``number``; where there is none, the emulated bus of that number."""
     from smbus2 import SMBus
 
@@ -231,7 +316,8 @@ def _open_recorded(text: str) -> Target:
         recording = load_recording(path)
     except OSError as error:
         raise PortOpenError(f"can not open {path}: {error.strerror}") from error
-    interface = interface_of(recording.device, text)
+    owner = device_of(recording.device, text)
+    interface = owner.interface
     bus = RecordedI2c(recording, interface)
     spoken = [port for port in recording.bauds if recording.sent(port, "host")[0]]
     if "uart" in spoken or (not recording.transfers and "uart" in recording.bauds):
@@ -241,6 +327,7 @@ def _open_recorded(text: str) -> Target:
         client = I2cClient(bus, interface, wait=_no_wait)
         target = Target(text, interface, client)
     target.registers = with_i2c(target, bus, _no_wait)
+    target.device = owner
     if "bench_uart" in recording.bauds:
         target.bench = RecordedTransport(recording, interface, "bench_uart")
     return target

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.host.devices.emulated import open_cubestar_device
+from cubestack.host.devices.emulated import open_device
 from cubestack.host.experiments.cubestar import compare
 
 HERE = Path(__file__).parents[2] / "examples"
@@ -20,7 +20,7 @@ TIMEOUT_S = 120
 
 @pytest.fixture
 def device() -> Any:
-    device = open_cubestar_device(seed=4)
+    device = open_device("cubestar", seed=4)
     yield device
     device.close()
 

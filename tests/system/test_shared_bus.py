@@ -12,14 +12,15 @@ import pytest
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.devices.targets import INTERFACES, open_target
+from cubestack.host.devices.registry import devices
+from cubestack.host.devices.targets import open_target
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 START_TIMEOUT_S = 120
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
 BUS = 16 + os.getpid() % 200
-ADDRESSES = [interface.i2c_address for interface in INTERFACES.values()]
+ADDRESSES = [device.interface.i2c_address for device in devices()]
 READ_ALL = (
     "import smbus2\n"
     f"bus = smbus2.SMBus({BUS})\n"

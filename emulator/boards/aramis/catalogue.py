@@ -30,7 +30,14 @@ from cubestack.firmware_model.aramis.catalogue.geodesic import geodesic_sphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
 from cubestack.firmware_model.aramis.field import FOV_DEG
 
-__all__ = ["PUBLISHED", "CatalogueParameters", "build_database", "cached_database", "select_stars"]
+__all__ = [
+    "PUBLISHED",
+    "CatalogueParameters",
+    "build_database",
+    "cached_database",
+    "onboard_database",
+    "select_stars",
+]
 
 Progress = Callable[[Iterable[int], int, str], Iterable[int]]
 """Passes items through and shows how many of a total are done, under a label."""
@@ -42,6 +49,8 @@ MOST_TRIANGLES = 1_400_000
 """More, at 22 bytes each, would not fit the 32 MB of RAM of the thesis' appendix A."""
 
 MOST_STARS = 6000
+
+SAME_FIELD_DEG = 1e-3
 
 ADVICE = "change fov_deg, stars_per_field, longest_side_deg or mag_limit"
 
@@ -85,6 +94,10 @@ class CatalogueParameters:
     def side_deg(self) -> float:
         """Longest side of a triangle in degrees."""
         return self.fov_deg if self.longest_side_deg is None else self.longest_side_deg
+
+
+#: Databases of this process, the latest last.
+_kept: dict[CatalogueParameters, Database] = {}
 
 
 def _silent(items: Iterable[int], total: int, label: str) -> Iterable[int]:
@@ -150,6 +163,18 @@ def build_database(
         moment_index=KVector.build(moments[by_moment]),
         sphere=sphere,
     )
+
+
+def onboard_database(field_deg: float = FOV_DEG, progress: Progress = _silent) -> Database:
+    """The onboard catalogue for a lens of this field of view in degrees; the last two are kept."""
+    usual = abs(field_deg - FOV_DEG) < SAME_FIELD_DEG
+    parameters = CatalogueParameters(fov_deg=FOV_DEG if usual else field_deg)
+    if parameters not in _kept:
+        made = cached_database(parameters, progress)
+        while len(_kept) > 1:
+            del _kept[next(iter(_kept))]
+        _kept[parameters] = made
+    return _kept[parameters]
 
 
 def cached_database(

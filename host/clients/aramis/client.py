@@ -26,7 +26,7 @@ from cubestack.firmware_model.interface.aramis import (
 )
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.message import Value
-from cubestack.host.clients.contract import Client, Progress
+from cubestack.host.clients.contract import DeviceClient, Progress
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
 
@@ -86,12 +86,8 @@ class Star:
     hipparcos: int | None
 
 
-class Aramis:
+class Aramis(DeviceClient):
     """A star tracker behind a client. Errors are those of the client, and the ones named here."""
-
-    def __init__(self, client: Client) -> None:
-        """Use ``client``, whose interface must be AraMiS'."""
-        self.client = client
 
     # --- use cases --------------------------------------------------------------------------------
 

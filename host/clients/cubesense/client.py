@@ -26,7 +26,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
-from cubestack.host.clients.contract import Client
+from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.clients.cubesense.values import (
     CameraSettings,
     Mask,
@@ -58,12 +58,8 @@ DETECT_TIMEOUT_S = 3.0
 _NO_MASK = Mask(0, 0, 0, 0)
 
 
-class CubeSense:
+class CubeSense(DeviceClient):
     """A CubeSense behind a client. Errors are those of the client, and the ones named here."""
-
-    def __init__(self, client: Client) -> None:
-        """Use ``client``, whose interface must be CubeSense's."""
-        self.client = client
 
     def capture_and_detect(self, camera: Camera, sram: Sram | None = None) -> Measurement:
         """Take a picture into ``sram`` (default: the camera's own) and measure in it.

@@ -22,7 +22,7 @@ from cubestack.firmware_model.interface.cubestar import (
     MatchMode,
     TaskStatus,
 )
-from cubestack.host.clients.contract import Client, Progress
+from cubestack.host.clients.contract import DeviceClient, Progress
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
 
@@ -94,12 +94,8 @@ class Star:
     hipparcos: int | None
 
 
-class CubeStar:
+class CubeStar(DeviceClient):
     """A CubeStar behind a client. Errors are those of the client, and the ones named here."""
-
-    def __init__(self, client: Client) -> None:
-        """Use ``client``, whose interface must be CubeStar's."""
-        self.client = client
 
     def configure(self, settings: Mapping[str, Mapping[str, object]]) -> None:
         """Send telecommands, name to parameters, as ``Calibration.settings`` has them."""

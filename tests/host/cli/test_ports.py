@@ -2,6 +2,7 @@
 
 import argparse
 from contextlib import ExitStack
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,22 +11,26 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.serial_port import PortError
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.host.cli.ports import add_port_arguments, open_ports
-from cubestack.host.devices.boards import Opened
-
-
-class Board:
-    def __init__(self, lines) -> None:
-        self.lines = lines
 
 
 @pytest.fixture
-def opened() -> Opened:
-    uart = Uart(Kernel(), 9600, lambda _b: None, lambda: None, silence_bytes=9)
-    lines = (
-        SerialLine("uart", "node protocol", "", uart),
-        SerialLine("bench_uart", "bench protocol", ".bench", uart),
-    )
-    return Opened("CubeSense", Board(lines))
+def opened():
+    return emulated("CubeSense", ("node protocol", ""), ("bench protocol", ".bench"))
+
+
+def emulated(title: str, *lines: tuple[str, str]) -> SimpleNamespace:
+    """What stands for a powered-up device here: its title, and its serial lines."""
+    kernel = Kernel()
+    return SimpleNamespace(
+        device=SimpleNamespace(title=title),
+        board=SimpleNamespace(
+            lines=[
+                SerialLine(name, name, suffix, Uart(kernel, 9600, lambda _b: None, lambda: None,
+                                                    silence_bytes=9))
+                for name, suffix in lines
+            ]
+        ),
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -54,7 +59,7 @@ def test_of_several_devices_the_name_is_what_comes_before_theirs(opened, tmp_pat
     monkeypatch.chdir(tmp_path)
     parser = argparse.ArgumentParser()
     add_port_arguments(parser)
-    other = Opened("CubeStar", Board(opened.board.lines[:1]))
+    other = emulated("CubeStar", ("node protocol", ""))
     with ExitStack() as stack:
         served = open_ports(parser.parse_args(["--pty", "x_"]), [other, opened], stack)
         names = [port.name for _, _, port in served]
@@ -84,3 +89,4 @@ def test_other_machines_must_be_allowed(ports, kind):
 def test_one_end_only(ports):
     with pytest.raises(argparse.ArgumentError, match="not allowed with"):
         ports("--tcp", "0", "--rfc2217", "0")
+

@@ -13,8 +13,7 @@ from cubestack.host.cli import replay
 from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.main import main
 from cubestack.host.cli.records import record
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.boards import open_board
+from cubestack.host.devices.emulated import open_device, power_up
 from cubestack.host.recording.setups import emulated_setup
 
 HEADER = '{"recording":1,"device":"cubesense","lines":{}'
@@ -28,12 +27,10 @@ def recording(tmp_path):
     path = tmp_path / "a.rec"
     args = argparse.Namespace(record=path, trace=tmp_path / "a.vcd")
     with ExitStack() as stack:
-        opened = open_board("cubesense", None, seed=3, engine="auto", baud=None)
-        stack.callback(opened.board.close)
+        opened = open_device("cubesense", seed=3)
+        stack.callback(opened.close)
         record(args, opened, stack, emulated_setup(3, None))
-        from cubestack.emulator.ports.direct import DirectSerial
-
-        client = NodeClient(DirectSerial(opened.board.kernel, opened.board.uart), INTERFACE)
+        client = opened.client.client
         client.telemetry("Configuration")
         client.command("DetectionThreshold1", Threshold=9)
         client.telemetry("Configuration")
@@ -141,8 +138,8 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys, monkeypa
     made = tmp_path / "a.rec"
     args = argparse.Namespace(record=made, trace=None)
     with ExitStack() as stack:
-        opened = open_board("cubesense", None, seed=3, engine="auto", baud=9600)
-        stack.callback(opened.board.close)
+        opened = open_device("cubesense", seed=3, baud=9600)
+        stack.callback(opened.close)
         inject_plan(opened.board.faults, plan)
         setup = emulated_setup(3, None, plan, {"mcu_addressing": True})
         record(args, opened, stack, setup)
@@ -155,9 +152,9 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys, monkeypa
 
     def with_usual_fpgas(*arguments, mcu_addressing, **others):  # the others take long to compile
         options.append(mcu_addressing)
-        return open_board(*arguments, **others)
+        return power_up(*arguments, **others)
 
-    monkeypatch.setattr(replay, "open_board", with_usual_fpgas)
+    monkeypatch.setattr(replay, "power_up", with_usual_fpgas)
     assert main(["replay", str(made)]) == 0
     assert options == [True]
     assert "no difference" in capsys.readouterr().out

@@ -16,7 +16,7 @@ from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.main import main
-from cubestack.host.devices.boards import open_board
+from cubestack.host.devices.emulated import open_device
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
@@ -38,7 +38,7 @@ KINDS = ("pty", "tcp", "rfc2217", "i2c", "recorded", "recorded i2c")
 @contextlib.contextmanager
 def serving(kind, folder):
     """A CubeSense on a port of that kind, and the target that leads to it."""
-    board = open_board("cubesense", None, seed=0, engine="auto", baud=None).board
+    board = open_device("cubesense").board
     with contextlib.ExitStack() as stack:
         stack.callback(board.close)
         adapter = I2cAdapter(board.kernel, board.i2c_bus)

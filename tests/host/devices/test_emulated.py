@@ -9,7 +9,7 @@ import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.devices.emulated import open_cubestar_device
+from cubestack.host.devices.emulated import open_device
 
 ASK = bytes([0x1F, 0x7F, 128, 0x1F, 0xFF])
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 @pytest.fixture
 def device() -> Iterator[Any]:
-    device = open_cubestar_device(seed=4)
+    device = open_device("cubestar", seed=4)
     yield device
     device.close()
 

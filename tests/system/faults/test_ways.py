@@ -13,7 +13,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.cli.main import main
 from cubestack.host.cli.session import open_session
-from cubestack.host.cli.targets import open_emulated
+from cubestack.host.devices.targets import open_target
 from cubestack.host.shell.language import Shell
 
 from .bench import BENCHES, Bench
@@ -46,7 +46,7 @@ def in_words(value: Any) -> str:
 
 @pytest.fixture(params=BENCHES)
 def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
-    target = open_emulated(f"emulated:{request.param}", request.param, None, seed=1)
+    target = open_target(f"emulated:{request.param}", seed=1)
     yield Shell(target)
     target.close()
 

@@ -16,7 +16,7 @@ from cubestack.emulator.i2cdev.pacing import wait_precisely
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.realtime import RealtimeScheduler
-from cubestack.host.devices.boards import open_board
+from cubestack.host.devices.emulated import open_device
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
 ENVIRONMENT = os.environ | {"PATH": f"{os.environ['PATH']}:/usr/sbin:/sbin"}
@@ -63,7 +63,7 @@ class Latch:
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The socket of an emulation that runs in this process."""
     path = tmp_path_factory.mktemp("private", numbered=True) / "bus"
-    opened = open_board("cubestar", None, seed=0, engine="auto", baud=None)
+    opened = open_device("cubestar")
     board = opened.board
     board.i2c_bus.attach(LATCH, Latch(), general_call=True)
     adapter = I2cAdapter(board.kernel, board.i2c_bus)

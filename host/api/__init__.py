@@ -1,0 +1,97 @@
+"""Firmware-in-the-loop emulator of CubeSat camera sensors: what a user's program needs.
+
+::
+
+    import cubestack
+
+    with cubestack.open_device("cubestar", cubestack.SkyScene.pointing(84, -1)) as device:
+        device.client.capture_and_process()
+        print(device.client.attitude())
+
+    with cubestack.connect("/dev/ttyUSB0", "cubestar") as cubestar:
+        print(cubestar.attitude())
+
+    for frame in cubestack.measure("cubestar", frames=20, mag_limit=3.8):
+        print(frame.error_cross_deg)
+
+Deeper modules are for those who change the project. Nothing of the emulator is loaded before it is
+used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from cubestack.emulator.faults.plan import Plan, load_plan, parse_plan
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.emulator.scene.sky import PictureScene, SkyScene
+    from cubestack.host.clients.aramis.client import Aramis
+    from cubestack.host.clients.cubesense.client import CubeSense
+    from cubestack.host.clients.cubestar.client import CubeStar
+    from cubestack.host.devices.device import BoardOption, Device
+    from cubestack.host.devices.emulated import EmulatedDevice, open_device
+    from cubestack.host.devices.registry import device_names
+    from cubestack.host.devices.targets import connect
+    from cubestack.host.errors import HostError
+    from cubestack.host.experiments.measure import measure
+
+__all__ = [
+    "Aramis",
+    "BoardOption",
+    "CubeSense",
+    "CubeStar",
+    "Device",
+    "EarthSunScene",
+    "EmulatedDevice",
+    "HostError",
+    "PictureScene",
+    "Plan",
+    "SkyScene",
+    "__version__",
+    "connect",
+    "device_names",
+    "load_plan",
+    "measure",
+    "open_device",
+    "parse_plan",
+]
+
+__version__: Final = version("cubestack")
+
+#: Where each name comes from; loaded at its first use.
+_HOMES: Final = {
+    "Aramis": "host.clients.aramis.client",
+    "BoardOption": "host.devices.device",
+    "CubeSense": "host.clients.cubesense.client",
+    "CubeStar": "host.clients.cubestar.client",
+    "Device": "host.devices.device",
+    "EarthSunScene": "emulator.scene.earth_sun",
+    "EmulatedDevice": "host.devices.emulated",
+    "HostError": "host.errors",
+    "PictureScene": "emulator.scene.sky",
+    "Plan": "emulator.faults.plan",
+    "SkyScene": "emulator.scene.sky",
+    "connect": "host.devices.targets",
+    "device_names": "host.devices.registry",
+    "load_plan": "emulator.faults.plan",
+    "measure": "host.experiments.measure",
+    "open_device": "host.devices.emulated",
+    "parse_plan": "emulator.faults.plan",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name at its first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"cubestack.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Every public name, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,109 @@
+"""What a sensor is to everything generic: one declaration, found by its name.
+
+Command, shell, fixtures, conformance, registers, recordings, faults and gateware tools ask a
+``Device`` and name no sensor. What needs the emulator is behind a callable, so that listing devices
+loads none of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.host.clients.contract import Client, DeviceClient
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import Board
+    from cubestack.host.experiments.contract import Experiment
+
+__all__ = ["BoardOption", "BoardT", "ClientT", "Device", "Engine", "Shown"]
+
+#: How an FPGA is run: compiled where there is a compiler, always compiled, or Amaranth's simulator.
+Engine = Literal["auto", "compiled", "python"]
+
+#: Passes items through and shows how many of a total are done: (items, total, label) -> items.
+Shown = Callable[[Iterable[Any], int, str], Iterator[Any]]
+
+BoardT = TypeVar("BoardT", bound="Board")
+ClientT = TypeVar("ClientT", bound=DeviceClient)
+
+
+@dataclass(frozen=True)
+class BoardOption:
+    """An option that one device's board has, beside those of all.
+
+    Attributes:
+        name: keyword of ``Device.open_board``, and its name in recordings; ``--name`` on the
+            command line, with dashes.
+        help: one phrase for a user.
+        choices: what it may be, as typed; empty for a switch.
+        default: what it is when it is not given: one of ``choices``, or False.
+        notice: what a user must know of a value, or None.
+    """
+
+    name: str
+    help: str
+    choices: tuple[str, ...] = ()
+    default: str | bool = False
+    notice: Callable[[str], str | None] = lambda _value: None
+
+    @property
+    def flag(self) -> str:
+        """As the command line has it."""
+        return "--" + self.name.replace("_", "-")
+
+
+@dataclass(frozen=True)
+class Device(Generic[BoardT, ClientT]):
+    """A sensor.
+
+    Attributes:
+        name: as it is typed, and as recordings have it: lower case.
+        title: as it is written.
+        summary: one phrase for lists.
+        interface: its messages, registers and service port.
+        client: makes the device's client from a client of its node.
+        open_board: powers a board up: (scene, *, seed, engine, baud, kernel, i2c_bus, and what
+            ``options`` names) as ``emulator.boards.contract.Board`` has them.
+        load_scene: reads a scene file; ValueError names the key that is wrong.
+        default_scene: what it looks at when nothing is said.
+        default_scene_title: that, for the help.
+        scene_types: classes of scenes that it takes.
+        options: of its board alone.
+        has_fpga: whether an engine can be chosen.
+        experiment: what ``measure`` does with it; None for nothing.
+        demo: shows it end to end, with pictures: (arguments of the command) -> found; None for
+            nothing.
+        tops: designs of its FPGAs by name, as ``hdl.flow`` takes them.
+        proofs: formal properties of them by name.
+        profiles: names of the firmware's profiles, the default one first.
+        prepare: makes what takes seconds the first time, such as a catalogue; it is given what
+            shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
+    """
+
+    name: str
+    title: str
+    summary: str
+    interface: Interface
+    client: Callable[[Client], ClientT]
+    open_board: Callable[..., BoardT]
+    load_scene: Callable[[Path], Any]
+    default_scene: Callable[[], Any]
+    default_scene_title: str
+    options: tuple[BoardOption, ...] = ()
+    has_fpga: bool = True
+    experiment: Callable[[], Experiment[Any, Any]] | None = None
+    demo: Callable[[Any], bool] | None = None
+    tops: Callable[[], Mapping[str, Any]] = dict
+    proofs: Callable[[], Mapping[str, Any]] = dict
+    profiles: tuple[str, ...] = ("extended",)
+    prepare: Callable[[Shown], None] = lambda _shown: None
+
+    def scene(self, given: Any) -> Any:
+        """The scene that ``given`` means: None the default, text or a path a file, else itself."""
+        if given is None:
+            return self.default_scene()
+        return self.load_scene(Path(given)) if isinstance(given, str | Path) else given

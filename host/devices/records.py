@@ -1,0 +1,51 @@
+"""Recordings and traces of an emulated device, made at its pins."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from cubestack.host.devices.emulated import EmulatedDevice
+
+if TYPE_CHECKING:
+    from cubestack.emulator.recording.recorder import Recorder
+    from cubestack.emulator.recording.trace import VcdTrace
+    from cubestack.firmware_model.formats.setup import Setup
+
+__all__ = ["create_file", "start_recorder", "start_trace"]
+
+
+def start_recorder(
+    emulated: EmulatedDevice[Any, Any], stream: IO[str], setup: Setup | None = None
+) -> Recorder:
+    """Record every byte of all ports; before any port is opened.
+
+    The board's I2C bus is replaced by one that is listened to. ``setup`` goes into the header.
+    """
+    from cubestack.emulator.recording.recorder import Recorder
+
+    board = emulated.board
+    recorder = Recorder(stream, emulated.device.name, board.uarts, setup)
+    board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+    return recorder
+
+
+def start_trace(emulated: EmulatedDevice[Any, Any], stream: IO[str]) -> VcdTrace:
+    """Trace lines, buses, FPGA pins and firmware for a waveform viewer; as ``start_recorder``."""
+    from cubestack.emulator.recording.trace import VcdTrace
+
+    board = emulated.board
+    trace = VcdTrace(
+        stream, emulated.device.name, board.kernel, board.uarts, board.engine, board.probes()
+    )
+    board.i2c_bus = trace.bus(board.i2c_bus)
+    return trace
+
+
+def create_file(path: Path, stack: ExitStack) -> IO[str]:
+    """``path`` for writing, closed by ``stack``; ValueError when it can not be written."""
+    try:
+        return stack.enter_context(path.open("w", encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"can not write {path}: {error.strerror}") from None

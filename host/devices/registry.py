@@ -1,0 +1,66 @@
+"""Every device by name: those that come with this distribution, and those of others.
+
+Another distribution registers a device by an entry point in the group ``cubestack.devices``: its
+name is the device's, its value leads to a ``Device``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from cubestack.host.devices.device import Device
+from cubestack.host.errors import TargetError
+
+__all__ = ["GROUP", "device", "device_names", "devices"]
+
+GROUP = "cubestack.devices"
+
+#: Those that come with this distribution, in the order of all lists.
+BUILT_IN = ("cubestar", "cubesense", "aramis")
+
+
+@cache
+def _entries() -> dict[str, EntryPoint]:
+    """Where each device is declared; a name is whoever's claims it first."""
+    entries = {
+        name: EntryPoint(name, f"cubestack.host.sensors.{name}:DEVICE", GROUP) for name in BUILT_IN
+    }
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        entries.setdefault(entry.name, entry)
+    return entries
+
+
+def device_names() -> tuple[str, ...]:
+    """Names of all registered devices; loads none of them."""
+    return tuple(_entries())
+
+
+@cache
+def device(name: str) -> Device[Any, Any]:
+    """The device of this name, in any case.
+
+    Raises TargetError for a name that nobody registered, and for a registration that leads to no
+    device, with what is wrong with it.
+    """
+    entry = _entries().get(name.lower())
+    if entry is None:
+        raise TargetError(f"no device {name!r}; known: {', '.join(device_names())}")
+    try:
+        found = entry.load()
+    except Exception as error:
+        raise TargetError(f"device {name}: {entry.value} does not load: {error}") from error
+    if not isinstance(found, Device) or found.name != entry.name:
+        raise TargetError(f"device {name}: {entry.value} is no Device of that name")
+    return found
+
+
+def devices() -> Iterator[Device[Any, Any]]:
+    """All registered devices that load; one that doesn't is told when it is asked for by name."""
+    for name in device_names():
+        try:
+            yield device(name)
+        except TargetError:
+            continue

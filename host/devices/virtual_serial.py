@@ -1,0 +1,83 @@
+"""A serial port with pyserial's interface, in virtual time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cubestack.emulator.ports.direct import DirectSerial
+
+__all__ = ["PS_PER_S", "VirtualSerial"]
+
+PS_PER_S = 10**12
+
+LONGEST_S = 3600.0
+"""What "for ever" is: nothing of a device takes as long."""
+
+
+class VirtualSerial:
+    """A serial port with the part of pyserial's interface that drivers use, in virtual time.
+
+    Attributes:
+        timeout: longest wait for all bytes of a read, in s of virtual time; None waits for ever.
+        port: a name for messages.
+        baudrate: of the line.
+    """
+
+    def __init__(self, line: DirectSerial, baudrate: int, timeout: float | None = None) -> None:
+        """Plug in."""
+        self._line = line
+        self._ahead = bytearray()
+        self.timeout = timeout
+        self.baudrate = baudrate
+        self.port = self.name = "emulated"
+        self.is_open = True
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that have arrived."""
+        self._ahead += self._line.read(1 << 16, 0.0)
+        return len(self._ahead)
+
+    def read(self, size: int = 1) -> bytes:
+        """Read ``size`` bytes, or what came within ``timeout``."""
+        left_s = LONGEST_S if self.timeout is None else self.timeout
+        while self.in_waiting < size:
+            began_ps = self._line.now_ps
+            piece = self._line.read(1 << 16, left_s)
+            left_s -= (self._line.now_ps - began_ps) / PS_PER_S
+            if not piece:
+                break
+            self._ahead += piece
+        data = bytes(self._ahead[:size])
+        del self._ahead[:size]
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Start sending."""
+        self._line.write(bytes(data))
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def reset_input_buffer(self) -> None:
+        """Drop what has arrived."""
+        if self.in_waiting:
+            self._ahead.clear()
+
+    def reset_output_buffer(self) -> None:
+        """Nothing is held back."""
+
+    def close(self) -> None:
+        """Take the plug out."""
+        self._line.close()
+        self.is_open = False
+
+    def __enter__(self) -> VirtualSerial:
+        """Use it in a ``with`` block."""
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        """Close."""
+        self.close()

@@ -1,0 +1,73 @@
+"""AraMiS' star tracker as a registered device."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.host.clients.contract import Client
+from cubestack.host.devices.device import Device, Engine, Shown
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.scene.sky import Scene
+    from cubestack.host.clients.aramis.client import Aramis
+
+__all__ = ["DEVICE"]
+
+POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+
+
+def _client(client: Client) -> Aramis:
+    from cubestack.host.clients.aramis.client import Aramis
+
+    return Aramis(client)
+
+
+def _open_board(
+    scene: Scene, *, baud: int | None = None, engine: Engine = "auto", **common: Any
+) -> AramisBoard:
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.boards.aramis.catalogue import onboard_database
+
+    if engine != "auto":
+        raise ValueError(f"aramis has no FPGA: leave --engine {engine} out")
+    catalogue = common.pop("catalogue", None) or onboard_database()
+    return AramisBoard(scene, catalogue, baud=baud or INTERFACE.baud, **common)
+
+
+def _load_scene(path: Path) -> Scene:
+    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+    from cubestack.emulator.scene.sky import load_scene
+
+    return load_scene(path, aramis_lens())
+
+
+def _default_scene() -> Scene:
+    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.sky import SkyScene
+
+    return SkyScene(quaternion_from_pointing(*POINTING_DEG), optics=aramis_lens())
+
+
+def _prepare(shown: Shown) -> None:
+    from cubestack.emulator.boards.aramis.catalogue import onboard_database
+
+    onboard_database(progress=shown)
+
+
+DEVICE: Device[AramisBoard, Aramis] = Device(
+    name="aramis",
+    title="AraMiS",
+    summary="attitudes of the star tracker without FPGA",
+    interface=INTERFACE,
+    client=_client,
+    open_board=_open_board,
+    load_scene=_load_scene,
+    default_scene=_default_scene,
+    default_scene_title="Orion",
+    has_fpga=False,
+    prepare=_prepare,
+)

@@ -1,0 +1,66 @@
+"""CubeSense as a registered device."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.host.clients.contract import Client
+from cubestack.host.devices.device import BoardOption, Device
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.host.clients.cubesense.client import CubeSense
+
+__all__ = ["DEVICE"]
+
+SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
+
+
+def _client(client: Client) -> CubeSense:
+    from cubestack.host.clients.cubesense.client import CubeSense
+
+    return CubeSense(client)
+
+
+def _open_board(
+    scene: EarthSunScene, *, baud: int | None = None, mcu_addressing: bool = False, **common: Any
+) -> CubeSenseBoard:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+
+    return CubeSenseBoard(
+        scene, baud=baud or INTERFACE.baud, mcu_addressing=mcu_addressing, **common
+    )
+
+
+def _load_scene(path: Path) -> EarthSunScene:
+    from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+
+    return load_earth_sun_scene(path)
+
+
+def _default_scene() -> EarthSunScene:
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+
+    return EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
+
+
+DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
+    name="cubesense",
+    title="CubeSense",
+    summary="directions of the Sun and of the Earth's centre",
+    interface=INTERFACE,
+    client=_client,
+    open_board=_open_board,
+    load_scene=_load_scene,
+    default_scene=_default_scene,
+    default_scene_title="Earth and Sun",
+    options=(
+        BoardOption(
+            "mcu_addressing",
+            "FPGAs that let the processor choose addresses (telecommand 100)",
+        ),
+    ),
+)

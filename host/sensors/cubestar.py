@@ -1,0 +1,90 @@
+"""CubeStar as a registered device."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.host.clients.contract import Client
+from cubestack.host.devices.device import BoardOption, Device
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.scene.sky import Scene
+    from cubestack.host.clients.cubestar.client import CubeStar
+
+__all__ = ["DEVICE"]
+
+POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
+MAG_LIMIT = 3.8
+"""Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
+
+
+def _client(client: Client) -> CubeStar:
+    from cubestack.host.clients.cubestar.client import CubeStar
+
+    return CubeStar(client)
+
+
+def _open_board(
+    scene: Scene, *, baud: int | None = None, layout: str = Layout.COPIED.value, **common: Any
+) -> CubeStarBoard:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+
+    return CubeStarBoard(
+        scene, onboard_catalogue(), baud=baud or INTERFACE.baud, layout=Layout(layout), **common
+    )
+
+
+def _load_scene(path: Path) -> Scene:
+    from cubestack.emulator.scene.sky import load_scene
+
+    return load_scene(path)
+
+
+def _default_scene() -> Scene:
+    from cubestack.emulator.scene.attitude import quaternion_from_pointing
+    from cubestack.emulator.scene.sky import SkyScene
+
+    return SkyScene(quaternion_from_pointing(*POINTING_DEG), mag_limit=MAG_LIMIT)
+
+
+def _layout_notice(value: str) -> str | None:
+    """What a user must know of a layout that can not be built from the published parts."""
+    if value == Layout.COPIED.value:
+        return None
+    from cubestack.emulator.boards.cubestar.layouts import fpga_of
+
+    fpga = fpga_of(Layout(value))
+    if fpga.fits:
+        return None
+    return (
+        f"layout {value} can not be built with an AGLN030: its FPGA takes {fpga.pins} "
+        f"pins of {fpga.part_pins}, {fpga.tiles} tiles of {fpga.part_tiles}"
+    )
+
+
+DEVICE: Device[CubeStarBoard, CubeStar] = Device(
+    name="cubestar",
+    title="CubeStar",
+    summary="attitudes of the star tracker",
+    interface=INTERFACE,
+    client=_client,
+    open_board=_open_board,
+    load_scene=_load_scene,
+    default_scene=_default_scene,
+    default_scene_title="Orion",
+    options=(
+        BoardOption(
+            "layout",
+            "memory layout; 1 (default) is the published one, 2 and two-boards its "
+            "recommended successors, 3 needs a larger FPGA (docs/layouts.md)",
+            choices=tuple(layout.value for layout in Layout),
+            default=Layout.COPIED.value,
+            notice=_layout_notice,
+        ),
+    ),
+)

@@ -1,0 +1,42 @@
+"""What ``import cubestack`` gives."""
+
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import cubestack
+
+
+@pytest.mark.parametrize("name", cubestack.__all__)
+def test_every_public_name_is_there_and_documented(name: str) -> None:
+    value = getattr(cubestack, name)
+    assert name == "__version__" or value.__doc__
+    assert name in dir(cubestack)
+
+
+def test_the_lazy_names_are_the_public_ones() -> None:
+    assert {*cubestack._HOMES, "__version__"} == set(cubestack.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'opendevice'"):
+        _ = cubestack.opendevice
+
+
+def test_importing_it_loads_nothing_heavy() -> None:
+    script = "import sys, cubestack; print({'numpy', 'amaranth', 'simpy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.strip() == "set()", done.stderr
+
+
+@pytest.mark.parametrize("command", [["-m", "cubestack"], [str(Path(sys.executable).parent / "cubestack")]])
+def test_the_command_tells_its_version(command: list[str]) -> None:
+    words = [sys.executable, *command] if command[0] == "-m" else command
+    done = subprocess.run([*words, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"cubestack {version('cubestack')}\n"
+
+
+def test_a_script_needs_one_import_line() -> None:
+    with cubestack.connect("emulated:aramis") as aramis:
+        assert isinstance(aramis, cubestack.Aramis)
+        assert aramis.client.telemetry("Identification")["InterfaceVersion"] == 1

@@ -1,0 +1,94 @@
+"""Devices by name: those of this distribution, those of others, and registrations that are wrong."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from cubestack.host.devices import registry
+from cubestack.host.devices.emulated import check_options, open_device
+from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.errors import TargetError
+
+
+@pytest.fixture
+def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[EntryPoint]]:
+    """What other distributions register; to be filled."""
+    others: list[EntryPoint] = []
+    monkeypatch.setattr(registry, "entry_points", lambda group: others)
+    registry._entries.cache_clear()
+    device.cache_clear()
+    yield others
+    registry._entries.cache_clear()
+    device.cache_clear()
+
+
+def test_the_names_of_declarations_are_those_they_are_registered_by() -> None:
+    assert [one.name for one in devices()] == list(device_names())
+    assert [one.name for one in devices()] == [one.interface.name.lower() for one in devices()]
+
+
+def test_listing_them_loads_no_emulator() -> None:
+    script = (
+        "import sys; from cubestack.host.devices.registry import devices; list(devices());"
+        "print([m for m in sys.modules if m.startswith(('cubestack.emulator', 'amaranth'))])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_a_name_in_any_case_is_found_and_an_unknown_one_told() -> None:
+    assert device("CubeStar") is device("cubestar")
+    with pytest.raises(TargetError, match="no device 'cubestart'; known: cubestar, cubesense"):
+        device("cubestart")
+
+
+def test_another_distribution_can_register_one(registered: list[EntryPoint]) -> None:
+    registered.append(EntryPoint("other", "cubestack.host.errors:TargetError", registry.GROUP))
+    assert device_names()[-1] == "other"
+    with pytest.raises(TargetError, match="host.errors:TargetError is no Device of that name"):
+        device("other")
+
+
+def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]) -> None:
+    registered.append(EntryPoint("cubestar", "nowhere:NOTHING", registry.GROUP))
+    assert device("cubestar").title == "CubeStar"
+
+
+def test_one_that_does_not_load_is_told_by_name_and_left_out_of_lists(
+    registered: list[EntryPoint],
+) -> None:
+    registered.append(EntryPoint("broken", "no_such_module:DEVICE", registry.GROUP))
+    assert "broken" in device_names()
+    assert "broken" not in [one.name for one in devices()]
+    with pytest.raises(TargetError, match="device broken: no_such_module:DEVICE does not load"):
+        device("broken")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("aramis", {"layout": "2"}, "layout is an option of cubestar, not of aramis"),
+        ("cubestar", {"layuot": "2"}, "layuot is no option of cubestar"),
+        ("cubestar", {"layout": "4"}, "layout of cubestar must be one of 1, 2, 3, two-boards"),
+        ("cubesense", {"mcu_addressing": "yes"}, "must be one of False, True, not 'yes'"),
+    ],
+)
+def test_options_that_make_no_sense(name: str, options: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        check_options(device(name), options)
+    with pytest.raises(ValueError, match=message):
+        open_device(name, **options)
+
+
+def test_devices_beside_each_other_share_time_and_bus() -> None:
+    with (
+        open_device("aramis", seed=1) as first,
+        open_device("aramis", seed=1) as alone,
+    ):
+        with pytest.raises(ValueError, match="address"):
+            open_device("aramis", beside=first)  # both would be at the same I2C address
+        alone.wait(0.5)
+        assert first.time_s == 0.0
