@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from cubestack.host.devices.registry import device_names
     from cubestack.host.devices.targets import connect
     from cubestack.host.errors import HostError
-    from cubestack.host.experiments.measure import measure
 
 __all__ = [
     "Aramis",
@@ -54,7 +53,6 @@ __all__ = [
     "connect",
     "device_names",
     "load_plan",
-    "measure",
     "open_device",
     "parse_plan",
 ]
@@ -77,7 +75,6 @@ _HOMES: Final = {
     "connect": "host.devices.targets",
     "device_names": "host.devices.registry",
     "load_plan": "emulator.faults.plan",
-    "measure": "host.experiments.measure",
     "open_device": "host.devices.emulated",
     "parse_plan": "emulator.faults.plan",
 }

@@ -40,9 +40,7 @@ def make_parser() -> Parser:
     parser = Parser(
         prog="cubestack",
         description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
-        epilog=_with_names(
-            "Try: cubestack measure {first}, or cubestack COMMAND --help"
-        ),
+        epilog=_with_names("Try: cubestack measure {first}, or cubestack COMMAND --help"),
     )
     parser.add_argument("--version", action="version", version=f"cubestack {version('cubestack')}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

@@ -37,7 +37,7 @@ def start_trace(emulated: EmulatedDevice[Any, Any], stream: IO[str]) -> VcdTrace
 
     board = emulated.board
     trace = VcdTrace(
-        stream, emulated.device.name, board.kernel, board.uarts, board.engine, board.probes()
+        stream, emulated.device.name, board.kernel, board.uarts, board.engine, board.probes
     )
     board.i2c_bus = trace.bus(board.i2c_bus)
     return trace

@@ -14,9 +14,11 @@ import pytest
 from vcd.reader import TokenKind, tokenize
 
 from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.host.cli.main import main
 from cubestack.host.cli.records import record
+from cubestack.host.clients.contract import Client
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.recording.setups import emulated_setup
@@ -60,7 +62,7 @@ def when(changes: Changes, name: str, value: object, after_ns: int = 0) -> int:
 
 
 @contextmanager
-def traced(device: str, folder: Path) -> Iterator[tuple[Any, NodeClient]]:
+def traced(device: str, folder: Path) -> Iterator[tuple[Any, Client]]:
     """A device whose run is traced and recorded in ``folder``, and a client."""
     args = argparse.Namespace(record=folder / "run.rec", trace=folder / "run.vcd")
     with ExitStack() as stack:
@@ -69,6 +71,10 @@ def traced(device: str, folder: Path) -> Iterator[tuple[Any, NodeClient]]:
         stack.callback(board.close)
         record(args, opened, stack, emulated_setup(2, None))
         yield board, opened.client.client
+
+
+def interface_of(device: str) -> Interface:
+    return registered(device).interface
 
 
 def first_byte_ns(folder: Path, identifier: int) -> int:
@@ -84,7 +90,7 @@ def test_a_cubestar_takes_a_picture(tmp_path: Path) -> None:
         client.command("CaptureImage")
         client.wait_processed(5)
     changes = read(tmp_path / "run.vcd")
-    command = first_byte_ns(tmp_path, registered("cubestar").interface.telecommand("CaptureImage").id)
+    command = first_byte_ns(tmp_path, interface_of("cubestar").telecommand("CaptureImage").id)
     heard = when(changes, "uart.rx_byte", 0x1F, command)
     assert heard == command
     busy = min(t for t, name in changes["firmware.task"] if t > command)
@@ -101,7 +107,7 @@ def test_a_cubesense_measures_the_sun(tmp_path: Path) -> None:
         client.command("CaptureAndDetect", Camera=0, Sram=0)
         client.pause(0.5)
     changes = read(tmp_path / "run.vcd")
-    command = first_byte_ns(tmp_path, registered("cubesense").interface.telecommand("CaptureAndDetect").id)
+    command = first_byte_ns(tmp_path, interface_of("cubesense").telecommand("CaptureAndDetect").id)
     pending = when(changes, "firmware.sun_detect", "PENDING", command)
     store = when(changes, "fpga.SUNEN", 0, pending)  # active low
     stored = when(changes, "fpga.SUNACK", 1, store)
@@ -115,7 +121,7 @@ def test_an_aramis_measures(tmp_path: Path) -> None:
         client.command("Activate")
         client.wait_processed(10)
     changes = read(tmp_path / "run.vcd")
-    command = first_byte_ns(tmp_path, registered("aramis").interface.telecommand("Activate").id)
+    command = first_byte_ns(tmp_path, interface_of("aramis").telecommand("Activate").id)
     activating = when(changes, "firmware.task", "ACTIVATING", command)
     assert command < activating < when(changes, "firmware.task", "READY", activating)
 

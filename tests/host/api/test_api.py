@@ -29,7 +29,9 @@ def test_importing_it_loads_nothing_heavy() -> None:
     assert done.stdout.strip() == "set()", done.stderr
 
 
-@pytest.mark.parametrize("command", [["-m", "cubestack"], [str(Path(sys.executable).parent / "cubestack")]])
+@pytest.mark.parametrize(
+    "command", [["-m", "cubestack"], [str(Path(sys.executable).parent / "cubestack")]]
+)
 def test_the_command_tells_its_version(command: list[str]) -> None:
     words = [sys.executable, *command] if command[0] == "-m" else command
     done = subprocess.run([*words, "--version"], capture_output=True, text=True, check=True)

@@ -89,4 +89,3 @@ def test_other_machines_must_be_allowed(ports, kind):
 def test_one_end_only(ports):
     with pytest.raises(argparse.ArgumentError, match="not allowed with"):
         ports("--tcp", "0", "--rfc2217", "0")
-

@@ -8,7 +8,6 @@ import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
-from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.cli import replay
 from cubestack.host.cli.fault_plan import inject_plan
 from cubestack.host.cli.main import main

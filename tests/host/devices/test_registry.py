@@ -1,4 +1,4 @@
-"""Devices by name: those of this distribution, those of others, and registrations that are wrong."""
+"""Devices by name: those of this distribution, those of others, and wrong registrations."""
 
 import subprocess
 import sys
@@ -48,7 +48,7 @@ def test_a_name_in_any_case_is_found_and_an_unknown_one_told() -> None:
 def test_another_distribution_can_register_one(registered: list[EntryPoint]) -> None:
     registered.append(EntryPoint("other", "cubestack.host.errors:TargetError", registry.GROUP))
     assert device_names()[-1] == "other"
-    with pytest.raises(TargetError, match="host.errors:TargetError is no Device of that name"):
+    with pytest.raises(TargetError, match=r"host\.errors:TargetError is no Device of that name"):
         device("other")
 
 
