@@ -28,8 +28,8 @@ LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
     "firmware_model": (
-        "interface formats",
-        "mcu",
+        "interface",
+        "formats mcu",
         "attitude",
         "cubestar cubesense aramis",
     ),

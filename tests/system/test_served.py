@@ -100,7 +100,7 @@ def test_first_script_of_the_readme(emulate: Emulate, root: Path, tmp_path: Path
     readme = (root / "README.md").read_text(encoding="utf-8")
     command = code_block(readme, "sh", "emulate cubestar --pty").split()
     assert command[:3] == [".venv/bin/cubestack", "emulate", "cubestar"]
-    script = code_block(readme, "python", "NodeClient")
+    script = code_block(readme, "python", "cubestack.connect")
     with emulate(*command[3:]):
         output = run_script(script, folder=tmp_path)
     first, *stars = output.splitlines()
