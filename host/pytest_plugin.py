@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
     from cubestack.host.devices.device import Engine
-    from cubestack.host.devices.emulated import EmulatedDevice
+    from cubestack.host.devices.emulated import AnyEmulated
 
 __all__: list[str] = []
 
@@ -65,14 +65,14 @@ def pytest_configure(config: pytest.Config) -> None:
 def _fixture(name: str) -> Any:
     """The fixture of a device."""
 
-    def powered(request: pytest.FixtureRequest) -> Iterator[EmulatedDevice[Any, Any]]:
+    def powered(request: pytest.FixtureRequest) -> Iterator[AnyEmulated]:
         yield from _powered(request, name)
 
     powered.__doc__ = f"An emulated {name}; see ``cubestack.EmulatedDevice``."
     return pytest.fixture(powered, name=name)
 
 
-def _powered(request: pytest.FixtureRequest, name: str) -> Iterator[EmulatedDevice[Any, Any]]:
+def _powered(request: pytest.FixtureRequest, name: str) -> Iterator[AnyEmulated]:
     """Power a device up as the test's marker says, and down after it."""
     from cubestack.emulator.faults.plan import load_plan, parse_plan
     from cubestack.host.devices.emulated import open_device

@@ -22,9 +22,12 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, overload
 
 if TYPE_CHECKING:
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.faults.plan import Plan, load_plan, parse_plan
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.emulator.scene.sky import PictureScene, SkyScene
@@ -32,10 +35,41 @@ if TYPE_CHECKING:
     from cubestack.host.clients.cubesense.client import CubeSense
     from cubestack.host.clients.cubestar.client import CubeStar
     from cubestack.host.devices.device import BoardOption, Device
-    from cubestack.host.devices.emulated import EmulatedDevice, open_device
+    from cubestack.host.devices.emulated import AnyEmulated, EmulatedDevice
     from cubestack.host.devices.registry import device_names
-    from cubestack.host.devices.targets import connect
     from cubestack.host.errors import HostError
+
+    # What a type checker sees: which name gives which client. See ``host.devices`` for the rest.
+    @overload
+    def open_device(
+        name: Literal["cubestar"], scene: Any = None, **options: Any
+    ) -> EmulatedDevice[CubeStarBoard, CubeStar]: ...
+    @overload
+    def open_device(
+        name: Literal["cubesense"], scene: Any = None, **options: Any
+    ) -> EmulatedDevice[CubeSenseBoard, CubeSense]: ...
+    @overload
+    def open_device(
+        name: Literal["aramis"], scene: Any = None, **options: Any
+    ) -> EmulatedDevice[AramisBoard, Aramis]: ...
+    @overload
+    def open_device(name: str, scene: Any = None, **options: Any) -> AnyEmulated: ...
+    def open_device(name: str, scene: Any = None, **options: Any) -> Any:
+        """Power up a registered device; see ``host.devices.emulated.open_device``."""
+
+    @overload
+    def connect(text: str, device: Literal["cubestar"], *, baud: int | None = None) -> CubeStar: ...
+    @overload
+    def connect(
+        text: str, device: Literal["cubesense"], *, baud: int | None = None
+    ) -> CubeSense: ...
+    @overload
+    def connect(text: str, device: Literal["aramis"], *, baud: int | None = None) -> Aramis: ...
+    @overload
+    def connect(text: str, device: str | None = None, *, baud: int | None = None) -> Any: ...
+    def connect(text: str, device: str | None = None, *, baud: int | None = None) -> Any:
+        """The client of the device that ``text`` names; see ``host.devices.targets.connect``."""
+
 
 __all__ = [
     "Aramis",

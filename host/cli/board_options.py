@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
-from cubestack.host.devices.device import BoardOption, Device, Engine
+from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
 from cubestack.host.devices.registry import devices
 
 __all__ = [
@@ -52,7 +52,7 @@ def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str
         )
 
 
-def chosen_options(args: argparse.Namespace, device: Device[Any, Any]) -> dict[str, Any]:
+def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any]:
     """The board options that were given, but for defaults.
 
     Raises ValueError for one that is of another device.
@@ -73,7 +73,7 @@ def chosen_options(args: argparse.Namespace, device: Device[Any, Any]) -> dict[s
 
 
 def tell_notices(
-    device: Device[Any, Any], options: Mapping[str, Any], tell: Callable[[str], None]
+    device: AnyDevice, options: Mapping[str, Any], tell: Callable[[str], None]
 ) -> None:
     """Tell what a user must know of the chosen ``options``."""
     for option in device.options:

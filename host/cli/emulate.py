@@ -17,7 +17,6 @@ import argparse
 import signal
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
@@ -31,7 +30,7 @@ from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.cli.terminal import progress, say
-from cubestack.host.devices.emulated import EmulatedDevice, power_up
+from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.recording.setups import emulated_setup
 
@@ -86,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
             if getattr(args, name) is not None:
                 raise ValueError(f"--{name} belongs to one device, and there are several")
     with ExitStack() as stack:
-        opened: list[EmulatedDevice[Any, Any]] = []
+        opened: list[AnyEmulated] = []
         for name in args.devices:
             found = device(name)
             options = chosen_options(args, found)

@@ -6,10 +6,10 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cubestack.host.cli.arguments import whole
-from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.registry import device_names
 
 if TYPE_CHECKING:
@@ -55,8 +55,8 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def open_ports(
-    args: argparse.Namespace, devices: Sequence[EmulatedDevice[Any, Any]], stack: ExitStack
-) -> list[tuple[EmulatedDevice[Any, Any], SerialLine, Endpoint]]:
+    args: argparse.Namespace, devices: Sequence[AnyEmulated], stack: ExitStack
+) -> list[tuple[AnyEmulated, SerialLine, Endpoint]]:
     """A port for each serial line of each device, in order; ``stack`` closes them.
 
     Raises ValueError when there are not enough ports from the given one on, PortError when one
@@ -74,7 +74,7 @@ def open_ports(
 def _open(
     args: argparse.Namespace,
     several: bool,
-    opened: EmulatedDevice[Any, Any],
+    opened: AnyEmulated,
     line: SerialLine,
     index: int,
     count: int,

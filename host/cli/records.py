@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.records import create_file, start_recorder, start_trace
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 def record(
     args: argparse.Namespace,
-    emulated: EmulatedDevice[Any, Any],
+    emulated: AnyEmulated,
     stack: ExitStack,
     setup: Setup | None = None,
 ) -> Recorder | None:

@@ -29,7 +29,7 @@ from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.cli.terminal import say
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.device import Engine
-from cubestack.host.devices.emulated import EmulatedDevice, power_up
+from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device
 from cubestack.host.recording.setups import setup_for, written
 
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     return int(bool(differences))
 
 
-def _open(recording: Recording, setup: Setup, engine: Engine) -> EmulatedDevice[Any, Any]:
+def _open(recording: Recording, setup: Setup, engine: Engine) -> AnyEmulated:
     """The device, made as ``setup`` says."""
     found = device(recording.device)
     options: dict[str, Any] = dict(setup.options)

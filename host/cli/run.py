@@ -20,14 +20,14 @@ import shutil
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.board_options import add_engine_arguments
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.terminal import say
-from cubestack.host.devices.emulated import EmulatedDevice, open_device
+from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device_names, devices
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     names = args.device or device_names()[:1]
     if len(names) > 1 and (args.scene or args.faults):
         raise ValueError("--scene and --faults are of one device, and several are on the bus")
-    opened: list[EmulatedDevice[Any, Any]] = []
+    opened: list[AnyEmulated] = []
     for name in names:
         beside = opened[0] if opened else None
         opened.append(

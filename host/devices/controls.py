@@ -8,7 +8,7 @@ from typing import Any
 
 from cubestack.firmware_model.formats.recording import Control
 from cubestack.firmware_model.formats.setup import Document
-from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.errors import TargetError
 from cubestack.host.recording.setups import read_document, written
 
@@ -29,7 +29,7 @@ class EmulatedControls:
             name.
     """
 
-    def __init__(self, emulated: EmulatedDevice[Any, Any]) -> None:
+    def __init__(self, emulated: AnyEmulated) -> None:
         """Control ``emulated``."""
         from cubestack.emulator.faults.table import FAULTS
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.contract import Client, DeviceClient
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
     from cubestack.host.experiments.contract import Experiment
 
-__all__ = ["BoardOption", "BoardT", "ClientT", "Device", "Engine", "Shown"]
+__all__ = ["AnyDevice", "BoardOption", "BoardT_co", "ClientT_co", "Device", "Engine", "Shown"]
 
 #: How an FPGA is run: compiled where there is a compiler, always compiled, or Amaranth's simulator.
 Engine = Literal["auto", "compiled", "python"]
@@ -27,8 +27,8 @@ Engine = Literal["auto", "compiled", "python"]
 #: Passes items through and shows how many of a total are done: (items, total, label) -> items.
 Shown = Callable[[Iterable[Any], int, str], Iterator[Any]]
 
-BoardT = TypeVar("BoardT", bound="Board")
-ClientT = TypeVar("ClientT", bound=DeviceClient)
+BoardT_co = TypeVar("BoardT_co", bound="Board", covariant=True)
+ClientT_co = TypeVar("ClientT_co", bound=DeviceClient, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class BoardOption:
 
 
 @dataclass(frozen=True)
-class Device(Generic[BoardT, ClientT]):
+class Device(Generic[BoardT_co, ClientT_co]):
     """A sensor.
 
     Attributes:
@@ -88,8 +88,8 @@ class Device(Generic[BoardT, ClientT]):
     title: str
     summary: str
     interface: Interface
-    client: Callable[[Client], ClientT]
-    open_board: Callable[..., BoardT]
+    client: Callable[[Client], ClientT_co]
+    open_board: Callable[..., BoardT_co]
     load_scene: Callable[[Path], Any]
     default_scene: Callable[[], Any]
     default_scene_title: str
@@ -107,3 +107,7 @@ class Device(Generic[BoardT, ClientT]):
         if given is None:
             return self.default_scene()
         return self.load_scene(Path(given)) if isinstance(given, str | Path) else given
+
+
+#: A device, whichever it is.
+AnyDevice: TypeAlias = "Device[Board, DeviceClient]"

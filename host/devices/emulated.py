@@ -17,28 +17,30 @@ import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Generic, Literal, Self
+from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeAlias
 
+from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.device import BoardT, ClientT, Device, Engine
+from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
 from cubestack.host.devices.virtual_serial import PS_PER_S, VirtualSerial
 from cubestack.host.transport.smbus import CubeSMBus
 
 if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.ports.realtime import RealtimeScheduler
     from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["EmulatedDevice", "check_options", "open_device", "power_up"]
+__all__ = ["AnyEmulated", "EmulatedDevice", "check_options", "open_device", "power_up"]
 
 PORT = "{port}"
 """What ``run`` replaces in a command by the path of the serial port."""
 
 
-class EmulatedDevice(Generic[BoardT, ClientT]):
+class EmulatedDevice(Generic[BoardT_co, ClientT_co]):
     """A powered-up device.
 
     Attributes:
@@ -47,15 +49,15 @@ class EmulatedDevice(Generic[BoardT, ClientT]):
         seed: of everything random.
     """
 
-    def __init__(self, device: Device[BoardT, ClientT], board: BoardT, seed: int) -> None:
+    def __init__(self, device: Device[BoardT_co, ClientT_co], board: BoardT_co, seed: int) -> None:
         """Take over ``board``."""
         self.device = device
         self.board = board
         self.seed = seed
-        self._client: ClientT | None = None
+        self._client: ClientT_co | None = None
 
     @property
-    def client(self) -> ClientT:
+    def client(self) -> ClientT_co:
         """This project's client on the serial line; plugged in again after any other host."""
         if self._client is None:
             self._client = self.device.client(
@@ -163,6 +165,10 @@ class EmulatedDevice(Generic[BoardT, ClientT]):
         self.close()
 
 
+#: A powered-up device, whichever it is.
+AnyEmulated: TypeAlias = "EmulatedDevice[Board, DeviceClient]"
+
+
 class _Watch:
     """Waits for a program in a thread of its own, and ends the scheduler after it."""
 
@@ -198,7 +204,7 @@ class _Watch:
         return self._outcome
 
 
-def check_options(device: Device[Any, Any], options: Mapping[str, object]) -> None:
+def check_options(device: AnyDevice, options: Mapping[str, object]) -> None:
     """Refuse board options that ``device`` does not have, or a value that one does not take.
 
     Raises ValueError with what would be right.
@@ -218,7 +224,7 @@ def check_options(device: Device[Any, Any], options: Mapping[str, object]) -> No
 
 
 def power_up(
-    device: Device[BoardT, ClientT],
+    device: Device[BoardT_co, ClientT_co],
     scene: Any = None,
     *,
     seed: int = 0,
@@ -227,7 +233,7 @@ def power_up(
     kernel: Kernel | None = None,
     i2c_bus: I2cBus | None = None,
     **options: Any,
-) -> EmulatedDevice[BoardT, ClientT]:
+) -> EmulatedDevice[BoardT_co, ClientT_co]:
     """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board.
 
     ``kernel`` and ``i2c_bus`` are those of another board that it stands beside, if any.
@@ -251,9 +257,9 @@ def open_device(
     seed: int = 0,
     engine: Engine = "auto",
     baud: int | None = None,
-    beside: EmulatedDevice[Any, Any] | None = None,
+    beside: AnyEmulated | None = None,
     **options: Any,
-) -> EmulatedDevice[Any, Any]:
+) -> AnyEmulated:
     """Power up a registered device.
 
     Args:

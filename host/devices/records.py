@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
-from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.devices.emulated import AnyEmulated
 
 if TYPE_CHECKING:
     from cubestack.emulator.recording.recorder import Recorder
@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["create_file", "start_recorder", "start_trace"]
 
 
-def start_recorder(
-    emulated: EmulatedDevice[Any, Any], stream: IO[str], setup: Setup | None = None
-) -> Recorder:
+def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None = None) -> Recorder:
     """Record every byte of all ports; before any port is opened.
 
     The board's I2C bus is replaced by one that is listened to. ``setup`` goes into the header.
@@ -31,7 +29,7 @@ def start_recorder(
     return recorder
 
 
-def start_trace(emulated: EmulatedDevice[Any, Any], stream: IO[str]) -> VcdTrace:
+def start_trace(emulated: AnyEmulated, stream: IO[str]) -> VcdTrace:
     """Trace lines, buses, FPGA pins and firmware for a waveform viewer; as ``start_recorder``."""
     from cubestack.emulator.recording.trace import VcdTrace
 

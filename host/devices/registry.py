@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
 
-from cubestack.host.devices.device import Device
+from cubestack.host.devices.device import AnyDevice, Device
 from cubestack.host.errors import TargetError
 
 __all__ = ["GROUP", "device", "device_names", "devices"]
@@ -39,7 +38,7 @@ def device_names() -> tuple[str, ...]:
 
 
 @cache
-def device(name: str) -> Device[Any, Any]:
+def device(name: str) -> AnyDevice:
     """The device of this name, in any case.
 
     Raises TargetError for a name that nobody registered, and for a registration that leads to no
@@ -57,7 +56,7 @@ def device(name: str) -> Device[Any, Any]:
     return found
 
 
-def devices() -> Iterator[Device[Any, Any]]:
+def devices() -> Iterator[AnyDevice]:
     """All registered devices that load; one that doesn't is told when it is asked for by name."""
     for name in device_names():
         try:

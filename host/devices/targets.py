@@ -28,7 +28,7 @@ from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.controls import EmulatedControls
-from cubestack.host.devices.device import Device
+from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.records import create_file, start_recorder
 from cubestack.host.devices.registry import device, device_names, devices
@@ -108,7 +108,7 @@ class Target:
     registers: RegisterClient | None = None
     bench: Transport | None = None
     controls: Controls | None = None
-    device: Device[Any, Any] | None = None
+    device: AnyDevice | None = None
     on_close: list[Callable[[], None]] = field(default_factory=list)
 
     def close(self) -> None:
@@ -117,7 +117,7 @@ class Target:
             callback()
 
 
-def device_of(name: str | None, target: str) -> Device[Any, Any]:
+def device_of(name: str | None, target: str) -> AnyDevice:
     """The device called ``name``; TargetError when none is given, or it is unknown."""
     if name is None:
         known = ", ".join(device_names())

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from cubestack.host.devices.device import Device
+    from cubestack.host.devices.device import AnyDevice
 
 __all__ = ["Experiment", "Result"]
 
@@ -36,7 +36,7 @@ class Experiment(Protocol[OptionsT_contra, ResultT]):
     def count(self, options: OptionsT_contra) -> int:
         """How many results there will be."""
 
-    def run(self, device: Device[Any, Any], options: OptionsT_contra) -> Iterator[ResultT]:
+    def run(self, device: AnyDevice, options: OptionsT_contra) -> Iterator[ResultT]:
         """Power the device up and measure; ValueError for options that do not go together."""
 
     def report(self, results: Sequence[ResultT], wall_s: float) -> None:
