@@ -30,7 +30,7 @@ ORDER = {
     "firmware_model": (
         "interface",
         "formats mcu",
-        "attitude node",
+        "attitude",
         "cubestar cubesense aramis",
     ),
     "host": (

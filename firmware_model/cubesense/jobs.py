@@ -6,16 +6,25 @@ of its own, and gets its turn when nothing else waits.
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubesense.codes import Camera, ImageSize, Sram
 from cubestack.firmware_model.mcu.requests import Routine
-from cubestack.firmware_model.node.queue import BoundedQueue
 
-__all__ = ["Background", "FrameRequest", "Job", "JobQueue", "Measure", "TelecommandJob"]
+__all__ = [
+    "QUEUE_DEPTH",
+    "Background",
+    "FrameRequest",
+    "Job",
+    "JobQueue",
+    "Measure",
+    "Telecommand",
+]
+
+QUEUE_DEPTH = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +37,7 @@ class FrameRequest:
 
 
 @dataclass(eq=False)
-class TelecommandJob:
+class Telecommand:
     """An accepted telecommand.
 
     Attributes:
@@ -39,7 +48,7 @@ class TelecommandJob:
     """
 
     message: Message
-    values: dict[str, Any]
+    values: Mapping[str, Any]
     frame: FrameRequest | None = None
     latest: bool = False
 
@@ -60,7 +69,7 @@ class Background:
     work: Callable[[], Routine[None]]
 
 
-Job = TelecommandJob | Measure | Background
+Job = Telecommand | Measure | Background
 
 
 class JobQueue:
@@ -68,7 +77,7 @@ class JobQueue:
 
     def __init__(self) -> None:
         """Make an empty queue."""
-        self._jobs: BoundedQueue[TelecommandJob | Measure] = BoundedQueue()
+        self._jobs: deque[Telecommand | Measure] = deque()
         self._streams: deque[Background] = deque()
 
     def __len__(self) -> int:
@@ -78,11 +87,14 @@ class JobQueue:
     @property
     def full(self) -> bool:
         """Whether no further job is accepted."""
-        return self._jobs.full
+        return len(self._jobs) >= QUEUE_DEPTH
 
-    def put(self, job: TelecommandJob | Measure) -> bool:
+    def put(self, job: Telecommand | Measure) -> bool:
         """Append ``job``; False when the queue is full."""
-        return self._jobs.put(job)
+        if self.full:
+            return False
+        self._jobs.append(job)
+        return True
 
     def request(self, stream: Background, *, next_turn: bool = False) -> bool:
         """Let ``stream`` have a turn; ``next_turn``: the next one. False when it waits already."""

@@ -17,11 +17,12 @@ import json
 from collections import Counter
 
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
-from cubestack.host.conformance.suite import Check, Outcome, Suite, compare
+from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
+from cubestack.host.conformance.suite import compare, run_suite
 
 __all__ = ["add_arguments", "run"]
 
-MARKS = {Outcome.PASSED: "ok", Outcome.FAILED: "FAILED"}
+MARKS = {Verdict.PASSED: "ok", Verdict.FAILED: "FAILED"}
 NAME_COLUMNS = 52
 DETAIL_COLUMNS = 100
 
@@ -39,52 +40,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the suite on one target, or on two."""
     show = _show_json if args.json else _show_text
-    suites = []
+    runs = []
     for number, text in enumerate([args.target, args.compare][: 1 + (args.compare is not None)]):
         if number:  # options are the first target's, but for the device
             args.bench = args.scene = args.baud = args.record = None
         target = open_any_target(text, args)
         try:
-            suite = Suite(target, args.allow_write)
-            if not number:
-                suite.on_check = show
-                args.device = args.device or target.interface.name.lower()
-            suite.run()
-            suites.append(suite)
+            args.device = args.device or target.interface.name.lower()
+            runs.append(run_suite(target, args.allow_write, _ignore if number else show))
         finally:
             target.close()
-    difference = compare(*suites) if len(suites) == 2 else None
-    _summarise(suites, difference, as_json=args.json)
-    return int(any(suite.failed for suite in suites) or difference is not None)
+    difference = compare(*runs) if len(runs) == 2 else None
+    _summarise(runs, difference, as_json=args.json)
+    return int(any(one.failed for one in runs) or difference is not None)
 
 
-def _show_text(check: Check) -> None:
-    if check.outcome is Outcome.SKIPPED:
+def _ignore(_check: CheckResult) -> None:
+    """The second target's results are compared only."""
+
+
+def _show_text(check: CheckResult) -> None:
+    if check.verdict is Verdict.SKIPPED:
         return  # summed up at the end
     detail = check.detail
-    if len(detail) > DETAIL_COLUMNS and check.outcome is Outcome.PASSED:
+    if len(detail) > DETAIL_COLUMNS and check.verdict is Verdict.PASSED:
         detail = detail[: DETAIL_COLUMNS - 3] + "..."
-    print(f"{MARKS[check.outcome]:<7}{check.name:<{NAME_COLUMNS}} {detail}".rstrip())
+    print(f"{MARKS[check.verdict]:<7}{check.name:<{NAME_COLUMNS}} {detail}".rstrip())
 
 
-def _show_json(check: Check) -> None:
-    content = {"check": check.name, "outcome": check.outcome.value, "detail": check.detail}
+def _show_json(check: CheckResult) -> None:
+    content = {"check": check.name, "outcome": check.verdict.value, "detail": check.detail}
     print(json.dumps(content))
 
 
-def _summarise(suites: list[Suite], difference: str | None, *, as_json: bool) -> None:
-    for suite in suites:
-        counts = Counter(check.outcome for check in suite.checks)
-        numbers = {outcome.value: counts[outcome] for outcome in Outcome}
+def _summarise(runs: list[CheckRun], difference: str | None, *, as_json: bool) -> None:
+    for one in runs:
+        counts = Counter(check.verdict for check in one.checks)
+        numbers = {verdict.value: counts[verdict] for verdict in Verdict}
         if as_json:
-            print(json.dumps({"target": suite.target.name, **numbers}))
+            print(json.dumps({"target": one.target.name, **numbers}))
         else:
-            reasons = Counter(c.detail for c in suite.checks if c.outcome is Outcome.SKIPPED)
+            reasons = Counter(c.detail for c in one.checks if c.verdict is Verdict.SKIPPED)
             for reason, number in reasons.items():
                 print(f"{number} left out: {reason}")
             text = ", ".join(f"{number} {name}" for name, number in numbers.items())
-            print(f"{suite.target.name}: {text}")
-    if len(suites) == 2:
+            print(f"{one.target.name}: {text}")
+    if len(runs) == 2:
         if as_json:
             print(json.dumps({"difference": difference}))
         else:

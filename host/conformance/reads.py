@@ -6,15 +6,13 @@ from cubestack.firmware_model.interface.codec.frames import END, ESCAPE, START
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.conformance.suite import (
+from cubestack.host.conformance.contract import (
     LATE_S,
+    CheckRun,
     FailedError,
     PassedError,
     SkippedError,
-    Suite,
-    show_values,
 )
-from cubestack.host.shell.names import SCHEDULING
 
 __all__ = ["check_reads"]
 
@@ -22,52 +20,60 @@ UNKNOWN_SAMPLES = 3
 """Unknown telemetry IDs that are tried: each costs a time-out."""
 
 
-def check_reads(suite: Suite) -> None:
+MEASURED_UNITS = {"s", "ms", "us", "mA", "C", "deg C", "degC"}
+"""Units of fields whose values two devices need not share."""
+
+
+def check_reads(run: CheckRun) -> None:
     """Run them all."""
-    for message in suite.target.interface.telemetries:
+    for message in run.target.interface.telemetries:
         if message.supported:
-            _check_telemetry(suite, message)
-    _check_unknown(suite)
-    _check_framing(suite)
-    registers = suite.target.interface.registers
+            _check_telemetry(run, message)
+    _check_unknown(run)
+    _check_framing(run)
+    registers = run.target.interface.registers
     if registers is not None:
-        _check_registers(suite, registers)
-    _check_times(suite)
+        _check_registers(run, registers)
+    _check_times(run)
 
 
-def _check_telemetry(suite: Suite, message: Message) -> None:
+def _check_telemetry(run: CheckRun, message: Message) -> None:
     name = f"telemetry {message.name}"
-    if message.name in SCHEDULING and not suite.may_write(name):
+    if message.starts_measurement and not run.may_write(name):
         return
-    with suite.check(name) as seen:
-        values = suite.telemetry(message)  # of the declared length, else it raises
-        seen += show_values(message, values)
+    with run.check(name) as seen:
+        values = run.telemetry(message)  # of the declared length, else it raises
+        seen += [
+            f"{f.name}={f.label(values[f.name])}"
+            for f in message.fields
+            if f.unit not in MEASURED_UNITS
+        ]
         wrong = message.violations(values)
         if wrong:
             field = wrong[0][0]
             raise FailedError(
                 f"field {field.name} is {field.label(values[field.name])}: not allowed"
             )
-        version = suite.target.interface.version
+        version = run.target.interface.version
         if values.get("InterfaceVersion", version) != version:
             found = message.field("InterfaceVersion").label(values["InterfaceVersion"])
             raise FailedError(f"InterfaceVersion is {found}, declared {version}")
 
 
-def _check_unknown(suite: Suite) -> None:
-    declared = {message.id for message in suite.target.interface.messages if message.supported}
+def _check_unknown(run: CheckRun) -> None:
+    declared = {message.id for message in run.target.interface.messages if message.supported}
     unknown = [i for i in range(TELEMETRY_BIT, 256) if i not in declared]
     step = max(1, len(unknown) // UNKNOWN_SAMPLES)
     for identifier in unknown[::step][:UNKNOWN_SAMPLES]:
-        with suite.check(f"unknown telemetry ID {identifier}") as seen:
-            answer = suite.request(bytes([identifier]))
+        with run.check(f"unknown telemetry ID {identifier}") as seen:
+            answer = run.request(bytes([identifier]))
             if answer is not None:
                 raise FailedError(f"answered with {answer.hex() or 'nothing in a frame'}")
             seen.append("no answer")
 
 
-def _check_framing(suite: Suite) -> None:
-    message = suite.target.interface.telemetries[0]
+def _check_framing(run: CheckRun) -> None:
+    message = run.target.interface.telemetries[0]
     whole = bytes([ESCAPE, START, message.id, ESCAPE, END])
     cases = {
         "noise before a frame": bytes([0x00, 0x55, 0xAA]) + whole,
@@ -76,17 +82,17 @@ def _check_framing(suite: Suite) -> None:
         "end without a start": bytes([ESCAPE, END]) + whole,
     }
     for name, wire in cases.items():
-        with suite.check(f"framing: {name}") as seen:
-            _expect(suite, wire, message)
+        with run.check(f"framing: {name}") as seen:
+            _expect(run, wire, message)
             seen.append("found again")
-    with suite.check("framing: frame in two pieces") as seen:
-        _expect(suite, whole[:3], message, whole[3:])
+    with run.check("framing: frame in two pieces") as seen:
+        _expect(run, whole[:3], message, whole[3:])
         seen.append("answered")
 
 
-def _expect(suite: Suite, wire: bytes, message: Message, rest: bytes = b"") -> None:
+def _expect(run: CheckRun, wire: bytes, message: Message, rest: bytes = b"") -> None:
     """The node answers the request in ``wire``, ``rest`` following separately."""
-    node, line = suite.target.node, suite.target.line
+    node, line = run.target.node, run.target.line
     if line is None or not isinstance(node, NodeClient):
         raise SkippedError("needs a serial line")
     answer = node.exchange(wire, rest)
@@ -95,12 +101,12 @@ def _expect(suite: Suite, wire: bytes, message: Message, rest: bytes = b"") -> N
         raise FailedError(f"{found} to telemetry {message.name}")
 
 
-def _check_registers(suite: Suite, registers: PointerMap) -> None:
-    client = suite.target.registers
+def _check_registers(run: CheckRun, registers: PointerMap) -> None:
+    client = run.target.registers
     for register in registers:
         if not register.readable or register.streams:
             continue
-        with suite.check(f"register {register.name}") as seen:
+        with run.check(f"register {register.name}") as seen:
             if client is None:
                 raise SkippedError("no I2C bus within reach")
             value = client.read(register.name)
@@ -108,7 +114,7 @@ def _check_registers(suite: Suite, registers: PointerMap) -> None:
             if not register.field.allows(value, {}):
                 raise FailedError(f"{register.field.label(value)} is not allowed")
     unused = next(address for address in range(255, -1, -1) if registers.at(address) is None)
-    with suite.check(f"register address {unused:#04x} without a register") as seen:
+    with run.check(f"register address {unused:#04x} without a register") as seen:
         if client is None:
             raise SkippedError("no I2C bus within reach")
         data = client.read_raw(unused, 2)
@@ -117,13 +123,13 @@ def _check_registers(suite: Suite, registers: PointerMap) -> None:
             raise FailedError(f"read {data.hex()}, declared {FILL:#04x} in each byte")
 
 
-def _check_times(suite: Suite) -> None:
-    with suite.check("times of answers"):
-        if not suite.latencies_s:
+def _check_times(run: CheckRun) -> None:
+    with run.check("times of answers"):
+        if not run.latencies_s:
             raise SkippedError("no telemetry was answered")
-        slowest = max(suite.latencies_s, key=lambda name: suite.latencies_s[name])
-        worst_ms = 1000 * suite.latencies_s[slowest]
-        middle_ms = 1000 * median(suite.latencies_s.values())
+        slowest = max(run.latencies_s, key=lambda name: run.latencies_s[name])
+        worst_ms = 1000 * run.latencies_s[slowest]
+        middle_ms = 1000 * median(run.latencies_s.values())
         text = f"median {middle_ms:.1f} ms, {slowest} {worst_ms:.1f} ms beside the wire"
         if worst_ms > 1000 * LATE_S:
             raise FailedError(f"{text}: more than {1000 * LATE_S:g} ms")

@@ -5,35 +5,22 @@ from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
 from cubestack.firmware_model.interface.codec.message import Interface, Message
+from cubestack.host.devices.device import ConformanceNotes
 
 __all__ = ["keys_of", "limits_of", "read_back", "values_to_try", "violations"]
 
-#: Telecommands with fields of the same names as telemetry that shows something else: what was
-#: measured, a clock, or part of what is set.
-NOT_SHOWN = {
-    "setTrackingMode",
-    "GetAttitudeNearPoint",
-    "SetBodyRotation",
-    "SetSystemTime",
-    "StartLoop",
-    "SetIdentification",
-    "SetField",
-}
 
-#: Fields that say which of several settings a telecommand is for; telemetry shows them all, each
-#: with its number behind the name.
-KEYS = ("Area",)
-
-
-def read_back(interface: Interface, message: Message) -> dict[str, tuple[Message, Field]]:
+def read_back(
+    interface: Interface, message: Message, notes: ConformanceNotes
+) -> dict[str, tuple[Message, Field]]:
     """Where each of a telecommand's fields but keys is shown in telemetry; empty unless all are.
 
     By name: the field's own, with the telecommand's number or the key behind it, or the
     telecommand's.
     """
-    if message.name in NOT_SHOWN:
+    if message.name in notes.not_shown:
         return {}
-    keys = keys_of(message)
+    keys = keys_of(message, notes)
     number = re.sub(r".*?(\d*)$", r"\1", message.name)
     found = {}
     for field in message.fields:
@@ -51,9 +38,10 @@ def read_back(interface: Interface, message: Message) -> dict[str, tuple[Message
     return found
 
 
-def keys_of(message: Message) -> dict[str, Value]:
+def keys_of(message: Message, notes: ConformanceNotes) -> dict[str, Value]:
     """Key fields, at the values that are tried."""
-    return {name: value for name, value in message.reset_values().items() if name in KEYS}
+    reset = message.reset_values()
+    return {name: value for name, value in reset.items() if name in notes.keys}
 
 
 def _place(
@@ -62,12 +50,8 @@ def _place(
     for telemetry in interface.telemetries:
         if telemetry.supported and not telemetry.steps and telemetry.name.endswith(ending):
             for shown in telemetry.fields:
-                same = (shown.type, shown.scale, shown.unit) == (
-                    field.type,
-                    field.scale,
-                    field.unit,
-                )
-                if same and shown.name.lower() in names:
+                as_set = (shown.type, shown.scale, shown.unit)
+                if shown.name.lower() in names and as_set == (field.type, field.scale, field.unit):
                     return telemetry, shown
     return None
 

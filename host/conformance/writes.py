@@ -10,9 +10,7 @@ from cubestack.firmware_model.interface.codec.field import Field, Value
 from cubestack.firmware_model.interface.codec.letters import BenchProtocol, Letter
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
-from cubestack.host.conformance.actions import perform
-from cubestack.host.conformance.suite import FailedError, SkippedError, Suite
-from cubestack.host.conformance.tasks import TASKS
+from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
 from cubestack.host.conformance.values import (
     keys_of,
     limits_of,
@@ -28,103 +26,98 @@ __all__ = ["check_writes"]
 BENCH_TIMEOUT_S = 3.0
 BENCH_READ_BYTES = 4096
 
-#: Settings of which some values need an option of the hardware; without it they are refused.
-OPTIONAL = {"SetNadirSearch", "NADIR_SEARCH"}
 
-#: What ends a mode that a telecommand starts.
-ENDED_BY = {"Trigger": "StopLoop", "StartLoop": "StopLoop"}
-
-
-def check_writes(suite: Suite) -> None:
+def check_writes(run: CheckRun) -> None:
     """Run them all; without permission each is reported as left out."""
-    interface = suite.target.interface
-    suite.writing("unknown telecommand IDs", lambda seen: _check_unknown(suite, seen))
+    interface = run.target.interface
+    run.writing("unknown telecommand IDs", lambda seen: _check_unknown(run, seen))
     for message in interface.telecommands:
         if message.supported:
-            _check_telecommand(suite, message)
+            _check_telecommand(run, message)
     for register in interface.registers or ():
         if register.writable and register.readable:
-            suite.writing(
-                f"register {register.name}: written", partial(_check_register, suite, register)
+            run.writing(
+                f"register {register.name}: written", partial(_check_register, run, register)
             )
     if interface.bench is not None:
         for letter in interface.bench.letters:
-            suite.writing(f"bench letter {letter.letter!r}", partial(_check_letter, suite, letter))
-        suite.writing(
-            "bench: no letter of the protocol", partial(_check_no_letter, suite, interface.bench)
+            run.writing(f"bench letter {letter.letter!r}", partial(_check_letter, run, letter))
+        run.writing(
+            "bench: no letter of the protocol", partial(_check_no_letter, run, interface.bench)
         )
 
 
-def _check_telecommand(suite: Suite, message: Message) -> None:
+def _check_telecommand(run: CheckRun, message: Message) -> None:
     name = f"telecommand {message.name}"
-    suite.writing(f"{name}: wrong lengths", partial(_check_lengths, suite, message))
+    run.writing(f"{name}: wrong lengths", partial(_check_lengths, run, message))
     for field, data in violations(message):
-        suite.writing(
-            f"{name}: {field.name} out of range", partial(_check_range, suite, message, field, data)
+        run.writing(
+            f"{name}: {field.name} out of range", partial(_check_range, run, message, field, data)
         )
-    suite.writing(name, partial(_check_effect, suite, message))
+    run.writing(name, partial(_check_effect, run, message))
 
 
-def _check_unknown(suite: Suite, seen: list[str]) -> None:
-    declared = {m.id for m in suite.target.interface.telecommands if m.supported}
+def _check_unknown(run: CheckRun, seen: list[str]) -> None:
+    declared = {m.id for m in run.target.interface.telecommands if m.supported}
     unknown = [identifier for identifier in range(TELEMETRY_BIT) if identifier not in declared]
     for identifier in unknown:
-        _expect_error(suite, bytes([identifier]), "INVALID_ID", f"ID {identifier}")
+        _expect_error(run, bytes([identifier]), "INVALID_ID", f"ID {identifier}")
     seen.append(f"{len(unknown)} refused")
 
 
-def _check_lengths(suite: Suite, message: Message, seen: list[str]) -> None:
+def _check_lengths(run: CheckRun, message: Message, seen: list[str]) -> None:
     data = message.pack(**message.reset_values())
     for wrong in [data + b"\0", data[:-1]] if data else [b"\0"]:
         what = f"{len(wrong)} bytes"
-        _expect_error(suite, bytes([message.id]) + wrong, "WRONG_LENGTH", what)
+        _expect_error(run, bytes([message.id]) + wrong, "WRONG_LENGTH", what)
         seen.append(f"{what} refused")
 
 
 def _check_range(
-    suite: Suite, message: Message, field: Field, data: bytes, seen: list[str]
+    run: CheckRun, message: Message, field: Field, data: bytes, seen: list[str]
 ) -> None:
     """``field`` at a value that its limits forbid, the others at their reset values."""
-    before = _shown(suite, message)
+    before = _shown(run, message)
     what = f"{field.name} = {field.label(message.unpack(data)[field.name])}"
-    _expect_error(suite, bytes([message.id]) + data, "BAD_PARAMETER", what)
+    _expect_error(run, bytes([message.id]) + data, "BAD_PARAMETER", what)
     seen.append("refused")
-    if _shown(suite, message) != before:
+    if _shown(run, message) != before:
         raise FailedError(f"refused, but {what} changed what is read back")
-    _expect_flag(suite, field.range_flag, seen)
+    _expect_flag(run, field.range_flag, seen)
 
 
-def _check_effect(suite: Suite, message: Message, seen: list[str]) -> None:
-    if message.name in TASKS:
-        TASKS[message.name](suite, message, seen)
+def _check_effect(run: CheckRun, message: Message, seen: list[str]) -> None:
+    notes = run.notes
+    if message.name in notes.effects:
+        notes.effects[message.name](run, message, seen)
         return
-    before = _shown(suite, message)
+    before = _shown(run, message)
     if before is None:
-        _perform_any(suite, message)
+        _perform_any(run, message)
         seen.append("processed")
-        if message.name in ENDED_BY:
-            perform(suite, suite.target.interface.telecommand(ENDED_BY[message.name]), {})
+        if message.name in notes.ended_by:
+            run.perform(notes.ended_by[message.name], {})
         return
     refused = 0
     for tried in [*values_to_try(message), before]:
-        values = tried | keys_of(message)
+        values = tried | keys_of(message, notes)
         try:
-            perform(suite, message, values)
+            run.perform(message.name, values)
         except CommandRefusedError:
-            if message.name not in OPTIONAL or values == before:
+            if message.name not in notes.optional or values == before:
                 raise
             refused += 1
             continue
-        _expect_shown(suite, message, values)
+        _expect_shown(run, message, values)
     seen.append("read back" + (f", {refused} values not there" if refused else ""))
 
 
-def _perform_any(suite: Suite, message: Message) -> None:
+def _perform_any(run: CheckRun, message: Message) -> None:
     """Perform it with the first values that the node takes: not all go together with its state."""
     refusal: CommandRefusedError | None = None
     for values in values_to_try(message):
         try:
-            perform(suite, message, values)
+            run.perform(message.name, values)
             return
         except CommandRefusedError as error:
             refusal = refusal or error
@@ -132,19 +125,19 @@ def _perform_any(suite: Suite, message: Message) -> None:
         raise refusal
 
 
-def _shown(suite: Suite, message: Message) -> dict[str, Value] | None:
+def _shown(run: CheckRun, message: Message) -> dict[str, Value] | None:
     """What telemetry shows of a telecommand's fields; None when not all are there."""
-    places = read_back(suite.target.interface, message)
+    places = read_back(run.target.interface, message, run.notes)
     if not places:
         return None
     frames = {telemetry.name for telemetry, _ in places.values()}
-    read = {name: suite.target.node.telemetry(name) for name in sorted(frames)}
+    read = {name: run.target.node.telemetry(name) for name in sorted(frames)}
     values = {name: read[place.name][field.name] for name, (place, field) in places.items()}
-    return message.unpack(message.pack(**values, **keys_of(message)))
+    return message.unpack(message.pack(**values, **keys_of(message, run.notes)))
 
 
-def _expect_shown(suite: Suite, message: Message, wanted: Mapping[str, Value]) -> None:
-    found = _shown(suite, message) or {}
+def _expect_shown(run: CheckRun, message: Message, wanted: Mapping[str, Value]) -> None:
+    found = _shown(run, message) or {}
     for field in message.fields:
         if found[field.name] != wanted[field.name]:
             raise FailedError(
@@ -153,9 +146,9 @@ def _expect_shown(suite: Suite, message: Message, wanted: Mapping[str, Value]) -
             )
 
 
-def _expect_error(suite: Suite, payload: bytes, error: str, what: str) -> None:
-    codes = suite.target.interface.ack_errors
-    answer = suite.request(payload)
+def _expect_error(run: CheckRun, payload: bytes, error: str, what: str) -> None:
+    codes = run.target.interface.ack_errors
+    answer = run.request(payload)
     if answer is None:
         raise FailedError(f"{what}: no acknowledge, declared {error}")
     if answer != bytes([codes[error]]):
@@ -164,20 +157,20 @@ def _expect_error(suite: Suite, payload: bytes, error: str, what: str) -> None:
         raise FailedError(f"{what}: acknowledged with {answer.hex()} ({name}), declared {error}")
 
 
-def _expect_flag(suite: Suite, flag: str, seen: list[str]) -> None:
+def _expect_flag(run: CheckRun, flag: str, seen: list[str]) -> None:
     if not flag:
         return
-    for telemetry in suite.target.interface.telemetries:
+    for telemetry in run.target.interface.telemetries:
         for field in telemetry.fields:
             if telemetry.supported and (field.flag or field.name) == flag:
-                if not suite.target.node.telemetry(telemetry.name)[field.name]:
+                if not run.target.node.telemetry(telemetry.name)[field.name]:
                     raise FailedError(f"refused, but flag {flag} is not set in {telemetry.name}")
                 seen.append(f"flag {flag}")
                 return
 
 
-def _check_register(suite: Suite, register: PointerRegister, seen: list[str]) -> None:
-    client = suite.target.registers
+def _check_register(run: CheckRun, register: PointerRegister, seen: list[str]) -> None:
+    client = run.target.registers
     if client is None:
         raise SkippedError("no I2C bus within reach")
     before = client.read(register.name)
@@ -186,7 +179,7 @@ def _check_register(suite: Suite, register: PointerRegister, seen: list[str]) ->
     for value in (int(low), int(high), before):
         client.write(register.name, value)
         found = client.read(register.name)
-        if found == before and register.name in OPTIONAL:
+        if found == before and register.name in run.notes.optional:
             continue
         if found != value:
             raise FailedError(f"{label(value)} was written, {label(found)} is read")
@@ -201,8 +194,8 @@ def _check_register(suite: Suite, register: PointerRegister, seen: list[str]) ->
         seen.append("wrong value ignored")
 
 
-def _check_letter(suite: Suite, letter: Letter, seen: list[str]) -> None:
-    line = _bench_line(suite)
+def _check_letter(run: CheckRun, letter: Letter, seen: list[str]) -> None:
+    line = _bench_line(run)
     line.write(letter.request)
     answer = bytearray()
     while len(answer) < letter.length:
@@ -215,9 +208,9 @@ def _check_letter(suite: Suite, letter: Letter, seen: list[str]) -> None:
     seen.append(f"{letter.length} bytes")
 
 
-def _check_no_letter(suite: Suite, protocol: BenchProtocol, seen: list[str]) -> None:
+def _check_no_letter(run: CheckRun, protocol: BenchProtocol, seen: list[str]) -> None:
     unknown = next(byte for byte in range(256) if protocol.find(byte) is None)
-    line = _bench_line(suite)
+    line = _bench_line(run)
     line.write(bytes([unknown]))
     data = line.read(BENCH_READ_BYTES, BENCH_TIMEOUT_S)
     if data:
@@ -225,7 +218,7 @@ def _check_no_letter(suite: Suite, protocol: BenchProtocol, seen: list[str]) -> 
     seen.append("no answer")
 
 
-def _bench_line(suite: Suite) -> Transport:
-    if suite.target.bench is None:
+def _bench_line(run: CheckRun) -> Transport:
+    if run.target.bench is None:
         raise SkippedError("no line with the bench protocol within reach")
-    return suite.target.bench
+    return run.target.bench

@@ -8,7 +8,7 @@ loads none of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 
@@ -19,7 +19,16 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
     from cubestack.host.experiments.contract import Experiment
 
-__all__ = ["AnyDevice", "BoardOption", "BoardT_co", "ClientT_co", "Device", "Engine", "Shown"]
+__all__ = [
+    "AnyDevice",
+    "BoardOption",
+    "BoardT_co",
+    "ClientT_co",
+    "ConformanceNotes",
+    "Device",
+    "Engine",
+    "Shown",
+]
 
 #: How an FPGA is run: compiled where there is a compiler, always compiled, or Amaranth's simulator.
 Engine = Literal["auto", "compiled", "python"]
@@ -57,6 +66,29 @@ class BoardOption:
 
 
 @dataclass(frozen=True)
+class ConformanceNotes:
+    """What the protocol suite must know of a device beside its tables, by the tables' names.
+
+    Attributes:
+        effects: checks of telecommands whose success takes more to see than a setting that is read
+            back: (run, telecommand, list of what is observed), as in ``host.conformance.effects``.
+        ended_by: telecommand that ends a mode, by the one that starts it.
+        not_shown: telecommands with fields of the same names as telemetry that shows something
+            else: what was measured, a clock, or part of what is set.
+        keys: fields that say which of several settings a telecommand is for; telemetry shows them
+            all, each with its number behind the name.
+        optional: telecommands and registers of which some values need an option of the hardware;
+            without it they are refused.
+    """
+
+    effects: Mapping[str, Callable[..., None]] = field(default_factory=dict)
+    ended_by: Mapping[str, str] = field(default_factory=dict)
+    not_shown: frozenset[str] = frozenset()
+    keys: frozenset[str] = frozenset()
+    optional: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
 class Device(Generic[BoardT_co, ClientT_co]):
     """A sensor.
 
@@ -82,6 +114,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         profiles: names of the firmware's profiles, the default one first.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
+        conformance: what the protocol suite must know of it beside its tables.
     """
 
     name: str
@@ -101,6 +134,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     proofs: Callable[[], Mapping[str, Any]] = dict
     profiles: tuple[str, ...] = ("extended",)
     prepare: Callable[[Shown], None] = lambda _shown: None
+    conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
 
     def scene(self, given: Any) -> Any:
         """The scene that ``given`` means: None the default, text or a path a file, else itself."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.host.clients.contract import Client
-from cubestack.host.devices.device import Device, Engine, Shown
+from cubestack.host.conformance.effects import check_camera_register, check_stream
+from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Shown
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
@@ -70,4 +73,23 @@ DEVICE: Device[AramisBoard, Aramis] = Device(
     default_scene_title="Orion",
     has_fpga=False,
     prepare=_prepare,
+    conformance=ConformanceNotes(
+        effects={
+            "StreamDownImage": partial(check_stream, picture_bytes=IMAGE_BYTES),
+            "WriteCameraRegister": partial(
+                check_camera_register, address=REGISTERS["SHUTTER_WIDTH"].address
+            ),
+        },
+        ended_by={"StartLoop": "StopLoop"},
+        not_shown=frozenset(
+            {
+                "GetAttitudeNearPoint",
+                "SetBodyRotation",
+                "SetSystemTime",
+                "StartLoop",
+                "SetIdentification",
+                "SetField",
+            }
+        ),
+    ),
 )

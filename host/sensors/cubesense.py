@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.contract import Client
-from cubestack.host.devices.device import BoardOption, Device
+from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
@@ -62,5 +62,8 @@ DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
             "mcu_addressing",
             "FPGAs that let the processor choose addresses (telecommand 100)",
         ),
+    ),
+    conformance=ConformanceNotes(
+        keys=frozenset({"Area"}), optional=frozenset({"SetNadirSearch", "NADIR_SEARCH"})
     ),
 )

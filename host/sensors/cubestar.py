@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.clients.contract import Client
-from cubestack.host.devices.device import BoardOption, Device
+from cubestack.host.conformance.effects import (
+    check_camera_register,
+    check_stream,
+    check_upload,
+    check_watchdog,
+)
+from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -86,5 +94,18 @@ DEVICE: Device[CubeStarBoard, CubeStar] = Device(
             default=Layout.COPIED.value,
             notice=_layout_notice,
         ),
+    ),
+    conformance=ConformanceNotes(
+        effects={
+            "StreamDownImage": partial(check_stream, picture_bytes=IMAGE_BYTES),
+            "UploadBlock": check_upload,
+            "TestWDG": check_watchdog,
+            "WriteCameraRegister": partial(
+                check_camera_register,
+                address=REGISTERS["EXPOSURE"].address + 1,  # its lower byte
+            ),
+        },
+        ended_by={"Trigger": "StopLoop"},
+        not_shown=frozenset({"setTrackingMode"}),
     ),
 )

@@ -8,15 +8,10 @@ from difflib import get_close_matches
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Kind, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
-from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
 from cubestack.host.devices.targets import Target
 from cubestack.host.shell.result import ShellError
 
-__all__ = ["SCHEDULING", "Names", "has_side_effect", "number_of"]
-
-SCHEDULING = {CUBESENSE.telemetry(identifier).name for identifier in SCHEDULES}
-"""Telemetry that starts a measurement when it is read."""
+__all__ = ["Names", "number_of"]
 
 ADDRESS = "@"
 NEAR = 3
@@ -26,11 +21,6 @@ CUTOFF = 0.55
 """Least likeness of a name that is suggested."""
 
 Found = Message | PointerRegister
-
-
-def has_side_effect(message: Message) -> bool:
-    """Whether reading a telemetry frame changes something in the node."""
-    return message.steps or message.name in SCHEDULING
 
 
 def number_of(found: Found) -> str:

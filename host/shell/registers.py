@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.codec.register_pointer import PointerReg
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
-from cubestack.host.shell.names import Names, has_side_effect, number_of
+from cubestack.host.shell.names import Names, number_of
 from cubestack.host.shell.result import (
     Result,
     ShellCommand,
@@ -120,7 +120,7 @@ class RegisterCommands:
         frames: dict[str, object] = {}
         registers: dict[str, object] = {}
         for message in self._target.interface.telemetries:
-            if not message.supported or has_side_effect(message):
+            if not message.supported or message.has_side_effect:
                 continue
             try:
                 values = self._target.node.telemetry(message.name)

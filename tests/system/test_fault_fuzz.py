@@ -29,7 +29,6 @@ from cubestack.host.cli.aramis_session import open_aramis
 from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.shell.names import has_side_effect
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
@@ -107,7 +106,7 @@ class Fuzzer:
         ]
         self.turns = [getattr(self, f"_{name}") for name in TURNS]
         self.shares = list(accumulate(TURNS.values()))
-        self.steady = [m for m in interface.telemetries if m.supported and not has_side_effect(m)]
+        self.steady = [m for m in interface.telemetries if m.supported and not m.has_side_effect]
 
     def run(self, events: int) -> tuple[int, str]:
         """Make ``events``; how many faults did something, and the trace."""

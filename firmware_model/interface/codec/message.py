@@ -64,6 +64,7 @@ class Message:
         ordered: pairs of field names of which the first must not exceed the second.
         extension: added by this project to the published interface.
         steps: each read returns the next of several records, and wraps.
+        starts_measurement: reading it makes the node measure again.
         supported: False when the node treats the ID as unknown.
         confidence: how well the layout is known; None when it is printed, or an extension.
         length: bytes of parameters or data.
@@ -76,6 +77,7 @@ class Message:
     ordered: tuple[tuple[str, str], ...] = ()
     extension: bool = False
     steps: bool = False
+    starts_measurement: bool = False
     supported: bool = True
     confidence: Confidence | None = None
     length: int = dataclasses.field(default=0, init=False)
@@ -113,6 +115,11 @@ class Message:
     def kind(self) -> Kind:
         """Telecommand or telemetry."""
         return Kind.TELEMETRY if self.id & TELEMETRY_BIT else Kind.TELECOMMAND
+
+    @property
+    def has_side_effect(self) -> bool:
+        """Whether reading it changes something in the node."""
+        return self.steps or self.starts_measurement
 
     def field(self, name: str) -> Field:
         """The field called ``name``, in any case; else InterfaceError."""

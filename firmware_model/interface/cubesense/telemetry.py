@@ -58,10 +58,6 @@ _RESULT = (
 )
 
 
-def _result(identifier: int, name: str, meaning: str, confidence: Confidence) -> Message:
-    return Message(identifier, name, meaning, confidence=confidence).of(*_RESULT)
-
-
 def _configuration_fields() -> tuple[Field, ...]:
     fields = [u8(f"Threshold{camera + 1}", "detection threshold", "DN") for camera in Camera]
     for camera in Camera:
@@ -160,21 +156,22 @@ _STATE = (
 TELEMETRIES = (
     *_NODE,
     *(
-        _result(
+        Message(
             identifier,
             f"Result{camera + 1}",
             f"latest measurement of camera {camera + 1}",
-            _MEDIUM,
-        )
+            confidence=_MEDIUM,
+        ).of(*_RESULT)
         for camera, identifier in RESULTS.items()
     ),
     *(
-        _result(
+        Message(
             identifier,
             f"Result{camera + 1}ThenSram{sram + 1}",
             f"latest measurement of camera {camera + 1}; starts its next one, into SRAM{sram + 1}",
-            _HIGH,
-        )
+            confidence=_HIGH,
+            starts_measurement=True,
+        ).of(*_RESULT)
         for identifier, (camera, sram) in SCHEDULES.items()
     ),
     *_STATE,

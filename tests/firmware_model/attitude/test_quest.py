@@ -6,8 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
 
 Matrix = NDArray[np.float64]
 

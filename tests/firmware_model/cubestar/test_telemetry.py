@@ -5,7 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubestar.telemetry import NODE_TYPE
+from cubestack.firmware_model.cubestar.telemetry import (
+    FIRMWARE_VERSION,
+    NODE_TYPE,
+    SERIAL_NUMBER,
+)
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
@@ -15,7 +19,6 @@ from cubestack.firmware_model.interface.cubestar import (
     ResetCause,
     TaskStatus,
 )
-from cubestack.firmware_model.node.identification import FIRMWARE_VERSION, SERIAL_NUMBER
 
 from .bench import BOOT_US, FRAME_US, Bench
 from .sky import Sky

@@ -1,7 +1,13 @@
 import pytest
 
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, cortex_m3
-from cubestack.firmware_model.mcu.costs import Cost, CostError, CostTable, Meter
+from cubestack.firmware_model.mcu.costs import (
+    CORTEX_M3,
+    Cost,
+    CostError,
+    CostTable,
+    Meter,
+    cortex_m3,
+)
 
 SIMPLE = CostTable(
     "simple part",

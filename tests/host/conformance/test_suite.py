@@ -1,5 +1,8 @@
 """The suite on nodes in memory: a good one passes, each fault is found and named."""
 
+from dataclasses import replace
+from functools import partial
+
 import pytest
 
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
@@ -8,28 +11,37 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar import ResetCause
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.conformance.suite import Check, Outcome, Suite, compare
-from cubestack.host.conformance.tasks import PICTURE_BYTES
+from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
+from cubestack.host.conformance.effects import check_stream
+from cubestack.host.conformance.reads import check_reads
+from cubestack.host.conformance.suite import compare
 from cubestack.host.conformance.values import read_back, values_to_try
+from cubestack.host.conformance.writes import check_writes
+from cubestack.host.devices.registry import device
 from cubestack.host.devices.targets import Target
 
 BLOCKS = 4
+NOTES = {name: device(name).conformance for name in ("cubestar", "cubesense")}
+STREAM = {"StreamDownImage": partial(check_stream, picture_bytes=128 * BLOCKS)}
+SMALL = replace(NOTES["cubestar"], effects=NOTES["cubestar"].effects | STREAM)
 
 
-def suite(node, link, **options) -> Suite:
+def suite(node, link, **options) -> CheckRun:
     interface = node.interface
     client = NodeClient(link, interface, retries=0)
-    return Suite(Target("fake", interface, client, link), **options)
+    return CheckRun(Target("fake", interface, client, link), notes=SMALL, **options)
+
+
+def run_all(run: CheckRun) -> CheckRun:
+    check_reads(run)
+    check_writes(run)
+    return run
 
 
 @pytest.fixture
 def good(node, uart, monkeypatch):
-    """A CubeStar in memory that shows its settings, and the error flags of refusals.
-
-    Its pictures are small.
-    """
-    monkeypatch.setitem(PICTURE_BYTES, "CubeStar", 128 * BLOCKS)
-    places = {m.name: read_back(CUBESTAR, m) for m in CUBESTAR.telecommands}
+    """A CubeStar in memory that shows its settings, and the error flags of refusals."""
+    places = {m.name: read_back(CUBESTAR, m, SMALL) for m in CUBESTAR.telecommands}
     for message in CUBESTAR.telemetries:  # after power-up, settings show their reset values
         node.values[message.name] = {}
     for name, shown in places.items():
@@ -82,14 +94,14 @@ def good(node, uart, monkeypatch):
     return node
 
 
-def failures(run: Suite) -> dict[str, str]:
-    return {check.name: check.detail for check in run.run() if check.outcome is Outcome.FAILED}
+def failures(run: CheckRun) -> dict[str, str]:
+    return {c.name: c.detail for c in run_all(run).checks if c.verdict is Verdict.FAILED}
 
 
 def test_good_node_passes(good, uart):
     run = suite(good, uart, allow_write=True)
     assert failures(run) == {}
-    assert {check.outcome for check in run.checks} == {Outcome.PASSED}
+    assert {check.verdict for check in run.checks} == {Verdict.PASSED}
     names = [check.name for check in run.checks]
     assert len(set(names)) == len(names)
     for message in CUBESTAR.messages:
@@ -101,14 +113,14 @@ def test_nothing_is_sent_without_permission(good, uart):
     run = suite(good, uart)
     assert failures(run) == {}
     assert good.log == []
-    skipped = [check for check in run.checks if check.outcome is Outcome.SKIPPED]
+    skipped = [check for check in run.checks if check.verdict is Verdict.SKIPPED]
     assert "telecommand Exposure" in {check.name for check in skipped}
     assert all("--allow-write" in check.detail for check in skipped)
 
 
 def test_settings_are_put_back(good, uart):
     before = {name: dict(values) for name, values in good.values.items()}
-    suite(good, uart, allow_write=True).run()
+    run_all(suite(good, uart, allow_write=True))
     after = {name: dict(values) for name, values in good.values.items()}
     for changing in ("ErrorFlags", "UploadStatus", "ExtendedIdentification", "CameraRegister"):
         after[changing] = before[changing]
@@ -246,7 +258,7 @@ def test_values_to_try_are_allowed_and_differ(interface):
 
 def test_masks_are_read_back_by_camera_and_area():
     for number in (1, 2):
-        places = read_back(CUBESENSE, CUBESENSE.telecommand(f"Mask{number}"))
+        places = read_back(CUBESENSE, CUBESENSE.telecommand(f"Mask{number}"), NOTES["cubesense"])
         shown = {name: (frame.name, place.name) for name, (frame, place) in places.items()}
         assert shown == {
             name: (f"Masks{number}", f"{name}1") for name in ("XMin", "XMax", "YMin", "YMax")
@@ -254,20 +266,18 @@ def test_masks_are_read_back_by_camera_and_area():
 
 
 def test_measurements_are_no_settings():
-    assert read_back(CUBESTAR, CUBESTAR.telecommand("setTrackingMode")) == {}
+    assert read_back(CUBESTAR, CUBESTAR.telecommand("setTrackingMode"), SMALL) == {}
 
 
-def runs(*checks: Check) -> Suite:
-    made = Suite(Target("x", CUBESTAR, None))
-    made.checks = list(checks)
-    return made
+def runs(*checks: CheckResult) -> CheckRun:
+    return CheckRun(Target("x", CUBESTAR, None), checks=list(checks))
 
 
 def test_comparison_shows_the_first_difference():
-    one = Check("a", Outcome.PASSED, "", ("Gain=1",))
+    one = CheckResult("a", Verdict.PASSED, "", ("Gain=1",))
     assert compare(runs(one), runs(one)) is None
-    other = Check("a", Outcome.PASSED, "", ("Gain=2",))
+    other = CheckResult("a", Verdict.PASSED, "", ("Gain=2",))
     assert compare(runs(one), runs(other)) == "a: Gain=1 on x, Gain=2 on x"
-    failed = Check("a", Outcome.FAILED, "why", ("Gain=1",))
+    failed = CheckResult("a", Verdict.FAILED, "why", ("Gain=1",))
     assert compare(runs(one), runs(failed)) == "a: passed on x, failed on x (why)"
     assert compare(runs(one), runs()) == "a: only on x"

@@ -18,7 +18,6 @@ from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell, ShellError
-from cubestack.host.shell.names import has_side_effect
 from cubestack.host.shell.values import parse_value, parse_values
 
 
@@ -158,7 +157,7 @@ def test_refusal_is_the_clients(sense, sense_shell):
 def test_dump_reads_all_that_changes_nothing(sense, sense_shell):
     sense.execute("StartImageDownload", {"Sram": 0, "Size": 4})
     frames = sense_shell.execute("dump").data["telemetry"]
-    assert set(frames) == {m.name for m in CUBESENSE.telemetries if not has_side_effect(m)}
+    assert set(frames) == {m.name for m in CUBESENSE.telemetries if not m.has_side_effect}
     assert sense.log == []
     assert "Result1ThenSram1" not in frames
 

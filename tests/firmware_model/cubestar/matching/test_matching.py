@@ -23,8 +23,7 @@ from cubestack.firmware_model.cubestar.matching.voting import (
     expected_coincidences,
     identify,
 )
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
 
 Shoot = Callable[..., Any]
 

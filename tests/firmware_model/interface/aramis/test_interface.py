@@ -15,7 +15,6 @@ from cubestack.firmware_model.interface.aramis import (
 )
 from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
-from cubestack.firmware_model.interface.codec.message import Kind
 
 # AraMiS thesis, section 2.2: use case to telecommands.
 USE_CASES = {
@@ -92,9 +91,3 @@ def test_limits_are_those_of_the_things_themselves() -> None:
 )
 def test_examples_on_the_wire(command: str, values: dict[str, object], wire: str) -> None:
     assert INTERFACE.telecommand(command).pack(**values).hex() == wire
-
-
-def test_reset_values_are_allowed_everywhere() -> None:
-    for message in INTERFACE.messages:
-        if message.kind is Kind.TELECOMMAND:
-            assert message.violations(message.reset_values()) == []

@@ -1,1 +1,0 @@
-"""CubeSense's links to the outside, one for each protocol."""

@@ -1,0 +1,104 @@
+"""Checks of telecommands whose success takes more to see than a setting that is read back.
+
+For devices whose tables have the messages named here; each one says which of them it has.
+"""
+
+from cubestack.firmware_model.interface.codec.field import Value
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
+
+__all__ = ["check_camera_register", "check_stream", "check_upload", "check_watchdog"]
+
+UPLOADED = 3
+"""Number of the block that is uploaded."""
+
+AHEAD_BLOCKS = 16
+BITS_PER_BLOCK = 1400
+"""So much time passes at once in an emulation; what comes meanwhile is kept."""
+
+
+def check_stream(run: CheckRun, message: Message, seen: list[str], *, picture_bytes: int) -> None:
+    """A picture of ``picture_bytes`` comes, in blocks that are the same when asked for singly."""
+    node, controls = run.target.node, run.target.controls
+    if not isinstance(node, NodeClient):
+        raise SkippedError("needs a serial line")
+    interface = run.target.interface
+    length = interface.telemetry("ImageBlock").length
+    count = picture_bytes // length
+    first = last = b""
+    for number, block in enumerate(node.stream(message.name, count)):
+        if len(block) != length:
+            raise FailedError(f"block {number} has {len(block)} bytes, declared {length}")
+        first, last = (first or block), block
+        if controls is not None and number % AHEAD_BLOCKS == 0:
+            controls.advance(AHEAD_BLOCKS * BITS_PER_BLOCK / interface.baud)
+    node.wait_processed(1.0)
+    for number, block in ((0, first), (count - 1, last)):
+        if _block(run, number) != block:
+            raise FailedError(f"block {number} of the stream is another one when it is asked for")
+    seen.append(f"{count} blocks")
+
+
+def check_upload(run: CheckRun, message: Message, seen: list[str]) -> None:
+    """A block arrives where it belongs, and is counted."""
+    interface = run.target.interface
+    length = interface.telemetry("ImageBlock").length
+    data = bytes((17 * index + 5) % 256 for index in range(length))
+    run.perform("UploadImage", {})
+    run.perform(message.name, {"BlockNumber": UPLOADED, "Data": data})
+    status = run.target.node.telemetry("UploadStatus")
+    wanted = {"NextBlock": UPLOADED + 1, "BlocksReceived": 1}
+    if status != wanted:
+        raise FailedError(f"UploadStatus is {status}, after one block {wanted}")
+    if _block(run, UPLOADED) != data:
+        raise FailedError(f"block {UPLOADED} is not what was uploaded")
+    seen.append("read back")
+
+
+def check_watchdog(run: CheckRun, message: Message, seen: list[str]) -> None:
+    """The device goes on until its watchdog resets it, which it counts."""
+    node = run.target.node
+    before = int(node.telemetry("ExtendedIdentification")["WDGResetCount"])
+    run.perform(message.name, {})
+    after = node.telemetry("ExtendedIdentification")
+    cause = run.target.interface.telemetry("ExtendedIdentification").field("ResetCause")
+    count = int(after["WDGResetCount"])
+    if count != before + 1:
+        raise FailedError(f"WDGResetCount was {before}, is {count}")
+    if cause.label(after["ResetCause"]) != "WATCHDOG":
+        raise FailedError(f"ResetCause is {cause.label(after['ResetCause'])}, declared WATCHDOG")
+    if not before:
+        run.perform("ClearWDGResetCounter", {})
+    seen.append("reset and counted")
+
+
+def check_camera_register(
+    run: CheckRun, message: Message, seen: list[str], *, address: int
+) -> None:
+    """A register of the camera is read back as written, and put back.
+
+    The one at ``address`` must be one that the firmware sets up anew before it counts.
+    """
+    before = _camera_register(run, address)
+    for value in (before ^ 1, before):
+        run.perform(message.name, {"Address": address, "Value": value})
+        found = _camera_register(run, address)
+        if found != value:
+            raise FailedError(f"{value:#x} was written to {address:#x}, {found:#x} is read back")
+    seen.append("read back")
+
+
+def _camera_register(run: CheckRun, address: int) -> int:
+    run.perform("SelectCameraRegister", {"Address": address})
+    shown = run.target.node.telemetry("CameraRegister")
+    if not shown["Valid"] or shown["Address"] != address:
+        raise FailedError(f"register {address:#x} of the camera is not read: {shown}")
+    return int(shown["Value"])
+
+
+def _block(run: CheckRun, number: int) -> Value:
+    """A block of the picture in memory."""
+    select = run.target.interface.telecommand("ImageBlockSet")
+    run.perform(select.name, select.reset_values() | {"BlockNumber": number})
+    return run.target.node.telemetry("ImageBlock")["Block"]
