@@ -12,7 +12,6 @@ from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.catalogue_commands import CatalogueUpload
 from cubestack.firmware_model.aramis.hardware import AramisHardware
-from cubestack.firmware_model.aramis.host_link import Command
 from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.aramis.settings import SETTING_COMMANDS
 from cubestack.firmware_model.aramis.state import State
@@ -27,6 +26,7 @@ from cubestack.firmware_model.interface.aramis import (
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.node.queue import QueuedCommand
 
 __all__ = ["Commands"]
 
@@ -62,7 +62,7 @@ class Commands:
         self.running = False
         self.upload = CatalogueUpload(hardware, meter, catalogue)
         self._reset_cause: ResetCause | None = None
-        self._actions: dict[str, Callable[[Command], None]] = {
+        self._actions: dict[str, Callable[[QueuedCommand], None]] = {
             "SetSystemTime": self._set_time,
             "SetExposure": lambda _: measuring.restart(),
             "SetGain": lambda _: measuring.restart(),
@@ -75,7 +75,7 @@ class Commands:
             "ClearErrorFlags": lambda _: state.flags.clear(),
             "Reset": self._reset,
         }
-        self._routines: dict[str, Callable[[Command], Routine[object]]] = {
+        self._routines: dict[str, Callable[[QueuedCommand], Routine[object]]] = {
             "Activate": self._activate,
             "Deactivate": self._deactivate,
             "GetAttitude": lambda _: measuring.measure(None),
@@ -92,12 +92,12 @@ class Commands:
         }
         self.handled = frozenset({*SETTING_COMMANDS, *self._actions, *self._routines})
 
-    def urgent(self, command: Command) -> None:
+    def urgent(self, command: QueuedCommand) -> None:
         """Interrupt: what of an accepted telecommand can not wait for the main loop."""
         if command.message.name == "LatchUpAction" and command.values["Step"] == LatchUpStep.OFF:
             self._camera.cut()
 
-    def execute(self, command: Command) -> Routine[ResetCause | None]:
+    def execute(self, command: QueuedCommand) -> Routine[ResetCause | None]:
         """Execute ``command``; returns a cause when the program has to end in a reset."""
         self.running = True
         name = command.message.name
@@ -113,7 +113,7 @@ class Commands:
 
     # --- node -------------------------------------------------------------------------------------
 
-    def _activate(self, _command: Command) -> Routine[None]:
+    def _activate(self, _command: QueuedCommand) -> Routine[None]:
         if self._state.active:
             return
         self._state.sensor = SensorState.ACTIVATING
@@ -123,44 +123,44 @@ class Commands:
         self._report_load()
         self._state.sensor = SensorState.READY
 
-    def _deactivate(self, _command: Command) -> Routine[None]:
+    def _deactivate(self, _command: QueuedCommand) -> Routine[None]:
         self._state.looping = False
         yield from self._camera.stop()
         self._catalogue.forget()
         self._state.sensor = SensorState.INACTIVE
 
-    def _set_time(self, command: Command) -> None:
+    def _set_time(self, command: QueuedCommand) -> None:
         values = command.values
         self._state.clock.set(values["JulianDay"], values["Millisecond"], command.came_us)
 
-    def _latch_up_action(self, command: Command) -> Routine[None]:
+    def _latch_up_action(self, command: QueuedCommand) -> Routine[None]:
         if command.values["Step"] == LatchUpStep.OFF or not self._camera.off:
             return
         yield from self._camera.restore()
         if self._state.active:
             yield from self._camera.start()
 
-    def _reset(self, _command: Command) -> None:
+    def _reset(self, _command: QueuedCommand) -> None:
         self._reset_cause = ResetCause.TELECOMMAND
 
-    def _clear_config(self, _command: Command) -> None:
+    def _clear_config(self, _command: QueuedCommand) -> None:
         self._state.settings.erase()
         self._measuring.restart()
 
     # --- measurements -----------------------------------------------------------------------------
 
-    def _measure_near_vector(self, command: Command) -> Routine[None]:
+    def _measure_near_vector(self, command: QueuedCommand) -> Routine[None]:
         vector = np.array([command.values[axis] for axis in "XYZ"], np.float32)
         length = np.sqrt(np.float32((vector * vector).sum()))
         self._meter.charge(f32_mul=3, f32_add=2, f32_sqrt=1, f32_div=3)
         yield from self._measuring.measure((vector / length).astype(np.float32))
 
-    def _measure_near_point(self, command: Command) -> Routine[None]:
+    def _measure_near_point(self, command: QueuedCommand) -> Routine[None]:
         values = command.values
         hint = self._measuring.direction(values["RightAscension"], values["Declination"])
         yield from self._measuring.measure(hint)
 
-    def _start_loop(self, _command: Command) -> Routine[None]:
+    def _start_loop(self, _command: QueuedCommand) -> Routine[None]:
         if not self._state.active:
             self._state.raise_flag("NotActive")
             return
@@ -168,7 +168,7 @@ class Commands:
         self._state.looping = True
         self._state.loop_due_us = now_us
 
-    def _stop_loop(self, _command: Command) -> None:
+    def _stop_loop(self, _command: QueuedCommand) -> None:
         self._state.looping = False
 
     # --- catalogue --------------------------------------------------------------------------------
@@ -188,14 +188,14 @@ class Commands:
         if (yield from self._catalogue.load_step()):
             self._report_load()
 
-    def _reload(self, _command: Command) -> Routine[None]:
+    def _reload(self, _command: QueuedCommand) -> Routine[None]:
         if not self._state.active:
             self._state.raise_flag("NotActive")
             return
         yield from self._catalogue.load()
         self._report_load()
 
-    def _refresh(self, _command: Command) -> Routine[None]:
+    def _refresh(self, _command: QueuedCommand) -> Routine[None]:
         if not self._state.active:
             self._state.raise_flag("NotActive")
             return
@@ -205,14 +205,14 @@ class Commands:
         yield from self._catalogue.refresh()
         self._state.sensor = SensorState.READY
 
-    def _begin_upload(self, command: Command) -> None:
+    def _begin_upload(self, command: QueuedCommand) -> None:
         self.upload.begin(command.values["Length"], command.values["Checksum"])
 
-    def _upload_block(self, command: Command) -> None:
+    def _upload_block(self, command: QueuedCommand) -> None:
         if not self.upload.put(command.values["BlockNumber"], command.values["Data"]):
             self._state.raise_flag("UploadError")
 
-    def _commit_upload(self, _command: Command) -> Routine[None]:
+    def _commit_upload(self, _command: QueuedCommand) -> Routine[None]:
         before = self._state.sensor
         self._state.sensor = SensorState.PROGRAMMING
         written = yield from self.upload.commit()
@@ -237,17 +237,17 @@ class Commands:
         picture = self._camera.picture(self._camera.latest).reshape(-1)
         return picture[start : start + BLOCK_BYTES].tobytes()
 
-    def _stream_image(self, _command: Command) -> Routine[None]:
+    def _stream_image(self, _command: QueuedCommand) -> Routine[None]:
         for start in range(0, IMAGE_BYTES, BLOCK_BYTES):
             while self._hardware.uart_backlog() > STREAM_BACKLOG_BYTES:
                 now_us: int = yield ReadTimer()
                 yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
             self._hardware.uart_send(encode_frame(self._block(start)))
 
-    def _write_register(self, command: Command) -> Routine[None]:
+    def _write_register(self, command: QueuedCommand) -> Routine[None]:
         self._camera.forget_set_up()
         if not (yield from self._camera.write(command.values["Address"], command.values["Value"])):
             self._state.raise_flag("CameraSilent")
 
-    def _select_register(self, command: Command) -> Routine[None]:
+    def _select_register(self, command: QueuedCommand) -> Routine[None]:
         yield from self._camera.select(command.values["Address"])

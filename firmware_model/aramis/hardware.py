@@ -10,7 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.mcu.requests import FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.node.hardware import NodeHardware
 
 __all__ = ["AramisHardware", "FrameEnd"]
 
@@ -25,7 +26,7 @@ class FrameEnd(IntEnum):
     """Lines were longer or shorter than programmed."""
 
 
-class AramisHardware(Protocol):
+class AramisHardware(NodeHardware, Protocol):
     """Peripherals that the program uses without waiting for them.
 
     Attributes:
@@ -51,15 +52,3 @@ class AramisHardware(Protocol):
 
     def camera_current_ma(self) -> float:
         """Current of the camera unit's supply, in mA."""
-
-    def uart_send(self, data: bytes) -> None:
-        """Queue ``data`` for the satellite's UART; the peripheral sends at its own pace."""
-
-    def uart_backlog(self) -> int:
-        """Bytes that the UART still has to send."""
-
-    def wake(self) -> None:
-        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
-
-    def uptime_us(self) -> int:
-        """Time since power-up in us, read in an interrupt."""

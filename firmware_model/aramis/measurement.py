@@ -26,7 +26,7 @@ from cubestack.firmware_model.aramis.pipeline import (
     detect,
     explain,
 )
-from cubestack.firmware_model.aramis.settings import Settings
+from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.solution import Outcome, Solution, StarList, unsolved
 from cubestack.firmware_model.aramis.solution import Reason as Finding
 from cubestack.firmware_model.aramis.state import Measurement, State
@@ -60,7 +60,7 @@ def _lens(fov_deg: float, only_round: bool) -> Field:
     return Field(fov_deg=fov_deg, round=only_round)
 
 
-def configuration(settings: Settings) -> Configuration:
+def configuration(settings: StoredSettings) -> Configuration:
     """Settings of the processing."""
     search = settings.all("SetDetection")
     matching = settings.all("SetIdentification")

@@ -9,7 +9,7 @@ from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.commands import Commands
 from cubestack.firmware_model.aramis.hardware import AramisHardware, FrameEnd
-from cubestack.firmware_model.aramis.host_link import HostLink
+from cubestack.firmware_model.aramis.link import AramisLink
 from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.aramis.telemetry import Telemetry
@@ -54,7 +54,7 @@ class AramisProgram:
             self.commands,
             lambda: self.link,
         )
-        self.link = HostLink(hardware, meter, state, telemetry.values, self.commands.urgent)
+        self.link = AramisLink(hardware, meter, state, telemetry.values, self.commands.urgent)
 
     def frame_ended(self, end: FrameEnd) -> None:
         """Interrupt: the transfer of a frame ended."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.settings import Settings
+from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.solution import Solution
 from cubestack.firmware_model.interface.aramis import (
     MS_PER_DAY,
@@ -16,7 +16,8 @@ from cubestack.firmware_model.interface.aramis import (
     SensorState,
 )
 from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
-from cubestack.firmware_model.mcu.requests import FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.node.state import NodeState
 
 __all__ = ["Clock", "Measurement", "State"]
 
@@ -74,13 +75,12 @@ class Measurement:
         return self.outcome is MeasurementOutcome.CONCLUSIVE
 
 
-class State:
+class State(NodeState):
     """RAM of the program.
 
     Attributes:
         settings: parameters of the setting telecommands.
         clock: Julian date.
-        flags: names of the raised error flags.
         sensor: what the star tracker does.
         measurement: the latest one.
         quaternion: (4,) the latest attitude, inertial to camera, scalar last; None without any.
@@ -93,9 +93,9 @@ class State:
 
     def __init__(self, flash: FlashStore) -> None:
         """Start with the settings in ``flash``."""
-        self.settings = Settings(flash)
+        super().__init__(FLAG_NAMES)
+        self.settings = StoredSettings(flash)
         self.clock = Clock()
-        self.flags: set[str] = set()
         self.sensor = SensorState.INACTIVE
         self.measurement = Measurement()
         self.quaternion: NDArray[np.float32] | None = None
@@ -112,9 +112,3 @@ class State:
     def active(self) -> bool:
         """Whether measurements can be asked for."""
         return self.sensor in (SensorState.READY, SensorState.MEASURING, SensorState.PROGRAMMING)
-
-    def raise_flag(self, name: str) -> None:
-        """Raise an error flag; a name that the table lacks is a programming error."""
-        if name not in FLAG_NAMES:
-            raise KeyError(f"telemetry ErrorFlags declares no flag {name!r}")
-        self.flags.add(name)

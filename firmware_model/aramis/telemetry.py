@@ -10,21 +10,19 @@ from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.commands import Commands
 from cubestack.firmware_model.aramis.hardware import AramisHardware
-from cubestack.firmware_model.aramis.host_link import HostLink
+from cubestack.firmware_model.aramis.link import AramisLink
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.attitude.geometry import angles_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
-from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
 
 __all__ = ["Telemetry", "body_quaternion"]
 
 NODE_TYPE = 6
-FIRMWARE_VERSION = (0, 1)
-SERIAL_NUMBER = 1
 
 _U16, _U32 = 0xFFFF, 0xFFFF_FFFF
 
@@ -60,7 +58,7 @@ class Telemetry:
         camera: Camera,
         catalogue: CatalogueStore,
         commands: Commands,
-        link: Callable[[], HostLink],
+        link: Callable[[], AramisLink],
     ) -> None:
         """Report on the given parts; ``link`` gives the host's, which is made after this."""
         self._hardware = hardware
@@ -71,9 +69,9 @@ class Telemetry:
         self._commands = commands
         self._link = link
         self._sources: dict[str, Callable[[], Values]] = {
-            "Identification": self._identification,
+            "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
             "ExtendedIdentification": self._extended_identification,
-            "ErrorFlags": lambda: {name: name in state.flags for name in FLAG_NAMES},
+            "ErrorFlags": state.flag_values,
             "TcmdProcessed": self._processed,
             "SensorStatus": self._sensor_status,
             "SystemTime": self._system_time,
@@ -99,17 +97,6 @@ class Telemetry:
         return self._sources[message.name]()
 
     # --- node -------------------------------------------------------------------------------------
-
-    def _identification(self) -> Values:
-        seconds, milliseconds = divmod(self._hardware.uptime_us() // 1000, 1000)
-        return {
-            "NodeType": NODE_TYPE,
-            "InterfaceVersion": INTERFACE.version,
-            "FirmwareVersionMajor": FIRMWARE_VERSION[0],
-            "FirmwareVersionMinor": FIRMWARE_VERSION[1],
-            "RuntimeMilliseconds": milliseconds,
-            "RuntimeSeconds": seconds & _U16,
-        }
 
     def _extended_identification(self) -> Values:
         return {

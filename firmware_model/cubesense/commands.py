@@ -12,7 +12,7 @@ from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.download import Download, PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
-from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, Telecommand
+from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, TelecommandJob
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import CameraSettings, State, distortion_of
 from cubestack.firmware_model.cubesense.supply import Supply
@@ -76,7 +76,7 @@ class Commands:
             "Mask": self._set_mask,
             "Distortion": self._set_distortion,
         }
-        self._routines: dict[str, Callable[[Telecommand], Routine[int | None]]] = {
+        self._routines: dict[str, Callable[[TelecommandJob], Routine[int | None]]] = {
             "Reset": self._reset,
             "ClearOverCurrent": self._clear_over_current,
             "CaptureAndDetect": self._capture,
@@ -94,7 +94,7 @@ class Commands:
         """Do ``job``; returns a cause when the program has to end in a reset."""
         cause = None
         match job:
-            case Telecommand():
+            case TelecommandJob():
                 cause = yield from self._telecommand(job)
             case Measure():
                 yield from self._measurement.measure(job.camera, job.sram, detect=job.detect)
@@ -103,7 +103,7 @@ class Commands:
         yield Pay()
         return cause
 
-    def _telecommand(self, job: Telecommand) -> Routine[int | None]:
+    def _telecommand(self, job: TelecommandJob) -> Routine[int | None]:
         name = job.message.name
         cause = None
         if name in self._cameras_by_setting:
@@ -119,7 +119,7 @@ class Commands:
 
     # --- node ---------------------------------------------------------------------------------
 
-    def _reset(self, job: Telecommand) -> Routine[int | None]:
+    def _reset(self, job: TelecommandJob) -> Routine[int | None]:
         match ResetTarget(job.values["Target"]):
             case ResetTarget.COMMUNICATION:
                 self._state.reset_communication()
@@ -130,25 +130,25 @@ class Commands:
                 return SOFTWARE_RESET
         return None
 
-    def _clear_over_current(self, job: Telecommand) -> Routine[None]:
+    def _clear_over_current(self, job: TelecommandJob) -> Routine[None]:
         selection = SramSelection(job.values["Selection"])
         both = selection is SramSelection.BOTH
         yield from self._supply.clear_over_current(*(Sram if both else [Sram(selection)]))
 
     # --- pictures -----------------------------------------------------------------------------
 
-    def _capture(self, job: Telecommand) -> Routine[None]:
+    def _capture(self, job: TelecommandJob) -> Routine[None]:
         camera, sram = Camera(job.values["Camera"]), Sram(job.values["Sram"])
         detect = job.message.name == "CaptureAndDetect"
         yield from self._measurement.measure(camera, sram, detect=detect)
 
-    def _prepare_frame(self, job: Telecommand) -> Routine[None]:
+    def _prepare_frame(self, job: TelecommandJob) -> Routine[None]:
         if job.frame is not None:
             yield from self.download.prepare(job.frame)
 
     # --- settings -----------------------------------------------------------------------------
 
-    def _set_search(self, job: Telecommand) -> Routine[None]:
+    def _set_search(self, job: TelecommandJob) -> Routine[None]:
         self._state.nadir_search = NadirSearch(job.values["Search"])
         yield Pay()
 

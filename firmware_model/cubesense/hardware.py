@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from cubestack.firmware_model.interface.cubesense.pins import Monitor
+from cubestack.firmware_model.node.hardware import NodeHardware
 
 __all__ = ["CubeSenseHardware", "Port"]
 
@@ -20,8 +21,8 @@ class Port(StrEnum):
     BENCH = "bench"
 
 
-class CubeSenseHardware(Protocol):
-    """Peripherals that the program uses without waiting for them.
+class CubeSenseHardware(NodeHardware, Protocol):
+    """Peripherals that the program uses without waiting for them; uptime starts with each reset.
 
     Attributes:
         mcu_addressing: the FPGAs are built with the option that lets the program choose addresses.
@@ -31,17 +32,11 @@ class CubeSenseHardware(Protocol):
     mcu_addressing: bool
     serial_number: str
 
-    def uart_send(self, port: Port, data: bytes) -> None:
+    def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
         """Queue ``data`` for ``port``; the peripheral sends at its own pace."""
 
-    def uart_backlog(self, port: Port) -> int:
+    def uart_backlog(self, port: Port = Port.NODE) -> int:
         """Bytes that ``port`` still has to send."""
-
-    def wake(self) -> None:
-        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
 
     def adc_counts(self, monitor: Monitor) -> int:
         """Result of a conversion, 0 to 1023; the program charges its time."""
-
-    def uptime_ms(self) -> int:
-        """Time since the latest reset in ms, read in an interrupt."""

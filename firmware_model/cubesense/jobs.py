@@ -6,25 +6,16 @@ of its own, and gets its turn when nothing else waits.
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubesense.codes import Camera, ImageSize, Sram
 from cubestack.firmware_model.mcu.requests import Routine
+from cubestack.firmware_model.node.queue import BoundedQueue
 
-__all__ = [
-    "QUEUE_DEPTH",
-    "Background",
-    "FrameRequest",
-    "Job",
-    "JobQueue",
-    "Measure",
-    "Telecommand",
-]
-
-QUEUE_DEPTH = 4
+__all__ = ["Background", "FrameRequest", "Job", "JobQueue", "Measure", "TelecommandJob"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +28,7 @@ class FrameRequest:
 
 
 @dataclass(eq=False)
-class Telecommand:
+class TelecommandJob:
     """An accepted telecommand.
 
     Attributes:
@@ -48,7 +39,7 @@ class Telecommand:
     """
 
     message: Message
-    values: Mapping[str, Any]
+    values: dict[str, Any]
     frame: FrameRequest | None = None
     latest: bool = False
 
@@ -69,7 +60,7 @@ class Background:
     work: Callable[[], Routine[None]]
 
 
-Job = Telecommand | Measure | Background
+Job = TelecommandJob | Measure | Background
 
 
 class JobQueue:
@@ -77,7 +68,7 @@ class JobQueue:
 
     def __init__(self) -> None:
         """Make an empty queue."""
-        self._jobs: deque[Telecommand | Measure] = deque()
+        self._jobs: BoundedQueue[TelecommandJob | Measure] = BoundedQueue()
         self._streams: deque[Background] = deque()
 
     def __len__(self) -> int:
@@ -87,14 +78,11 @@ class JobQueue:
     @property
     def full(self) -> bool:
         """Whether no further job is accepted."""
-        return len(self._jobs) >= QUEUE_DEPTH
+        return self._jobs.full
 
-    def put(self, job: Telecommand | Measure) -> bool:
+    def put(self, job: TelecommandJob | Measure) -> bool:
         """Append ``job``; False when the queue is full."""
-        if self.full:
-            return False
-        self._jobs.append(job)
-        return True
+        return self._jobs.put(job)
 
     def request(self, stream: Background, *, next_turn: bool = False) -> bool:
         """Let ``stream`` have a turn; ``next_turn``: the next one. False when it waits already."""

@@ -11,9 +11,8 @@ from enum import Enum
 
 import numpy as np
 
-from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
-from cubestack.firmware_model.cubesense.jobs import QUEUE_DEPTH
-from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
+from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
+from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
 from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
@@ -24,6 +23,7 @@ from cubestack.firmware_model.interface.cubesense.telecommands import (
     DISTORTION_TERMS,
     TELECOMMANDS,
 )
+from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 __all__ = ["CAPACITY", "Buffer", "Memory", "budget", "report", "used"]
 

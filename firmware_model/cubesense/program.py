@@ -5,14 +5,14 @@ nothing runs by itself. While nothing is asked for, the program watches the memo
 """
 
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
-from cubestack.firmware_model.cubesense.bench_link import BenchLink
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.commands import Commands
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import JobQueue
+from cubestack.firmware_model.cubesense.links.bench import BenchLink
+from cubestack.firmware_model.cubesense.links.node import NodeLink
+from cubestack.firmware_model.cubesense.links.registers import RegisterLink
 from cubestack.firmware_model.cubesense.measurement import Measurement
-from cubestack.firmware_model.cubesense.node_link import NodeLink
-from cubestack.firmware_model.cubesense.register_link import RegisterLink
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry

@@ -24,8 +24,12 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     coefficient,
 )
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
+from cubestack.firmware_model.node.state import NodeState
 
 __all__ = ["CameraSettings", "Result", "State", "distortion_of"]
+
+ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
+"""Of telemetry CommunicationStatus."""
 
 
 def distortion_of(values: Mapping[str, Any]) -> tuple[float, ...]:
@@ -118,7 +122,7 @@ class Result:
     total_us: int = 0
 
 
-class State:
+class State(NodeState):
     """RAM of the program.
 
     Attributes:
@@ -128,12 +132,12 @@ class State:
         nadir_search: how the nadir camera's edges are looked for.
         image_sram: memory that register IMAGE streams.
         telecommands, telemetries: received, for CommunicationStatus.
-        flags: error flags of CommunicationStatus by field name.
         last_command, last_processed, last_error: for telemetry TcmdProcessed.
     """
 
     def __init__(self) -> None:
         """Start with the declared reset values."""
+        super().__init__(ERROR_FLAGS)
         self.cameras = {camera: CameraSettings.at_reset(camera) for camera in Camera}
         self.results = {camera: Result(sram=Sram(camera)) for camera in Camera}
         self.over_current = dict.fromkeys(Sram, False)
@@ -145,7 +149,7 @@ class State:
         """Clear counters and error flags, as telecommand Reset of the communication does."""
         self.telecommands = 0
         self.telemetries = 0
-        self.flags: set[str] = set()
+        self.flags.clear()
         self.last_command = 0
         self.last_processed = 1
         self.last_error = AckError.OK

@@ -22,13 +22,12 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.pins import Monitor
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.identification import identification
 
-__all__ = ["FIRMWARE_VERSION", "NODE_TYPE", "SERIAL_BYTES", "Telemetry"]
+__all__ = ["NODE_TYPE", "SERIAL_BYTES", "Telemetry"]
 
 NODE_TYPE = 4
 """Ours; the public material names no number."""
-
-FIRMWARE_VERSION = (0, 1)
 
 SERIAL_BYTES = INTERFACE.telemetry("SerialNumber").length
 
@@ -58,7 +57,7 @@ class Telemetry:
         self._supply = supply
         self._download = download
         self._sources: dict[str, Callable[[], Values]] = {
-            "Identification": self._identification,
+            "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
             "SerialNumber": self._serial_number,
             "CommunicationStatus": self._communication,
             "TcmdProcessed": self._processed,
@@ -83,28 +82,16 @@ class Telemetry:
         """Values of every field of ``message``, one of the interface's frames."""
         return self._sources[message.name]()
 
-    def _identification(self) -> Values:
-        seconds, milliseconds = divmod(self._hardware.uptime_ms(), 1000)
-        return {
-            "NodeType": NODE_TYPE,
-            "InterfaceVersion": INTERFACE.version,
-            "FirmwareVersionMajor": FIRMWARE_VERSION[0],
-            "FirmwareVersionMinor": FIRMWARE_VERSION[1],
-            "RuntimeSeconds": seconds % _COUNTER,
-            "RuntimeMilliseconds": milliseconds,
-        }
-
     def _serial_number(self) -> Values:
         text = self._hardware.serial_number.encode("ascii", "replace")
         return {"SerialNumber": text[:SERIAL_BYTES].ljust(SERIAL_BYTES, b"\0")}
 
     def _communication(self) -> Values:
         state = self._state
-        flags = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
         return {
             "TcmdCount": state.telecommands % _COUNTER,
             "TlmCount": state.telemetries % _COUNTER,
-            **{name: name in state.flags for name in flags},
+            **state.flag_values(),
         }
 
     def _processed(self) -> Values:

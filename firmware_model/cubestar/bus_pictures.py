@@ -16,6 +16,7 @@ from cubestack.firmware_model.cubestar.detection import (
     Look,
     search_stars,
 )
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.pictures import (
     ITERATION_US,
     CopiedPictures,
@@ -28,7 +29,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import BusAccess, Hardware, Routine, SetPin
+from cubestack.firmware_model.mcu.requests import BusAccess, Routine, SetPin
 
 __all__ = ["pictures_of"]
 
@@ -48,7 +49,7 @@ class _BusPictures(ABC):
     """Chip select, first address and size of each memory."""
 
     def __init__(
-        self, hardware: Hardware, state: State, meter: Meter, supply: SupplyMonitor
+        self, hardware: CubeStarHardware, state: State, meter: Meter, supply: SupplyMonitor
     ) -> None:
         """Reach the memories by ``hardware``'s bus."""
         self._hardware = hardware
@@ -235,7 +236,7 @@ class TwoBoardPictures(_BusPictures):
     memories = ((0, 0, 2 * IMAGE_BYTES), (1, 0, 2 * IMAGE_BYTES))
 
     def __init__(
-        self, hardware: Hardware, state: State, meter: Meter, supply: SupplyMonitor
+        self, hardware: CubeStarHardware, state: State, meter: Meter, supply: SupplyMonitor
     ) -> None:
         """Store into the board that has not got the newest picture."""
         super().__init__(hardware, state, meter, supply)
@@ -290,7 +291,7 @@ _KINDS: dict[Layout, type[CopiedPictures | _BusPictures]] = {
 
 
 def pictures_of(
-    layout: Layout, hardware: Hardware, state: State, meter: Meter, supply: SupplyMonitor
+    layout: Layout, hardware: CubeStarHardware, state: State, meter: Meter, supply: SupplyMonitor
 ) -> Pictures:
     """The program's way to its pictures in ``layout``."""
     return _KINDS[layout](hardware, state, meter, supply)

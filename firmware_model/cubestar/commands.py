@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cubestack.firmware_model.cubestar.capture import ImageCapture
-from cubestack.firmware_model.cubestar.host_link import Command
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
 from cubestack.firmware_model.cubestar.state import State
@@ -24,7 +24,8 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     TestPattern,
 )
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Hardware, Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.node.queue import QueuedCommand
 
 __all__ = ["WATCHDOG_US", "Commands"]
 
@@ -49,7 +50,7 @@ class Commands:
 
     def __init__(
         self,
-        hardware: Hardware,
+        hardware: CubeStarHardware,
         meter: Meter,
         state: State,
         capture: ImageCapture,
@@ -69,7 +70,7 @@ class Commands:
         self.blocks_received = 0
         self.second_half = False
         self._reset_cause: ResetCause | None = None
-        self._actions: dict[str, Callable[[Command], None]] = {
+        self._actions: dict[str, Callable[[QueuedCommand], None]] = {
             "Reset": self._reset,
             "MCUReset": self._reset_processor,
             "ClearWDGResetCounter": self._clear_watchdog_count,
@@ -81,7 +82,7 @@ class Commands:
             "ClearConfig": lambda _: state.erase_config(),
             "StopLoop": self._stop_loop,
         }
-        self._routines: dict[str, Callable[[Command], Routine[object]]] = {
+        self._routines: dict[str, Callable[[QueuedCommand], Routine[object]]] = {
             "TogglePowerSW": self._toggle_supply,
             "WriteTo_IS_Register": self._write_paged_register,
             "ReadFrom_IS_Register": self._read_paged_register,
@@ -104,7 +105,7 @@ class Commands:
         }
         self.handled = frozenset({*SETTING_COMMANDS, *self._actions, *self._routines})
 
-    def execute(self, command: Command) -> Routine[ResetCause | None]:
+    def execute(self, command: QueuedCommand) -> Routine[ResetCause | None]:
         """Execute ``command``; returns a cause when the program has to end in a reset."""
         self.running = True
         name = command.message.name
@@ -120,55 +121,55 @@ class Commands:
 
     # --- node ---------------------------------------------------------------------------------
 
-    def _toggle_supply(self, _command: Command) -> Routine[None]:
+    def _toggle_supply(self, _command: QueuedCommand) -> Routine[None]:
         if self._supply.toggle_imager():
             yield from self._capture.sensor.power_up()
 
-    def _reset(self, _command: Command) -> None:
+    def _reset(self, _command: QueuedCommand) -> None:
         if self._state.retained.imager_off:
             self._supply.toggle_imager()
         self._state.forget()
         self._reset_cause = ResetCause.SYSTEM_REQUEST
 
-    def _reset_processor(self, _command: Command) -> None:
+    def _reset_processor(self, _command: QueuedCommand) -> None:
         self._reset_cause = ResetCause.SYSTEM_REQUEST
 
-    def _test_watchdog(self, _command: Command) -> Routine[None]:
+    def _test_watchdog(self, _command: QueuedCommand) -> Routine[None]:
         """Hang; interrupts are still served."""
         now_us: int = yield ReadTimer()
         yield Sleep(now_us + WATCHDOG_US, wakeable=False)
         self._reset_cause = ResetCause.WATCHDOG
 
-    def _clear_watchdog_count(self, _command: Command) -> None:
+    def _clear_watchdog_count(self, _command: QueuedCommand) -> None:
         self._state.retained.watchdog_resets = 0
 
-    def _test_memory(self, _command: Command) -> Routine[None]:
+    def _test_memory(self, _command: QueuedCommand) -> Routine[None]:
         self._state.retained.image_present = 0
         passed = yield from self._capture.pictures.test_memory()
         self.memory_test = MemoryTest.PASSED if passed else MemoryTest.FAILED
 
     # --- image sensor -------------------------------------------------------------------------
 
-    def _page(self, command: Command) -> int:
+    def _page(self, command: QueuedCommand) -> int:
         page: int = self._state.settings.get("SetCameraRegisterPage", "Page")
         return page << 8 | int(command.values["Reg"])
 
-    def _write_paged_register(self, command: Command) -> Routine[None]:
+    def _write_paged_register(self, command: QueuedCommand) -> Routine[None]:
         yield from self._capture.sensor.write_byte(self._page(command), command.values["DataL"])
 
-    def _write_register(self, command: Command) -> Routine[None]:
+    def _write_register(self, command: QueuedCommand) -> Routine[None]:
         values = command.values
         yield from self._capture.sensor.write_byte(values["Address"], values["Value"])
 
-    def _read_paged_register(self, command: Command) -> Routine[None]:
+    def _read_paged_register(self, command: QueuedCommand) -> Routine[None]:
         yield from self._capture.sensor.select_register(self._page(command))
 
-    def _read_register(self, command: Command) -> Routine[None]:
+    def _read_register(self, command: QueuedCommand) -> Routine[None]:
         yield from self._capture.sensor.select_register(command.values["Address"])
 
     # --- picture ------------------------------------------------------------------------------
 
-    def _test_pattern(self, command: Command) -> Routine[None]:
+    def _test_pattern(self, command: QueuedCommand) -> Routine[None]:
         row, column = np.ogrid[:ROWS, :COLUMNS]
         match TestPattern(command.values["TestPaternType"]):
             case TestPattern.COLUMN_RAMP:
@@ -182,13 +183,13 @@ class Commands:
         self._meter.charge(i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
         yield from self._capture.replaced()
 
-    def _begin_upload(self, _command: Command) -> Routine[None]:
+    def _begin_upload(self, _command: QueuedCommand) -> Routine[None]:
         self.next_block = self.blocks_received = 0
         yield from self._capture.pictures.write(0, np.zeros(IMAGE_BYTES, np.uint8))
         self._meter.charge(loop=IMAGE_BYTES)
         yield from self._capture.replaced()
 
-    def _upload_block(self, command: Command) -> Routine[None]:
+    def _upload_block(self, command: QueuedCommand) -> Routine[None]:
         number, data = int(command.values["BlockNumber"]), bytes(command.values["Data"])
         start = number * UPLOAD_BLOCK_BYTES
         pixels = np.frombuffer(data, np.uint8)
@@ -197,10 +198,10 @@ class Commands:
         self.next_block = number + 1
         self.blocks_received += 1
 
-    def _select_block(self, _command: Command) -> None:
+    def _select_block(self, _command: QueuedCommand) -> None:
         self.second_half = False
 
-    def _stream_image(self, _command: Command) -> Routine[None]:
+    def _stream_image(self, _command: QueuedCommand) -> Routine[None]:
         step = UPLOAD_BLOCK_BYTES
         for start in range(0, IMAGE_BYTES, step):
             while self._hardware.uart_backlog() > STREAM_BACKLOG_BYTES:
@@ -212,19 +213,19 @@ class Commands:
 
     # --- stars --------------------------------------------------------------------------------
 
-    def _capture_and_process(self, _command: Command) -> Routine[None]:
+    def _capture_and_process(self, _command: QueuedCommand) -> Routine[None]:
         if (yield from self._capture.get_image()):
             yield from self._processing.process()
         else:
             self._processing.discard_results()
 
-    def _set_hint(self, _command: Command) -> None:
+    def _set_hint(self, _command: QueuedCommand) -> None:
         self._state.retained.hint_present = 1
         self._state.mode = MatchMode.ASSISTED
 
     # --- loop ---------------------------------------------------------------------------------
 
-    def _trigger(self, _command: Command) -> Routine[None]:
+    def _trigger(self, _command: QueuedCommand) -> Routine[None]:
         retained = self._state.retained
         if retained.looping:
             self._state.raise_flag(
@@ -236,5 +237,5 @@ class Commands:
         retained.looping = retained.delaying = 1
         retained.loop_due_us = now_us + round(1_000_000 * delay_s)
 
-    def _stop_loop(self, _command: Command) -> None:
+    def _stop_loop(self, _command: QueuedCommand) -> None:
         self._state.retained.looping = self._state.retained.delaying = 0

@@ -4,8 +4,8 @@ import math
 
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
-from cubestack.firmware_model.cubestar.settings import Settings
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.node.settings import Settings
 
 __all__ = ["camera_parameters", "detection_config", "field_radius_deg"]
 

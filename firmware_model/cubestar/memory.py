@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.host_link import (
-    LONGEST_COMMAND,
-    QUEUE_DEPTH,
-    SEND_BUFFER_BYTES,
-)
+from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import (
     ATTITUDE_PAGE,
@@ -27,7 +23,10 @@ from cubestack.firmware_model.cubestar.state import (
     State,
 )
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.link import longest_command
+from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 __all__ = [
     "CAPACITY",
@@ -114,7 +113,7 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         "marks of the reduced catalogue": listed,
         "reduced pair list": _largest_reduction(catalogue) * (2 + 2 + 4),
         "received frame, I2C message, waiting telecommands": (2 + QUEUE_DEPTH)
-        * (LONGEST_COMMAND + 1),
+        * (longest_command(INTERFACE) + 1),
         "I2C answer": longest_answer,
         "UART send buffer": SEND_BUFFER_BYTES,
         "settings, flags and counters": State.RETENTION_SIZE,

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import Detection, DetectionConfig, detect_stars
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Hardware, Pay, Routine, SetPin, StrobeRead
+from cubestack.firmware_model.mcu.requests import Pay, Routine, SetPin, StrobeRead
 
 __all__ = ["ITERATION_US", "CopiedPictures", "Pictures", "test_pattern"]
 
@@ -79,7 +80,7 @@ class CopiedPictures:
     iteration_us = ITERATION_US
 
     def __init__(
-        self, hardware: Hardware, state: State, meter: Meter, supply: SupplyMonitor
+        self, hardware: CubeStarHardware, state: State, meter: Meter, supply: SupplyMonitor
     ) -> None:
         """Use the external RAM of ``hardware``."""
         self._hardware = hardware

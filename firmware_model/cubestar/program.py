@@ -11,7 +11,8 @@ from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import Commands
-from cubestack.firmware_model.cubestar.host_link import HostLink
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.pictures import ITERATION_US
 from cubestack.firmware_model.cubestar.processing import Processing
@@ -21,7 +22,7 @@ from cubestack.firmware_model.cubestar.telemetry import Telemetry
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Hardware, Pay, ReadTimer, Reset, Routine
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine
 
 __all__ = ["ITERATION_US", "RESET_LEAD_US", "CubeStarProgram"]
 
@@ -44,7 +45,7 @@ class CubeStarProgram:
 
     def __init__(
         self,
-        hardware: Hardware,
+        hardware: CubeStarHardware,
         meter: Meter,
         catalogue: StarCatalogue,
         layout: Layout = Layout.COPIED,
@@ -70,7 +71,7 @@ class CubeStarProgram:
             self.commands,
             lambda: bool(self.link.queue),
         )
-        self.link = HostLink(hardware, meter, state, telemetry.values)
+        self.link = CubeStarLink(hardware, meter, state, telemetry.values)
         if hardware.reset_cause == ResetCause.WATCHDOG:
             state.retained.watchdog_resets += 1
 
@@ -95,7 +96,7 @@ class CubeStarProgram:
         if self.supply.cut and (yield from self.supply.restore()):
             yield from self._capture.sensor.power_up()
         if self.link.queue:
-            cause = yield from self.commands.execute(self.link.next_command())
+            cause = yield from self.commands.execute(self.link.queue.popleft())
             if cause is not None:
                 yield from self._reset(cause)
         return waiting

@@ -11,15 +11,16 @@ model counts the writes (``FlashStore.writes``) and does not wear out.
 
 import struct
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubestar.settings import Settings
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS, SETTINGS_BYTES
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskStatus
-from cubestack.firmware_model.mcu.requests import Hardware
+from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.state import NodeState
 
 __all__ = ["ATTITUDE_PAGE", "CONFIG_PAGE", "MODE_PAGE", "Attitude", "Retained", "State"]
 
@@ -28,7 +29,6 @@ ATTITUDE_PAGE = "attitude"
 MODE_PAGE = "mode"
 
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
-_FLAG_NAMES = frozenset(field.name for field in _FLAGS.fields)
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF
 
@@ -109,13 +109,12 @@ class Retained:
     attitude_us: int = 0
 
 
-class State:
+class State(NodeState):
     """RAM of the program, restored from the retention registers at boot.
 
     Attributes:
         settings: parameters of the setting telecommands.
         retained: counters that survive resets.
-        flags: names of the raised error flags of telemetry ErrorFlags.
         task_status: value of telemetry TaskStatus.
         startup_us: time from the reset to the main loop.
     """
@@ -124,14 +123,14 @@ class State:
     _COUNTERS = struct.Struct(f"<{len(fields(Retained))}Q")
 
     #: Retention registers in use, in bytes.
-    RETENTION_SIZE = len(_MAGIC) + Settings.SIZE + _FLAGS.length + _COUNTERS.size
+    RETENTION_SIZE = len(_MAGIC) + SETTINGS_BYTES + _FLAGS.length + _COUNTERS.size
 
-    def __init__(self, hardware: Hardware) -> None:
+    def __init__(self, hardware: CubeStarHardware) -> None:
         """Restore from ``hardware``: retention registers, else the configuration in flash."""
         self._hardware = hardware
-        self.settings = Settings()
+        super().__init__(field.name for field in _FLAGS.fields)
+        self.settings = Settings(INTERFACE, SETTING_COMMANDS)
         self.retained = Retained()
-        self.flags: set[str] = set()
         self.task_status = TaskStatus.POWERED_UP
         self.startup_us = 0
         magic = len(self._MAGIC)
@@ -141,8 +140,8 @@ class State:
             self.load_config()
 
     def _restore(self, data: bytes) -> None:
-        self.settings.unpack(data[: Settings.SIZE])
-        data = data[Settings.SIZE :]
+        self.settings.unpack(data[:SETTINGS_BYTES])
+        data = data[SETTINGS_BYTES:]
         flags = _FLAGS.unpack(data[: _FLAGS.length])
         self.flags = {name for name, raised in flags.items() if raised}
         self.retained = Retained(*self._COUNTERS.unpack(data[_FLAGS.length :]))
@@ -183,16 +182,6 @@ class State:
     @attitude.setter
     def attitude(self, attitude: Attitude) -> None:
         self._hardware.flash.write(ATTITUDE_PAGE, attitude.pack())
-
-    def flag_values(self) -> dict[str, Any]:
-        """Fields of telemetry ErrorFlags."""
-        return {name: name in self.flags for name in _FLAG_NAMES}
-
-    def raise_flag(self, name: str) -> None:
-        """Raise an error flag; a name that the table lacks is a programming error."""
-        if name not in _FLAG_NAMES:
-            raise KeyError(f"telemetry ErrorFlags declares no flag {name!r}")
-        self.flags.add(name)
 
     def save_config(self) -> None:
         """Write the settings to flash."""

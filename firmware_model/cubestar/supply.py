@@ -3,8 +3,9 @@
 CubeStar thesis, section 5.2.3. The main loop later powers the channel up again.
 """
 
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.mcu.requests import Hardware, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
 __all__ = ["CHANNELS", "OFF_TIME_US", "UNDER_CURRENT_MA", "SupplyMonitor"]
 
@@ -21,7 +22,7 @@ UNDER_CURRENT_MA = 0.5
 class SupplyMonitor:
     """Cuts, counts and restores the two monitored supplies."""
 
-    def __init__(self, hardware: Hardware, state: State) -> None:
+    def __init__(self, hardware: CubeStarHardware, state: State) -> None:
         """Watch the channels of ``hardware``."""
         self._hardware = hardware
         self._state = state

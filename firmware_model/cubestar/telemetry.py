@@ -6,6 +6,7 @@ from typing import Any
 from cubestack.firmware_model.cubestar.attitude_reports import AttitudeReports
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.commands import Commands
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.star_reports import StarReports
 from cubestack.firmware_model.cubestar.state import State
@@ -16,13 +17,11 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize, SwitchState
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Hardware
+from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
 
 __all__ = ["Telemetry"]
 
 NODE_TYPE = 5
-FIRMWARE_VERSION = (0, 1)
-SERIAL_NUMBER = 1
 
 Values = dict[str, Any]
 
@@ -32,7 +31,7 @@ class Telemetry:
 
     def __init__(
         self,
-        hardware: Hardware,
+        hardware: CubeStarHardware,
         meter: Meter,
         state: State,
         capture: ImageCapture,
@@ -51,7 +50,7 @@ class Telemetry:
         self._commands = commands
         self._pending = pending
         self._sources: dict[str, Callable[[], Values]] = {
-            "Identification": self._identification,
+            "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
             "ExtendedIdentification": self._extended_identification,
             "ErrorFlags": state.flag_values,
             "TcmdProcessed": self._processed,
@@ -96,17 +95,6 @@ class Telemetry:
 
     # --- node ---------------------------------------------------------------------------------
 
-    def _identification(self) -> Values:
-        seconds, milliseconds = divmod(self._hardware.uptime_ms(), 1000)
-        return {
-            "NodeType": NODE_TYPE,
-            "InterfaceVersion": INTERFACE.version,
-            "FirmwareVersionMajor": FIRMWARE_VERSION[0],
-            "FirmwareVersionMinor": FIRMWARE_VERSION[1],
-            "RuntimeMilliseconds": milliseconds,
-            "RuntimeSeconds": seconds & 0xFFFF,
-        }
-
     def _extended_identification(self) -> Values:
         retained = self._state.retained
         return {
@@ -143,7 +131,7 @@ class Telemetry:
         shown = {f.name: f.flag in self._state.flags for f in flag_fields(log_names=True)}
         return {
             "Temp": self._hardware.temperature_c(),
-            "Runtime": self._hardware.uptime_ms() // 1000,
+            "Runtime": self._hardware.uptime_us() // 1_000_000,
             "WDGcounter": self._state.retained.watchdog_resets,
             "Status": self._state.task_status,
             "SW": self._switch(),

@@ -9,7 +9,7 @@ at the instant of their cause; the cycles that they charge are paid by the runni
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,6 @@ __all__ = [
     "AwaitPin",
     "BusAccess",
     "CameraTransfer",
-    "FlashStore",
-    "Hardware",
     "Pay",
     "ReadPin",
     "ReadTimer",
@@ -152,73 +150,3 @@ Request = (
 T = TypeVar("T")
 Routine = Generator[Request, Any, T]
 """Part of a firmware program that takes time; used with ``yield from``."""
-
-
-class FlashStore:
-    """Flash pages by name: survives resets and power cycles.
-
-    Attributes:
-        pages: contents by page name.
-        writes: how often each page was written, for the wear report.
-    """
-
-    def __init__(self) -> None:
-        """Make an erased store."""
-        self.pages: dict[str, bytes] = {}
-        self.writes: dict[str, int] = {}
-
-    def write(self, page: str, data: bytes) -> None:
-        """Erase and program ``page``."""
-        self.pages[page] = bytes(data)
-        self.writes[page] = self.writes.get(page, 0) + 1
-
-    def erase(self, page: str) -> None:
-        """Erase ``page``; reading it then gives None."""
-        self.pages.pop(page, None)
-
-    def read(self, page: str) -> bytes | None:
-        """Contents of ``page``, or None when it is erased."""
-        return self.pages.get(page)
-
-
-class Hardware(Protocol):
-    """Peripherals that a program uses without waiting for them.
-
-    Attributes:
-        external_ram: SRAM on the external bus, shape (bytes,), uint8.
-        retention: battery-domain registers, kept over software resets, not over power-off.
-        flash: non-volatile store.
-        reset_cause: why the processor started, as in ``Reset``.
-    """
-
-    external_ram: NDArray[np.uint8]
-    retention: bytearray
-    flash: FlashStore
-    reset_cause: int
-
-    def uart_send(self, data: bytes) -> None:
-        """Queue ``data`` for the satellite's UART; the peripheral sends at its own pace."""
-
-    def uart_backlog(self) -> int:
-        """Bytes that the UART still has to send."""
-
-    def wake(self) -> None:
-        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
-
-    def switch_supply(self, channel: str, on: bool) -> None:
-        """Turn the load switch of supply ``channel`` on or off."""
-
-    def bus_read(self, select: int, address: int, count: int) -> bytes:
-        """Load bytes over the external bus, in an interrupt: their cycles are still to be charged.
-
-        Only where that bus leads to the FPGA; see ``BusAccess``.
-        """
-
-    def supply_current_ma(self, channel: str) -> float:
-        """Current that the monitor of supply ``channel`` shows, in mA."""
-
-    def uptime_ms(self) -> int:
-        """Time since power-up in ms, read in an interrupt."""
-
-    def temperature_c(self) -> float:
-        """On-chip temperature sensor, in degrees Celsius."""

@@ -36,7 +36,8 @@ from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, 
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS, ROWS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import CameraTransfer, FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.requests import CameraTransfer
 
 __all__ = ["ARAMIS_POWER", "AramisBoard"]
 

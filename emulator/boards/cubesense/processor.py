@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from cubestack.emulator.boards.cubesense.gpio import CHANNELS
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.sim.power import PowerModel
-from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.interface.cubesense.pins import (
     ADC_FULL_SCALE,
@@ -46,11 +46,11 @@ class Pic18f45k20:
         """The part starts anew, its timer from 0."""
         self._reset_ps = self._kernel.now
 
-    def uart_send(self, port: Port, data: bytes) -> None:
+    def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
         """Queue ``data`` for ``port``."""
         self._uarts[port].send(data)
 
-    def uart_backlog(self, port: Port) -> int:
+    def uart_backlog(self, port: Port = Port.NODE) -> int:
         """Bytes that ``port`` still has to send."""
         return self._uarts[port].backlog
 
@@ -71,6 +71,6 @@ class Pic18f45k20:
                 current = self._power.current_ma(monitor.value)
         return min(ADC_FULL_SCALE, round(current / MA_PER_COUNT))
 
-    def uptime_ms(self) -> int:
-        """Time since the latest reset in ms."""
-        return (self._kernel.now - self._reset_ps) // PS_PER_MS
+    def uptime_us(self) -> int:
+        """Time since the latest reset in us."""
+        return (self._kernel.now - self._reset_ps) // PS_PER_US

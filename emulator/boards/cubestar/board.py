@@ -20,7 +20,7 @@ from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.rtl.contract import RtlEngine, make_engine
 from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTION_BYTES
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
@@ -28,8 +28,10 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
-from cubestack.firmware_model.mcu.requests import CameraTransfer, FlashStore
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.requests import CameraTransfer
 
 __all__ = ["CubeStarBoard"]
 
@@ -234,8 +236,8 @@ class _Efm32gg:
     def supply_current_ma(self, channel: str) -> float:
         return self._board.power.current_ma(channel)
 
-    def uptime_ms(self) -> int:
-        return self._board.kernel.now // PS_PER_MS
+    def uptime_us(self) -> int:
+        return self._board.kernel.now // PS_PER_US
 
     def temperature_c(self) -> float:
         return self._board.camera.temperature_c

@@ -13,7 +13,8 @@ from cubestack.emulator.rtl.contract import make_engine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import AwaitPin, BusAccess, Pay, SetPin, Sleep
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 

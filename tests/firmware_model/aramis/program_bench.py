@@ -10,13 +10,8 @@ from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import (
-    CameraTransfer,
-    FlashStore,
-    Pay,
-    ReadTimer,
-    Sleep,
-)
+from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.requests import CameraTransfer, Pay, ReadTimer, Sleep
 
 T = TypeVar("T")
 

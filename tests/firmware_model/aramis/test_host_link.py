@@ -4,11 +4,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.aramis.host_link import LONGEST_COMMAND, Command, HostLink
+from cubestack.firmware_model.aramis.link import AramisLink
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import INTERFACE, AckError
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.node.link import longest_command
+from cubestack.firmware_model.node.queue import QueuedCommand
 
 from .program_bench import Bench
 
@@ -20,12 +22,12 @@ class Desk:
         self.bench = Bench()
         self.state = State(self.bench.flash)
         self.told: list[str] = []
-        self.link = HostLink(self.bench, self.bench.meter, self.state, self.values, self.tell)
+        self.link = AramisLink(self.bench, self.bench.meter, self.state, self.values, self.tell)
 
     def values(self, message: Message) -> dict[str, Any]:
         return dict(message.reset_values())
 
-    def tell(self, command: Command) -> None:
+    def tell(self, command: QueuedCommand) -> None:
         self.told.append(command.message.name)
 
     def uart(self, data: bytes) -> bytes:
@@ -139,7 +141,7 @@ def test_i2c_reads_without_an_id_and_writes_that_are_too_long() -> None:
     assert desk.link.i2c_read() == 0xFF
     desk.link.i2c_stop()
     assert desk.state.flags == {"I2cReadWithoutId"}
-    acknowledged = desk.i2c_write(bytes(LONGEST_COMMAND + 2))
+    acknowledged = desk.i2c_write(bytes(longest_command(INTERFACE) + 2))
     assert acknowledged[-1] is False
     assert all(acknowledged[:-1])
     assert "TcmdIdError" in desk.state.flags

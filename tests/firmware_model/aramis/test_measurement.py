@@ -9,14 +9,14 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.measurement import configuration
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
-from cubestack.firmware_model.aramis.settings import Settings
+from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.telemetry import body_quaternion
 from cubestack.firmware_model.interface.aramis import INTERFACE
-from cubestack.firmware_model.mcu.requests import FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 
 def test_reset_values_are_the_verified_way() -> None:
-    found = configuration(Settings(FlashStore()))
+    found = configuration(StoredSettings(FlashStore()))
     assert found.detection == VERIFIED.detection
     assert found.field.fov_deg == pytest.approx(VERIFIED.field.fov_deg, abs=1e-5)
     assert found.profile.sigma_rad == pytest.approx(VERIFIED.profile.sigma_rad, rel=0.01)
@@ -24,7 +24,7 @@ def test_reset_values_are_the_verified_way() -> None:
 
 
 def test_every_setting_arrives() -> None:
-    settings = Settings(FlashStore())
+    settings = StoredSettings(FlashStore())
     settings.put("SetField", {"FieldOfView": 18.0, "Round": 0})
     settings.put(
         "SetDetection",
@@ -52,7 +52,7 @@ def test_every_setting_arrives() -> None:
 
 @given(st.data())
 def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObject) -> None:
-    settings = Settings(FlashStore())
+    settings = StoredSettings(FlashStore())
     for name in ("SetField", "SetDetection", "SetIdentification"):
         message = INTERFACE.telecommand(name)
         values = message.unpack(

@@ -4,40 +4,40 @@ from cubestack.firmware_model.aramis.settings import (
     BODY_PAGE,
     CONFIG_PAGE,
     SETTING_COMMANDS,
-    Settings,
+    StoredSettings,
 )
 from cubestack.firmware_model.interface.aramis import INTERFACE
-from cubestack.firmware_model.mcu.requests import FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 TURN = {"Q0": 0.0, "Q1": 0.0, "Q2": 1.0, "Q3": 0.0}
 
 
 def test_settings_start_at_the_declared_values() -> None:
-    settings = Settings(FlashStore())
+    settings = StoredSettings(FlashStore())
     for name in SETTING_COMMANDS:
         assert settings.all(name) == INTERFACE.telecommand(name).reset_values()
 
 
 def test_saved_settings_come_back_and_others_do_not() -> None:
     flash = FlashStore()
-    settings = Settings(flash)
+    settings = StoredSettings(flash)
     settings.put("SetGain", {"Gain": 4.0})
     settings.save()
     settings.put("SetExposure", {"Rows": 17})
-    again = Settings(flash)
+    again = StoredSettings(flash)
     assert again.get("SetGain", "Gain") == 4.0
     assert again.get("SetExposure", "Rows") != 17
     again.erase()
     assert again.get("SetGain", "Gain") == 15.0
-    assert Settings(flash).get("SetGain", "Gain") == 15.0
+    assert StoredSettings(flash).get("SetGain", "Gain") == 15.0
 
 
 def test_the_body_rotation_is_kept_at_once_and_survives_erasing_the_rest() -> None:
     flash = FlashStore()
-    settings = Settings(flash)
+    settings = StoredSettings(flash)
     settings.put("SetBodyRotation", TURN)
     settings.erase()
-    assert Settings(flash).all("SetBodyRotation") == TURN
+    assert StoredSettings(flash).all("SetBodyRotation") == TURN
 
 
 @pytest.mark.parametrize("page", [CONFIG_PAGE, BODY_PAGE])
@@ -46,7 +46,7 @@ def test_the_body_rotation_is_kept_at_once_and_survives_erasing_the_rest() -> No
 )
 def test_damaged_pages_are_noticed_and_left_out(page: str, damage: object) -> None:
     flash = FlashStore()
-    settings = Settings(flash)
+    settings = StoredSettings(flash)
     settings.put("SetGain", {"Gain": 4.0})
     settings.save()
     settings.put("SetBodyRotation", TURN)
@@ -54,7 +54,7 @@ def test_damaged_pages_are_noticed_and_left_out(page: str, damage: object) -> No
     assert stored is not None
     assert callable(damage)
     flash.write(page, damage(stored))
-    again = Settings(flash)
+    again = StoredSettings(flash)
     assert again.damaged
     changed = {CONFIG_PAGE: "SetGain", BODY_PAGE: "SetBodyRotation"}
     for key, command in changed.items():

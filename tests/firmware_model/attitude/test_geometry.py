@@ -13,7 +13,8 @@ from cubestack.firmware_model.attitude.geometry import (
     undistort,
     unit_vectors,
 )
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 #: Figure 5.12 with the signs of the coefficients inverted, focal length from star pairs (5.4).
 C = CameraParameters(

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 Matrix = NDArray[np.float64]
 

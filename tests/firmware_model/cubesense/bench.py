@@ -164,10 +164,10 @@ class Bench:
 
     # --- what the program uses ------------------------------------------------------------------
 
-    def uart_send(self, port: Port, data: bytes) -> None:
+    def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
         self.sent[port] += data
 
-    def uart_backlog(self, port: Port) -> int:
+    def uart_backlog(self, port: Port = Port.NODE) -> int:
         return self.backlog[port]
 
     def wake(self) -> None:
@@ -181,8 +181,8 @@ class Bench:
         drawn = LATCH_UP_MA if sram in self.latched else self.memory_ma
         return round(drawn * self.pins[SRAM_POWER[sram]] / MA_PER_COUNT)
 
-    def uptime_ms(self) -> int:
-        return self.now_us // 1000
+    def uptime_us(self) -> int:
+        return self.now_us
 
     # --- what a test uses -----------------------------------------------------------------------
 

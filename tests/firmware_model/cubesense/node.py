@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
-from cubestack.firmware_model.cubesense.bench_link import BenchLink
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.commands import Commands
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.jobs import JobQueue
+from cubestack.firmware_model.cubesense.links.bench import BenchLink
+from cubestack.firmware_model.cubesense.links.node import NodeLink
+from cubestack.firmware_model.cubesense.links.registers import RegisterLink
 from cubestack.firmware_model.cubesense.measurement import Measurement
-from cubestack.firmware_model.cubesense.node_link import NodeLink
-from cubestack.firmware_model.cubesense.register_link import RegisterLink
 from cubestack.firmware_model.cubesense.state import Result, State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
@@ -95,12 +95,12 @@ class Node:
 
     # --- hardware -------------------------------------------------------------------------------
 
-    def uart_send(self, port: Port, data: bytes) -> None:
+    def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
         self.sent[port] += data
         if port is Port.BENCH:
             self._free_us = max(self._free_us, self.now_us) + BENCH_BYTE_US * len(data)
 
-    def uart_backlog(self, port: Port) -> int:
+    def uart_backlog(self, port: Port = Port.NODE) -> int:
         if port is Port.NODE:
             return self.backlog
         return max(0, -(-(self._free_us - self.now_us) // BENCH_BYTE_US))
@@ -111,8 +111,8 @@ class Node:
     def adc_counts(self, monitor: Monitor) -> int:
         raise AssertionError("asked for through the supply")
 
-    def uptime_ms(self) -> int:
-        return self.now_us // 1000
+    def uptime_us(self) -> int:
+        return self.now_us
 
     # --- supply, cameras, acquisition, measurement ------------------------------------------------
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.bench_link import CHUNK_BYTES, LETTERS
 from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
 from cubestack.firmware_model.interface.cubesense.bench import CAPTURES, DOWNLOADS
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,

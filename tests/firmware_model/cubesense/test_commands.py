@@ -257,7 +257,7 @@ def test_a_lens_that_only_the_table_finds_out_is_refused_later(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lit(bench)
-    monkeypatch.setattr("cubestack.firmware_model.cubesense.node_link.invertible", lambda *_: True)
+    monkeypatch.setattr("cubestack.firmware_model.cubesense.links.node.invertible", lambda *_: True)
     bench.command("Distortion1", **{f"Mantissa{power}": 0 for power in range(5)})
     assert bench.telemetry("TcmdProcessed") == {"LastTcmd": 54, "Processed": 1, "Error": 3}
     assert measured(bench, Camera.SUN)[0] is DetectResult.SUCCESS

@@ -1,8 +1,9 @@
 import pytest
 
-from cubestack.firmware_model.cubesense.jobs import QUEUE_DEPTH, Background, JobQueue, Measure
+from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.mcu.requests import Pay, Routine
+from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 
 def nothing() -> Routine[None]:

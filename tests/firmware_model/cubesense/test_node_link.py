@@ -3,7 +3,7 @@
 import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
-from cubestack.firmware_model.cubesense.node_link import LONGEST_COMMAND, SEND_BYTES
+from cubestack.firmware_model.cubesense.links.node import SEND_BYTES
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -16,6 +16,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
 from cubestack.firmware_model.mcu.requests import Request
+from cubestack.firmware_model.node.link import longest_command
 
 from .node import Node
 
@@ -130,10 +131,10 @@ def test_results_are_pending_before_the_acknowledge(node: Node) -> None:
     at_send = []
     send = node.uart_send
 
-    def spy(port: Port, data: bytes) -> None:
+    def spy(data: bytes, port: Port = Port.NODE) -> None:
         result = node.state.results[Camera.SUN]
         at_send.append((result.capture, result.detect))
-        send(port, data)
+        send(data, port)
 
     node.uart_send = spy  # type: ignore[method-assign]
     node.send("CaptureAndDetect")
@@ -343,7 +344,7 @@ def test_a_telecommand_is_not_processed_while_it_runs(node: Node) -> None:
 
 
 def test_bytes_beyond_the_longest_telecommand_are_not_acknowledged(node: Node) -> None:
-    assert node.i2c_write(bytes([54]) + bytes(40)) == LONGEST_COMMAND + 1
+    assert node.i2c_write(bytes([54]) + bytes(40)) == longest_command(INTERFACE) + 1
     assert node.i2c_read(3, 0x83) == bytes([54, 1, AckError.WRONG_LENGTH])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
-from cubestack.firmware_model.cubesense.register_link import READ_AHEAD_BYTES
+from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.interface.codec.register_pointer import FILL
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.state import Result
-from cubestack.firmware_model.cubesense.telemetry import FIRMWARE_VERSION, NODE_TYPE
+from cubestack.firmware_model.cubesense.telemetry import NODE_TYPE
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -22,6 +22,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     checksum,
 )
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
+from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
 
 from .node import Node
 

@@ -17,11 +17,12 @@ from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause, TaskStatus
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.mcu.requests import (
     AwaitPin,
     CameraTransfer,
-    FlashStore,
     Pay,
     ReadTimer,
     Request,
@@ -106,8 +107,8 @@ class Bench:
     def supply_current_ma(self, channel: str) -> float:
         return self.currents[channel] if self.switches[channel] else 0.0
 
-    def uptime_ms(self) -> int:
-        return self.now_us // 1000
+    def uptime_us(self) -> int:
+        return self.now_us
 
     def temperature_c(self) -> float:
         return 21.5

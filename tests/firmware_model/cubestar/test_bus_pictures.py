@@ -15,9 +15,11 @@ from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.external_bus import EBI
-from cubestack.firmware_model.mcu.requests import BusAccess, FlashStore, Routine, SetPin
+from cubestack.firmware_model.mcu.flash_store import FlashStore
+from cubestack.firmware_model.mcu.requests import BusAccess, Routine, SetPin
 
 from .sky import Sky
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.cubestar.catalogue import CatalogueError, StarCatalogue
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 
 def random_sky(

@@ -8,20 +8,26 @@ from cubestack.firmware_model.cubestar.configuration import (
     field_radius_deg,
 )
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
-from cubestack.firmware_model.cubestar.settings import Settings
+from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.node.settings import Settings
+
+
+def reset_settings() -> Settings:
+    return Settings(INTERFACE, SETTING_COMMANDS)
 
 
 def test_the_reset_values_are_the_published_ones() -> None:
-    assert detection_config(Settings()) == DetectionConfig()
+    assert detection_config(reset_settings()) == DetectionConfig()
     # Figure 5.12, coefficients with inverted sign, and the focal length of section 5.4.
     published = CameraParameters(
         6.28, 1147.5, 1147.4, 539.0, 175.5, 0.32358, -0.12456, -0.00414, 0.00624
     )
-    assert vars(camera_parameters(Settings())) == pytest.approx(vars(published), rel=1e-6)
+    assert vars(camera_parameters(reset_settings())) == pytest.approx(vars(published), rel=1e-6)
 
 
 def test_every_setting_has_its_place() -> None:
-    settings = Settings()
+    settings = reset_settings()
     region = {"StepSize": 4, "Xstart": 10, "Xend": 20, "Ystart": 30, "Yend": 40}
     settings.put("setDetectionRegion", region)
     settings.put("setDetectionThresholds", {"DetectionThreshold": 50, "StarThreshold": 51})
@@ -56,7 +62,7 @@ def test_every_setting_has_its_place() -> None:
 
 @pytest.mark.parametrize(("cx", "cy"), [(539.0, 175.5), (512.0, 256.0), (100.0, 500.0)])
 def test_the_field_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
-    settings = Settings()
+    settings = reset_settings()
     settings.put("setPrincipalPoint", {"Cx": cx, "Cy": cy})
     x, y = np.meshgrid([0, 1024], [0, 512])
     farthest = np.hypot(x - cx, y - cy).max()

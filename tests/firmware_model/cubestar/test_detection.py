@@ -14,7 +14,8 @@ from cubestack.firmware_model.cubestar.detection import (
     SearchEnd,
     detect_stars,
 )
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 Place = tuple[int, int]
 

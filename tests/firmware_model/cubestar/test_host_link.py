@@ -5,14 +5,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.host_link import (
-    LONGEST_COMMAND,
-    QUEUE_DEPTH,
-    SEND_BUFFER_BYTES,
-)
+from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
+from cubestack.firmware_model.node.link import longest_command
+from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 from .bench import Bench
 
@@ -69,7 +67,7 @@ def test_one_parameter_byte_too_many_or_too_few(bench: Bench, message: Message) 
 
 
 def test_a_frame_longer_than_any_telecommand(bench: Bench) -> None:
-    frame = encode_frame(GOOD + bytes(LONGEST_COMMAND + 1000))
+    frame = encode_frame(GOOD + bytes(longest_command(INTERFACE) + 1000))
     assert bench.uart(frame) == ack(AckError.WRONG_LENGTH)
     assert bench.flags() == {"UART_Tcmd_TooManyParm"}
 
@@ -269,10 +267,10 @@ def test_wrong_lengths_on_i2c(bench: Bench) -> None:
 def test_a_write_beyond_the_longest_telecommand_is_not_acknowledged(bench: Bench) -> None:
     upload = INTERFACE.telecommand("UploadBlock")
     longest = bytes([upload.id]) + upload.pack(BlockNumber=0, Data=bytes(128))
-    assert len(longest) == LONGEST_COMMAND
-    assert bench.i2c_write(longest + bytes(50)) == LONGEST_COMMAND + 1
+    assert len(longest) == longest_command(INTERFACE)
+    assert bench.i2c_write(longest + bytes(50)) == longest_command(INTERFACE) + 1
     assert bench.flags() == {"I2C_TCMD_TooManyparm"}
-    assert bench.i2c_write(longest) == LONGEST_COMMAND
+    assert bench.i2c_write(longest) == longest_command(INTERFACE)
     bench.run()
     assert bench.telemetry("UploadStatus")["BlocksReceived"] == 1
 

@@ -7,7 +7,8 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.memory import CAPACITY, Buffer, Memory, budget, used
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 PROGRAM_RAM = 32 * 1024
 """Left for what the model does not have: library data, other peripherals' buffers."""

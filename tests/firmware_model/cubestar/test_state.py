@@ -8,7 +8,7 @@ import pytest
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
 from cubestack.firmware_model.cubestar.state import Attitude, Retained, State
 from cubestack.firmware_model.interface.cubestar import INTERFACE, MatchMode
-from cubestack.firmware_model.mcu.requests import FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 COUNTERS = [field.name for field in fields(Retained)]
 FLAGS = [field.name for field in INTERFACE.telemetry("ErrorFlags").fields]

@@ -5,11 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubestar.telemetry import (
-    FIRMWARE_VERSION,
-    NODE_TYPE,
-    SERIAL_NUMBER,
-)
+from cubestack.firmware_model.cubestar.telemetry import NODE_TYPE
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
@@ -19,6 +15,7 @@ from cubestack.firmware_model.interface.cubestar import (
     ResetCause,
     TaskStatus,
 )
+from cubestack.firmware_model.node.identification import FIRMWARE_VERSION, SERIAL_NUMBER
 
 from .bench import BOOT_US, FRAME_US, Bench
 from .sky import Sky

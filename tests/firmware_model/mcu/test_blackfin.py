@@ -3,7 +3,8 @@ import re
 import pytest
 
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533, CORE_HZ, blackfin_bf533
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 
 def test_clock_and_memory_speed() -> None:

@@ -1,13 +1,7 @@
 import pytest
 
-from cubestack.firmware_model.mcu.costs import (
-    CORTEX_M3,
-    Cost,
-    CostError,
-    CostTable,
-    Meter,
-    cortex_m3,
-)
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, cortex_m3
+from cubestack.firmware_model.mcu.costs import Cost, CostError, CostTable, Meter
 
 SIMPLE = CostTable(
     "simple part",

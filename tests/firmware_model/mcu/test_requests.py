@@ -1,4 +1,4 @@
-from cubestack.firmware_model.mcu.requests import FlashStore
+from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 
 def test_a_flash_page_keeps_what_was_written_last() -> None:

@@ -12,6 +12,7 @@ from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
 
 from .conftest import LATCH, Run, needs_tools
 
@@ -67,9 +68,9 @@ def identity(interface: Interface, node_type: int, firmware: tuple[int, int]) ->
     return text(message.pack(**message.reset_values() | known)[:4])
 
 
-CUBESTAR_IDENTITY = identity(CUBESTAR, cubestar.NODE_TYPE, cubestar.FIRMWARE_VERSION)
-CUBESENSE_IDENTITY = identity(CUBESENSE, cubesense.NODE_TYPE, cubesense.FIRMWARE_VERSION)
-ARAMIS_IDENTITY = identity(ARAMIS, aramis.NODE_TYPE, aramis.FIRMWARE_VERSION)
+CUBESTAR_IDENTITY = identity(CUBESTAR, cubestar.NODE_TYPE, FIRMWARE_VERSION)
+CUBESENSE_IDENTITY = identity(CUBESENSE, cubesense.NODE_TYPE, FIRMWARE_VERSION)
+ARAMIS_IDENTITY = identity(ARAMIS, aramis.NODE_TYPE, FIRMWARE_VERSION)
 
 FLAGS = "i2ctransfer -y 7 w1@0x1a 0x82 r10"
 SESSION: Session = (

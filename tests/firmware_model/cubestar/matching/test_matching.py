@@ -23,7 +23,8 @@ from cubestack.firmware_model.cubestar.matching.voting import (
     expected_coincidences,
     identify,
 )
-from cubestack.firmware_model.mcu.costs import CORTEX_M3, Meter
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 Shoot = Callable[..., Any]
 

@@ -113,4 +113,4 @@ class BenchLink:
 
     def _uart_send(self, data: bytes) -> None:
         self._meter.charge(uart_interrupt=len(data))
-        self._hardware.uart_send(Port.BENCH, data)
+        self._hardware.uart_send(data, Port.BENCH)

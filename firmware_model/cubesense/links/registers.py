@@ -16,7 +16,7 @@ import numpy as np
 
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
-from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, Telecommand
+from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, TelecommandJob
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerRegister
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -217,16 +217,16 @@ class RegisterLink:
 
     def _clear_over_current(self, selection: int) -> None:
         message = INTERFACE.telecommand("ClearOverCurrent")
-        self._put(Telecommand(message, {"Selection": selection}))
+        self._put(TelecommandJob(message, {"Selection": selection}))
 
     def _search(self, value: int) -> None:
         if value == NadirSearch.LINES or self._hardware.mcu_addressing:
             self._state.nadir_search = NadirSearch(value)
 
-    def _put(self, job: Measure | Telecommand) -> bool:
+    def _put(self, job: Measure | TelecommandJob) -> bool:
         accepted = self._queue.put(job)
         if accepted:
             self._hardware.wake()
         else:
-            self._state.flags.add("TcmdBufferOverrun")
+            self._state.raise_flag("TcmdBufferOverrun")
         return accepted

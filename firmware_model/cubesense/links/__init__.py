@@ -1,0 +1,1 @@
+"""CubeSense's links to the outside, one for each protocol."""

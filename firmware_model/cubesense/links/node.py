@@ -1,0 +1,152 @@
+"""CubeSense's link by the node protocol, on UART and I2C; interrupts.
+
+Assumed, where the public material is silent: an unknown telemetry ID raises UartProtocolError on
+the UART, I2cTlmReadError (once it is read) on I2C. Counters count every message that came, refused
+ones too. A result that schedules the next measurement does so once its answer is on its way (UART),
+or once the transfer that read some of it has ended (I2C); when the queue is full nothing is
+scheduled, the result stays, and TcmdBufferOverrun is raised.
+"""
+
+from collections.abc import Collection
+from typing import Any
+
+from cubestack.firmware_model.cubesense.download import Download
+from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
+from cubestack.firmware_model.cubesense.jobs import JobQueue, Measure, TelecommandJob
+from cubestack.firmware_model.cubesense.state import State, distortion_of
+from cubestack.firmware_model.cubesense.telemetry import Telemetry
+from cubestack.firmware_model.cubesense.vision.lens_check import invertible
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense.codes import (
+    FRAME_BYTES,
+    Camera,
+    NadirSearch,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
+
+__all__ = ["SEND_BYTES", "NodeLink"]
+
+SEND_BYTES = len(encode_frame(b"")) + 2 * FRAME_BYTES
+"""What the UART may still have to send: the longest answer, every byte of it doubled."""
+
+_FLAGS = LinkFlags(
+    uart=BusFlags("TcmdBufferOverrun", unknown_telemetry="UartProtocolError"),
+    i2c=BusFlags("TcmdBufferOverrun"),
+    protocol_error="UartProtocolError",
+    incomplete="UartMsgIncomplete",
+    read_without_id="I2cTlmReadError",
+)
+
+
+class NodeLink(SatelliteLink):
+    """Decodes what the host sends and answers it."""
+
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        state: State,
+        queue: JobQueue,
+        telemetry: Telemetry,
+        download: Download,
+    ) -> None:
+        """Fill ``queue``; ``telemetry`` gives values, ``download`` knows which frames exist."""
+        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BYTES)
+        self._mcu_addressing = hardware.mcu_addressing
+        self._state = state
+        self._queue = queue
+        self._telemetry = telemetry
+        self._download = download
+        self._latest: TelecommandJob | None = None
+
+    # --- telemetry --------------------------------------------------------------------------------
+
+    def _transmit(self, frame: bytes) -> None:
+        self._meter.charge(uart_interrupt=len(frame))
+        super()._transmit(frame)
+
+    def _read_telemetry(self, identifier: int, bus: BusFlags) -> bytes | None:
+        self._state.telemetries += 1
+        return super()._read_telemetry(identifier, bus)
+
+    def _values(self, message: Message) -> dict[str, Any]:
+        return self._telemetry.values(message)
+
+    def _uart_answer(self, identifier: int) -> bool:
+        sent = super()._uart_answer(identifier)
+        if sent:
+            self._taken(identifier)
+        return sent
+
+    def i2c_start(self, read: bool) -> None:
+        """Interrupt: the node's address came; a repeated start ends what came before."""
+        self.i2c_stop()
+        super().i2c_start(read)
+
+    def _finish_read(self) -> None:
+        """An answer is used up once some of it was read."""
+        if self._position and self._answer is not None:
+            super()._finish_read()
+            self._taken(self._requested)
+
+    def _taken(self, identifier: int) -> None:
+        """The host has a telemetry message, which may schedule a measurement."""
+        if identifier not in SCHEDULES:
+            return
+        camera, sram = SCHEDULES[identifier]
+        if self._queue.put(Measure(camera, sram, detect=True)):
+            self._state.schedule(camera, sram, detect=True)
+            self._hardware.wake()
+        else:
+            self._state.raise_flag("TcmdBufferOverrun")
+
+    # --- telecommands -----------------------------------------------------------------------------
+
+    def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
+        """Check a telecommand and queue it; what telemetry TcmdProcessed says follows."""
+        self._state.telecommands += 1
+        if self._latest is not None:
+            self._latest.latest = False
+        self._latest = None
+        error = super()._accept(identifier, parameters, bus)
+        self._state.last_command = identifier
+        self._state.last_error = error
+        self._state.last_processed = int(error is not AckError.OK)
+        return error
+
+    def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
+        return super()._refusals(message, values) or [None] * (not self._possible(message, values))
+
+    def _possible(self, message: Message, values: dict[str, Any]) -> bool:
+        """What the table can not say of a telecommand's parameters."""
+        match message.name:
+            case "NextImageFrame":
+                return self._download.has(int(values["Frame"]))
+            case "Distortion1" | "Distortion2":
+                return invertible(distortion_of(values), self._meter)
+            case "SetNadirSearch":
+                return values["Search"] == NadirSearch.LINES or self._mcu_addressing
+        return True
+
+    def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
+        if self._queue.full:
+            return False
+        self._latest = TelecommandJob(message, values, latest=True)
+        self._announce(self._latest)
+        return self._queue.put(self._latest)
+
+    def _announce(self, job: TelecommandJob) -> None:
+        """What telemetry shows of a telecommand before it is executed."""
+        values = job.values
+        match job.message.name:
+            case "CaptureAndDetect" | "CaptureOnly":
+                detect = job.message.name == "CaptureAndDetect"
+                self._state.schedule(Camera(values["Camera"]), Sram(values["Sram"]), detect=detect)
+            case "StartImageDownload" | "NextImageFrame":
+                job.frame = self._download.request(values)

@@ -1,0 +1,65 @@
+"""CubeStar's link to the host: counters that survive resets, and nothing left unfinished by one."""
+
+from collections.abc import Callable
+from typing import Any
+
+from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
+from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
+
+__all__ = ["SEND_BUFFER_BYTES", "CubeStarLink"]
+
+SEND_BUFFER_BYTES = 2048
+"""What the UART may still have to send: assumed, a third of a second at the default baud rate."""
+
+_FLAGS = LinkFlags(
+    uart=BusFlags(
+        "UART_TcmdBufOfError", "UART_Tcmd_TooFewParm", "UART_Tcmd_TooManyParm", "TlmIDError"
+    ),
+    i2c=BusFlags("I2C_TcmdBufOFError", "I2C_TCMD_TooFewParm", "I2C_TCMD_TooManyparm", "TlmIDError"),
+    protocol_error="UART_ProtocolError",
+    incomplete="UART_MsgIncomplete",
+    read_without_id="I2C_WaitForIDReadRequestError",
+    timeout="UART_RXTimeout",
+    unknown_command="TcmdIDError",
+)
+
+
+class CubeStarLink(SatelliteLink):
+    """Decodes what the host sends and answers it.
+
+    Attributes:
+        queue: accepted telecommands for the main loop.
+    """
+
+    def __init__(
+        self,
+        hardware: CubeStarHardware,
+        meter: Meter,
+        state: State,
+        telemetry: Callable[[Message], dict[str, Any] | None],
+    ) -> None:
+        """Serve; ``telemetry`` gives a message's values, or None when it is not supported."""
+        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES)
+        self._state = state
+        self._telemetry = telemetry
+        self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is under way that a reset would cut short: a message or an answer."""
+        return not (self.receiving or self.queue or self._hardware.uart_backlog())
+
+    def _values(self, message: Message) -> dict[str, Any] | None:
+        values = self._telemetry(message)
+        self._state.retained.telemetry += values is not None
+        return values
+
+    def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
+        accepted = self.queue.put(QueuedCommand(message, values))
+        self._state.retained.telecommands += accepted
+        return accepted

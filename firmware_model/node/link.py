@@ -1,0 +1,266 @@
+"""The satellite's side of a node: frames over UART and messages over I2C, in interrupt context.
+
+Both carry the same telecommands and telemetry. A telecommand is checked here against the table
+(ID, length, parameter ranges), acknowledged, and queued for the main loop; telemetry is answered
+at once. Dialect of the CubeSpace family of nodes: a telemetry answer does not repeat the ID; a
+telecommand is acknowledged on the UART with one error byte, on I2C through telemetry TcmdProcessed.
+An unknown telemetry ID gets no answer. Parameters behind the ID of a telemetry request are ignored.
+An answer that the UART's buffer has no room for is dropped: a host that waits for each answer never
+fills it.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
+from cubestack.firmware_model.interface.codec.message import (
+    TELEMETRY_BIT,
+    Interface,
+    Kind,
+    Message,
+)
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.hardware import NodeHardware
+from cubestack.firmware_model.node.state import NodeState
+
+__all__ = ["BusFlags", "LinkFlags", "SatelliteLink", "longest_command"]
+
+NO_DATA = 0xFF
+"""What a read delivers beyond the end of a message, or without one."""
+
+
+def longest_command(interface: Interface) -> int:
+    """Bytes of the longest telecommand, its ID included."""
+    return 1 + max(message.length for message in interface.telecommands)
+
+
+@dataclass(frozen=True)
+class BusFlags:
+    """Names of the error flags that messages on one bus raise; None: it raises none.
+
+    Attributes:
+        overflow: telecommand while the queue is full.
+        too_few, too_many: parameter bytes of a telecommand.
+        unknown_telemetry: telemetry ID that the node does not offer.
+    """
+
+    overflow: str
+    too_few: str | None = None
+    too_many: str | None = None
+    unknown_telemetry: str | None = None
+
+
+@dataclass(frozen=True)
+class LinkFlags:
+    """Names of a node's error flags for its link; None: it has none.
+
+    Attributes:
+        uart, i2c: what differs from bus to bus.
+        protocol_error: byte outside of a frame, unknown escape or empty frame.
+        incomplete: frame that never ended.
+        read_without_id: I2C read with no answer to give; one that was refused with a flag counts
+            as an empty answer.
+        timeout: silence inside a frame.
+        unknown_command: telecommand ID that the node does not know.
+    """
+
+    uart: BusFlags
+    i2c: BusFlags
+    protocol_error: str
+    incomplete: str
+    read_without_id: str
+    timeout: str | None = None
+    unknown_command: str | None = None
+
+
+class SatelliteLink(ABC):
+    """Decodes what the host sends and answers it; a node says what its messages mean."""
+
+    def __init__(
+        self,
+        hardware: NodeHardware,
+        meter: Meter,
+        state: NodeState,
+        interface: Interface,
+        flags: LinkFlags,
+        send_buffer_bytes: int,
+    ) -> None:
+        """Serve ``interface``.
+
+        Args:
+            hardware: the UART, and the main loop's sleep.
+            meter: charged.
+            state: where error flags are raised.
+            interface: telecommands and telemetry.
+            flags: their names.
+            send_buffer_bytes: what the UART may still have to send.
+        """
+        self._hardware = hardware
+        self._meter = meter
+        self._flagged = state
+        self._interface = interface
+        self._flags = flags
+        self._send_buffer_bytes = send_buffer_bytes
+        self._longest = longest_command(interface)
+        self._decoder = FrameDecoder(self._longest + 1)
+        self._addressed = False
+        self._written = bytearray()
+        self._reading = False
+        self._requested = 0
+        self._answer: bytes | None = None
+        self._position = 0
+
+    # --- what a node says -------------------------------------------------------------------------
+
+    @abstractmethod
+    def _values(self, message: Message) -> dict[str, Any] | None:
+        """Values of telemetry ``message``, which is counted; None when it is not supported."""
+
+    @abstractmethod
+    def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
+        """Queue an accepted telecommand; False when the queue is full."""
+
+    def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
+        """Why parameters are refused: error flags, None for one without; empty: they are good."""
+        return [flag or None for _, flag in message.violations(values)]
+
+    @property
+    def receiving(self) -> bool:
+        """Whether a frame or a transfer has begun and not ended."""
+        return self._decoder.unfinished or self._addressed
+
+    # --- UART -------------------------------------------------------------------------------------
+
+    def uart_byte(self, byte: int) -> None:
+        """Interrupt: a byte came."""
+        self._meter.charge(uart_interrupt=1)
+        match self._decoder.feed(byte):
+            case FrameEvent.FRAME | FrameEvent.TOO_LONG:  # the kept front is too long as well
+                self._uart_message(self._decoder.payload)
+            case FrameEvent.INCOMPLETE:
+                self._raise(self._flags.incomplete)
+            case FrameEvent.PROTOCOL_ERROR:
+                self._raise(self._flags.protocol_error)
+
+    def uart_silence(self) -> None:
+        """Interrupt: nothing came for a while."""
+        if self._decoder.reset():
+            self._raise(self._flags.incomplete)
+            self._raise(self._flags.timeout)
+
+    def _uart_message(self, payload: bytes) -> None:
+        self._meter.charge(host_message=1)
+        if not payload:
+            self._raise(self._flags.protocol_error)
+        elif payload[0] & TELEMETRY_BIT:
+            self._uart_answer(payload[0])
+        else:
+            self._uart_send(bytes([self._accept(payload[0], payload[1:], self._flags.uart)]))
+
+    def _uart_answer(self, identifier: int) -> bool:
+        """Send a telemetry message; False when the host does not get it."""
+        answer = self._read_telemetry(identifier, self._flags.uart)
+        return answer is not None and self._uart_send(answer)
+
+    def _uart_send(self, payload: bytes) -> bool:
+        """Answer, if there is room for it."""
+        frame = encode_frame(payload)
+        room = self._hardware.uart_backlog() + len(frame) <= self._send_buffer_bytes
+        if room:
+            self._transmit(frame)
+        return room
+
+    def _transmit(self, frame: bytes) -> None:
+        """Hand a frame to the UART."""
+        self._hardware.uart_send(frame)
+
+    # --- I2C --------------------------------------------------------------------------------------
+
+    def i2c_start(self, read: bool) -> None:
+        """Interrupt: the node's address came, to write or to ``read``."""
+        self._finish_write()
+        self._addressed = True
+        self._reading = read
+        if read and self._answer is None:
+            self._raise(self._flags.read_without_id)
+
+    def i2c_write(self, byte: int) -> bool:
+        """Interrupt: a byte came; one beyond the longest telecommand is not acknowledged."""
+        self._meter.charge(i2c_interrupt=1)
+        if len(self._written) > self._longest:
+            return False
+        self._written.append(byte)
+        return True
+
+    def i2c_read(self) -> int:
+        """Interrupt: the next byte is wanted; beyond the end of an answer it is 255."""
+        self._meter.charge(i2c_interrupt=1)
+        answer = self._answer or b""
+        byte = answer[self._position] if self._position < len(answer) else NO_DATA
+        self._position += 1
+        return byte
+
+    def i2c_stop(self) -> None:
+        """Interrupt: the transfer ended."""
+        self._finish_write()
+        if self._reading:
+            self._finish_read()
+        self._addressed = self._reading = False
+
+    def _finish_read(self) -> None:
+        """A telemetry answer is used up once it was read."""
+        self._answer = None
+
+    def _finish_write(self) -> None:
+        """Act on the message that a stop or a repeated start ended."""
+        if not self._written:
+            return
+        self._meter.charge(host_message=1)
+        identifier, parameters = self._written[0], bytes(self._written[1:])
+        self._written.clear()
+        if identifier & TELEMETRY_BIT:
+            self._requested = identifier
+            self._answer = self._read_telemetry(identifier, self._flags.i2c)
+            if self._answer is None and self._flags.i2c.unknown_telemetry:
+                self._answer = b""
+            self._position = 0
+        else:
+            self._accept(identifier, parameters, self._flags.i2c)
+
+    # --- both -------------------------------------------------------------------------------------
+
+    def _raise(self, flag: str | None) -> None:
+        if flag is not None:
+            self._flagged.raise_flag(flag)
+
+    def _read_telemetry(self, identifier: int, bus: BusFlags) -> bytes | None:
+        message = self._interface.find(identifier)
+        values = None if message is None else self._values(message)
+        if message is None or values is None:
+            self._raise(bus.unknown_telemetry)
+            return None
+        return message.pack(**values)
+
+    def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
+        """Queue a telecommand, or say what is wrong with it."""
+        message = self._interface.find(identifier)
+        if message is None or message.kind is not Kind.TELECOMMAND:
+            self._raise(self._flags.unknown_command)
+            return AckError.INVALID_ID
+        if len(parameters) != message.length:
+            self._raise(bus.too_few if len(parameters) < message.length else bus.too_many)
+            return AckError.WRONG_LENGTH
+        values = dict(message.unpack(parameters))
+        refusals = self._refusals(message, values)
+        if refusals:
+            for flag in refusals:
+                self._raise(flag)
+            return AckError.BAD_PARAMETER
+        if not self._enqueue(message, values):
+            self._raise(bus.overflow)
+            return AckError.BUFFER_FULL
+        self._hardware.wake()
+        return AckError.OK

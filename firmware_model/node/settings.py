@@ -1,0 +1,55 @@
+"""Settings that telecommands change: stored as the telecommands' own parameter bytes.
+
+The layout derives from the telecommand table, so a new setting is one more name.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from cubestack.firmware_model.interface.codec.message import Interface
+
+__all__ = ["Settings"]
+
+
+class Settings:
+    """Current parameters of every setting telecommand."""
+
+    def __init__(self, interface: Interface, commands: Iterable[str]) -> None:
+        """Start with the reset values that ``interface`` declares for ``commands``."""
+        self._messages = {name: interface.telecommand(name) for name in commands}
+        self._values: dict[str, dict[str, Any]] = {}
+        self.clear()
+
+    def clear(self) -> None:
+        """Go back to the reset values."""
+        self._values = {name: dict(m.reset_values()) for name, m in self._messages.items()}
+
+    def get(self, command: str, field: str) -> Any:
+        """Value of parameter ``field`` of telecommand ``command``."""
+        return self._values[command][field]
+
+    def all(self, command: str) -> dict[str, Any]:
+        """All parameters of telecommand ``command``."""
+        return dict(self._values[command])
+
+    def put(self, command: str, values: Mapping[str, Any]) -> None:
+        """Store all parameters of ``command``."""
+        self._values[command] = dict(values)
+
+    def size(self, *commands: str) -> int:
+        """Bytes of the parameters of ``commands``, in their order; of all when none is named."""
+        return sum(self._messages[name].length for name in commands or self._messages)
+
+    def pack(self, *commands: str) -> bytes:
+        """Parameters of ``commands``, ``size`` bytes."""
+        names = commands or self._messages
+        return b"".join(self._messages[name].pack(**self._values[name]) for name in names)
+
+    def unpack(self, data: bytes, *commands: str) -> None:
+        """Restore what ``pack`` gave; other lengths raise ValueError."""
+        if len(data) != self.size(*commands):
+            raise ValueError(f"stored settings have {len(data)} bytes, not {self.size(*commands)}")
+        for name in commands or self._messages:
+            message = self._messages[name]
+            self._values[name] = message.unpack(data[: message.length])
+            data = data[message.length :]
