@@ -30,7 +30,7 @@ ORDER = {
     "firmware_model": (
         "interface",
         "formats mcu",
-        "attitude",
+        "attitude node",
         "cubestar cubesense aramis",
     ),
     "host": (
