@@ -10,7 +10,7 @@ import numpy as np
 
 from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
-from cubestack.firmware_model.aramis.catalogue_commands import CatalogueUpload
+from cubestack.firmware_model.aramis.catalogue.upload import CatalogueUpload
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.aramis.settings import SETTING_COMMANDS

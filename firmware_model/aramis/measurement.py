@@ -27,8 +27,7 @@ from cubestack.firmware_model.aramis.pipeline import (
     explain,
 )
 from cubestack.firmware_model.aramis.settings import StoredSettings
-from cubestack.firmware_model.aramis.solution import Outcome, Solution, StarList, unsolved
-from cubestack.firmware_model.aramis.solution import Reason as Finding
+from cubestack.firmware_model.aramis.solution import Solution, StarList, unsolved
 from cubestack.firmware_model.aramis.state import Measurement, State
 from cubestack.firmware_model.attitude.geometry import direction_of
 from cubestack.firmware_model.attitude.quest import dcm
@@ -46,12 +45,6 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 __all__ = ["Measuring", "configuration"]
 
 Direction = NDArray[np.float32]
-
-_OUTCOMES = {
-    Outcome.CONCLUSIVE: MeasurementOutcome.CONCLUSIVE,
-    Outcome.AMBIGUOUS: MeasurementOutcome.AMBIGUOUS,
-    Outcome.NONE: MeasurementOutcome.NONE,
-}
 
 
 @lru_cache(maxsize=4)
@@ -186,8 +179,8 @@ class Measuring:
             solution = self._solve(result, self._camera.picture(place), database, hint)
         yield Pay()
         result.solution = solution
-        result.outcome = _OUTCOMES[solution.outcome]
-        result.reason = Reason[solution.reason.name]
+        result.outcome = solution.outcome
+        result.reason = solution.reason
         if solution.quaternion is not None:
             self._state.quaternion = solution.quaternion
             self._state.matched = int((solution.stars >= 0).sum())
@@ -206,7 +199,7 @@ class Measuring:
         result.pictures = len(self._background.sums)
         if stars is None:
             nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
-            return unsolved(Outcome.NONE, Finding.TOO_MANY_PIXELS, nothing)
+            return unsolved(Reason.TOO_MANY_PIXELS, nothing)
         exposure = int(self._state.settings.get("SetExposure", "Rows"))
         stars = replace(stars, skew_px=stars.smear_px * settings.field.rows / exposure)
         found = identify(stars, settings.field, settings.profile, database, self._meter, hint)

@@ -16,14 +16,8 @@ from cubestack.firmware_model.aramis.detection.smear import is_drawn_out, smear_
 from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
-from cubestack.firmware_model.aramis.solution import (
-    Outcome,
-    Profile,
-    Reason,
-    Solution,
-    StarList,
-    unsolved,
-)
+from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList, unsolved
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["PUBLISHED", "VERIFIED", "Configuration", "Detection", "detect", "explain", "solve"]
@@ -150,7 +144,7 @@ def solve(
     stars = detect(picture, background, configuration.field, configuration.detection, meter)
     if stars is None:
         nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
-        return unsolved(Outcome.NONE, Reason.TOO_MANY_PIXELS, nothing)
+        return unsolved(Reason.TOO_MANY_PIXELS, nothing)
     solution = identify(stars, configuration.field, configuration.profile, database, meter, hint)
     return explain(solution, picture, configuration, meter)
 
@@ -162,7 +156,7 @@ def explain(
 
     Phase `verification`.
     """
-    if not configuration.profile.verify or solution.outcome is not Outcome.NONE:
+    if not configuration.profile.verify or solution.outcome is not MeasurementOutcome.NONE:
         return solution
     if solution.reason is Reason.SMEAR:
         return solution

@@ -4,46 +4,16 @@ AraMiS thesis, sections 5.7 (the three outcomes), 5.9 (rough direction) and appe
 """
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.matching.matching import MatchEnd
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
-__all__ = ["NONE", "Outcome", "Profile", "Reason", "Solution", "StarList", "unsolved"]
+__all__ = ["NONE", "Profile", "Solution", "StarList", "unsolved"]
 
 NONE = -1
 """Mark of a measured star without identity."""
-
-
-class Outcome(Enum):
-    """The three outcomes of section 5.7."""
-
-    CONCLUSIVE = "conclusive"
-    AMBIGUOUS = "ambiguous"
-    NONE = "none"
-
-
-class Reason(Enum):
-    """Why an identification ended as it did."""
-
-    UNIQUE = "one triangle of the database was left"
-    CONFIRMED = "further stars confirm the attitude"
-    SEVERAL = "several triangles of the database were left after the last pivot"
-    TOO_FEW_STARS = "there were fewer than three stars"
-    TOO_MANY_PIXELS = "too many pixels were lit to be stars"
-    DEGENERATE = "the stars stand on a line"
-    NO_TRIANGLE = "no triangle of the database has that area and moment"
-    NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
-    UNCONFIRMED = "no attitude was confirmed"
-    FAR_FROM_HINT = "the boresight is far from the rough direction"
-    SMEAR = "motion drew the stars out"
-
-    @classmethod
-    def of(cls, end: MatchEnd) -> "Reason":
-        """The reason that the end of matching gives; both have the same names and words."""
-        return cls[end.name]
 
 
 @dataclass(frozen=True)
@@ -151,7 +121,7 @@ class Solution:
         expected: catalogue stars in the field by the attitude, 0 without verification.
     """
 
-    outcome: Outcome
+    outcome: MeasurementOutcome
     reason: Reason
     quaternion: NDArray[np.float32] | None
     stars: NDArray[np.int32]
@@ -162,8 +132,7 @@ class Solution:
     expected: int = 0
 
 
-def unsolved(outcome: Outcome, reason: Reason, measured: StarList, **counts: int) -> Solution:
+def unsolved(reason: Reason, measured: StarList, **counts: int) -> Solution:
     """A solution without attitude."""
-    return Solution(
-        outcome, reason, None, np.full(len(measured), NONE, dtype=np.int32), measured, **counts
-    )
+    nothing = np.full(len(measured), NONE, dtype=np.int32)
+    return Solution(MeasurementOutcome.NONE, reason, None, nothing, measured, **counts)

@@ -24,7 +24,7 @@ from cubestack.firmware_model.cubestar.configuration import (
 )
 from cubestack.firmware_model.cubestar.detection import Detection, SearchEnd
 from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG, identify_assisted
-from cubestack.firmware_model.cubestar.matching.identification import Identification, Outcome
+from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
 from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import identify
 from cubestack.firmware_model.cubestar.phases import Phases
@@ -44,10 +44,10 @@ FEWEST_STARS = 3
 """Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4)."""
 
 _OUTCOME_FLAGS = {
-    Outcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
-    Outcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
-    Outcome.MIRRORED: "IDError",
-    Outcome.CHANCE: "IDError",
+    MatchOutcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
+    MatchOutcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
+    MatchOutcome.MIRRORED: "IDError",
+    MatchOutcome.CHANCE: "IDError",
 }
 
 
@@ -179,7 +179,7 @@ class Processing:
             results.mode = self._choose_mode()
             identification = self._match(results.mode, results.vectors)
         self._record("identification", (yield from self._phases.end("match_us", started_us)))
-        if identification.outcome is not Outcome.IDENTIFIED:
+        if identification.outcome is not MatchOutcome.IDENTIFIED:
             self._explain_failure(identification)
             self._step_back()
             return self._fail(
@@ -220,7 +220,7 @@ class Processing:
 
     def _explain_failure(self, identification: Identification) -> None:
         """Raise the flags that say more about a failure than its outcome."""
-        too_few = identification.outcome is Outcome.TOO_FEW_MATCHED
+        too_few = identification.outcome is MatchOutcome.TOO_FEW_MATCHED
         if too_few and not identification.votes.any():
             self._state.raise_flag("IDSearchError")
         mode = self.results.mode

@@ -7,14 +7,14 @@ Ours: the reset waits until shortly before the next iteration, so that results c
 then, and leaves out a turn when the host is in the middle of a message.
 """
 
-from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.phases import Phases
-from cubestack.firmware_model.cubestar.pictures import ITERATION_US
+from cubestack.firmware_model.cubestar.pictures.copied import ITERATION_US
+from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor

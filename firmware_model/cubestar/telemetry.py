@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.firmware_model.cubestar.attitude_reports import AttitudeReports
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.processing import Processing
-from cubestack.firmware_model.cubestar.star_reports import StarReports
+from cubestack.firmware_model.cubestar.reports.attitude import AttitudeReports
+from cubestack.firmware_model.cubestar.reports.stars import StarReports
+from cubestack.firmware_model.cubestar.reports.tables import SETTINGS_SHOWN, TIMES_SHOWN
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
-from cubestack.firmware_model.cubestar.telemetry_tables import SETTINGS_SHOWN, TIMES_SHOWN
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize, SwitchState

@@ -22,19 +22,12 @@ from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.assignment import assign
 from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
-from cubestack.firmware_model.aramis.matching.matching import Match, MatchEnd, match_triple
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
+from cubestack.firmware_model.aramis.matching.triples import Match, match_triple
 from cubestack.firmware_model.aramis.matching.verification import confirm, sides_agree
-from cubestack.firmware_model.aramis.solution import (
-    NONE,
-    Outcome,
-    Profile,
-    Reason,
-    Solution,
-    StarList,
-    unsolved,
-)
+from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList, unsolved
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
 __all__ = ["identify"]
@@ -62,9 +55,9 @@ def identify(
     # As published, there is no such reason, and its spike removal cuts stars into long pieces.
     smeared = profile.verify and measured.smear_px > profile.smear_px
     if smeared and measured.skew_px > profile.skew_px:
-        return unsolved(Outcome.NONE, Reason.SMEAR, measured)
+        return unsolved(Reason.SMEAR, measured)
     solution = _identify(measured, field, profile, database, meter, hint)
-    if smeared and solution.outcome is Outcome.NONE:
+    if smeared and solution.outcome is MeasurementOutcome.NONE:
         return replace(solution, reason=Reason.SMEAR)
     return solution
 
@@ -78,7 +71,7 @@ def _identify(
     hint: NDArray[np.float32] | None,
 ) -> Solution:
     if len(measured) < 3:
-        return unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, measured)
+        return unsolved(Reason.TOO_FEW_STARS, measured)
     vectors = field.directions(measured.centroids, meter)
     faces = None
     if hint is not None:
@@ -106,22 +99,23 @@ class _Search:
         main = (0, 1, 2)
         match = self._match(main)
         counts = {"candidates": len(match.candidates), "pivots": match.pivots, "triples": 1}
-        reason = Reason.of(match.end)
-        if match.end is MatchEnd.SEVERAL:
-            return unsolved(Outcome.AMBIGUOUS, reason, self.measured, **counts)
-        if match.end is not MatchEnd.UNIQUE:
-            return unsolved(Outcome.NONE, reason, self.measured, **counts)
+        reason = match.end
+        if match.end is Reason.SEVERAL:
+            several = unsolved(reason, self.measured, **counts)
+            return replace(several, outcome=MeasurementOutcome.AMBIGUOUS)
+        if match.end is not Reason.UNIQUE:
+            return unsolved(reason, self.measured, **counts)
         choices = self._identities(main, match, int(match.candidates[0]))
         if self.hint is not None:
             choices = [choice for choice in choices if self._sides_agree(main, choice)]
             if not choices:
-                return unsolved(Outcome.NONE, Reason.UNCONFIRMED, self.measured, **counts)
+                return unsolved(Reason.UNCONFIRMED, self.measured, **counts)
         identities = choices[0]
         quaternion = self._attitude(np.array(main), identities)
         if quaternion is None:
-            return unsolved(Outcome.NONE, Reason.DEGENERATE, self.measured, **counts)
+            return unsolved(Reason.DEGENERATE, self.measured, **counts)
         if self._far_from_hint(quaternion):
-            return unsolved(Outcome.NONE, Reason.FAR_FROM_HINT, self.measured, **counts)
+            return unsolved(Reason.FAR_FROM_HINT, self.measured, **counts)
         return self._solution(reason, quaternion, np.array(main), identities, **counts)
 
     def verified(self) -> Solution:
@@ -133,7 +127,7 @@ class _Search:
             match = self._match(main)
             if len(match.candidates):
                 reason = Reason.UNCONFIRMED
-            reason = reason or Reason.of(match.end)
+            reason = reason or match.end
             for triangle in match.candidates[: self.profile.candidates].tolist():
                 for identities in self._identities(main, match, triangle):
                     if not self._sides_agree(main, identities):
@@ -147,7 +141,7 @@ class _Search:
                         quaternion, stars, identities, expected = found
                         straight = self._at_middle_row(quaternion, stars, identities)
                         if straight is None:
-                            return unsolved(Outcome.NONE, Reason.SMEAR, self.measured)
+                            return unsolved(Reason.SMEAR, self.measured)
                         return self._solution(
                             Reason.CONFIRMED,
                             straight,
@@ -158,9 +152,7 @@ class _Search:
                             triples=triples,
                             expected=expected,
                         )
-        return unsolved(
-            Outcome.NONE, reason or Reason.TOO_FEW_STARS, self.measured, triples=triples
-        )
+        return unsolved(reason or Reason.TOO_FEW_STARS, self.measured, triples=triples)
 
     def _triples(self) -> Iterator[tuple[int, int, int]]:
         """Triples of the brightest stars, by the sum of their ranks."""
@@ -295,7 +287,7 @@ class _Search:
         stars = np.full(len(self.measured), NONE, dtype=np.int32)
         stars[measured] = identities
         return Solution(
-            Outcome.CONCLUSIVE,
+            MeasurementOutcome.CONCLUSIVE,
             reason,
             quaternion,
             stars,

@@ -19,7 +19,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 NONE = -1
 
 
-class Outcome(Enum):
+class MatchOutcome(Enum):
     """How an identification ended."""
 
     IDENTIFIED = "enough stars were identified"
@@ -43,7 +43,7 @@ class Identification:
 
     stars: NDArray[np.int32]
     votes: NDArray[np.uint8]
-    outcome: Outcome
+    outcome: MatchOutcome
 
     @property
     def matched(self) -> NDArray[np.intp]:
@@ -59,7 +59,7 @@ class Identification:
         return np.where(self.stars != NONE, part, np.float32(0))
 
 
-def unidentified(count: int, outcome: Outcome) -> Identification:
+def unidentified(count: int, outcome: MatchOutcome) -> Identification:
     """Identification of `count` centroids that gave nothing."""
     return Identification(
         np.full(count, NONE, dtype=np.int32), np.zeros(count, dtype=np.uint8), outcome

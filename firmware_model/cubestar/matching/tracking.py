@@ -18,7 +18,7 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     NONE,
     CentroidPairs,
     Identification,
-    Outcome,
+    MatchOutcome,
     unidentified,
     verify,
 )
@@ -55,7 +55,7 @@ def track(
     """
     count = len(directions)
     if count < FEWEST_STARS:
-        return unidentified(count, Outcome.TOO_FEW_CENTROIDS)
+        return unidentified(count, MatchOutcome.TOO_FEW_CENTROIDS)
     with meter.phase("reduction"):
         stars = catalogue.near(attitude[2], radius_deg, meter)
     with meter.phase("prediction"):
@@ -65,8 +65,10 @@ def track(
     with meter.phase("verification"):
         votes, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
     if np.count_nonzero(kept != NONE) < FEWEST_STARS:
-        return Identification(np.full(count, NONE, dtype=np.int32), votes, Outcome.TOO_FEW_MATCHED)
-    return Identification(kept, votes, Outcome.IDENTIFIED)
+        return Identification(
+            np.full(count, NONE, dtype=np.int32), votes, MatchOutcome.TOO_FEW_MATCHED
+        )
+    return Identification(kept, votes, MatchOutcome.IDENTIFIED)
 
 
 def _nearest(

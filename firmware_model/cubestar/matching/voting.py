@@ -29,7 +29,7 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     NONE,
     CentroidPairs,
     Identification,
-    Outcome,
+    MatchOutcome,
     unidentified,
     verify,
 )
@@ -39,7 +39,7 @@ __all__ = [
     "DEFAULT_MARGIN_RAD",
     "LARGEST_CHANCE",
     "Identification",
-    "Outcome",
+    "MatchOutcome",
     "identify",
     "identify_among",
 ]
@@ -93,7 +93,7 @@ def identify_among(
     """
     count = len(directions)
     if count < FEWEST_STARS:
-        return unidentified(count, Outcome.TOO_FEW_CENTROIDS)
+        return unidentified(count, MatchOutcome.TOO_FEW_CENTROIDS)
     with meter.phase("distances"):
         pairs = CentroidPairs.measure(directions, meter)
     with meter.phase("votes"):
@@ -107,7 +107,7 @@ def identify_among(
         outcome = _judge(
             kept, directions, vectors, entries.looked_up, stars_per_sr, margin_rad, meter
         )
-    if outcome is not Outcome.IDENTIFIED:
+    if outcome is not MatchOutcome.IDENTIFIED:
         return Identification(np.full(count, NONE, dtype=np.int32), confirmed, outcome)
     return Identification(kept, confirmed, outcome)
 
@@ -206,16 +206,16 @@ def _judge(
     stars_per_sr: float,
     margin_rad: float,
     meter: Meter,
-) -> Outcome:
+) -> MatchOutcome:
     """Decide whether the kept identities can be believed."""
     matched = np.flatnonzero(kept != NONE)
     if len(matched) < FEWEST_STARS:
-        return Outcome.TOO_FEW_MATCHED
+        return MatchOutcome.TOO_FEW_MATCHED
     if _mirrored(directions[matched], vectors[kept[matched]], meter):
-        return Outcome.MIRRORED
+        return MatchOutcome.MIRRORED
     chance = expected_coincidences(len(kept), len(matched), looked_up, stars_per_sr, margin_rad)
     meter.charge(f32_mul=2 * len(matched) + 6, f32_div=len(matched), f32_compare=1)
-    return Outcome.CHANCE if chance > LARGEST_CHANCE else Outcome.IDENTIFIED
+    return MatchOutcome.CHANCE if chance > LARGEST_CHANCE else MatchOutcome.IDENTIFIED
 
 
 def expected_coincidences(

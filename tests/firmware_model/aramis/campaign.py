@@ -13,7 +13,8 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
-from cubestack.firmware_model.aramis.solution import Outcome, Profile
+from cubestack.firmware_model.aramis.solution import Profile
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -42,8 +43,8 @@ def rates(
         meter = Meter(BLACKFIN_BF533)
         solution = identify(made.stars, field, profile, onboard, meter, hint)
         cycles += meter.total
-        if solution.outcome is not Outcome.CONCLUSIVE:
-            counts[solution.outcome.value] += 1
+        if solution.outcome is not MeasurementOutcome.CONCLUSIVE:
+            counts[solution.outcome.name.lower()] += 1
             continue
         counts["right" if is_right(solution, made.attitude) else "wrong"] += 1
         counts["far"] += not in_published_sense(solution, made, onboard)

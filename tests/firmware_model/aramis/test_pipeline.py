@@ -17,7 +17,7 @@ from cubestack.firmware_model.aramis.pipeline import (
     detect,
     solve,
 )
-from cubestack.firmware_model.aramis.solution import Outcome, Reason
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -54,7 +54,7 @@ def sky(seed: int) -> tuple[Picture, NDArray[np.uint8]]:
 def test_a_picture_gives_the_attitude(seed: int) -> None:
     made, image = sky(seed)
     solution = solve(image, Background(), VERIFIED, database(), meter())
-    assert solution.outcome is Outcome.CONCLUSIVE
+    assert solution.outcome is MeasurementOutcome.CONCLUSIVE
     assert solution.quaternion is not None
     cross, roll = errors_deg(solution.quaternion, made.attitude)
     assert cross < 0.01
@@ -117,7 +117,7 @@ def test_only_the_brightest_are_kept() -> None:
 def test_an_empty_picture(configuration: Configuration, level: int) -> None:
     image = np.full((FIELD.rows, FIELD.columns), level, dtype=np.uint8)
     solution = solve(image, Background(), configuration, database(), meter())
-    assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.TOO_FEW_STARS)
+    assert (solution.outcome, solution.reason) == (MeasurementOutcome.NONE, Reason.TOO_FEW_STARS)
 
 
 def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
@@ -126,14 +126,14 @@ def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
     image[::2] = 0
     off = replace(VERIFIED, detection=replace(VERIFIED.detection, spikes=SpikeRemoval.OFF))
     solution = solve(image, Background(), off, database(), meter())
-    assert (solution.outcome, solution.reason) == (Outcome.NONE, Reason.TOO_MANY_PIXELS)
+    assert (solution.outcome, solution.reason) == (MeasurementOutcome.NONE, Reason.TOO_MANY_PIXELS)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_dice_give_no_attitude(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (FIELD.rows, FIELD.columns))
     solution = solve(image.astype(np.uint8), Background(), VERIFIED, database(), meter())
-    assert solution.outcome is Outcome.NONE
+    assert solution.outcome is MeasurementOutcome.NONE
 
 
 def test_a_picture_of_another_size_is_refused() -> None:

@@ -18,7 +18,7 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, solve
-from cubestack.firmware_model.aramis.solution import Outcome
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -56,7 +56,7 @@ def test_each_is_solved(path: Path, aided: bool) -> None:
     solution = solve(
         picture, Background(), configuration, database(ONBOARD), Meter(BLACKFIN_BF533), hint
     )
-    assert solution.outcome is Outcome.CONCLUSIVE
+    assert solution.outcome is MeasurementOutcome.CONCLUSIVE
     assert solution.quaternion is not None
     cross, roll = errors_deg(solution.quaternion, truth)
     assert cross < 0.05

@@ -11,7 +11,8 @@ from cubestack.firmware_model.aramis.detection.smear import is_drawn_out, smear_
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, explain
-from cubestack.firmware_model.aramis.solution import Outcome, Reason, StarList, unsolved
+from cubestack.firmware_model.aramis.solution import StarList, unsolved
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -78,7 +79,7 @@ def test_a_picture_without_noise_is_not_drawn_out() -> None:
 
 def test_streaks_explain_why_there_is_no_attitude() -> None:
     nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
-    failed = unsolved(Outcome.NONE, Reason.TOO_FEW_STARS, nothing)
+    failed = unsolved(Reason.TOO_FEW_STARS, nothing)
     streaks, rest = swept(95, 40, light=800), swept(0, 0, light=800)
     assert explain(failed, streaks, VERIFIED, meter()).reason is Reason.SMEAR
     assert explain(failed, rest, VERIFIED, meter()).reason is Reason.TOO_FEW_STARS
@@ -90,12 +91,12 @@ def test_smear_is_the_reason_when_there_is_no_attitude() -> None:
     few = made.stars.centroids[:2], made.stars.brightness[:2]
     for smear, reason in ((9.0, Reason.SMEAR), (2.0, Reason.TOO_FEW_STARS)):
         found = identify(StarList(*few, smear), FIELD, VERIFIED.profile, database(), meter())
-        assert (found.outcome, found.reason) == (Outcome.NONE, reason)
+        assert (found.outcome, found.reason) == (MeasurementOutcome.NONE, reason)
 
 
 def test_a_skewed_picture_is_refused_and_a_smeared_one_is_not() -> None:
     made = picture(np.random.default_rng(2), FIELD).stars
-    for skew, outcome in ((1.0, Outcome.CONCLUSIVE), (9.0, Outcome.NONE)):
+    for skew, outcome in ((1.0, MeasurementOutcome.CONCLUSIVE), (9.0, MeasurementOutcome.NONE)):
         stars = StarList(made.centroids, made.brightness, 20.0, skew)
         found = identify(stars, FIELD, VERIFIED.profile, database(), meter())
         assert found.outcome is outcome

@@ -11,7 +11,8 @@ from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
-from cubestack.firmware_model.aramis.solution import Outcome, Reason, StarList
+from cubestack.firmware_model.aramis.solution import StarList
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -104,4 +105,4 @@ def test_moving_stars_are_solved_for_the_middle_row() -> None:
     assert errors[1] < errors[0] / 2
     strict = replace(VERIFIED.profile, motion_sigma_rad=0.0)
     refused = identify(skewed, FIELD, strict, database(), meter())
-    assert (refused.outcome, refused.reason) == (Outcome.NONE, Reason.SMEAR)
+    assert (refused.outcome, refused.reason) == (MeasurementOutcome.NONE, Reason.SMEAR)

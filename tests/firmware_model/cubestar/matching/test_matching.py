@@ -14,7 +14,7 @@ from cubestack.firmware_model.cubestar.matching.assisted import identify_assiste
 from cubestack.firmware_model.cubestar.matching.identification import (
     CentroidPairs,
     Identification,
-    Outcome,
+    MatchOutcome,
     verify,
 )
 from cubestack.firmware_model.cubestar.matching.tracking import track
@@ -33,9 +33,9 @@ def check(found: Identification, stars: NDArray[np.int64]) -> tuple[bool, int]:
     """Whether it is solved, and how many kept identities are wrong."""
     matched = found.matched
     wrong = int((found.stars[matched] != stars[matched]).sum())
-    assert (found.outcome is Outcome.IDENTIFIED) == (len(matched) > 0)
+    assert (found.outcome is MatchOutcome.IDENTIFIED) == (len(matched) > 0)
     assert len(set(found.stars[matched].tolist())) == len(matched)
-    return found.outcome is Outcome.IDENTIFIED, wrong
+    return found.outcome is MatchOutcome.IDENTIFIED, wrong
 
 
 def near(
@@ -96,7 +96,7 @@ def test_a_boresight_on_the_other_side_of_the_sky_finds_nothing(
         shot = shoot(rng)
         hint = -shot.attitude[2].astype(np.float32)
         found = identify_assisted(shot.directions, catalogue, hint, Meter(CORTEX_M3))
-        assert found.outcome is not Outcome.IDENTIFIED
+        assert found.outcome is not MatchOutcome.IDENTIFIED
 
 
 @pytest.mark.parametrize("count", [3, 5, 10, 20])
@@ -110,7 +110,7 @@ def test_points_that_are_no_stars_are_not_identified(
         rays = np.column_stack([rng.uniform(-half, half, (count, 2)), np.ones(count)])
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         found = identify(rays.astype(np.float32), catalogue, Meter(CORTEX_M3))
-        solved += found.outcome is Outcome.IDENTIFIED
+        solved += found.outcome is MatchOutcome.IDENTIFIED
     assert solved <= 3
 
 
@@ -121,8 +121,8 @@ def test_the_mirror_image_of_the_sky_is_refused(catalogue: StarCatalogue, shoot:
         shot = shoot(rng)
         mirrored = shot.directions * np.array([-1, 1, 1], dtype=np.float32)
         outcomes.append(identify(mirrored, catalogue, Meter(CORTEX_M3)).outcome)
-    assert Outcome.IDENTIFIED not in outcomes
-    assert outcomes.count(Outcome.MIRRORED) > 30
+    assert MatchOutcome.IDENTIFIED not in outcomes
+    assert outcomes.count(MatchOutcome.MIRRORED) > 30
 
 
 def test_three_stars_that_fit_two_places_get_no_identity() -> None:
@@ -133,15 +133,15 @@ def test_three_stars_that_fit_two_places_get_no_identity() -> None:
     sky = StarCatalogue.build(np.arange(6), twice, np.ones(6), 3.8, 57.3)
     once = StarCatalogue.build(np.arange(3), triple, np.ones(3), 3.8, 57.3)
     rays = triple.astype(np.float32)
-    assert identify(rays, once, Meter(CORTEX_M3)).outcome is Outcome.IDENTIFIED
-    assert identify(rays, sky, Meter(CORTEX_M3)).outcome is Outcome.TOO_FEW_MATCHED
+    assert identify(rays, once, Meter(CORTEX_M3)).outcome is MatchOutcome.IDENTIFIED
+    assert identify(rays, sky, Meter(CORTEX_M3)).outcome is MatchOutcome.TOO_FEW_MATCHED
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_fewer_than_three_centroids_are_not_enough(catalogue: StarCatalogue, count: int) -> None:
     rays = np.tile(np.array([[0, 0, 1]], dtype=np.float32), (count, 1))
     found = identify(rays, catalogue, Meter(CORTEX_M3))
-    assert found.outcome is Outcome.TOO_FEW_CENTROIDS
+    assert found.outcome is MatchOutcome.TOO_FEW_CENTROIDS
     assert found.stars.tolist() == [-1] * count
 
 
@@ -169,7 +169,7 @@ def test_tracking_loses_a_turn_beyond_its_reach(catalogue: StarCatalogue, shoot:
         turn = Rotation.from_rotvec(np.radians([1.0, 0, 0])).as_matrix()
         last = (turn @ shot.attitude).astype(np.float32)
         lost += track(shot.directions, catalogue, last, Meter(CORTEX_M3)).outcome is not (
-            Outcome.IDENTIFIED
+            MatchOutcome.IDENTIFIED
         )
     assert lost >= 38
 
@@ -181,7 +181,7 @@ def test_tracking_needs_two_stars_only(catalogue: StarCatalogue, shoot: Shoot) -
     assert found.stars.tolist() == shot.stars.tolist()
     assert found.votes.tolist() == [1, 1]
     one = track(shot.directions[:1], catalogue, shot.attitude.astype(np.float32), Meter(CORTEX_M3))
-    assert one.outcome is Outcome.TOO_FEW_CENTROIDS
+    assert one.outcome is MatchOutcome.TOO_FEW_CENTROIDS
 
 
 def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:

@@ -11,7 +11,6 @@ are searched.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from math import ceil, log2
 
 import numpy as np
@@ -19,9 +18,10 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
+from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["BOUND_SIGMAS", "Match", "MatchEnd", "find_triangles", "match_triple"]
+__all__ = ["BOUND_SIGMAS", "Match", "find_triangles", "match_triple"]
 
 BOUND_SIGMAS = np.float32(3)
 
@@ -30,16 +30,6 @@ PIVOT_PAIRS = ((0, 1), (0, 2), (0, 1))
 
 #: The three pairs of a triangle's stars.
 _FIRST, _SECOND = [0, 0, 1], [1, 2, 2]
-
-
-class MatchEnd(Enum):
-    """How matching one main triangle ended."""
-
-    UNIQUE = "one triangle of the database was left"
-    SEVERAL = "several triangles of the database were left after the last pivot"
-    DEGENERATE = "the stars stand on a line"
-    NO_TRIANGLE = "no triangle of the database has that area and moment"
-    NO_SHARED_PAIR = "no candidate shared two stars with a pivot triangle's"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +43,7 @@ class Match:
         pivots: pivot triangles that were used.
     """
 
-    end: MatchEnd
+    end: Reason
     main: Triangle | None
     candidates: NDArray[np.uint32]
     pivots: int
@@ -118,11 +108,11 @@ def match_triple(
     with meter.phase("triangles"):
         triangle = measure_triangle(vectors[list(main)], sigma_rad, meter)
     if triangle is None:
-        return Match(MatchEnd.DEGENERATE, None, _NOTHING, 0)
+        return Match(Reason.DEGENERATE, None, _NOTHING, 0)
     with meter.phase("search"):
         left = find_triangles(triangle, database, faces, meter)
     if len(left) == 0:
-        return Match(MatchEnd.NO_TRIANGLE, triangle, left, 0)
+        return Match(Reason.NO_TRIANGLE, triangle, left, 0)
     used = 0
     for (first, second), star in zip(PIVOT_PAIRS, pivots, strict=False):
         if len(left) <= enough:
@@ -137,8 +127,8 @@ def match_triple(
         with meter.phase("pivoting"):
             left = left[_share_pair(database.stars[left], database.stars[others], meter)]
         if len(left) == 0:
-            return Match(MatchEnd.NO_SHARED_PAIR, triangle, left, used)
-    end = MatchEnd.UNIQUE if len(left) == 1 else MatchEnd.SEVERAL
+            return Match(Reason.NO_SHARED_PAIR, triangle, left, used)
+    end = Reason.UNIQUE if len(left) == 1 else Reason.SEVERAL
     return Match(end, triangle, left, used)
 
 

@@ -4,12 +4,12 @@ import math
 
 import pytest
 
+from cubestack.firmware_model.cubestar.reports.tables import SETTINGS_SHOWN, TIMES_SHOWN
 from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
-from cubestack.firmware_model.cubestar.telemetry_tables import SETTINGS_SHOWN, TIMES_SHOWN
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
 
-from .bench import Bench
-from .sky import Sky
+from ..bench import Bench
+from ..sky import Sky
 
 
 @pytest.mark.parametrize("frame", SETTINGS_SHOWN | TIMES_SHOWN)

@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 
-from .bench import Bench
-from .sky import Sky, attitude_of, error_deg, take
+from ..bench import Bench
+from ..sky import Sky, attitude_of, error_deg, take
 
 
 @pytest.fixture(params=range(4))

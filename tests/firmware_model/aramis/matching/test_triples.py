@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.matching.matching import MatchEnd, find_triangles, match_triple
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
+from cubestack.firmware_model.aramis.matching.triples import find_triangles, match_triple
+from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -106,10 +107,10 @@ def test_pivots_leave_the_true_triangle() -> None:
         match = match_triple(
             directions(made), (0, 1, 2), (3, 4, 5), 2 * SIGMA, database(), None, meter()
         )
-        if match.end is MatchEnd.UNIQUE:
+        if match.end is Reason.UNIQUE:
             assert match.candidates.tolist() == [true]
         ends.append(match.end)
-    assert ends.count(MatchEnd.UNIQUE) > 0.9 * len(ends)
+    assert ends.count(Reason.UNIQUE) > 0.9 * len(ends)
 
 
 def test_each_pivot_thins_the_candidates() -> None:
@@ -189,14 +190,14 @@ def test_enough_candidates_need_no_pivot() -> None:
 def test_a_triangle_that_the_sky_does_not_have() -> None:
     far = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
     match = match_triple(far, (0, 1, 2), (), SIGMA, database(), None, meter())
-    assert match.end is MatchEnd.NO_TRIANGLE
+    assert match.end is Reason.NO_TRIANGLE
     assert len(match.candidates) == 0
 
 
 def test_three_times_the_same_star() -> None:
     same = np.tile(np.array([0, 0, 1], dtype=np.float32), (3, 1))
     match = match_triple(same, (0, 1, 2), (), SIGMA, database(), None, meter())
-    assert match.end is MatchEnd.DEGENERATE
+    assert match.end is Reason.DEGENERATE
 
 
 def test_phases_are_booked() -> None:

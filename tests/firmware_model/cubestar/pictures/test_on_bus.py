@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubestar.bus_pictures import pictures_of
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, detect_stars
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
-from cubestack.firmware_model.cubestar.pictures import ITERATION_US, Pictures
+from cubestack.firmware_model.cubestar.pictures.copied import ITERATION_US, Pictures
+from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
@@ -21,7 +21,7 @@ from cubestack.firmware_model.mcu.external_bus import EBI
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.mcu.requests import BusAccess, Routine, SetPin
 
-from .sky import Sky
+from ..sky import Sky
 
 ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]
 SIZE = 2 * IMAGE_BYTES

@@ -17,7 +17,7 @@ from cubestack.firmware_model.cubestar.detection import (
     search_stars,
 )
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.cubestar.pictures import (
+from cubestack.firmware_model.cubestar.pictures.copied import (
     ITERATION_US,
     CopiedPictures,
     Pictures,

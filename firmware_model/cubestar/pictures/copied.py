@@ -2,7 +2,7 @@
 
 CubeStar thesis, section 3.3. Here the published layout, option 1: the FPGA stores into its own
 SRAM, and the program copies the picture to the processor's. The others are in
-:mod:`cubestack.firmware_model.cubestar.bus_pictures`.
+:mod:`cubestack.firmware_model.cubestar.pictures.on_bus`.
 """
 
 from typing import Protocol

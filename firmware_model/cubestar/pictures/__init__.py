@@ -1,0 +1,1 @@
+"""Where pictures lie and how they get there, by memory layout."""
