@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,11 @@ from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.sim.power import PowerModel
-from cubestack.emulator.sim.power_tables import PowerTable
+from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Processor, Program
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["Board", "EngineKind", "SerialLine"]
-
-EngineKind = Literal["auto", "compiled", "python"]
-"""How FPGAs are run; see ``make_engine``."""
+__all__ = ["Board", "SerialLine"]
 
 SILENCE_BYTES = 100
 """Byte times of silence after which a UART gives up half a message: assumed."""

@@ -5,7 +5,7 @@ Stands where the processor looks for its FPGA and passes on everything else.
 
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.faults.injection import Injection, Report, active
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
-from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.external_bus import Transactions
+from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 
 __all__ = ["PinFaults"]
@@ -22,14 +21,14 @@ __all__ = ["PinFaults"]
 PS_PER_NS = 1000
 
 
-class PinFaults:
+class PinFaults(FpgaPort):
     """An FPGA whose pins are not what they should be.
 
     Attributes:
         around_reads: called before and after bytes are taken from the FPGA.
     """
 
-    def __init__(self, env: Kernel, engine: RtlEngine, report: Report) -> None:
+    def __init__(self, env: Kernel, engine: FpgaPort, report: Report) -> None:
         """Stand before ``engine``."""
         self._env = env
         self._engine = engine
@@ -45,12 +44,8 @@ class PinFaults:
         """Stand between the FPGA and the processor of a board."""
         assert sites.engine is not None
         pins = cls(sites.kernel, sites.engine, report)
-        sites.processor.engine = cast(RtlEngine, pins)  # it has what a processor calls
+        sites.processor.fpga = pins
         return pins
-
-    def __getattr__(self, name: str) -> Any:
-        """Whatever is not disturbed."""
-        return getattr(self._engine, name)
 
     def prepare(self, injection: Injection) -> None:
         """Nothing yet."""
@@ -70,6 +65,11 @@ class PinFaults:
             self._injections.remove(injection)
 
     # --- what a processor calls -----------------------------------------------------------------
+
+    @property
+    def now_ps(self) -> int:
+        """Virtual time of the FPGA."""
+        return self._engine.now_ps
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive a pin; one that is in a glitch follows after it."""

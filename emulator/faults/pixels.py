@@ -22,7 +22,7 @@ from cubestack.emulator.faults.table import (
     PixelDead,
     PixelHot,
 )
-from cubestack.emulator.rtl.contract import PixelSource, StreamSegment
+from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
 
 __all__ = ["FaultySource"]
 
@@ -34,7 +34,7 @@ _PIXEL_FAULTS = (PixelHot, PixelDead, ColumnDefect, Blooming)
 
 @dataclass(frozen=True)
 class _Piece:
-    """A segment with a grid of its own; see StreamSegment and PixelSource."""
+    """A segment with a grid of its own; see PixelSegment and PixelSource."""
 
     start_ps: int
     clocks: int
@@ -77,7 +77,7 @@ class FaultySource:
         self.active_columns = source.active_columns
         self._cut: tuple[tuple[object, ...], list[_Piece]] | None = None
 
-    def segment_at(self, time_ps: int) -> StreamSegment | None:
+    def segment_at(self, time_ps: int) -> PixelSegment | None:
         """See PixelSource."""
         if active(self.injections, CameraDead, time_ps):
             return None
@@ -104,7 +104,7 @@ class FaultySource:
 
     # --- the picture ----------------------------------------------------------------------------
 
-    def _spoiled(self, base: StreamSegment, hits: list[_Hit]) -> Callable[[], Picture]:
+    def _spoiled(self, base: PixelSegment, hits: list[_Hit]) -> Callable[[], Picture]:
         """Renders the picture with its faults, once; the log then knows that it was needed."""
         rendered: list[Picture] = []
         line_ps = self.line_clocks * self.period
@@ -132,7 +132,7 @@ class FaultySource:
 
     # --- the clocks -----------------------------------------------------------------------------
 
-    def _hits(self, base: StreamSegment) -> list[_Hit]:
+    def _hits(self, base: PixelSegment) -> list[_Hit]:
         """What hits the clocks of this frame, by line."""
         hits: dict[int, _Hit] = {}
         for injection in self.injections:
@@ -150,7 +150,7 @@ class FaultySource:
             hits.setdefault(row, _Hit(injection, row, column))
         return [hits[row] for row in sorted(hits)]
 
-    def _pieces(self, base: StreamSegment) -> list[_Piece]:
+    def _pieces(self, base: PixelSegment) -> list[_Piece]:
         hits = self._hits(base)
         full = self._spoiled(base, hits)
         pieces: list[_Piece] = []

@@ -38,7 +38,7 @@ class Sites:
 
     Attributes:
         kernel: virtual time.
-        processor: it looks for its FPGA in ``processor.engine``.
+        processor: it looks for its FPGA in ``processor.fpga``.
         uarts: serial lines.
         buses: I2C buses to the satellite.
         supplies: all supply channels.

@@ -4,30 +4,22 @@ Two engines keep to it. The compiled one is quick; the one on the Amaranth simul
 reference, and the fallback where there is no C++ compiler.
 """
 
-import warnings
 from collections import Counter
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import Literal, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from amaranth.lib.wiring import Component
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.external_bus import Transactions
-from cubestack.emulator.rtl.sram import SramTiming, Violation, ViolationKind
-from cubestack.emulator.rtl.wiring import Wiring, wiring_of
+from cubestack.emulator.rtl.sram import Violation, ViolationKind
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.sim.fpga_port import FpgaPort
 
-__all__ = [
-    "PinEvent",
-    "PixelSource",
-    "RtlEngine",
-    "StreamSegment",
-    "make_engine",
-]
+__all__ = ["PinEvent", "PixelSegment", "PixelSource", "RtlEngine"]
 
 
-class StreamSegment(Protocol):
+class PixelSegment(Protocol):
     """A stretch of the camera's output with an unbroken pixel clock: blanking, or whole lines."""
 
     @property
@@ -73,7 +65,7 @@ class PixelSource(Protocol):
     def active_columns(self) -> int:
         """Clocks of a line with the line pin high."""
 
-    def segment_at(self, time_ps: int) -> StreamSegment | None:
+    def segment_at(self, time_ps: int) -> PixelSegment | None:
         """Segment whose clocks contain ``time_ps``; None when there is no pixel clock then.
 
         After None the engine asks again only when told to, by ``stream_changed``.
@@ -88,7 +80,7 @@ class PinEvent(NamedTuple):
     level: int
 
 
-class RtlEngine(Protocol):
+class RtlEngine(FpgaPort, Protocol):
     """A wiring's design, cycle for cycle, and its SRAMs.
 
     Time only moves in ``run``, ``apply``, ``strobe_read`` and ``access``. At one instant, edges of
@@ -107,10 +99,6 @@ class RtlEngine(Protocol):
     @property
     def sram(self) -> NDArray[np.uint8]:
         """Bytes of the first memory."""
-
-    @property
-    def now_ps(self) -> int:
-        """Virtual time."""
 
     @property
     def violations(self) -> list[Violation]:
@@ -146,41 +134,6 @@ class RtlEngine(Protocol):
         A register that is in reset at once has its reset value again.
         """
 
-    def set_pin(self, name: str, value: int) -> None:
-        """Drive one of the wiring's ``mcu_pins`` from ``now_ps`` on; ValueError for any other."""
-
-    def get_pin(self, name: str) -> int:
-        """Settled level at ``now_ps`` of any input or output pin.
-
-        Clocks that change nothing may have been skipped. The one trace that leaves is in a memory's
-        D_O while its D_OE is low.
-        """
-
-    def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
-        """Advance to ``until_ps``, pixel clock edges at that very instant included.
-
-        ``stop_on`` is one of the wiring's acknowledges and a level: stop right after the edge that
-        brings it to that level, or at once when it is there already; later cameras' edges at that
-        instant are then still to come. Returns ``now_ps``; ValueError for a time in the past.
-        """
-
-    def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
-        """Run the microcontroller's transfer loop from ``now_ps``.
-
-        In each cycle of ``period`` ps, the data clock rises, the data pins are taken into ``out``
-        after half the period, and the clock falls. Only cycles that end by ``until_ps`` are made.
-        Returns how many, n; ``now_ps`` advances by floor(n * period). The fraction cut off there is
-        kept for a burst of the same period that follows at once, so that bursts do not drift.
-        """
-
-    def access(self, transactions: Transactions, until_ps: int) -> int:
-        """Make transactions on the microcontroller's external bus from ``now_ps``.
-
-        A read of which no byte comes back takes what the lines kept: address bits 15..8. Only
-        transactions that end by ``until_ps`` are made. Returns how many, n; ``now_ps`` advances by
-        floor(n * period). ValueError for a design without that bus.
-        """
-
     def apply(self, events: Sequence[PinEvent]) -> NDArray[np.int64]:
         """Drive any input pin at any time, for tests of one engine against another.
 
@@ -191,43 +144,3 @@ class RtlEngine(Protocol):
 
     def close(self) -> None:
         """Release what the engine holds; it can not be used afterwards."""
-
-
-def make_engine(
-    design: Wiring | Component | None = None,
-    kind: Literal["auto", "compiled", "python"] = "auto",
-    sram_timing: SramTiming | None = None,
-    *,
-    skipping: bool = True,
-) -> RtlEngine:
-    """Make an engine.
-
-    Args:
-        design: a wiring, or a design that has a ready one (``CubeStarTop``, ``CubeSensePair``);
-            CubeStar's full-size board unless given.
-        kind: "compiled", "python" (the Amaranth simulator), or "auto": compiled where there is a
-            C++ compiler, else the simulator with a warning.
-        sram_timing: limits that the SRAM model checks.
-        skipping: skip pixel clocks that provably change nothing.
-
-    Raises:
-        TypeError: there is no ready wiring for ``design``.
-        CompilerError: "compiled" without a C++ compiler, or the compiler failed.
-    """
-    # Here because the engines import this module for the contract above.
-    from cubestack.emulator.rtl.cxxrtl.build import NoCompilerError
-    from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
-    from cubestack.emulator.rtl.simulated import SimulatedEngine
-
-    wiring = wiring_of(design)
-    if kind == "python":
-        return SimulatedEngine(wiring, sram_timing, skipping=skipping)
-    try:
-        return CompiledEngine(wiring, sram_timing, skipping=skipping)
-    except NoCompilerError as error:
-        if kind == "compiled":
-            raise
-        warnings.warn(
-            f"{error}; using the Amaranth simulator, about a thousand times slower", stacklevel=2
-        )
-        return SimulatedEngine(wiring, sram_timing, skipping=skipping)

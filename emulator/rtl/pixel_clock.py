@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.contract import PixelSource, StreamSegment
+from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
 
 __all__ = ["LoadedSegment"]
 
@@ -27,14 +27,14 @@ class LoadedSegment:
         pixels: the lines once rendered, else None.
     """
 
-    segment: StreamSegment
+    segment: PixelSegment
     half_period: Fraction
     line_clocks: int
     active_columns: int
     pixels: NDArray[np.uint8] | None = None
 
     @classmethod
-    def of(cls, source: PixelSource, segment: StreamSegment) -> "LoadedSegment":
+    def of(cls, source: PixelSource, segment: PixelSegment) -> "LoadedSegment":
         """Check ``segment`` of ``source``; ValueError names what does not fit."""
         if segment.rows and segment.clocks != segment.rows * source.line_clocks:
             raise ValueError(

@@ -18,7 +18,7 @@ from cubestack.emulator.rtl.sram import (
     Violation,
     ViolationLog,
 )
-from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
+from cubestack.emulator.rtl.stepping import BurstEnd, SteppingEngine
 from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
 __all__ = ["SimulatedEngine"]
@@ -146,7 +146,7 @@ class SimulatedEngine(SteppingEngine):
     def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
         self._put_sample(self._streams[camera])
 
-    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, Outcome, int]:
+    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, BurstEnd, int]:
         before = self._acknowledges()
         while True:
             camera = min(cameras, key=lambda number: self._streams[number].time_ps)
@@ -154,17 +154,17 @@ class SimulatedEngine(SteppingEngine):
             assert stream.loaded is not None
             time_ps = stream.time_ps
             if time_ps > until_ps:
-                return until_ps, Outcome.TIME_REACHED, camera
+                return until_ps, BurstEnd.TIME_REACHED, camera
             self._make_edge(stream, stream.loaded, time_ps, until_ps)
-            outcome = Outcome.TIME_REACHED
+            end = BurstEnd.TIME_REACHED
             if self._acknowledges() != before:
-                outcome = Outcome.ACKNOWLEDGE_CHANGED
+                end = BurstEnd.ACKNOWLEDGE_CHANGED
             elif stream.edge == stream.loaded.edges:
-                outcome = Outcome.SEGMENT_OVER
-            if outcome is not Outcome.TIME_REACHED:
+                end = BurstEnd.SEGMENT_OVER
+            if end is not BurstEnd.TIME_REACHED:
                 for number in cameras:
                     self._come_back(self._streams[number], time_ps, number > camera)
-                return time_ps, outcome, camera
+                return time_ps, end, camera
 
     def _acknowledges(self) -> list[int]:
         return [self._get(name) for name in self.wiring.acknowledges]

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.contract import PinEvent, PixelSource
-from cubestack.emulator.rtl.external_bus import STEPS, TAKE, Transactions
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.sram import Violation, ViolationKind, ViolationLog
 from cubestack.emulator.rtl.wiring import CameraPins, Wiring
+from cubestack.emulator.sim.fpga_port import STEPS, TAKE, Transactions
 
-__all__ = ["Outcome", "SteppingEngine"]
+__all__ = ["BurstEnd", "SteppingEngine"]
 
 
-class Outcome(Enum):
+class BurstEnd(Enum):
     """Why a burst of pixel clock edges ended."""
 
     TIME_REACHED = auto()
@@ -102,7 +102,7 @@ class SteppingEngine(ABC):
         """The lines of the loaded segment have been rendered."""
 
     @abstractmethod
-    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, Outcome, int]:
+    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, BurstEnd, int]:
         """Make the edges of the loaded segments up to ``until_ps``.
 
         Edges are made in the order of time, then of ``cameras``. Returns the time reached, why,
@@ -190,10 +190,10 @@ class SteppingEngine(ABC):
                 self.now_ps = until_ps
                 return self.now_ps
             # An acknowledge is where idle time begins, so it ends the burst in any case.
-            self.now_ps, outcome, number = self._burst(until_ps, [c.number for c in running])
-            if outcome is Outcome.SEGMENT_OVER:
+            self.now_ps, end, number = self._burst(until_ps, [c.number for c in running])
+            if end is BurstEnd.SEGMENT_OVER:
                 self._follow_segment(self._cameras[number])
-            elif outcome is Outcome.TIME_REACHED or (
+            elif end is BurstEnd.TIME_REACHED or (
                 stop_on is not None and self._get(stop_on[0]) == stop_on[1]
             ):
                 return self.now_ps
@@ -245,7 +245,7 @@ class SteppingEngine(ABC):
             if step == TAKE and not transactions.write:
                 driven = self._get(f"{bus.low}_OE")
                 transactions.data[index] = self._get(f"{bus.low}_{'O' if driven else 'I'}")
-            for pin, level in transactions.levels(bus, event):
+            for pin, level in bus.levels(transactions, event):
                 self._set(pin, level)
             last = step == STEPS - 1 and not transactions.write
             if last and transactions.data[index] > transactions.above:

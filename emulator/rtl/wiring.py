@@ -3,42 +3,32 @@
 Everything that no camera drives and no memory is the microcontroller's.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 from amaranth.lib.wiring import Component, In
 
-from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
-from cubestack.hdl.cubesense.pair import CubeSensePair
-from cubestack.hdl.cubestar.double_top import CubeStarDouble
-from cubestack.hdl.cubestar.shared_top import CubeStarShared
-from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
+from cubestack.emulator.sim.fpga_port import STEPS, Transactions
 
 __all__ = [
     "MEMORY_PINS",
     "BusPins",
     "CameraPins",
+    "Level",
+    "Levels",
     "MemoryPins",
     "Wiring",
-    "cubesense_wiring",
-    "cubestar_double_wiring",
-    "cubestar_shared_wiring",
-    "cubestar_two_boards_wiring",
-    "cubestar_wiring",
-    "wiring_of",
 ]
 
 #: An SRAM's pins, seen from the FPGA.
 MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 Level = Callable[[str], int]
-Levels = tuple[tuple[str, int], ...]
+"""Tells a pin's level."""
 
-#: CubeStar's boards while they store, and the external bus between two accesses.
-_STORING: Levels = (("ENABLE", 1), ("RNW", 0))
-_AT_REST: Levels = (("ALE", 0), ("RE_N", 1), ("WE_N", 1))
+Levels = tuple[tuple[str, int], ...]
+"""Pins with levels."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +93,31 @@ class BusPins:
     latch: str = "ALE"
     read: str = "RE_N"
     write: str = "WE_N"
+
+    def levels(self, transactions: Transactions, event: int) -> Sequence[tuple[str, int]]:
+        """What the microcontroller's lines go to at ``event`` of ``transactions``.
+
+        It drives the lower lines while they carry an address, or a byte to be written; after that
+        they keep their level. The order of events is that of ``docs/gateware-cubestar-next.md``.
+        """
+        index, step = divmod(event, STEPS)
+        address, low = int(transactions.addresses[index]), f"{self.low}_I"
+        select = self.selects[transactions.select]
+        strobe = self.write if transactions.write else self.read
+        match step:
+            case 0:
+                high, middle = address >> 16 & 0xFF, address >> 8 & 0xFF
+                return ((self.high, high), (low, middle), (self.latch, 1))
+            case 1:
+                return ((self.latch, 0),)
+            case 2:
+                byte = ((low, int(transactions.data[index])),) if transactions.write else ()
+                return ((self.high, address & 0xFF), *byte, (select, 0))
+            case 3:
+                return ((strobe, 0),)
+            case 4:
+                return ((strobe, 1),)
+        return ((select, 1),)
 
 
 @dataclass(frozen=True)
@@ -172,163 +187,3 @@ class Wiring:
     def _members(self, flow: object) -> list[str]:
         members = self.component.signature.members
         return [name for name, member in members.items() if flow in (None, member.flow)]
-
-
-def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
-    """CubeStar's FPGA board: one camera, "imager", and one memory, "SRAM".
-
-    Not storing, its pixel clock domain is in reset; with ACK high it waits for one.
-    """
-
-    def storing(level: Level) -> Collection[str]:
-        stores = level("ENABLE") and not level("RNW") and not level("ACK")
-        return ("imager",) if stores else ()
-
-    return Wiring(
-        top or CubeStarTop(),
-        cameras=(CameraPins("imager", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"),),
-        memories=(MemoryPins("SRAM"),),
-        data_clock="DCLK",
-        data="DATA",
-        acknowledges=("ACK",),
-        storing=storing,
-        # Two release the reset, one ends the store, one the line.
-        settling_clocks=8,
-        burst_levels=((("DCLK", 0), *_STORING),),
-    )
-
-
-def cubestar_shared_wiring(top: CubeStarShared | None = None) -> Wiring:
-    """CubeStar's FPGA board with one shared memory, "SRAM"."""
-    return _on_bus(top or CubeStarShared(), (MemoryPins("SRAM"),), (_STORING,))
-
-
-def cubestar_double_wiring(top: CubeStarDouble | None = None) -> Wiring:
-    """CubeStar's FPGA board with two memories in turn, "SRAM1" and "SRAM2"."""
-    names = ("SRAM1", "SRAM2")
-    memories = tuple(MemoryPins(name, part=name) for name in names)
-    return _on_bus(top or CubeStarDouble(), memories, ((*_STORING, *_AT_REST, ("CS_N", 1)),))
-
-
-def cubestar_two_boards_wiring(boards: CubeStarTwoBoards | None = None) -> Wiring:
-    """Two of CubeStar's boards with one shared memory each, "SRAM1" and "SRAM2"."""
-    prefixes = ("BOARD1_", "BOARD2_")
-    memories = tuple(MemoryPins(f"SRAM{n}", prefix) for n, prefix in enumerate(prefixes, 1))
-    levels = tuple(
-        tuple((f"{board}{pin}", level) for board, own in states for pin, level in own)
-        for storing, other in (prefixes, prefixes[::-1])
-        for others in ((("ENABLE", 0),), (("ENABLE", 1), ("RNW", 1)))
-        for states in [((storing, _STORING), (other, others), ("", _AT_REST))]
-    )
-    return _on_bus(boards or CubeStarTwoBoards(), memories, levels, prefixes, "CONTENTION")
-
-
-def _on_bus(
-    component: Component,
-    memories: tuple[MemoryPins, ...],
-    burst_levels: tuple[Levels, ...],
-    boards: tuple[str, ...] = ("",),
-    contention: str | None = None,
-) -> Wiring:
-    """CubeStar's boards on the external bus; ``boards`` goes before the names of their own pins."""
-
-    def storing(level: Level) -> Collection[str]:
-        stores = any(
-            level(f"{board}ENABLE") and not level(f"{board}RNW") and not level(f"{board}ACK")
-            for board in boards
-        )
-        return ("imager",) if stores else ()
-
-    return Wiring(
-        component,
-        cameras=(CameraPins("imager", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"),),
-        memories=memories,
-        data_clock="RE_N",
-        data="AD_LOW_O",
-        acknowledges=tuple(f"{board}ACK" for board in boards),
-        storing=storing,
-        settling_clocks=8,  # as above
-        contention=contention,
-        burst_levels=burst_levels,
-        bus=BusPins(tuple(f"{board}CS_N" for board in boards)),
-    )
-
-
-def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool = False) -> Wiring:
-    """CubeSense's two FPGAs: cameras and memories "sun" and "nadir".
-
-    A pixel clock changes something while an FPGA stores with it that has not raised its ACK.
-    ``mcu_addressing`` is that of the full-size pair, which is taken when none is given.
-    """
-    if pair is None:
-        pair = CubeSensePair(mcu_addressing=mcu_addressing)
-
-    def storing(level: Level) -> Collection[str]:
-        controls = (level(name) for name in ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN"))
-        clocks = _clocks_used(*controls)
-        acks = ("SUNACK", "NADACK")
-        return [clock for clock, ack in zip(clocks, acks, strict=True) if clock and not level(ack)]
-
-    return Wiring(
-        pair,
-        cameras=(
-            CameraPins("sun", "SUN_PCLK", "SUN_Y", "SUN_HREF"),
-            CameraPins("nadir", "NAD_PCLK", "NAD_Y", "NAD_HREF"),
-        ),
-        memories=(MemoryPins("sun", "SUN_"), MemoryPins("nadir", "NAD_")),
-        data_clock="CLK",
-        data="DATA",
-        acknowledges=("SUNACK", "NADACK"),
-        storing=storing,
-        # As CubeStar's; then the pause between two frames is counted.
-        settling_clocks=8 + pair.read_out.frame_gap,
-        contention="CONTENTION",
-        burst_levels=tuple((("CLK", 0), *levels.items()) for levels in _storing_levels()),
-    )
-
-
-def wiring_of(design: Wiring | Component | None) -> Wiring:
-    """The wiring of one of our designs; None is CubeStar's board.
-
-    Raises:
-        TypeError: there is no ready wiring for that design.
-    """
-    match design:
-        case Wiring():
-            return design
-        case None | CubeStarTop():
-            return cubestar_wiring(design)
-        case CubeSensePair():
-            return cubesense_wiring(design)
-        case CubeStarShared():
-            return cubestar_shared_wiring(design)
-        case CubeStarDouble():
-            return cubestar_double_wiring(design)
-        case CubeStarTwoBoards():
-            return cubestar_two_boards_wiring(design)
-    raise TypeError(f"{type(design).__name__} has no ready wiring: make a Wiring for it")
-
-
-def _storing_levels() -> list[dict[str, int]]:
-    """Levels of the control lines in each command that stores a picture."""
-    storing = {Action.STORE, Action.STORE_OTHER}
-    return [
-        {
-            "SHIFT": command.shift or 0,
-            "EDGE": command.edge or 0,
-            "RNW": command.rnw or 0,
-            "SUNEN": command.sunen,
-            "NADEN": command.naden,
-        }
-        for command in COMMANDS
-        if storing & {*command.actions}
-    ]
-
-
-@cache
-def _clocks_used(*controls: int) -> tuple[str | None, str | None]:
-    """Camera whose clock stores into the sun's memory, and into the nadir's."""
-    acts = actions(*controls)
-    sun = {Action.STORE: "sun", Action.STORE_OTHER: "nadir"}.get(acts.sun)
-    nadir = {Action.STORE: "nadir", Action.STORE_OTHER: "sun"}.get(acts.nadir)
-    return sun, nadir

@@ -1,19 +1,45 @@
-"""Supply currents, load switches, latch-up and the comparators that watch for it.
+"""Supply currents, load switches, latch-up and the comparators that watch for it."""
 
-Which parts there are and what they draw is in :mod:`cubestack.emulator.sim.power_tables`.
-"""
-
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import simpy
 
-from cubestack.emulator.sim.power_tables import PowerTable
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
 
-__all__ = ["COMPARATOR_US", "PowerModel"]
+__all__ = ["COMPARATOR_US", "Part", "PowerModel", "PowerTable"]
 
 COMPARATOR_US = 2
 """Response time of monitor and comparator: assumed."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A consumer.
+
+    Attributes:
+        channel: load switch that it is behind; None for the unswitched supply.
+        ma: current in mA by state; it starts in the first one.
+    """
+
+    channel: str | None
+    ma: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class PowerTable:
+    """A board's supplies.
+
+    Attributes:
+        volts: of the supply that the currents are drawn from.
+        parts: by name.
+        channels: load switches, with the trip current of each one's comparator in mA; None where
+            there is no comparator.
+    """
+
+    volts: float
+    parts: Mapping[str, Part]
+    channels: Mapping[str, float | None]
 
 
 class PowerModel:

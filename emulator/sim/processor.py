@@ -12,8 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 import simpy
 
-from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.external_bus import Transactions
+from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import (
@@ -61,10 +60,10 @@ class Pins(Protocol):
     def __contains__(self, pin: object) -> bool:
         """Whether this is one of them."""
 
-    def set(self, pin: str, level: int) -> None:
+    def set_pin(self, pin: str, level: int) -> None:
         """Drive an output pin from now on."""
 
-    def get(self, pin: str) -> int:
+    def get_pin(self, pin: str) -> int:
         """Level of a pin now."""
 
 
@@ -72,7 +71,7 @@ class Processor:
     """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
 
     Attributes:
-        engine: what the processor has at its pins to the FPGA.
+        fpga: what the processor has at its pins to the FPGA; None on a board without.
         program: the running program, for the interrupt lines of the peripherals.
         resets: number of resets since power-up.
         waiting: asleep until an interrupt, with no deadline.
@@ -83,7 +82,7 @@ class Processor:
         self,
         env: Kernel,
         meter: Meter,
-        engine: RtlEngine,
+        fpga: FpgaPort | None,
         camera_bus: CameraBus | None,
         boot: Callable[[int], Program],
         *,
@@ -99,7 +98,7 @@ class Processor:
         Args:
             env: kernel; its time is in ps.
             meter: what the program charges its cycles to; its table gives the clock.
-            engine: the FPGA board.
+            fpga: the FPGA; None without one: requests that need it are a ValueError then.
             camera_bus: the camera's control bus; None where the program drives its lines as pins.
             boot: makes the program after a reset; its argument is the cause (see ``Reset``).
             power_on_cause: cause of the first start.
@@ -112,7 +111,7 @@ class Processor:
         """
         self._env = env
         self._meter = meter
-        self.engine = engine
+        self.fpga = fpga
         self._camera_bus = camera_bus
         self._boot = boot
         self._boot_us = boot_us
@@ -133,10 +132,10 @@ class Processor:
         if not self._wake.triggered:
             self._wake.succeed()
 
-    def load(self, select: int, address: int, count: int) -> bytes:
+    def load(self, select: int, address: int, count: int, cycles: int) -> bytes:
         """Read bytes over the external bus in an interrupt, which still has to charge them.
 
-        The engine is ahead of the kernel then, until they are paid.
+        Each takes ``cycles``. The FPGA is ahead of the kernel then, until they are paid.
         """
         self._follow()
         addresses = np.arange(address, address + count, dtype=np.int32)
@@ -145,10 +144,10 @@ class Processor:
             np.zeros(count, np.uint8),
             False,
             self._cycle,
-            self._meter.table.operations["ebi_read"].cycles,
+            cycles,
             select,
         )
-        self.engine.access(reads, self.engine.now_ps + int(count * reads.period))
+        self._reached.access(reads, self._reached.now_ps + int(count * reads.period))
         return reads.data.tobytes()
 
     def _run(self) -> Steps:
@@ -191,20 +190,13 @@ class Processor:
             case ReadTimer():
                 return self._env.now // PS_PER_US
             case SetPin(pin, level):
-                self._follow()
-                if self._other_pins is not None and pin in self._other_pins:
-                    self._other_pins.set(pin, level)
-                else:
-                    self.engine.set_pin(pin, level)
+                self._pins_of(request).set_pin(pin, level)
                 self._meter.charge(port_write=1)
                 self._on_pin(pin, level)
                 return None
             case ReadPin(pin):
-                self._follow()
                 self._meter.charge(port_read=1)
-                if self._other_pins is not None and pin in self._other_pins:
-                    return self._other_pins.get(pin)
-                return self.engine.get_pin(pin)
+                return self._pins_of(request).get_pin(pin)
             case AwaitPin():
                 return (yield from self._await_pin(request))
             case Sleep():
@@ -227,7 +219,22 @@ class Processor:
 
     def _follow(self) -> None:
         """Let the FPGA be where the processor is; after an interrupt's accesses it is ahead."""
-        self.engine.run(max(self._env.now, self.engine.now_ps))
+        if self.fpga is not None:
+            self.fpga.run(max(self._env.now, self.fpga.now_ps))
+
+    @property
+    def _reached(self) -> FpgaPort:
+        """The FPGA; asked for anew after each wait, as a fault may begin to stand before it."""
+        if self.fpga is None:
+            raise ValueError("this board has no FPGA: its program can not reach for one")
+        return self.fpga
+
+    def _pins_of(self, request: SetPin | ReadPin) -> Pins | FpgaPort:
+        """Where the pin of ``request`` leads to."""
+        self._follow()
+        if self._other_pins is not None and request.pin in self._other_pins:
+            return self._other_pins
+        return self._reached
 
     def _horizon(self) -> int:
         """Nothing else happens before this time, so the FPGA may run ahead up to it."""
@@ -240,11 +247,11 @@ class Processor:
         deadline = start + request.timeout_us * PS_PER_US
         self._follow()
         reached = start
-        while self.engine.get_pin(request.pin) != request.level:
+        while self._reached.get_pin(request.pin) != request.level:
             if self._env.now >= deadline:
                 return False
-            until = max(self.engine.now_ps, min(deadline, self._horizon()))
-            reached = self.engine.run(until, (request.pin, request.level))
+            until = max(self._reached.now_ps, min(deadline, self._horizon()))
+            reached = self._reached.run(until, (request.pin, request.level))
             yield self._env.timeout(reached - self._env.now)
         poll = request.poll_cycles * PS_PER_S
         polls = max(1, -(-(reached - start) * self._clock.hz // poll))
@@ -276,10 +283,11 @@ class Processor:
         while done < len(request.target):
             yield from self._pay()
             self._follow()
+            fpga = self._reached
             # At least one cycle: an event inside it is an interrupt in the middle of the loop.
             limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
-            done += self.engine.strobe_read(request.target[done:], period, limit)
-            yield self._env.timeout(self.engine.now_ps - self._env.now)
+            done += fpga.strobe_read(request.target[done:], period, limit)
+            yield self._env.timeout(fpga.now_ps - self._env.now)
         return None
 
     def _bus_access(self, request: BusAccess) -> Steps:
@@ -287,6 +295,7 @@ class Processor:
         while done < total:
             yield from self._pay()
             self._follow()
+            fpga = self._reached
             wanted = Transactions(
                 request.addresses[done:],
                 request.data[done:],
@@ -298,9 +307,9 @@ class Processor:
             )
             # At least one, as above.
             one = -(-wanted.period.numerator // wanted.period.denominator)
-            limit = max(self._horizon(), self.engine.now_ps + one)
-            done += self.engine.access(wanted, limit)
-            yield self._env.timeout(self.engine.now_ps - self._env.now)
+            limit = max(self._horizon(), fpga.now_ps + one)
+            done += fpga.access(wanted, limit)
+            yield self._env.timeout(fpga.now_ps - self._env.now)
             if not request.write and request.data[done - 1] > request.above:
                 break
         return done

@@ -66,15 +66,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and report."""
-    from cubestack.emulator.rtl.benchmark import (
-        PAIR_STORES,
-        cold_build_s,
+    from cubestack.emulator.boards.cubesense.benchmark import (
+        STORES,
         pair_scan_ms,
         pair_store_ms,
-        rtl_clocks_per_s,
-        strobes_per_s,
+        pair_with_cameras,
     )
-    from cubestack.emulator.rtl.wiring import cubesense_wiring
+    from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+    from cubestack.emulator.boards.cubestar.benchmark import rtl_clocks_per_s, strobes_per_s
+    from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+    from cubestack.emulator.rtl.benchmark import cold_build_s
     from cubestack.emulator.scene.attitude import quaternion_from_pointing
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.emulator.scene.sky import SkyScene
@@ -89,10 +90,10 @@ def run(args: argparse.Namespace) -> int:
         figures["realtime_ratio"] = round(_realtime_ratio(session), 2)
     with open_cubesense(EarthSunScene(), engine="compiled") as sensors:
         figures["sensors_ratio"] = round(_sensors_ratio(sensors), 2)
-    figures["cold_build_s"] = round(cold_build_s(), 1)
-    for way in PAIR_STORES:
-        figures[f"pair_{way}_ms"] = round(pair_store_ms(way), 1)
-    figures["pair_scan_ms"] = round(pair_scan_ms(), 1)
+    figures["cold_build_s"] = round(cold_build_s(cubestar_wiring()), 1)
+    for way in STORES:
+        figures[f"pair_{way}_ms"] = round(pair_store_ms(pair_with_cameras(), way), 1)
+    figures["pair_scan_ms"] = round(pair_scan_ms(pair_with_cameras()), 1)
     figures["pair_build_s"] = round(cold_build_s(cubesense_wiring()), 1)
     figures |= _aramis()
     figures |= _i2c()

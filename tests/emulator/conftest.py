@@ -93,10 +93,10 @@ class FakePins:
     def __contains__(self, pin: object) -> bool:
         return pin == "LINE"
 
-    def set(self, pin: str, level: int) -> None:
+    def set_pin(self, pin: str, level: int) -> None:
         self.driven = level
 
-    def get(self, pin: str) -> int:
+    def get_pin(self, pin: str) -> int:
         return 1 - self.driven
 
 
@@ -130,7 +130,7 @@ class Desk:
         self.processor = Processor(
             self.kernel,
             self.meter,
-            self.engine,  # type: ignore[arg-type]
+            self.engine,
             self.camera_bus,
             self._boot,
             power_on_cause=POWER_ON,

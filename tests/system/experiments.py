@@ -23,6 +23,7 @@ import numpy as np
 
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.catalogue import PAIR_LIMIT_DEG, onboard_catalogue
+from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.scene.attitude import (
     attitude_error_deg,
@@ -31,7 +32,6 @@ from cubestack.emulator.scene.attitude import (
     random_quaternion,
 )
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.emulator.sim.power_tables import CUBESTAR
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
 from cubestack.host.clients.cubestar.client import CubeStar
@@ -267,7 +267,7 @@ def loop(frames: int) -> None:
             if turn >= 3:
                 rows.append(stack.cubestar.phase_times())
         seconds = (board.kernel.now - started) / PS_PER_S
-        power = (board.power.charge_mas() - charge) * CUBESTAR.volts / seconds
+        power = (board.power.charge_mas() - charge) * CUBESTAR_POWER.volts / seconds
     for name in rows[0]:
         print(f"{name}: {np.mean([row[name] for row in rows]):.1f} ms")
     print(f"mean power {power:.1f} mW over {seconds:.0f} s")

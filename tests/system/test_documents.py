@@ -131,8 +131,8 @@ def test_commands_of_the_fidelity_page_exist(root: Path) -> None:
 
 
 def test_commands_and_figures_of_cubesense_s_page(root: Path) -> None:
+    from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
     from cubestack.emulator.sim.power import PowerModel
-    from cubestack.emulator.sim.power_tables import CUBESENSE
     from cubestack.emulator.sim.virtual_time import Kernel
     from cubestack.firmware_model.cubesense.memory import Memory, budget, used
     from cubestack.host.cli.main import make_parser
@@ -151,7 +151,7 @@ def test_commands_and_figures_of_cubesense_s_page(root: Path) -> None:
     compared = 0
     for processor, *parts, published, ours, _ in states:
         memories, cameras, sides = (counts[part] for part in parts)
-        power = PowerModel(Kernel(), CUBESENSE)
+        power = PowerModel(Kernel(), CUBESENSE_POWER)
         power.set_state("processor", "on" if processor == "on" else "reset")
         for half, (number, side) in enumerate((("1", "sun"), ("2", "nadir"))):
             power.switch(f"SRAM{number}", half < memories)
@@ -159,7 +159,7 @@ def test_commands_and_figures_of_cubesense_s_page(root: Path) -> None:
             if half < sides:
                 power.set_state(f"sram{number}", "active")
                 power.set_state(f"{side}_fpga", "imaging")
-        milliwatts = power.current_ma() * CUBESENSE.volts
+        milliwatts = power.current_ma() * CUBESENSE_POWER.volts
         assert milliwatts == pytest.approx(float(ours), abs=0.06)
         assert milliwatts == pytest.approx(float(published), rel=0.06)
         compared += 1

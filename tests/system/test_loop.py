@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.scene.attitude import attitude_error_deg, random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.emulator.sim.power_tables import CUBESTAR
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 from cubestack.host.clients.cubestar.client import Attitude
@@ -88,7 +88,7 @@ def test_phases_and_mean_power_beside_the_published_ones(looping: Any) -> None:
         for phase, published in PUBLISHED_PHASES.items():
             assert turn.phases[phase] == pytest.approx(published, abs=5), phase
         assert sum(turn.phases[phase] for phase in PUBLISHED_PHASES) == pytest.approx(1000, abs=2)
-    assert spent_mas * CUBESTAR.volts / seconds == pytest.approx(PUBLISHED_MEAN_MW, rel=0.01)
+    assert spent_mas * CUBESTAR_POWER.volts / seconds == pytest.approx(PUBLISHED_MEAN_MW, rel=0.01)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

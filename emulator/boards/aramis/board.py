@@ -7,23 +7,22 @@ flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
 
 from collections import deque
 from fractions import Fraction
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.aramis.power import ARAMIS_POWER
 from cubestack.emulator.boards.aramis.ppi import Ppi
-from cubestack.emulator.boards.contract import Board, EngineKind
+from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.faults.seu import flip_bits
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
-from cubestack.emulator.sim.no_fpga import NoFpga
-from cubestack.emulator.sim.power_tables import Part, PowerTable
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
 from cubestack.firmware_model.aramis.catalogue.database import Database
@@ -39,7 +38,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.mcu.requests import CameraTransfer
 
-__all__ = ["ARAMIS_POWER", "AramisBoard"]
+__all__ = ["AramisBoard"]
 
 BOOT_US = 50_000
 """Reset to main: the boot code copies the program from flash to memory (assumed)."""
@@ -49,19 +48,6 @@ CAMERA_BUS_HZ = 100_000
 
 REMEMBERED = 8
 """Frames whose exposure is kept."""
-
-#: MT9M001 data sheet: 363 mW working, 294 uW in standby, at 3.3 V. The others are assumed; the
-#: thesis sums its parts in a figure only (2.16).
-ARAMIS_POWER = PowerTable(
-    volts=3.3,
-    parts={
-        "camera": Part("camera", {"standby": 0.1, "working": 110.0}),
-        "processor": Part(None, {"sleep": 15.0, "run": 110.0}),
-        "sdram": Part(None, {"on": 60.0}),
-        "flash": Part(None, {"on": 5.0}),
-    },
-    channels={"camera": None},
-)
 
 
 class AramisBoard(Board):
@@ -127,7 +113,7 @@ class AramisBoard(Board):
         self.processor = Processor(
             self.kernel,
             meter,
-            cast(RtlEngine, NoFpga()),  # it has what a processor calls
+            None,
             _CameraBus(self),
             boot,
             power_on_cause=ResetCause.POWER_ON,

@@ -6,16 +6,19 @@ microcontroller for both, its buses to the satellite, and its switches and curre
 
 from functools import lru_cache
 
-from cubestack.emulator.boards.contract import Board, EngineKind
+from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.boards.cubesense.gpio import GpioPins
+from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
 from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.factory import EngineKind, make_engine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth
-from cubestack.emulator.sim.power_tables import CUBESENSE
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.hardware import Port
@@ -34,7 +37,6 @@ from cubestack.firmware_model.interface.cubesense.pins import ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.hdl.cubesense.pair import CubeSensePair
 
 __all__ = ["CubeSenseBoard"]
 
@@ -49,9 +51,9 @@ CLOCKED = (*STORING, Action.SEND_PICTURE)
 
 
 @lru_cache(maxsize=2)
-def _design(mcu_addressing: bool) -> CubeSensePair:
-    """Both FPGAs; kept, as the engine knows its library by the design's text, which takes time."""
-    return CubeSensePair(mcu_addressing=mcu_addressing)
+def _wiring(mcu_addressing: bool) -> Wiring:
+    """Of both FPGAs; kept, as an engine knows its library by the design's text, a slow thing."""
+    return cubesense_wiring(mcu_addressing=mcu_addressing)
 
 
 class CubeSenseBoard(Board):
@@ -92,8 +94,8 @@ class CubeSenseBoard(Board):
             i2c_address: 7-bit address of the node protocol.
             register_address: 7-bit address of the register-pointer protocol.
         """
-        super().__init__(CUBESENSE, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
-        self.engine = make_engine(_design(mcu_addressing), kind=engine)
+        super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        self.engine = make_engine(_wiring(mcu_addressing), engine)
         self.cameras = {camera: Ov7620(scene, camera) for camera in Camera}
         self._failed: set[Camera] = set()
         self._serial_line(baud, lambda: self.program.node)

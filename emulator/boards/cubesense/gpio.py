@@ -49,11 +49,11 @@ class GpioPins:
     def release(self) -> None:
         """The processor was reset: resistors pull control lines up and switches off."""
         for pin in CHANNELS:
-            self.set(pin, 0)
+            self.set_pin(pin, 0)
         for pin in _CONTROL:
-            self.set(pin, 1)
+            self.set_pin(pin, 1)
 
-    def set(self, pin: str, level: int) -> None:
+    def set_pin(self, pin: str, level: int) -> None:
         """Drive a pin."""
         self._driven[pin] = level
         if pin in CHANNELS:
@@ -62,7 +62,7 @@ class GpioPins:
             camera, line = _CONTROL[pin]
             self._cameras[camera].on_pin(line, level, self._env.now)
 
-    def get(self, pin: str) -> int:
+    def get_pin(self, pin: str) -> int:
         """Level of a pin; a camera may pull its data line low."""
         if pin in _CONTROL and _CONTROL[pin][1] == "SDA":
             return self._driven[pin] & self._cameras[_CONTROL[pin][0]].sda

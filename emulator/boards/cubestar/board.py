@@ -10,14 +10,15 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.boards.contract import Board, EngineKind
+from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.boards.cubestar.layouts import BOARDS
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.camera.common.optics import ROWS
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
@@ -40,6 +41,10 @@ BOOT_US = 3_000
 
 CAMERA_BUS_HZ = 100_000
 """Standard mode; the sources give no rate."""
+
+
+EBI_READ_CYCLES = CORTEX_M3.operations["ebi_read"].cycles
+"""Of the processor, for a byte that an interrupt reads over its external bus."""
 
 
 class CubeStarBoard(Board):
@@ -225,7 +230,7 @@ class _Efm32gg:
         return self._board.uart.backlog
 
     def bus_read(self, select: int, address: int, count: int) -> bytes:
-        return self._board.processor.load(select, address, count)
+        return self._board.processor.load(select, address, count, EBI_READ_CYCLES)
 
     def wake(self) -> None:
         self._board.processor.wake()

@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 
 from amaranth.hdl import Fragment
 
-from cubestack.emulator.rtl.wiring import (
-    Wiring,
+from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.boards.cubestar.wiring import (
     cubestar_double_wiring,
     cubestar_shared_wiring,
     cubestar_two_boards_wiring,
     cubestar_wiring,
 )
-from cubestack.emulator.sim.power_tables import CUBESTAR, Part, PowerTable
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 
 __all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
@@ -28,7 +29,7 @@ __all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
 Pins = Mapping[str, int]
 States = dict[str, str]
 
-SRAM_MA = CUBESTAR.parts["memory"].ma
+SRAM_MA = CUBESTAR_POWER.parts["memory"].ma
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,10 @@ class LayoutBoard:
 
 def _powered(fpgas: tuple[str, ...], memories: int) -> PowerTable:
     """Currents with ``fpgas`` boards and so many memories, each for itself."""
-    parts = {name: part for name, part in CUBESTAR.parts.items() if name not in ("fpga", "memory")}
-    whole = CUBESTAR.parts["fpga"].ma
+    parts = {
+        name: part for name, part in CUBESTAR_POWER.parts.items() if name not in ("fpga", "memory")
+    }
+    whole = CUBESTAR_POWER.parts["fpga"].ma
     alone = {
         "standby": whole["standby"] - SRAM_MA["standby"],
         "storing": whole["storing"] - SRAM_MA["transfer"],
@@ -69,7 +72,7 @@ def _powered(fpgas: tuple[str, ...], memories: int) -> PowerTable:
     idle, used = SRAM_MA["standby"], SRAM_MA["transfer"]
     memory = {f"{n} used": n * used + (memories - n) * idle for n in range(memories + 1)}
     return replace(
-        CUBESTAR,
+        CUBESTAR_POWER,
         parts={
             **parts,
             "memory": Part("memory", memory),
@@ -117,7 +120,7 @@ BOARDS = {
         1,
         cubestar_wiring,
         _ONE_FPGA,
-        CUBESTAR,
+        CUBESTAR_POWER,
         _stores,
         _copied_states,
         external_ram=True,

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.cxxrtl.build import library_for
-from cubestack.emulator.rtl.external_bus import STEPS, Transactions
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.sram import (
     BETWEEN_FPGAS,
@@ -21,13 +20,14 @@ from cubestack.emulator.rtl.sram import (
     Violation,
     ViolationLog,
 )
-from cubestack.emulator.rtl.stepping import Outcome, SteppingEngine
+from cubestack.emulator.rtl.stepping import BurstEnd, SteppingEngine
 from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.sim.fpga_port import STEPS, Transactions
 
 __all__ = ["CompiledEngine"]
 
 _KINDS = tuple(RULES)
-_OUTCOMES = tuple(Outcome)  # declared in the driver's order
+_BURST_ENDS = tuple(BurstEnd)  # declared in the driver's order
 
 
 class _Segment(ctypes.Structure):
@@ -220,14 +220,14 @@ class CompiledEngine(SteppingEngine):
         # The loaded segment keeps the array alive while the driver reads it.
         self._library.driver_use_pixels(self._handle, camera, pixels.ctypes.data)
 
-    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, Outcome, int]:
+    def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, BurstEnd, int]:
         self._reached.value = self.now_ps
         running = sum(1 << camera for camera in cameras)
-        outcome = self._library.driver_burst(
+        end = self._library.driver_burst(
             self._handle, until_ps, running, self._reached, self._camera
         )
         self._collect_violations()
-        return max(self.now_ps, self._reached.value), _OUTCOMES[outcome], self._camera.value
+        return max(self.now_ps, self._reached.value), _BURST_ENDS[end], self._camera.value
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
         if not out.flags.c_contiguous or out.dtype != np.uint8:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import make_engine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tops import TOPS
 from tests.benchmarks.engines import speeds

@@ -13,15 +13,15 @@ import numpy as np
 from amaranth.utils import ceil_log2
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
-from cubestack.emulator.rtl.wiring import (
-    Wiring,
-    cubesense_wiring,
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.boards.cubestar.wiring import (
     cubestar_double_wiring,
     cubestar_shared_wiring,
     cubestar_two_boards_wiring,
     cubestar_wiring,
 )
+from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
 from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ

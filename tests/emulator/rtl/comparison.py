@@ -5,7 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
 

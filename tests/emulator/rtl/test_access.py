@@ -7,12 +7,19 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import RtlEngine, make_engine
+from cubestack.emulator.boards.cubestar.wiring import (
+    cubestar_double_wiring,
+    cubestar_shared_wiring,
+    cubestar_two_boards_wiring,
+    cubestar_wiring,
+)
+from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
-from cubestack.emulator.rtl.external_bus import Transactions
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.stepping import SteppingEngine
-from cubestack.emulator.rtl.wiring import Wiring, wiring_of
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.sim.fpga_port import Transactions
 from cubestack.firmware_model.mcu.external_bus import BusTiming
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
@@ -23,7 +30,11 @@ from .comparison import Step, assert_same, engines
 
 COLUMNS, ROWS = 8, 4
 CYCLE = Fraction(10**12, 48_000_000)
-DESIGNS = (CubeStarShared, CubeStarDouble, CubeStarTwoBoards)
+WIRINGS = {
+    CubeStarShared: cubestar_shared_wiring,
+    CubeStarDouble: cubestar_double_wiring,
+    CubeStarTwoBoards: cubestar_two_boards_wiring,
+}
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="there is no C++ compiler")
 
@@ -78,11 +89,11 @@ def random_step(rng: np.random.Generator, wiring: Wiring) -> Step:
 
 
 @needs_compiler
-@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize("design", WIRINGS)
 def test_every_engine_makes_the_same_transactions(design, make_random_camera) -> None:
     """At any time: beside pixels that are stored, in standby, over the ends of segments."""
     rng = np.random.default_rng(7)
-    wiring = wiring_of(design(COLUMNS, ROWS))
+    wiring = WIRINGS[design](design(COLUMNS, ROWS))
     all_engines = engines(wiring)
     camera = make_random_camera(rng, COLUMNS, ROWS)
     assert_same(all_engines, lambda engine: engine.attach(camera), "camera")
@@ -94,7 +105,7 @@ def test_every_engine_makes_the_same_transactions(design, make_random_camera) ->
 def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin(make_camera) -> None:
     """Beside a picture that is stored in the other memory, at every engine's own speed."""
     rng = np.random.default_rng(3)
-    wiring = wiring_of(CubeStarDouble())
+    wiring = cubestar_double_wiring()
     found = []
     for bulk in (True, False):
         engine = make_engine(wiring, "compiled")
@@ -122,7 +133,7 @@ def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin(make_camera) -> None:
 @pytest.fixture
 def shared() -> RtlEngine:
     kind = "python" if find_compiler() is None else "compiled"
-    return make_engine(CubeStarShared(COLUMNS, ROWS), kind)
+    return make_engine(cubestar_shared_wiring(CubeStarShared(COLUMNS, ROWS)), kind)
 
 
 def opened(engine: RtlEngine) -> RtlEngine:
@@ -184,7 +195,7 @@ def test_errors_say_what_would_be_right(shared: RtlEngine) -> None:
     with pytest.raises(ValueError, match="no chip select 1, only CS_N"):
         shared.access(transactions([1], select=1), 10**9)
     with pytest.raises(ValueError, match="CubeStarTop has no external bus"):
-        make_engine(CubeStarTop(COLUMNS, ROWS), "python").access(transactions([1]), 10**9)
+        make_engine(cubestar_wiring(CubeStarTop(3, 2)), "python").access(transactions([1]), 10**9)
     with pytest.raises(ValueError, match="takes 6 cycles, not 5"):
         transactions([1], cycles=5)
     with pytest.raises(ValueError, match="2 addresses have 1 bytes: one each"):

@@ -5,8 +5,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import PinEvent, RtlEngine, make_engine
-from cubestack.emulator.rtl.wiring import cubestar_wiring
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.rtl.contract import PinEvent, RtlEngine
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.cubestar.top import CubeStarTop
 
 PERIOD = 100_000
@@ -22,7 +23,7 @@ FRAME = (BLANK + ROWS * LINE) * PERIOD
 
 @pytest.fixture(params=["compiled", "python"])
 def engine(request):
-    engine = make_engine(CubeStarTop(COLUMNS, ROWS), request.param)
+    engine = make_engine(cubestar_wiring(CubeStarTop(COLUMNS, ROWS)), request.param)
     yield engine
     engine.close()
 
@@ -308,7 +309,7 @@ def test_segments_that_do_not_fit_are_refused(engine, make_camera):
 
 
 def test_closed_compiled_engine_says_so():
-    engine = make_engine(CubeStarTop(COLUMNS, ROWS), "compiled")
+    engine = make_engine(cubestar_wiring(CubeStarTop(COLUMNS, ROWS)), "compiled")
     engine.close()
     with pytest.raises(RuntimeError, match="the engine is closed"):
         engine.get_pin("ACK")

@@ -5,9 +5,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import PinEvent, make_engine
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.rtl.contract import PinEvent
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.sram import SramTiming
-from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import rtlil_text
 
@@ -127,7 +129,7 @@ def test_pin_by_pin(seed):
 def test_low_lines_are_really_skipped(make_camera):
     """An hour of blanking costs nothing, and the frame behind it is stored all the same."""
     camera = make_camera(blank=36_000_000_000)
-    engine = make_engine(CubeStarTop(*SIZES[0]), "compiled")
+    engine = make_engine(cubestar_wiring(CubeStarTop(*SIZES[0])), "compiled")
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
     start = camera.segments[1].start_ps
@@ -139,7 +141,7 @@ def test_other_limits_reach_the_model(make_camera):
     slow = SramTiming(write_pulse_ps=60_000, data_setup_ps=110_000)
     counts = []
     for kind in ("compiled", "python"):
-        engine = make_engine(CubeStarTop(*SIZES[0]), kind, slow)
+        engine = make_engine(cubestar_wiring(CubeStarTop(*SIZES[0])), kind, slow)
         engine.attach(make_camera(frames=1))
         engine.set_pin("ENABLE", 1)
         engine.run(10**10)

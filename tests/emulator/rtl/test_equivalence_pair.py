@@ -7,9 +7,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import PinEvent, make_engine
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.rtl.contract import PinEvent
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.sram import SramTiming
-from cubestack.emulator.rtl.wiring import cubesense_wiring, cubestar_wiring
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop

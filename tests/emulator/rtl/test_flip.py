@@ -2,10 +2,12 @@
 
 import pytest
 
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
-from cubestack.emulator.rtl.wiring import Wiring, cubesense_wiring, cubestar_wiring
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import verilog_text
 
@@ -79,7 +80,7 @@ def read_hex(path: Path) -> bytes:
 
 
 def run_compiled(top: CubeStarTop, camera, commands: Sequence[Command]) -> Outcome:
-    engine = make_engine(top, "compiled")
+    engine = make_engine(cubestar_wiring(top), "compiled")
     engine.attach(camera)
     data, acks = b"", []
 

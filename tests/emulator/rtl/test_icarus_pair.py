@@ -7,8 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
@@ -45,7 +46,7 @@ def board(request, tmp_path_factory) -> tuple[ReadOut, IcarusPair]:
 
 
 def run(kind: str, pair: CubeSensePair, cameras, commands: list[Command], watched: str) -> Outcome:
-    engine = make_engine(pair, kind)
+    engine = make_engine(cubesense_wiring(pair), kind)
     outcome = run_engine(engine, cameras, commands, watched)
     assert not engine.violations
     engine.close()

@@ -1,12 +1,13 @@
-"""The two ready wirings, and calls with names that they do not have."""
+"""The wirings of boards, and calls with names that they do not have."""
 
 from itertools import product
 
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import make_engine
-from cubestack.emulator.rtl.wiring import cubesense_wiring, cubestar_wiring, wiring_of
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import rtlil_text
@@ -47,14 +48,6 @@ def test_a_camera_is_stored_in_the_ways_to_store_until_the_acknowledge():
         for memory in memories.get(levels, ()):
             pins["SUNACK" if memory == "sun" else "NADACK"] = 1
         assert not PAIR.storing(pins.__getitem__)
-
-
-def test_ready_wirings_are_found():
-    assert wiring_of(PAIR) is PAIR
-    assert wiring_of(PAIR.component).acknowledges == ("SUNACK", "NADACK")
-    assert wiring_of(STAR.component).acknowledges == ("ACK",)
-    with pytest.raises(TypeError, match="int has no ready wiring"):
-        wiring_of(3)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kind", ["compiled", "python"])

@@ -2,12 +2,13 @@
 
 import pytest
 
+from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
+from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.sim.power import COMPARATOR_US, PowerModel
-from cubestack.emulator.sim.power_tables import CUBESENSE, CUBESTAR
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US, Kernel
 
 TRIP_PS = COMPARATOR_US * PS_PER_US
-PARTS, CHANNELS = CUBESTAR.parts, CUBESTAR.channels
+PARTS, CHANNELS = CUBESTAR_POWER.parts, CUBESTAR_POWER.channels
 
 # CubeStar thesis, table 6.2: current in mA, duration in ms, and what the parts do then.
 MODES = {
@@ -30,7 +31,7 @@ def kernel() -> Kernel:
 
 @pytest.fixture
 def power(kernel) -> PowerModel:
-    return PowerModel(kernel, CUBESTAR)
+    return PowerModel(kernel, CUBESTAR_POWER)
 
 
 @pytest.fixture
@@ -204,7 +205,7 @@ CUBESENSE_STATES = [
     ("published_mw", "processor", "memories", "cameras", "sides"), CUBESENSE_STATES
 )
 def test_published_power_of_cubesense(kernel, published_mw, processor, memories, cameras, sides):
-    power = PowerModel(kernel, CUBESENSE)
+    power = PowerModel(kernel, CUBESENSE_POWER)
     power.set_state("processor", processor)
     for half, (memory, side) in enumerate((("1", "sun"), ("2", "nadir"))):
         power.switch(f"SRAM{memory}", half < memories)
@@ -212,11 +213,11 @@ def test_published_power_of_cubesense(kernel, published_mw, processor, memories,
         if half < sides:
             power.set_state(f"sram{memory}", "active")
             power.set_state(f"{side}_fpga", "imaging")
-    assert power.current_ma() * CUBESENSE.volts == pytest.approx(published_mw, rel=0.06)
+    assert power.current_ma() * CUBESENSE_POWER.volts == pytest.approx(published_mw, rel=0.06)
 
 
 def test_channel_without_a_comparator_is_never_told(kernel):
-    power = PowerModel(kernel, CUBESENSE)
+    power = PowerModel(kernel, CUBESENSE_POWER)
     power.on_overcurrent = lambda channel: pytest.fail(f"{channel} has no comparator")
     power.latch_up("SRAM1")
     kernel.advance_to(PS_PER_MS)

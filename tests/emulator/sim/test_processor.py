@@ -1,5 +1,6 @@
 """The processor's requests: every duration counted by hand, a cycle is a microsecond."""
 
+import numpy as np
 import pytest
 
 from cubestack.emulator.sim.processor import LOOK_AHEAD_PS
@@ -13,12 +14,33 @@ from cubestack.firmware_model.mcu.requests import (
     Reset,
     SetPin,
     Sleep,
+    StrobeRead,
 )
 
 BOOT_US = 100
 PORT_WRITE = 2
 PORT_READ = 3
 POWER_ON = 1
+
+
+def test_a_board_without_an_fpga_refuses_what_needs_one(desk_of):
+    for request in (
+        SetPin("ENABLE", 1),
+        ReadPin("ACK"),
+        AwaitPin("ACK", 1, 10, poll_cycles=1),
+        StrobeRead(np.zeros(1, np.uint8), 4),
+    ):
+
+        def body(desk, request=request):
+            yield CameraTransfer(b"")
+            yield SetPin("LINE", 1)
+            yield request
+
+        desk = desk_of(body)
+        desk.processor.fpga = None
+        with pytest.raises(ValueError, match="this board has no FPGA"):
+            desk.run()
+        assert desk.pins_told == [("LINE", 1)]
 
 
 # --- cycles ------------------------------------------------------------------------------------

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.boards.cubestar.wiring import cubestar_double_wiring
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
@@ -43,7 +44,7 @@ class Desk:
 
     def __init__(self, body: Callable[["Desk"], Body], tick_ns: int | None = None) -> None:
         kind = "python" if find_compiler() is None else "compiled"
-        self.engine = make_engine(CubeStarDouble(COLUMNS, ROWS), kind)
+        self.engine = make_engine(cubestar_double_wiring(CubeStarDouble(COLUMNS, ROWS)), kind)
         self.engine.memories["SRAM2"][:] = np.arange(PIXELS) + 100
         self.kernel = Kernel()
         self.meter = Meter(CORTEX_M3)
@@ -132,7 +133,7 @@ def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
         yield SetPin("RNW", 0)  # would be in the FPGA's past, were the reads not paid
 
     def interrupt(desk: Desk) -> None:
-        loaded.append(desk.processor.load(0, PIXELS + 4, 6))
+        loaded.append(desk.processor.load(0, PIXELS + 4, 6, CYCLES))
         desk.meter.charge(ebi_read=6)
 
     plain = Desk(body).run()
@@ -160,7 +161,7 @@ def test_an_interrupt_reads_while_the_program_waits_for_the_fpga() -> None:
     desk = Desk(body, 50)
 
     def interrupt() -> None:
-        loaded.append(desk.processor.load(0, 2 * PIXELS - 3, 3))
+        loaded.append(desk.processor.load(0, 2 * PIXELS - 3, 3, CYCLES))
         desk.meter.charge(ebi_read=3)
 
     for ns in range(3000, 90_000, 977):

@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cubestack.emulator.rtl.contract import PinEvent
-from cubestack.emulator.rtl.wiring import (
-    CameraPins,
-    Wiring,
-    cubesense_wiring,
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.boards.cubestar.wiring import (
     cubestar_double_wiring,
     cubestar_shared_wiring,
     cubestar_two_boards_wiring,
     cubestar_wiring,
 )
+from cubestack.emulator.rtl.contract import PinEvent
+from cubestack.emulator.rtl.wiring import CameraPins, Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESSING_COMMANDS,
     COMMANDS,

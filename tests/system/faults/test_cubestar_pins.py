@@ -34,7 +34,7 @@ class Pin:
     def __init__(self, bench: Bench, name: str) -> None:
         self.seen: list[tuple[int, int]] = []
         processor = bench.board.processor
-        engine, real = processor.engine, bench.board.engine
+        engine, real = processor.fpga, bench.board.engine
         see = engine.get_pin
 
         def get_pin(pin: str) -> int:

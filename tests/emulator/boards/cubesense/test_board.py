@@ -203,7 +203,7 @@ def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
     scl, sda = CAMERA_SCL[Camera.SUN], CAMERA_SDA[Camera.SUN]
     assert all(pin in lines for pin in (scl, sda, *SRAM_POWER.values()))
     assert "SUNEN" not in lines
-    assert lines.get(sda) == 1
-    lines.set(sda, 0)
-    assert lines.get(sda) == 0
-    assert lines.get(scl) == 1
+    assert lines.get_pin(sda) == 1
+    lines.set_pin(sda, 0)
+    assert lines.get_pin(sda) == 0
+    assert lines.get_pin(scl) == 1

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.rtl.contract import make_engine
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.cxxrtl import build
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
-from cubestack.emulator.rtl.wiring import Wiring, cubestar_wiring
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
 
 TIMEOUT_S = 300
@@ -44,12 +45,8 @@ def make_compiler(folder: Path, name: str, on_compile: str, version: str = "1.0"
     return program
 
 
-def top() -> CubeStarTop:
-    return CubeStarTop(3, 2)
-
-
 def wiring() -> Wiring:
-    return cubestar_wiring(top())
+    return cubestar_wiring(CubeStarTop(3, 2))
 
 
 @pytest.fixture
@@ -91,11 +88,13 @@ def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypa
 def test_two_processes_may_build_at_once(cache):
     program = (
         "from pathlib import Path\n"
-        "from cubestack.emulator.rtl import build\n"
+        "from cubestack.emulator.rtl.cxxrtl import build\n"
         f"build.cache_folder = lambda: Path({str(cache)!r})\n"
-        "from cubestack.emulator.rtl.contract import make_engine\n"
+        "from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring\n"
+        "from cubestack.emulator.rtl.factory import make_engine\n"
         "from cubestack.hdl.cubestar.top import CubeStarTop\n"
-        "print(make_engine(CubeStarTop(3, 2), 'compiled').get_pin('SRAM_WE_N'))"
+        "wiring = cubestar_wiring(CubeStarTop(3, 2))\n"
+        "print(make_engine(wiring, 'compiled').get_pin('SRAM_WE_N'))"
     )
     started = [
         subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
@@ -107,7 +106,7 @@ def test_two_processes_may_build_at_once(cache):
 
 @needs_compiler
 def test_compiled_where_there_is_a_compiler_and_nothing_printed(cache, capfd, recwarn):
-    assert isinstance(make_engine(top()), CompiledEngine)
+    assert isinstance(make_engine(wiring()), CompiledEngine)
     assert capfd.readouterr() == ("", "")
     assert not recwarn.list
 
@@ -116,7 +115,7 @@ def test_compiler_that_fails_is_one_line_with_its_log(cache, tmp_path, monkeypat
     program = make_compiler(tmp_path, "badcc", "echo no such thing >&2; exit 3")
     monkeypatch.setenv("CXX", f"{program} -m64")
     with pytest.raises(build.CompilerError) as caught:
-        make_engine(top())
+        make_engine(wiring())
     (log,) = cache.glob("*.log")
     assert str(caught.value) == f"{program} -m64 failed; its log is {log}"
     assert "no such thing" in log.read_text()
@@ -153,10 +152,10 @@ def test_ziglang_wheel_is_the_last_resort(without_compiler, monkeypatch):
 
 def test_simulator_with_a_warning_where_there_is_no_compiler(without_compiler, cache):
     with pytest.warns(UserWarning, match=r"^no C\+\+ compiler .* found; using the Amaranth"):
-        engine = make_engine(top())
+        engine = make_engine(wiring())
     assert isinstance(engine, SimulatedEngine)
     with pytest.raises(build.NoCompilerError, match="ziglang wheel"):
-        make_engine(top(), "compiled")
+        make_engine(wiring(), "compiled")
     assert not cache.exists()
 
 
@@ -165,7 +164,7 @@ def test_cache_that_can_not_be_used(tmp_path, monkeypatch):
     monkeypatch.setattr(build, "cache_folder", lambda: tmp_path / "file" / "cubestack")
     monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1")))
     with pytest.raises(build.CompilerError, match="XDG_CACHE_HOME names another one"):
-        make_engine(top())
+        make_engine(wiring())
 
 
 def test_cache_is_where_the_user_wants_it(tmp_path, monkeypatch):

@@ -4,9 +4,10 @@ import re
 
 import pytest
 
+from cubestack.emulator.boards.cubestar.wiring import cubestar_double_wiring, cubestar_wiring
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps
 from cubestack.emulator.rtl.cxxrtl.variants import held, members, variant_text
-from cubestack.emulator.rtl.wiring import Wiring, cubestar_double_wiring, cubestar_wiring
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import rtlil_text

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
 from cubestack.emulator.rtl.cxxrtl.variants import members, variant_text
-from cubestack.emulator.rtl.wiring import cubesense_wiring
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.flow.generate import cxxrtl_text, rtlil_text
 

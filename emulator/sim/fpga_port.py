@@ -1,21 +1,19 @@
-"""A microcontroller's transactions on its external bus, as levels of lines at times.
+"""What a microcontroller has at its pins to an FPGA: lines, a data clock, an external bus.
 
-The order of events is that of ``docs/gateware-cubestar-next.md``; the phases between them are those
-of :mod:`cubestack.firmware_model.mcu.external_bus`.
+A transaction on the bus has the phases of :mod:`cubestack.firmware_model.mcu.external_bus`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.wiring import BusPins
 from cubestack.firmware_model.mcu.external_bus import EBI, BusTiming
 
-__all__ = ["STEPS", "TAKE", "Transactions"]
+__all__ = ["STEPS", "TAKE", "FpgaPort", "Transactions"]
 
 STEPS = 6
 """Events of a transaction: latch opens, latch closes, select, strobe falls, strobe rises, release.
@@ -86,26 +84,45 @@ class Transactions:
         index, step = divmod(event, STEPS)
         return int(self.cycle * (index * self.cycles + self.offsets[step]))
 
-    def levels(self, pins: BusPins, event: int) -> Sequence[tuple[str, int]]:
-        """What the microcontroller's lines go to at ``event``.
 
-        It drives the lower lines while they carry an address, or a byte to be written; after that
-        they keep their level.
+class FpgaPort(Protocol):
+    """FPGAs as the microcontroller reaches them. Time only moves in the last three calls."""
+
+    @property
+    def now_ps(self) -> int:
+        """Virtual time, which may be ahead of the kernel's."""
+
+    def set_pin(self, name: str, value: int) -> None:
+        """Drive one of the microcontroller's outputs from ``now_ps`` on; ValueError for others."""
+
+    def get_pin(self, name: str) -> int:
+        """Settled level at ``now_ps`` of any input or output pin.
+
+        Clocks that change nothing may have been skipped. The one trace that leaves is in a memory's
+        D_O while its D_OE is low.
         """
-        index, step = divmod(event, STEPS)
-        address, low = int(self.addresses[index]), f"{pins.low}_I"
-        strobe = pins.write if self.write else pins.read
-        match step:
-            case 0:
-                high, middle = address >> 16 & 0xFF, address >> 8 & 0xFF
-                return ((pins.high, high), (low, middle), (pins.latch, 1))
-            case 1:
-                return ((pins.latch, 0),)
-            case 2:
-                byte = ((low, int(self.data[index])),) if self.write else ()
-                return ((pins.high, address & 0xFF), *byte, (pins.selects[self.select], 0))
-            case 3:
-                return ((strobe, 0),)
-            case 4:
-                return ((strobe, 1),)
-        return ((pins.selects[self.select], 1),)
+
+    def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
+        """Advance to ``until_ps``, pixel clock edges at that very instant included.
+
+        ``stop_on`` is an acknowledge and a level: stop right after the edge that brings it to that
+        level, or at once when it is there already; later cameras' edges at that instant are then
+        still to come. Returns ``now_ps``; ValueError for a time in the past.
+        """
+
+    def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
+        """Run the microcontroller's transfer loop from ``now_ps``.
+
+        In each cycle of ``period`` ps, the data clock rises, the data pins are taken into ``out``
+        after half the period, and the clock falls. Only cycles that end by ``until_ps`` are made.
+        Returns how many, n; ``now_ps`` advances by floor(n * period). The fraction cut off there is
+        kept for a burst of the same period that follows at once, so that bursts do not drift.
+        """
+
+    def access(self, transactions: Transactions, until_ps: int) -> int:
+        """Make transactions on the microcontroller's external bus from ``now_ps``.
+
+        A read of which no byte comes back takes what the lines kept: address bits 15..8. Only
+        transactions that end by ``until_ps`` are made. Returns how many, n; ``now_ps`` advances by
+        floor(n * period). ValueError for a design without that bus.
+        """

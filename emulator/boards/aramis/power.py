@@ -1,0 +1,18 @@
+"""What the parts of AraMiS' star tracker draw, by state, and behind which load switch they are."""
+
+from cubestack.emulator.sim.power import Part, PowerTable
+
+__all__ = ["ARAMIS_POWER"]
+
+#: MT9M001 data sheet: 363 mW working, 294 uW in standby, at 3.3 V. The others are assumed; the
+#: thesis sums its parts in a figure only (2.16).
+ARAMIS_POWER = PowerTable(
+    volts=3.3,
+    parts={
+        "camera": Part("camera", {"standby": 0.1, "working": 110.0}),
+        "processor": Part(None, {"sleep": 15.0, "run": 110.0}),
+        "sdram": Part(None, {"on": 60.0}),
+        "flash": Part(None, {"on": 5.0}),
+    },
+    channels={"camera": None},
+)

@@ -1,0 +1,79 @@
+"""How fast the compiled engine is with CubeSense's two FPGAs."""
+
+import time
+from fractions import Fraction
+
+import numpy as np
+
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.rtl.benchmark import ROUNDS
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.factory import make_engine
+from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.cameras.ov7620 import (
+    CLOCKS_PER_LINE,
+    LINES_PER_FRAME,
+    PIXEL_CLOCK_HZ,
+)
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+
+__all__ = ["STORES", "pair_scan_ms", "pair_store_ms", "pair_with_cameras"]
+
+#: Ways to store: levels of SHIFT, EDGE, RNW, SUNEN and NADEN, and the acknowledges.
+STORES = {
+    "own": ((0, 0, 0, 0, 1), ("SUNACK",)),
+    "linked": ((1, 0, 0, 0, 0), ("NADACK",)),
+    "both": ((0, 0, 0, 0, 0), ("SUNACK", "NADACK")),
+}
+_CONTROLS = ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN")
+_SCAN_PERIOD = Fraction(PS_PER_S, 1_000_000)
+
+
+def pair_store_ms(engine: RtlEngine, way: str, rounds: int = ROUNDS) -> float:
+    """Wall time in which the ``engine`` of ``pair_with_cameras`` stores a frame in a way."""
+    levels, acknowledges = STORES[way]
+    best = float("inf")
+    for _ in range(rounds):
+        # From standby in the middle of the gap between two frames.
+        _command(engine, 0, 0, 0, 1, 1)
+        frame_ps = CLOCKS_PER_LINE * LINES_PER_FRAME * Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+        engine.run(int((engine.now_ps // frame_ps + 1) * frame_ps))
+        _command(engine, *levels)
+        start = time.perf_counter()
+        for pin in acknowledges:
+            engine.run(engine.now_ps + int(frame_ps), (pin, 1))
+        best = min(best, time.perf_counter() - start)
+    return 1000 * best
+
+
+def pair_scan_ms(engine: RtlEngine, rounds: int = ROUNDS) -> float:
+    """Wall time of a nadir scan from the nadir's memory."""
+    out = np.empty(FULL_SIZE.scan_clocks, np.uint8)
+    best = float("inf")
+    for _ in range(rounds):
+        _command(engine, 0, 0, 0, 1, 1)
+        _command(engine, 0, 1, 1, 1, 0)
+        engine.run(engine.now_ps + 1_000_000)
+        start = time.perf_counter()
+        reach_ps = len(out) * int(_SCAN_PERIOD)
+        engine.strobe_read(out, _SCAN_PERIOD, engine.now_ps + reach_ps)
+        best = min(best, time.perf_counter() - start)
+    return 1000 * best
+
+
+def pair_with_cameras() -> RtlEngine:
+    """Both FPGAs with cameras that send the same frames for ever."""
+    engine = make_engine(cubesense_wiring(), "compiled")
+    rng = np.random.default_rng(0)
+    blank = CLOCKS_PER_LINE * (LINES_PER_FRAME - FULL_SIZE.rows)
+    for camera in ("sun", "nadir"):
+        image = rng.integers(0, 256, (FULL_SIZE.rows, FULL_SIZE.columns), dtype=np.uint8)
+        period = Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+        engine.attach(RepeatedFrame(image, period, CLOCKS_PER_LINE, blank), camera)
+    return engine
+
+
+def _command(engine: RtlEngine, *levels: int) -> None:
+    for pin, level in zip(_CONTROLS, levels, strict=True):
+        engine.set_pin(pin, level)

@@ -1,0 +1,69 @@
+"""What is soldered to CubeSense's two FPGAs."""
+
+from collections.abc import Collection
+from functools import cache
+
+from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
+from cubestack.hdl.cubesense.pair import CubeSensePair
+
+__all__ = ["cubesense_wiring"]
+
+
+def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool = False) -> Wiring:
+    """Both FPGAs: cameras and memories "sun" and "nadir".
+
+    A pixel clock changes something while an FPGA stores with it that has not raised its ACK.
+    ``mcu_addressing`` is that of the full-size pair, which is taken when none is given.
+    """
+    if pair is None:
+        pair = CubeSensePair(mcu_addressing=mcu_addressing)
+
+    def storing(level: Level) -> Collection[str]:
+        controls = (level(name) for name in ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN"))
+        clocks = _clocks_used(*controls)
+        acks = ("SUNACK", "NADACK")
+        return [clock for clock, ack in zip(clocks, acks, strict=True) if clock and not level(ack)]
+
+    return Wiring(
+        pair,
+        cameras=(
+            CameraPins("sun", "SUN_PCLK", "SUN_Y", "SUN_HREF"),
+            CameraPins("nadir", "NAD_PCLK", "NAD_Y", "NAD_HREF"),
+        ),
+        memories=(MemoryPins("sun", "SUN_"), MemoryPins("nadir", "NAD_")),
+        data_clock="CLK",
+        data="DATA",
+        acknowledges=("SUNACK", "NADACK"),
+        storing=storing,
+        # Two release the reset, one ends the store, one the line;
+        # then the pause between two frames is counted.
+        settling_clocks=8 + pair.read_out.frame_gap,
+        contention="CONTENTION",
+        burst_levels=tuple((("CLK", 0), *levels.items()) for levels in _storing_levels()),
+    )
+
+
+def _storing_levels() -> list[dict[str, int]]:
+    """Levels of the control lines in each command that stores a picture."""
+    storing = {Action.STORE, Action.STORE_OTHER}
+    return [
+        {
+            "SHIFT": command.shift or 0,
+            "EDGE": command.edge or 0,
+            "RNW": command.rnw or 0,
+            "SUNEN": command.sunen,
+            "NADEN": command.naden,
+        }
+        for command in COMMANDS
+        if storing & {*command.actions}
+    ]
+
+
+@cache
+def _clocks_used(*controls: int) -> tuple[str | None, str | None]:
+    """Camera whose clock stores into the sun's memory, and into the nadir's."""
+    acts = actions(*controls)
+    sun = {Action.STORE: "sun", Action.STORE_OTHER: "nadir"}.get(acts.sun)
+    nadir = {Action.STORE: "nadir", Action.STORE_OTHER: "sun"}.get(acts.nadir)
+    return sun, nadir

@@ -1,0 +1,48 @@
+"""Makes the engine of a wiring: the compiled one, or the reference where there is no compiler."""
+
+import warnings
+from typing import Literal
+
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.cxxrtl.build import NoCompilerError
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.simulated import SimulatedEngine
+from cubestack.emulator.rtl.sram import SramTiming
+from cubestack.emulator.rtl.wiring import Wiring
+
+__all__ = ["EngineKind", "make_engine"]
+
+EngineKind = Literal["auto", "compiled", "python"]
+"""How FPGAs are run."""
+
+
+def make_engine(
+    wiring: Wiring,
+    kind: EngineKind = "auto",
+    sram_timing: SramTiming | None = None,
+    *,
+    skipping: bool = True,
+) -> RtlEngine:
+    """Make an engine.
+
+    Args:
+        wiring: the design with its surroundings.
+        kind: "compiled", "python" (the Amaranth simulator), or "auto": compiled where there is a
+            C++ compiler, else the simulator with a warning.
+        sram_timing: limits that the SRAM model checks.
+        skipping: skip pixel clocks that provably change nothing.
+
+    Raises:
+        CompilerError: "compiled" without a C++ compiler, or the compiler failed.
+    """
+    if kind == "python":
+        return SimulatedEngine(wiring, sram_timing, skipping=skipping)
+    try:
+        return CompiledEngine(wiring, sram_timing, skipping=skipping)
+    except NoCompilerError as error:
+        if kind == "compiled":
+            raise
+        warnings.warn(
+            f"{error}; using the Amaranth simulator, about a thousand times slower", stacklevel=2
+        )
+        return SimulatedEngine(wiring, sram_timing, skipping=skipping)
