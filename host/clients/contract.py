@@ -1,27 +1,60 @@
-"""What the host's device classes need of a client, whatever the bus.
+"""What a client of a node is, whatever the bus, and what the clients of all devices share.
 
-Messages come from the interface tables; nothing about a device is written here.
+Messages come from the interface tables; nothing about one device is written here.
 """
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
-from cubestack.host.errors import CommandRefusedError, NoAnswerError
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.host.errors import (
+    BadAnswerError,
+    CommandRefusedError,
+    NoAnswerError,
+    TargetError,
+)
 
-__all__ = ["POLL_PERIOD_S", "Client", "DeviceClient", "Progress"]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["POLL_PERIOD_S", "Client", "Closable", "DeviceClient", "Progress"]
 
 #: Called with (pieces done, pieces in all) during a transfer.
 Progress = Callable[[int, int], None]
+
+T = TypeVar("T")
 
 #: Time between two polls of a node.
 POLL_PERIOD_S = 0.01
 
 
-class Client(ABC):
+class Closable(ABC):
+    """What is closed at the end of a ``with`` block."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the port or bus."""
+
+    def __enter__(self) -> Self:
+        """Use it in a ``with`` block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
+
+
+class Client(Closable):
     """A node's telecommands and telemetry by name.
 
     Attributes:
@@ -49,21 +82,45 @@ class Client(ABC):
     def pause(self, seconds: float) -> None:
         """Let time pass on the node's side; what it sends meanwhile is lost."""
 
-    @abstractmethod
-    def close(self) -> None:
-        """Release the bus."""
+    def stream(self, name: str, count: int) -> Iterator[bytes]:
+        """Send telecommand ``name``, then yield the payloads of ``count`` frames without requests.
+
+        Raises NoAnswerError when the stream ends early, and TypeError on a bus where the host asks
+        for every byte.
+        """
+        raise TypeError(f"{name}: a picture can be streamed over a UART only")
 
     def wait_processed(self, timeout_s: float) -> dict[str, Value]:
         """Poll telemetry TcmdProcessed until every accepted telecommand is processed.
 
         Returns that frame's fields. Raises NoAnswerError after ``timeout_s``.
         """
-        for _ in range(math.ceil(timeout_s / POLL_PERIOD_S)):
-            values = self.telemetry("TcmdProcessed")
-            if values["Processed"]:
-                return values
-            self.pause(POLL_PERIOD_S)
-        raise NoAnswerError(f"telecommand not processed within {timeout_s:g} s")
+        late = f"telecommand not processed within {timeout_s:g} s"
+        return self.poll(
+            lambda: self.telemetry("TcmdProcessed"),
+            lambda values: bool(values["Processed"]),
+            timeout_s,
+            late,
+        )
+
+    def poll(
+        self,
+        read: Callable[[], T],
+        done: Callable[[T], bool],
+        timeout_s: float,
+        late: str,
+        period_s: float = POLL_PERIOD_S,
+    ) -> T:
+        """``read`` every ``period_s`` until what it gives is ``done``, and return that.
+
+        Raises NoAnswerError with the text ``late`` after ``timeout_s``.
+        """
+        for _ in range(math.ceil(timeout_s / period_s)):
+            found = read()
+            if done(found):
+                return found
+            self.pause(period_s)
+        raise NoAnswerError(late)
 
     def _check_error(self, message: Message, error: int) -> None:
         """Raise CommandRefusedError when an acknowledge's ``error`` code is one."""
@@ -71,26 +128,19 @@ class Client(ABC):
             known = {int(code): code for code in self.interface.ack_errors}
             raise CommandRefusedError(message.name, known.get(error, error))
 
-    def __enter__(self) -> Self:
-        """Use the client in a ``with`` block."""
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close."""
-        self.close()
-
-
-class DeviceClient:
+class DeviceClient(Closable):
     """A device as a program uses it, through any client of its node.
 
     Attributes:
         client: its messages by name.
     """
+
+    picture_sources: tuple[str, ...] = ()
+    """Memories that ``picture`` can read, in small letters; none where there is one only."""
+
+    step_timeout_s = 10.0
+    """What a step of the node may take."""
 
     def __init__(self, client: Client) -> None:
         """Use ``client``, whose interface must be the device's."""
@@ -105,15 +155,50 @@ class DeviceClient:
         """Release the port."""
         self._on_close()
 
-    def __enter__(self) -> Self:
-        """Use the device in a ``with`` block."""
-        return self
+    def picture(self, source: str | None = None) -> "NDArray[np.uint8]":
+        """The picture (rows, columns) in the device's memory, or in the memory ``source``.
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close."""
-        self.close()
+        Raises TargetError for a device or a line that carries no picture, and the client's errors.
+        """
+        raise TargetError(f"{self.client.interface.name} sends no picture")
+
+    def _perform(self, name: str, **parameters: object) -> None:
+        """Send a telecommand and wait until it is done."""
+        self._send(name, **parameters)
+        self.client.wait_processed(self.step_timeout_s)
+
+    def _send(self, name: str, **parameters: object) -> None:
+        """Send a telecommand; when the node's buffer is full, wait and send it once more."""
+        try:
+            self.client.command(name, **parameters)
+        except CommandRefusedError as refusal:
+            if refusal.code != AckError.BUFFER_FULL:
+                raise
+            self.client.wait_processed(self.step_timeout_s)
+            self.client.command(name, **parameters)
+
+    def _stream(self, name: str, count: int, length: int, progress: Progress | None) -> bytes:
+        """What telecommand ``name`` streams: ``count`` blocks of ``length`` bytes."""
+        blocks = []
+        for block in self.client.stream(name, count):
+            if len(block) != length:
+                raise BadAnswerError(f"picture stream: block of {len(block)} bytes, not {length}")
+            blocks.append(block)
+            if progress is not None:
+                progress(len(blocks), count)
+        return b"".join(blocks)
+
+    def _records(self, frame: str, count: int) -> dict[int, dict[str, Value]]:
+        """All ``count`` records of a telemetry frame that steps, in the order of star numbers."""
+        records: dict[int, dict[str, Value]] = {}
+        reads = 2 * count  # one round, and another for records whose answer was lost
+        for _ in range(reads):
+            if len(records) == count:
+                break
+            values = self.client.telemetry(frame)
+            records[int(values["StarNumber"])] = values
+        if len(records) != count:
+            raise BadAnswerError(
+                f"telemetry {frame}: {len(records)} stars of {count} came in {reads} reads"
+            )
+        return dict(sorted(records.items()))

@@ -91,10 +91,7 @@ class NodeClient(Client):
         return self._next_frame()
 
     def stream(self, name: str, count: int) -> Iterator[bytes]:
-        """Send telecommand ``name``, then yield the payloads of ``count`` frames without requests.
-
-        Raises NoAnswerError when the stream ends early.
-        """
+        """Send telecommand ``name``, then yield the payloads of the next ``count`` frames."""
         self.command(name)
         for number in range(count):
             payload = self._next_frame()

@@ -12,8 +12,8 @@ from cubestack.firmware_model.interface.codec.field import suggestion
 from cubestack.host.devices.targets import Target
 from cubestack.host.shell.completion import complete
 from cubestack.host.shell.controls import ControlCommands
-from cubestack.host.shell.lines import LineCommands
 from cubestack.host.shell.names import Names
+from cubestack.host.shell.ports import PortCommands
 from cubestack.host.shell.registers import RegisterCommands
 from cubestack.host.shell.result import Result, ShellCommand, ShellError
 
@@ -35,7 +35,7 @@ class Shell:
         self._registers = RegisterCommands(target, self._names)
         commands = [
             *self._registers.commands(),
-            *LineCommands(target).commands(),
+            *PortCommands(target).commands(),
             *ControlCommands(target).commands(),
             ShellCommand("help", "this list", self._help),
         ]

@@ -5,7 +5,6 @@ and turn inertial vectors into camera vectors, v_camera = q v_inertial q*; pixel
 from the middle of the first pixel.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from zlib import crc32
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.firmware_model.interface.aramis import (
     BLOCK_BYTES,
     IMAGE_BYTES,
-    AckError,
+    MS_PER_DAY,
     CatalogueState,
     LatchUpStep,
     MeasurementMode,
@@ -27,18 +26,13 @@ from cubestack.firmware_model.interface.aramis import (
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.message import Value
 from cubestack.host.clients.contract import DeviceClient, Progress
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+from cubestack.host.clients.quaternions import unit_quaternion
+from cubestack.host.errors import StepFailedError, TargetError
 
 __all__ = ["Aramis", "Attitude", "Star"]
 
-STEP_TIMEOUT_S = 10.0
-"""Longer than three of the longest frames, loading the catalogue, and the processing."""
-
 PROGRAM_TIMEOUT_S = 300.0
 """Longer than erasing and writing all of the catalogue's flash."""
-
-_MS_PER_DAY = 86_400_000
 
 
 @dataclass(frozen=True)
@@ -87,7 +81,11 @@ class Star:
 
 
 class Aramis(DeviceClient):
-    """A star tracker behind a client. Errors are those of the client, and the ones named here."""
+    """A star tracker behind a client. Errors are those of the client, and the ones named here.
+
+    A step's time-out is longer than three of the longest frames, loading the catalogue, and the
+    processing.
+    """
 
     # --- use cases --------------------------------------------------------------------------------
 
@@ -110,7 +108,7 @@ class Aramis(DeviceClient):
     def set_time(self, julian_date: float) -> None:
         """Set the clock to a Julian date in days; a float holds it to 0.05 ms."""
         day, part = divmod(julian_date, 1)
-        whole, millisecond = divmod(round(part * _MS_PER_DAY), _MS_PER_DAY)
+        whole, millisecond = divmod(round(part * MS_PER_DAY), MS_PER_DAY)
         self._send("SetSystemTime", JulianDay=int(day) + whole, Millisecond=millisecond)
 
     def julian_date(self) -> float | None:
@@ -143,9 +141,8 @@ class Aramis(DeviceClient):
     def attitude(self) -> Attitude:
         """The latest attitude; raises BadAnswerError when it is no rotation."""
         values = self.client.telemetry("Attitude")
-        parts = np.array([float(values[f"Q{index}"]) for index in range(4)])
         return Attitude(
-            quaternion=_unit(parts),
+            quaternion=_quaternion(values),
             valid=bool(values["Valid"]),
             outcome=MeasurementOutcome(int(values["Outcome"])),
             reason=Reason(int(values["Reason"])),
@@ -159,8 +156,7 @@ class Aramis(DeviceClient):
 
     def body_quaternion(self) -> NDArray[np.float64] | None:
         """The latest attitude of the spacecraft (4,), inertial to body; None before the first."""
-        values = self.client.telemetry("BodyAttitude")
-        return _unit(np.array([float(values[f"Q{index}"]) for index in range(4)]))
+        return _quaternion(self.client.telemetry("BodyAttitude"))
 
     def set_body_rotation(self, quaternion: Sequence[float]) -> None:
         """Set the rotation (4,) from the star tracker's axes to the spacecraft's."""
@@ -185,7 +181,7 @@ class Aramis(DeviceClient):
             self._send("CatalogueBlock", BlockNumber=number, Data=block.ljust(BLOCK_BYTES, b"\0"))
             if progress is not None:
                 progress(number + 1, blocks)
-        self.client.wait_processed(STEP_TIMEOUT_S)
+        self.client.wait_processed(self.step_timeout_s)
         received = int(self.client.telemetry("UploadStatus")["BlocksReceived"])
         if received != blocks:
             raise StepFailedError(f"catalogue: {received} blocks arrived of {blocks}")
@@ -204,14 +200,6 @@ class Aramis(DeviceClient):
         Raises BadAnswerError when the records do not make a whole list.
         """
         detected = int(self.client.telemetry("DetectionSummary")["Detected"])
-        records: dict[int, dict[str, Value]] = {}
-        for _ in range(2 * detected):  # one round, and another for lost answers
-            if len(records) == detected:
-                break
-            values = self.client.telemetry("StarDetails")
-            records[int(values["StarNumber"])] = values
-        if len(records) != detected:
-            raise BadAnswerError(f"telemetry StarDetails: {len(records)} stars came of {detected}")
         return [
             Star(
                 number=number,
@@ -220,7 +208,7 @@ class Aramis(DeviceClient):
                 brightness=float(record["Brightness"]),
                 hipparcos=int(record["Hipparcos"]) if record["Identified"] else None,
             )
-            for number, record in sorted(records.items())
+            for number, record in self._records("StarDetails", detected).items()
         ]
 
     def phase_times(self) -> dict[str, float]:
@@ -231,46 +219,25 @@ class Aramis(DeviceClient):
     def image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
         """The latest picture, (1024, 1280), as one stream of blocks: over a UART only.
 
-        A lost block can not be asked for again; raises BadAnswerError or NoAnswerError then.
+        A lost block can not be asked for again: raises BadAnswerError or NoAnswerError then, and
+        TypeError on I2C.
         """
-        if not isinstance(self.client, NodeClient):
-            raise TypeError("a picture can be streamed over a UART only")
-        blocks = []
-        count = IMAGE_BYTES // BLOCK_BYTES
-        for block in self.client.stream("StreamDownImage", count):
-            if len(block) != BLOCK_BYTES:
-                raise BadAnswerError(f"picture stream: a block of {len(block)} bytes")
-            blocks.append(block)
-            if progress is not None:
-                progress(len(blocks), count)
-        return np.frombuffer(b"".join(blocks), np.uint8).reshape(ROWS, COLUMNS)
+        data = self._stream("StreamDownImage", IMAGE_BYTES // BLOCK_BYTES, BLOCK_BYTES, progress)
+        return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
-    def _perform(self, name: str, **parameters: object) -> None:
-        """Send a telecommand and wait until it is done."""
-        self._send(name, **parameters)
-        self.client.wait_processed(STEP_TIMEOUT_S)
-
-    def _send(self, name: str, **parameters: object) -> None:
-        """Send a telecommand; when the buffer is full, wait and send it once more."""
+    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+        """The latest picture, as ``image`` gives it; TargetError on I2C."""
         try:
-            self.client.command(name, **parameters)
-        except CommandRefusedError as refusal:
-            if refusal.code != AckError.BUFFER_FULL:
-                raise
-            self.client.wait_processed(STEP_TIMEOUT_S)
-            self.client.command(name, **parameters)
+            return self.image()
+        except TypeError:
+            raise TargetError("AraMiS sends its picture over a serial line only") from None
 
 
 def _julian_date(values: dict[str, Value]) -> float | None:
     day, millisecond = int(values["JulianDay"]), int(values["Millisecond"])
-    return day + millisecond / _MS_PER_DAY if day else None
+    return day + millisecond / MS_PER_DAY if day else None
 
 
-def _unit(parts: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """A quaternion of length 1; None for one of zeros."""
-    norm = math.hypot(*parts)
-    if norm == 0:
-        return None
-    if not abs(norm - 1) < 0.01:
-        raise BadAnswerError(f"the star tracker's quaternion has length {norm:.4g}, not 1")
-    return parts / norm
+def _quaternion(values: dict[str, Value]) -> NDArray[np.float64] | None:
+    """The quaternion of a frame; None before the first attitude, when all is zero."""
+    return unit_quaternion(values) if any(values[f"Q{index}"] for index in range(4)) else None

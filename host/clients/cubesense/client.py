@@ -19,6 +19,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     CaptureResult,
     DetectResult,
     ImageLocation,
+    ImageSize,
     ResetTarget,
     Sram,
     SramSelection,
@@ -27,6 +28,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.cubesense.download import download_image, picture_of
 from cubestack.host.clients.cubesense.values import (
     CameraSettings,
     Mask,
@@ -60,6 +62,13 @@ _NO_MASK = Mask(0, 0, 0, 0)
 
 class CubeSense(DeviceClient):
     """A CubeSense behind a client. Errors are those of the client, and the ones named here."""
+
+    picture_sources = tuple(sram.name.lower() for sram in Sram)
+
+    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+        """The picture (480, 640) in memory ``source``; default: the Sun camera's, sram1."""
+        sram = Sram[(source or Sram.SRAM1.name).upper()]
+        return picture_of(download_image(self.client, sram, ImageSize.SIDE_1024))
 
     def capture_and_detect(self, camera: Camera, sram: Sram | None = None) -> Measurement:
         """Take a picture into ``sram`` (default: the camera's own) and measure in it.
@@ -239,13 +248,12 @@ class CubeSense(DeviceClient):
         return Measurement(camera, float(values["Alpha"]), float(values["Beta"]), capture, detect)
 
     def _wait_captured(self, camera: Camera) -> Measurement:
-        for _ in range(math.ceil(CAPTURE_TIMEOUT_S / POLL_PERIOD_S)):
-            found = self.result(camera)
-            if found.capture is not CaptureResult.PENDING:
-                return found
-            self.client.pause(POLL_PERIOD_S)
-        raise NoAnswerError(
-            f"capture of the {camera.name} camera still pending after {CAPTURE_TIMEOUT_S:g} s"
+        return self.client.poll(
+            lambda: self.result(camera),
+            lambda found: found.capture is not CaptureResult.PENDING,
+            CAPTURE_TIMEOUT_S,
+            f"capture of the {camera.name} camera still pending after {CAPTURE_TIMEOUT_S:g} s",
+            POLL_PERIOD_S,
         )
 
 

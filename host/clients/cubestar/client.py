@@ -13,23 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
-from cubestack.firmware_model.interface.codec.message import Value
 from cubestack.firmware_model.interface.cubestar import (
     IMAGE_BYTES,
     UPLOAD_BLOCK_BYTES,
-    AckError,
     ImageBlockSize,
     MatchMode,
     TaskStatus,
 )
 from cubestack.host.clients.contract import DeviceClient, Progress
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+from cubestack.host.clients.quaternions import unit_quaternion
+from cubestack.host.errors import BadAnswerError, StepFailedError
 
 __all__ = ["Attitude", "CubeStar", "Star"]
-
-#: Longer than two frames at the lowest frame rate, a transfer and the processing.
-STEP_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +90,11 @@ class Star:
 
 
 class CubeStar(DeviceClient):
-    """A CubeStar behind a client. Errors are those of the client, and the ones named here."""
+    """A CubeStar behind a client. Errors are those of the client, and the ones named here.
+
+    A step's time-out is longer than two frames at the lowest frame rate, a transfer and the
+    processing.
+    """
 
     def configure(self, settings: Mapping[str, Mapping[str, object]]) -> None:
         """Send telecommands, name to parameters, as ``Calibration.settings`` has them."""
@@ -127,6 +126,10 @@ class CubeStar(DeviceClient):
         except ValueError:
             raise BadAnswerError(f"telemetry TaskStatus: unknown status {value}") from None
 
+    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+        """The picture in memory, as ``download_image`` gives it; there is one memory only."""
+        return self.download_image()
+
     def download_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
         """The picture in memory, (512, 1024) with the first row on top.
 
@@ -147,19 +150,12 @@ class CubeStar(DeviceClient):
     def stream_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
         """The picture in memory, (512, 1024), as one stream of blocks: quicker, over a UART only.
 
-        A lost block can not be asked for again; raises BadAnswerError or NoAnswerError then.
+        A lost block can not be asked for again: raises BadAnswerError or NoAnswerError then, and
+        TypeError on I2C.
         """
-        if not isinstance(self.client, NodeClient):
-            raise TypeError("a picture can be streamed over a UART only: use download_image")
         length = ImageBlockSize.BYTES_128.length
-        blocks = []
-        for block in self.client.stream("StreamDownImage", IMAGE_BYTES // length):
-            if len(block) != length:
-                raise BadAnswerError(f"picture stream: block of {len(block)} bytes, not {length}")
-            blocks.append(block)
-            if progress is not None:
-                progress(len(blocks), IMAGE_BYTES // length)
-        return np.frombuffer(b"".join(blocks), np.uint8).reshape(ROWS, COLUMNS)
+        data = self._stream("StreamDownImage", IMAGE_BYTES // length, length, progress)
+        return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
     def upload_image(self, image: NDArray[np.uint8], progress: Progress | None = None) -> None:
         """Put ``image``, uint8 (512, 1024), in the picture memory.
@@ -178,7 +174,7 @@ class CubeStar(DeviceClient):
             self._send("UploadBlock", BlockNumber=int(number), Data=blocks[number].tobytes())
             if progress is not None:
                 progress(done, len(lit))
-        self.client.wait_processed(STEP_TIMEOUT_S)
+        self.client.wait_processed(self.step_timeout_s)
         received = int(self.client.telemetry("UploadStatus")["BlocksReceived"])
         if received != len(lit):
             raise StepFailedError(f"upload: {received} blocks arrived of {len(lit)}")
@@ -187,7 +183,7 @@ class CubeStar(DeviceClient):
         """The latest attitude in full precision; raises BadAnswerError when it is no rotation."""
         values = self.client.telemetry("AttitudeQuaternion")
         return Attitude(
-            quaternion=_unit_quaternion([values[f"Q{index}"] for index in range(4)]),
+            quaternion=unit_quaternion(values),
             valid=bool(values["Valid"]),
             matched=int(values["Matched"]),
             mode=MatchMode(int(values["Mode"])),
@@ -201,7 +197,7 @@ class CubeStar(DeviceClient):
         For a node without this project's extensions.
         """
         values = self.client.telemetry("AttitudeData")
-        return _unit_quaternion([values[f"Qbar{index}"] for index in range(4)])
+        return unit_quaternion(values, "Qbar")
 
     def stars(self) -> list[Star]:
         """The stars of the latest picture, in order of detection; stop the loop before.
@@ -223,7 +219,7 @@ class CubeStar(DeviceClient):
                 intensity=int(record["Intensity"]),
                 hipparcos=int(names[number]["Hipparcos"]) if number in names else None,
             )
-            for number, record in sorted(positions.items())
+            for number, record in positions.items()
         ]
 
     def phase_times(self) -> dict[str, float]:
@@ -234,41 +230,3 @@ class CubeStar(DeviceClient):
         values = self.client.telemetry("PhaseTimes")
         names = {name: name.lower() for name in values} | {"LoopTotal": "loop_total"}
         return {names[name]: int(value) / 1000.0 for name, value in values.items()}
-
-    def _records(self, frame: str, count: int) -> dict[int, dict[str, Value]]:
-        """All ``count`` records of a telemetry frame that steps, by star number."""
-        records: dict[int, dict[str, Value]] = {}
-        reads = 2 * count  # one round, and another for records whose answer was lost
-        for _ in range(reads):
-            if len(records) == count:
-                break
-            values = self.client.telemetry(frame)
-            records[int(values["StarNumber"])] = values
-        if len(records) != count:
-            raise BadAnswerError(
-                f"telemetry {frame}: {len(records)} stars of {count} came in {reads} reads"
-            )
-        return records
-
-    def _perform(self, name: str, **parameters: object) -> None:
-        """Send a telecommand and wait until it is done."""
-        self._send(name, **parameters)
-        self.client.wait_processed(STEP_TIMEOUT_S)
-
-    def _send(self, name: str, **parameters: object) -> None:
-        """Send a telecommand; when the node's buffer is full, wait and send it once more."""
-        try:
-            self.client.command(name, **parameters)
-        except CommandRefusedError as refusal:
-            if refusal.code != AckError.BUFFER_FULL:
-                raise
-            self.client.wait_processed(STEP_TIMEOUT_S)
-            self.client.command(name, **parameters)
-
-
-def _unit_quaternion(components: list[Value]) -> NDArray[np.float64]:
-    quaternion = np.array([float(value) for value in components])
-    norm = float(np.linalg.norm(quaternion))
-    if not abs(norm - 1.0) < 0.01:
-        raise BadAnswerError(f"the node's quaternion has length {norm:.4g}, not 1")
-    return quaternion / norm

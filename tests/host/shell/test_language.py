@@ -15,6 +15,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.devices.registry import device
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell, ShellError
@@ -88,7 +89,8 @@ class Controls:
 
 @pytest.fixture
 def shell(node, uart) -> Shell:
-    return Shell(Target("fake", CUBESTAR, NodeClient(uart, CUBESTAR), uart))
+    client = NodeClient(uart, CUBESTAR)
+    return Shell(Target("fake", CUBESTAR, client, uart, device=device("cubestar")))
 
 
 @pytest.fixture
@@ -187,6 +189,16 @@ def test_image(node, shell, tmp_path):
     assert (np.asarray(Image.open(tmp_path / "a.png")).ravel() == node.memory).all()
     with pytest.raises(TargetError, match="sends no picture 'x'"):
         shell.execute(f"image {tmp_path}/a.png x")
+
+
+def test_image_of_a_memory(sense, sense_shell, tmp_path):
+    sense_shell.target.device = device("cubesense")
+    sense.pictures[1, 7, 9] = 77
+    with pytest.raises(TargetError, match="no memory 'sram3'; known: sram1, sram2"):
+        sense_shell.execute(f"image {tmp_path}/a.png sram3")
+    rows = sense_shell.execute(f"image {tmp_path}/a.png SRAM2").rows
+    assert rows == [("", f"{tmp_path}/a.png: 640 x 480")]
+    assert np.asarray(Image.open(tmp_path / "a.png"))[7, 9] == 77
 
 
 def test_controls(sense_shell):

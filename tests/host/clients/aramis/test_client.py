@@ -192,7 +192,7 @@ def test_stars_by_number_and_a_list_that_is_not_whole(node: FakeAramis, aramis: 
     assert (second.x_px, second.y_px, second.brightness) == (3.5, 4.0, 50.0)
     node.records["StarDetails"] = [{"StarNumber": 1}]
     node._steps.clear()
-    with pytest.raises(BadAnswerError, match="1 stars came of 2"):
+    with pytest.raises(BadAnswerError, match="1 stars of 2 came"):
         aramis.stars()
 
 

@@ -1,13 +1,19 @@
-"""The shell's commands on pictures, bench letters and raw bytes: image, bench, raw."""
+"""The shell's commands on a device's ports: image (download), bench (letters), raw (bytes)."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cubestack.host.devices.targets import Target
-from cubestack.host.shell.picture import download
+from cubestack.host.errors import TargetError
+from cubestack.host.pictures.frames import save_picture
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["LineCommands"]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["PortCommands"]
 
 RAW_TIMEOUT_S = 0.3
 """Silence after which the answer to raw bytes is over."""
@@ -22,7 +28,7 @@ BENCH = "bench LETTER"
 RAW = "raw HEX ..."
 
 
-class LineCommands:
+class PortCommands:
     """The commands on one target."""
 
     def __init__(self, target: Target) -> None:
@@ -42,11 +48,31 @@ class LineCommands:
         path = Path(words[0])
         if path.suffix.lower() != ".png":
             raise ShellError(f"image: {path} must end in .png")
-        rows, columns = download(self._target, path, words[1] if len(words) > 1 else None)
+        picture = self._download(words[1] if len(words) > 1 else None)
+        save_picture(picture, path)
+        rows, columns = picture.shape
         return Result(
             [("", f"{path}: {columns} x {rows}")],
             {"file": str(path), "columns": columns, "rows": rows},
         )
+
+    def _download(self, source: str | None) -> "NDArray[np.uint8]":
+        """The picture in the device's memory, or in ``source``; TargetError where there is none."""
+        device, name = self._target.device, self._target.interface.name
+        if device is None:
+            raise TargetError(f"image: {name} sends no picture")
+        client = device.client(self._target.node)
+        known = client.picture_sources
+        if source is not None and source.lower() not in known:
+            raise TargetError(
+                f"image: no memory {source!r}; known: {', '.join(known)}"
+                if known
+                else f"image: {name} sends no picture {source!r}"
+            )
+        try:
+            return client.picture(source and source.lower())
+        except TargetError as error:
+            raise TargetError(f"image: {error}") from None
 
     def _bench(self, words: list[str]) -> Result:
         check_count(BENCH, words, 1, 1)
