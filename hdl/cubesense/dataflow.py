@@ -6,7 +6,7 @@ its second table are an option.
 """
 
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 from amaranth.hdl import Cat, Module, Value
 from amaranth.lib.wiring import Component, In, Out
@@ -20,9 +20,31 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     link_shows_enables,
 )
 
-__all__ = ["DataflowControl", "Side"]
+__all__ = ["SIDES", "DataflowControl", "Side", "checked"]
 
 Side = Literal["sun", "nadir"]
+SIDES: tuple[Side, ...] = get_args(Side)
+
+
+def checked(side: Side) -> Side:
+    """``side``; ValueError when it is none."""
+    if side not in SIDES:
+        raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
+    return side
+
+
+#: Output of each action; the last two with address control from the microcontroller only.
+_OUTPUTS = {
+    Action.STORE: "store",
+    Action.READ: "read",
+    Action.EDGE: "edge_data",
+    Action.SEND_PICTURE: "send_picture",
+    Action.STORE_OTHER: "store_other",
+    Action.SEND_EDGE: "send_edge",
+    Action.PASS_EDGE: "pass_edge",
+    Action.TAKE_ADDRESS: "take_address",
+    Action.READ_FROM: "read_from",
+}
 
 
 class DataflowControl(Component):
@@ -42,48 +64,23 @@ class DataflowControl(Component):
         """Make the control of the sun sensor's or the nadir sensor's FPGA."""
         self._side = side
         self._mcu_addressing = mcu_addressing
-        names = ("take_address", "read_from", "addressing") * mcu_addressing
-        super().__init__(
-            {
-                "en_n": In(1),
-                "other_en_n": In(1),
-                "rnw": In(1),
-                "edge": In(1),
-                "shift": In(1),
-                "store": Out(1),
-                "read": Out(1),
-                "edge_data": Out(1),
-                "send_picture": Out(1),
-                "store_other": Out(1),
-                "send_edge": Out(1),
-                "pass_edge": Out(1),
-                **dict.fromkeys(names, Out(1)),
-            }
-        )
+        self._outputs = dict(_OUTPUTS if mcu_addressing else list(_OUTPUTS.items())[:-2])
+        names = (*self._outputs.values(), *("addressing",) * mcu_addressing)
+        inputs = ("en_n", "other_en_n", "rnw", "edge", "shift")
+        super().__init__({**dict.fromkeys(inputs, In(1)), **dict.fromkeys(names, Out(1))})
 
     def elaborate(self, platform: object) -> Module:
         """Build one condition for each row that this FPGA acts on."""
         m = Module()
-        outputs = {
-            Action.STORE: self.store,
-            Action.READ: self.read,
-            Action.EDGE: self.edge_data,
-            Action.SEND_PICTURE: self.send_picture,
-            Action.STORE_OTHER: self.store_other,
-            Action.SEND_EDGE: self.send_edge,
-            Action.PASS_EDGE: self.pass_edge,
-        }
         commands: tuple[FpgaCommand, ...] = COMMANDS
         if self._mcu_addressing:
             commands += ADDRESSING_COMMANDS
-            outputs[Action.TAKE_ADDRESS] = self.take_address
-            outputs[Action.READ_FROM] = self.read_from
             m.d.comb += self.addressing.eq(self._addressing())
         for command in commands:
             action = getattr(command.actions, self._side)
             if action is not Action.STANDBY:
                 with m.If(self._fits(command)):
-                    m.d.comb += outputs[action].eq(1)
+                    m.d.comb += getattr(self, self._outputs[action]).eq(1)
         return m
 
     def _fits(self, command: FpgaCommand) -> Value:

@@ -9,7 +9,6 @@ from amaranth.lib.wiring import Component, Out
 from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
 __all__ = ["NadirScan"]
 
@@ -30,16 +29,14 @@ class NadirScan(Component):
         """Make the scan that ``read_out`` describes."""
         self._read_out = read_out
         self._domain = domain
-        super().__init__(
-            {"address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows))}
-        )
+        super().__init__({"address": Out(read_out.address_bits)})
 
     def elaborate(self, platform: object) -> Module:
         """Build one counter along the line and one of lines, which swap roles for the columns."""
         m = Module()
         sync = m.d[self._domain]
         size = self._read_out
-        column_bits, row_bits = ceil_log2(size.columns), ceil_log2(size.rows)
+        column_bits, row_bits = size.column_bits, size.row_bits
         step_bits = ceil_log2(size.scan_step)
 
         on_a_line = Signal()  # state A or C; else the default one or B

@@ -5,31 +5,20 @@ resolved here, so that simulators need no tri-state lines.
 """
 
 from amaranth.hdl import Cat, Module, Value
-from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.interface.cubesense.pins import OWN_PINS, PREFIXES, pair_pins
+from cubestack.firmware_model.interface.pins import resized
+from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
-__all__ = ["CubeSensePair"]
+__all__ = ["OWN_PORTS", "CubeSensePair", "driven", "released"]
 
 #: Ports that each FPGA has for itself; in the pair SUN_ or NAD_ goes before their names.
-_OWN = (
-    "Y",
-    "HREF",
-    "PCLK",
-    "SRAM_A",
-    "SRAM_D_I",
-    "SRAM_D_O",
-    "SRAM_D_OE",
-    "SRAM_CE_N",
-    "SRAM_OE_N",
-    "SRAM_WE_N",
-)
-#: Ports that carry the same of the microcontroller's lines on both.
-_COMMON = ("RNW", "CLK", "EDGE", "SHIFT")
+OWN_PORTS = [port.name for pin in OWN_PINS for port in pin.ports]
 
 
-class CubeSensePair(Component):
+class CubeSensePair(PinnedComponent):
     """The two FPGAs with all of their pins but those of the link.
 
     SUNEN and NADEN are low active; RNW, CLK, EDGE and SHIFT go to both FPGAs. DATA is the
@@ -47,41 +36,22 @@ class CubeSensePair(Component):
     def __init__(self, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False) -> None:
         """Make the pair."""
         self.read_out = read_out
-        self._sun = CubeSenseFpga("sun", read_out, mcu_addressing)
-        self._nadir = CubeSenseFpga("nadir", read_out, mcu_addressing)
-        self._common = (*_COMMON, *("DATA_I",) * mcu_addressing)
-        members = self._sun.signature.members
-        super().__init__(
-            {
-                **{f"SUN_{name}": members[name] for name in _OWN},
-                **{f"NAD_{name}": members[name] for name in _OWN},
-                **{name: members[name] for name in self._common},
-                "SUNEN": In(1, init=1),
-                "NADEN": In(1, init=1),
-                "SUNACK": Out(1),
-                "NADACK": Out(1),
-                "DATA": Out(8),
-                "DATA_OE": Out(1),
-                "CONTENTION": Out(4),
-            }
-        )
+        self.mcu_addressing = mcu_addressing
+        width = read_out.address_bits
+        super().__init__(resized(pair_pins(mcu_addressing), SUN_SRAM_A=width, NAD_SRAM_A=width))
 
     def elaborate(self, platform: object) -> Module:
         """Join the two FPGAs."""
         m = Module()
-        m.submodules.sun = sun = self._sun
-        m.submodules.nadir = nadir = self._nadir
-        for prefix, fpga in (("SUN_", sun), ("NAD_", nadir)):
-            own = [(name, prefix + name) for name in _OWN]
-            ports = own + [(name, name) for name in self._common]
-            for name, port in ports:
-                if fpga.signature.members[name].flow is In:
-                    m.d.comb += getattr(fpga, name).eq(getattr(self, port))
-                else:
-                    m.d.comb += getattr(self, port).eq(getattr(fpga, name))
+        m.submodules.sun = sun = CubeSenseFpga("sun", self.read_out, self.mcu_addressing)
+        m.submodules.nadir = nadir = CubeSenseFpga("nadir", self.read_out, self.mcu_addressing)
+        common = ["RNW", "CLK", "EDGE", "SHIFT", *("DATA_I",) * self.mcu_addressing]
+        for prefix, fpga in zip(PREFIXES.values(), (sun, nadir), strict=True):
+            own = [(name, prefix + name) for name in OWN_PORTS]
+            connect_ports(m, fpga, self, own + [(name, name) for name in common])
 
-        link_data = self._data(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
-        link_control = (sun.LINK_C_O | ~sun.LINK_C_OE) & (nadir.LINK_C_O | ~nadir.LINK_C_OE)
+        link_data = driven(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
+        link_control = released(sun.LINK_C_O, sun.LINK_C_OE, nadir.LINK_C_O, nadir.LINK_C_OE)
         m.d.comb += [
             sun.EN.eq(self.SUNEN),
             nadir.EN.eq(self.NADEN),
@@ -91,7 +61,7 @@ class CubeSensePair(Component):
             nadir.LINK_D_I.eq(link_data),
             sun.LINK_C_I.eq(link_control),
             nadir.LINK_C_I.eq(link_control),
-            self.DATA.eq(self._data(sun.DATA_O, sun.DATA_OE, nadir.DATA_O, nadir.DATA_OE)),
+            self.DATA.eq(driven(sun.DATA_O, sun.DATA_OE, nadir.DATA_O, nadir.DATA_OE)),
             self.DATA_OE.eq(sun.DATA_OE | nadir.DATA_OE),
             self.CONTENTION.eq(
                 Cat(
@@ -103,7 +73,12 @@ class CubeSensePair(Component):
         ]
         return m
 
-    @staticmethod
-    def _data(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
-        """Level of eight data lines that at most one FPGA drives."""
-        return (sun & sun_oe.replicate(8)) | (nadir & nadir_oe.replicate(8))
+
+def driven(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
+    """Level of eight data lines that at most one FPGA drives; 0 where none does."""
+    return (sun & sun_oe.replicate(8)) | (nadir & nadir_oe.replicate(8))
+
+
+def released(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
+    """Level of lines that are pulled up, which a driver of either FPGA may hold low."""
+    return (sun | ~sun_oe) & (nadir | ~nadir_oe)

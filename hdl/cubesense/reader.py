@@ -7,7 +7,6 @@ so it alone sets the rate, and reading works when no camera gives a clock.
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Mux, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
-from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
@@ -55,9 +54,9 @@ class CubeSenseReader(Component):
                 "picture": In(1),
                 "scan": In(1),
                 "window": In(1),
-                "sun_x": In(ceil_log2(read_out.columns)),
-                "sun_y": In(ceil_log2(read_out.rows)),
-                "address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "sun_x": In(read_out.column_bits),
+                "sun_y": In(read_out.row_bits),
+                "address": Out(read_out.address_bits),
                 "memory": In(8),
                 "data": Out(8),
                 **(addressing if mcu_addressing else {}),

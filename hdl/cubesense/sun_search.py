@@ -7,10 +7,8 @@ of a line; this one does not, because pixels there are not side by side.
 
 from amaranth.hdl import Module, Signal
 from amaranth.lib.wiring import Component, In, Out
-from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, ReadOut
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
 __all__ = ["SunSearch"]
 
@@ -33,16 +31,16 @@ class SunSearch(Component):
 
     def __init__(self, read_out: ReadOut, *, domain: str = "pix") -> None:
         """Make a search in pictures of ``read_out``'s size."""
-        self._columns = read_out.columns
+        self._column_bits = read_out.column_bits
         self._domain = domain
         super().__init__(
             {
                 "start": In(1),
                 "store": In(1),
                 "pixel": In(8),
-                "address": In(MatrixCounter.address_width(read_out.columns, read_out.rows)),
-                "x": Out(ceil_log2(read_out.columns)),
-                "y": Out(ceil_log2(read_out.rows)),
+                "address": In(read_out.address_bits),
+                "x": Out(read_out.column_bits),
+                "y": Out(read_out.row_bits),
             }
         )
 
@@ -50,7 +48,6 @@ class SunSearch(Component):
         """Build the count of bright pixels and the retained coordinates."""
         m = Module()
         sync = m.d[self._domain]
-        column_bits = ceil_log2(self._columns)
         # Reset does not reach these two, and while it lasts nothing is searched.
         x = Signal.like(self.x, reset_less=True)
         y = Signal.like(self.y, reset_less=True)
@@ -79,7 +76,7 @@ class SunSearch(Component):
             sync += [x.eq(-1), y.eq(-1)]
         with m.Elif(found):
             sync += [
-                x.eq(self.address[:column_bits] - (SUN_RUN - 1)),
-                y.eq(self.address[column_bits:]),
+                x.eq(self.address[: self._column_bits] - (SUN_RUN - 1)),
+                y.eq(self.address[self._column_bits :]),
             ]
         return m

@@ -6,10 +6,8 @@ published: here the whole window is moved inside of the picture.
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib.wiring import Component, In, Out
-from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
 __all__ = ["SunWindow"]
 
@@ -34,9 +32,9 @@ class SunWindow(Component):
         self._domain = domain
         super().__init__(
             {
-                "x": In(ceil_log2(read_out.columns)),
-                "y": In(ceil_log2(read_out.rows)),
-                "address": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
+                "x": In(read_out.column_bits),
+                "y": In(read_out.row_bits),
+                "address": Out(read_out.address_bits),
                 "coordinate": Out(1),
                 "byte": Out(8),
             }

@@ -19,63 +19,21 @@ The coordinates of the first Sun pixel outlive the reset: they are written by a 
 Sun picture is stored and stand still whenever a data clock looks at them.
 """
 
-from typing import NamedTuple
-
 from amaranth.hdl import Cat, Module, ResetSignal
-from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
-from cubestack.hdl.cubesense.dataflow import DataflowControl, Side
+from cubestack.firmware_model.interface.cubesense.pins import ADDRESSING, FPGA
+from cubestack.firmware_model.interface.pins import resized
+from cubestack.hdl.blocks.pinned import PinnedComponent
+from cubestack.hdl.cubesense.dataflow import DataflowControl, Side, checked
 from cubestack.hdl.cubesense.reader import CubeSenseReader
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.writer import add_writer
 
-__all__ = ["ADDRESSING_PINS", "PINS", "CubeSenseFpga", "FpgaPins"]
+__all__ = ["CubeSenseFpga"]
 
 
-class FpgaPins(NamedTuple):
-    """Pins of one purpose."""
-
-    number: int
-    ports: tuple[str, ...]
-    meaning: str
-
-
-#: Table 3.4: 64 pins. Ports ending in _I, _O and _OE are three sides of the same pins.
-PINS = (
-    FpgaPins(19, ("SRAM_A",), "SRAM address, row : column"),
-    FpgaPins(8, ("SRAM_D_I", "SRAM_D_O", "SRAM_D_OE"), "SRAM data"),
-    FpgaPins(1, ("SRAM_CE_N",), "SRAM chip enable, low active"),
-    FpgaPins(1, ("SRAM_OE_N",), "SRAM output enable, low active"),
-    FpgaPins(1, ("SRAM_WE_N",), "SRAM write enable, low active"),
-    FpgaPins(8, ("Y",), "pixel data from the camera"),
-    FpgaPins(1, ("HREF",), "high while a line's pixels are sent"),
-    FpgaPins(1, ("PCLK",), "pixel clock"),
-    FpgaPins(8, ("DATA_O", "DATA_OE"), "bytes to the microcontroller, on a bus for both FPGAs"),
-    FpgaPins(1, ("EN",), "own enable, low active: SUNEN or NADEN"),
-    FpgaPins(1, ("RNW",), "read, not write; with SHIFT the direction across the link"),
-    FpgaPins(1, ("CLK",), "data clock"),
-    FpgaPins(1, ("EDGE",), "edge data instead of the picture"),
-    FpgaPins(1, ("SHIFT",), "across the link"),
-    FpgaPins(1, ("ACK",), "a whole picture is stored: SUNACK or NADACK"),
-    FpgaPins(8, ("LINK_D_I", "LINK_D_O", "LINK_D_OE"), "data between the FPGAs"),
-    FpgaPins(
-        2,
-        ("LINK_C_I", "LINK_C_O", "LINK_C_OE"),
-        "bit 0: sun's enable or PCLK; bit 1: nadir's enable or HREF; pulled up",
-    ),
-)
-
-#: What is other with address control from the microcontroller: 64 pins too.
-ADDRESSING_PINS = FpgaPins(
-    8,
-    ("DATA_I", "DATA_O", "DATA_OE"),
-    "bytes to the microcontroller and addresses from it, on a bus for both FPGAs",
-)
-
-
-class CubeSenseFpga(Component):
+class CubeSenseFpga(PinnedComponent):
     """The sun sensor's or the nadir sensor's FPGA with the pins of table 3.4.
 
     Bidirectional pins are i / o / oe triples. LINK_C_OE has one bit for each of its two lines.
@@ -90,40 +48,11 @@ class CubeSenseFpga(Component):
         self, side: Side, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False
     ) -> None:
         """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
-        if side not in ("sun", "nadir"):
-            raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
-        self.side = side
+        self.side = checked(side)
         self.read_out = read_out
         self.mcu_addressing = mcu_addressing
-        super().__init__(
-            {
-                "Y": In(8),
-                "HREF": In(1),
-                "PCLK": In(1),
-                "EN": In(1, init=1),
-                "RNW": In(1),
-                "CLK": In(1),
-                "EDGE": In(1),
-                "SHIFT": In(1),
-                "ACK": Out(1),
-                "DATA_O": Out(8),
-                "DATA_OE": Out(1),
-                "LINK_D_I": In(8),
-                "LINK_D_O": Out(8),
-                "LINK_D_OE": Out(1),
-                "LINK_C_I": In(2, init=0b11),
-                "LINK_C_O": Out(2),
-                "LINK_C_OE": Out(2),
-                "SRAM_A": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
-                "SRAM_D_I": In(8),
-                "SRAM_D_O": Out(8),
-                "SRAM_D_OE": Out(1),
-                "SRAM_CE_N": Out(1, init=1),
-                "SRAM_OE_N": Out(1, init=1),
-                "SRAM_WE_N": Out(1, init=1),
-                **({"DATA_I": In(8)} if mcu_addressing else {}),
-            }
-        )
+        pins = ADDRESSING if mcu_addressing else FPGA
+        super().__init__(resized(pins, SRAM_A=read_out.address_bits))
 
     def elaborate(self, platform: object) -> Module:
         """Wire the blocks to the pins."""

@@ -1,8 +1,7 @@
 """CubeStar's FPGA board with two SRAMs in turn: one is filled while the processor has the other.
 
 CubeStar thesis, option 3 of section 3.3. It was not taken up because the AGLN030 has too few pins,
-77: this design has 95. Pins and protocol are ours, and keep those of the published board (table
-C.2) wherever they still serve.
+77: this design has 95. Pins and protocol are assumed.
 
 How each asynchronous input is brought in:
 
@@ -13,26 +12,16 @@ How each asynchronous input is brought in:
 """
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Signal
-from amaranth.lib.cdc import ResetSynchronizer
-from amaranth.lib.wiring import Component, In, Out
 
-from cubestack.hdl.blocks.bus_port import BusPort
-from cubestack.hdl.blocks.frame_writer import FrameWriter
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
-from cubestack.hdl.cubestar import shared_top as cubestar_shared_top
+from cubestack.firmware_model.interface.cubestar.pins import DOUBLE
+from cubestack.hdl.cubestar.board import CubeStarBoard
 
-__all__ = ["PINS", "CubeStarDouble"]
-
-#: Meaning of each port but the SRAMs'.
-PINS = {name: text for name, text in cubestar_shared_top.PINS.items() if name != "BANK"} | {
-    "RNW": "low: a picture is stored",
-    "INTO": "memory to store in, latched by the falling RNW",
-}
+__all__ = ["CubeStarDouble"]
 
 _SRAM = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 
-class CubeStarDouble(Component):
+class CubeStarDouble(CubeStarBoard):
     """Frame buffer and bus switch for two memories of one picture each.
 
     ENABLE = 0: standby, every output at its reset value. ENABLE = 1: the bus has the memories, at
@@ -42,70 +31,22 @@ class CubeStarDouble(Component):
     turn.
     """
 
-    def __init__(self, columns: int = 1024, rows: int = 512) -> None:
-        """Make the top for frames of ``columns`` x ``rows`` pixels."""
-        self.columns = columns
-        self.rows = rows
-        sram = {
-            "A": Out(MatrixCounter.address_width(columns, rows)),
-            "D_I": In(8),
-            "D_O": Out(8),
-            "D_OE": Out(1),
-            "CE_N": Out(1, init=1),
-            "OE_N": Out(1, init=1),
-            "WE_N": Out(1, init=1),
-        }
-        super().__init__(
-            {
-                "PIXCLK": In(1),
-                "PIXDATA": In(8),
-                "HSYNC": In(1),
-                "VSYNC": In(1),
-                "ENABLE": In(1),
-                "RNW": In(1),
-                "INTO": In(1),
-                "ACK": Out(1),
-                "AD_HIGH": In(8),
-                "AD_LOW_I": In(8),
-                "AD_LOW_O": Out(8),
-                "AD_LOW_OE": Out(1),
-                "ALE": In(1),
-                "CS_N": In(1, init=1),
-                "RE_N": In(1, init=1),
-                "WE_N": In(1, init=1),
-                **{f"SRAM{n}_{name}": member for n in (1, 2) for name, member in sram.items()},
-            }
-        )
+    _pins = DOUBLE
+    _banks = False
 
     def elaborate(self, platform: object) -> Module:
         """Wire writer and bus to either SRAM."""
         m = Module()
-        m.domains.pix = ClockDomain(async_reset=True, local=True)
         m.domains.start = ClockDomain(clk_edge="neg", reset_less=True, local=True)
         storing = Signal()
-        m.d.comb += [
-            storing.eq(self.ENABLE & ~self.RNW),
-            ClockSignal("pix").eq(self.PIXCLK),
-            ClockSignal("start").eq(self.RNW),
-        ]
-        m.submodules.pix_reset = ResetSynchronizer(~storing, domain="pix")
-        m.submodules.writer = writer = FrameWriter(self.columns, self.rows, domain="pix")
-        m.submodules.bus = bus = BusPort(len(self.SRAM1_A) + 1)
         into = Signal()
         m.d.start += into.eq(self.INTO)
         m.d.comb += [
-            writer.pixel.eq(self.PIXDATA),
-            writer.hsync.eq(self.HSYNC),
-            writer.vsync.eq(self.VSYNC),
-            self.ACK.eq(writer.ack),
-            bus.on.eq(self.ENABLE),
-            bus.high.eq(self.AD_HIGH),
-            bus.low.eq(self.AD_LOW_I),
-            bus.ale.eq(self.ALE),
-            bus.cs_n.eq(self.CS_N),
-            bus.re_n.eq(self.RE_N),
-            bus.we_n.eq(self.WE_N),
+            storing.eq(self.ENABLE & ~self.RNW),
+            ClockSignal("start").eq(self.RNW),
         ]
+        writer = self._add_writer(m, storing)
+        bus = self._add_bus(m, self.ENABLE, len(self.SRAM1_A) + 1)
         offered = []
         for number, stored_in, addressed in (
             (1, ~into, ~bus.address[-1]),

@@ -1,14 +1,14 @@
-"""Area of all designs in one table, and against the tracked file.
+"""Area of a table of tops, and against a tracked file.
 
-``area.json`` beside this module holds what the designs took when they were last looked at. The
-iCE40 stands there as a public yardstick: other designs are known in its 4-input tables. The clock
-rates are those of one placement on its HX8K, not the AGLN030's.
+Such a file, ``area.json`` beside a sensor's tops, holds what they took when they were last looked
+at. The iCE40 stands there as a public yardstick: other designs are known in its 4-input tables. The
+clock rates are those of one placement on its HX8K, not the AGLN030's.
 """
 
 import json
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,10 +17,9 @@ from amaranth.lib.wiring import Component
 from cubestack.hdl.flow.area import AGLN030_TILES, TileCount, count_tiles
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import run_nextpnr_ice40, run_yosys
-from cubestack.hdl.flow.tops import BLOCKS, TOPS
+from cubestack.hdl.flow.top import Top, TopTable
 
 __all__ = [
-    "AREA_FILE",
     "GROWTH",
     "Area",
     "Ice40Count",
@@ -28,14 +27,12 @@ __all__ = [
     "area_table",
     "areas",
     "count_ice40",
-    "designs",
     "grown",
     "ice40_fmax",
+    "recorded_areas",
 ]
 
-AREA_FILE = Path(__file__).parent / "area.json"
-
-#: A design may grow by this part of what AREA_FILE says.
+#: A design may grow by this part of what the tracked file says.
 GROWTH = 0.05
 
 
@@ -104,19 +101,13 @@ def _name_clocks_by_ports(netlist: Path) -> None:
     netlist.write_text(json.dumps(content), encoding="utf-8")
 
 
-def designs() -> dict[str, Callable[[], Component]]:
-    """Each top that is one FPGA, then each block."""
-    return {name: top.make for name, top in TOPS.items() if top.parts == 1} | BLOCKS
-
-
-def areas(names: Iterable[str], ice40: bool = False, fmax: bool = False) -> Iterator[Area]:
-    """Of these of :func:`designs`; ``ice40`` takes some seconds more for each.
+def areas(table: TopTable, ice40: bool = False, fmax: bool = False) -> Iterator[Area]:
+    """Of all in ``table``; ``ice40`` takes some seconds more for each.
 
     ``fmax`` takes some ten seconds more for each top; blocks have none, being no whole design.
     """
-    makes = designs()
-    for name in names:
-        make, top = makes[name], name in TOPS
+    for name, design in table.items():
+        make, top = design.make, isinstance(design, Top)
         yield Area(
             name,
             top,
@@ -147,7 +138,7 @@ def area_table(rows: Iterable[Area]) -> Iterator[str]:
 
 
 def area_json(rows: Iterable[Area]) -> str:
-    """The same as JSON; with the iCE40's counts, the content of AREA_FILE."""
+    """The same as JSON; with the iCE40's counts, the content of a tracked file."""
     counts: dict[str, dict[str, Any]] = {}
     for row in rows:
         counts[row.name] = {
@@ -163,11 +154,17 @@ def area_json(rows: Iterable[Area]) -> str:
     return json.dumps({**part, "designs": counts}, indent=1)
 
 
-def grown(row: Area) -> list[str]:
-    """What of a design is over GROWTH more than in AREA_FILE, in sentences."""
-    known = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"].get(row.name)
+def recorded_areas(file: Path) -> dict[str, dict[str, Any]]:
+    """What a tracked file says of each design, by name."""
+    designs: dict[str, dict[str, Any]] = json.loads(file.read_text(encoding="utf-8"))["designs"]
+    return designs
+
+
+def grown(row: Area, file: Path) -> list[str]:
+    """What of a design is over GROWTH more than in the tracked ``file``, in sentences."""
+    known = recorded_areas(file).get(row.name)
     if known is None:
-        return [f"{row.name} is not in {AREA_FILE.name}"]
+        return [f"{row.name} is not in {file.name}"]
     pairs = [("tiles", known["tiles"], row.tiles.total)]
     if row.ice40:
         pairs.append(("iCE40 LUT4s", known["ice40"]["lut4"], row.ice40.lut4))

@@ -7,14 +7,15 @@ as comments: what is known here is filled in, the package's pins are not.
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from itertools import chain
 from textwrap import wrap
 
+from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.flow.area import AGLN030_PINS
 from cubestack.hdl.flow.generate import rtlil_text
-from cubestack.hdl.flow.tops import Pin, Top, pins_of
+from cubestack.hdl.flow.top import Top
 
 __all__ = ["verilog_file"]
 
@@ -56,7 +57,7 @@ def verilog_file(name: str, top: Top) -> str:
     """Text of the file; its top module is ``name`` with ``_`` for ``-``, its core has ``_core``."""
     module = name.replace("-", "_")
     component = top.make()
-    pins = pins_of(component, top.meanings)
+    pins = component.pins
     rtlil = rtlil_text(component, f"{module}_core")
     parts = [
         *_comment(_header(name, module, top)),
@@ -101,7 +102,7 @@ def _header(name: str, module: str, top: Top) -> Iterator[str]:
         yield f"Needs pull-ups: {', '.join(top.pulled_up)}."
 
 
-def _pin_table(top: Top, pins: list[Pin]) -> Iterator[str]:
+def _pin_table(top: Top, pins: Sequence[Pin]) -> Iterator[str]:
     number = sum(pin.width for pin in pins)
     yield f"PINS ({number})"
     if top.parts == 1 and number > AGLN030_PINS:
@@ -110,7 +111,7 @@ def _pin_table(top: Top, pins: list[Pin]) -> Iterator[str]:
         yield f"  {_bus(pin):<19} {pin.direction:<9} {pin.meaning}"
 
 
-def _constraints(top: Top, pins: list[Pin]) -> Iterator[str]:
+def _constraints(top: Top, pins: Sequence[Pin]) -> Iterator[str]:
     yield "CONSTRAINTS (SDC); clocks are unrelated to each other"
     for clock in top.clocks:
         yield f"  # {clock.source}"
@@ -130,38 +131,38 @@ def _constraints(top: Top, pins: list[Pin]) -> Iterator[str]:
 
 
 def _bus(pin: Pin) -> str:
-    return pin.name if pin.width == 1 else f"{pin.name}[{pin.width - 1}:0]"
+    return pin if pin.width == 1 else f"{pin}[{pin.width - 1}:0]"
 
 
 def _bits(pin: Pin) -> list[str]:
-    return [pin.name] if pin.width == 1 else [f"{pin.name}[{n}]" for n in range(pin.width)]
+    return [pin] if pin.width == 1 else [f"{pin}[{n}]" for n in range(pin.width)]
 
 
-def _wrapper(module: str, pins: list[Pin]) -> Iterator[str]:
+def _wrapper(module: str, pins: Sequence[Pin]) -> Iterator[str]:
     """The module that has the bidirectional pins."""
     yield f"module {module} ("
-    declarations = [f"  {_KINDS[pin.direction]} wire {_range(pin.width)}{pin.name}" for pin in pins]
+    declarations = [f"  {_KINDS[pin.direction]} wire {_range(pin.width)}{pin}" for pin in pins]
     yield ",\n".join(declarations)
     yield ");"
-    connections = []
+    connections: list[tuple[str, str]] = []
     drivers = []
     for pin in pins:
         if pin.enable is None:
-            connections.append((pin.name, pin.name))
+            connections.append((pin, pin))
             continue
-        level, on = f"{pin.name}_level", f"{pin.name}_on"
+        level, on = f"{pin}_level", f"{pin}_on"
         connections += [(str(pin.level_out), level), (pin.enable, on)]
         if pin.level_in is not None:
-            connections.append((pin.level_in, pin.name))
+            connections.append((pin.level_in, pin))
         yield f"  wire {_range(pin.width)}{level};"
-        yield f"  wire {_range(pin.enable_width)}{on};"
-        if pin.enable_width == 1:
-            ports = f".level({level}), .on({on}), .pin({pin.name})"
-            drivers.append(f"  {module}_driver #({pin.width}) {pin.name}_driver ({ports});")
+        yield f"  wire {_range(pin.enables)}{on};"
+        if pin.enables == 1:
+            ports = f".level({level}), .on({on}), .pin({pin})"
+            drivers.append(f"  {module}_driver #({pin.width}) {pin}_driver ({ports});")
             continue
         for n in range(pin.width):
-            ports = f".level({level}[{n}]), .on({on}[{n}]), .pin({pin.name}[{n}])"
-            drivers.append(f"  {module}_driver #(1) {pin.name}_driver_{n} ({ports});")
+            ports = f".level({level}[{n}]), .on({on}[{n}]), .pin({pin}[{n}])"
+            drivers.append(f"  {module}_driver #(1) {pin}_driver_{n} ({ports});")
     yield from drivers
     yield f"  {module}_core core ("
     yield ",\n".join(f"    .{port}({wire})" for port, wire in connections)

@@ -21,8 +21,8 @@ from itertools import combinations, product
 from pathlib import Path
 from typing import NamedTuple
 
+from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.flow.tools import run_yosys
-from cubestack.hdl.flow.tops import Pin
 from cubestack.hdl.mutants.netlist import Mutant, Netlist
 
 __all__ = ["Equivalence", "Verdict"]
@@ -149,7 +149,7 @@ class Equivalence:
             return f"(gold{level} == gate{level})"
         enable = self._index[pin.enable]
         mask = f"gold{enable}"
-        if pin.enable_width == 1:
+        if pin.enables == 1:
             mask = f"{{{pin.width}{{gold{enable}}}}}"
         equal = f"(((gold{level} ^ gate{level}) & {mask}) == 0)"
         return f"((gold{enable} == gate{enable}) & {equal})"

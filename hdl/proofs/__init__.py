@@ -1,1 +1,1 @@
-"""Proofs by induction that the shipped designs keep what their documents promise."""
+"""Proofs by induction that designs keep what their documents promise."""

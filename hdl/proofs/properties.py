@@ -1,11 +1,13 @@
-"""Claims that both sensors' designs share, as assertions on a harness."""
+"""Properties that several designs share, as assumptions and assertions on a harness."""
 
+from collections.abc import Collection, Iterable
 from types import SimpleNamespace
 from typing import Any
 
 from amaranth.hdl import (
     Assert,
     Assume,
+    Cat,
     ClockDomain,
     ClockSignal,
     Module,
@@ -15,17 +17,25 @@ from amaranth.hdl import (
 )
 from amaranth.hdl._ast import Initial  # not among the public names, though documented as one
 
+from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.proofs.prover import past
 
 __all__ = [
+    "ACKNOWLEDGES",
     "WRITER_WIRES",
+    "acknowledges",
     "acknowledges_all_rows",
     "domain",
     "idle_is_reset",
+    "one_sram_driver",
+    "outputs_rest",
     "starts_in",
     "writer_wires",
+    "written_is_driven",
 ]
 
+#: What :func:`acknowledges` asserts.
+ACKNOWLEDGES = "ACK is high exactly from when all rows of a frame are stored"
 
 #: Wires of a writer, by where they are below it.
 WRITER_WIRES = {
@@ -78,15 +88,45 @@ def idle_is_reset(m: Module, d: SimpleNamespace, standby: Value, retained: set[s
             m.d.comb += Assert(~standby | (register.value == register.reset))
 
 
-def acknowledges_all_rows(
-    m: Module, d: SimpleNamespace, writer: str, clock: Value, columns: int, rows: int
-) -> Signal:
+def outputs_rest(
+    m: Module,
+    d: SimpleNamespace,
+    standby: Value,
+    pins: Iterable[Pin],
+    but: Collection[str] = (),
+) -> None:
+    """In standby each output of ``pins`` has its reset level; ``but`` are ports that need not."""
+    for port in (port for pin in pins for port in pin.ports):
+        if port.output and port.name not in but:
+            m.d.comb += Assert(~standby | (getattr(d, port.name) == port.level))
+
+
+def one_sram_driver(m: Module, d: SimpleNamespace, sram: str = "SRAM") -> None:
+    """The SRAM drives its data bus while its output enable is low; then the FPGA does not."""
+    m.d.comb += Assert(~getattr(d, f"{sram}_D_OE") | getattr(d, f"{sram}_OE_N"))
+
+
+def written_is_driven(m: Module, d: SimpleNamespace, sram: str = "SRAM") -> None:
+    """While an SRAM is written it is selected, and its data bus driven by the FPGA alone."""
+    one_sram_driver(m, d, sram)
+    d_oe, ce_n, we_n = (getattr(d, f"{sram}_{name}") for name in ("D_OE", "CE_N", "WE_N"))
+    m.d.comb += Assert(we_n | (d_oe & ~ce_n))
+
+
+def acknowledges(m: Module, d: SimpleNamespace, ack: Value, **clocks: Value) -> None:
+    """ACK is high exactly while one of the writers has stored all rows; their clocks by name."""
+    complete = [acknowledges_all_rows(m, d, writer, clock) for writer, clock in clocks.items()]
+    m.d.comb += Assert(Cat(*complete).any() == ack)
+
+
+def acknowledges_all_rows(m: Module, d: SimpleNamespace, writer: str, clock: Value) -> Signal:
     """One writer's ACK, from what it writes; returns the ACK that should be.
 
     ACK is high from the end of the last pixel's write on, and at no other time. Each row begins
     with its first column, after the row before it in the same frame, so then all of them have.
     ``d`` has the wires of WRITER_WIRES with ``writer`` before their names.
     """
+    columns, rows = d.size.columns, d.size.rows
     wires = SimpleNamespace(**{name: getattr(d, f"{writer}_{name}") for name in WRITER_WIRES})
     column, row, store = wires.column, wires.row, wires.store
     sync = domain(m, f"{writer}_monitor", clock, wires.rst)

@@ -25,7 +25,7 @@ from amaranth.lib.wiring import Component, In
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import run_yosys
 
-__all__ = ["Fault", "Outcome", "Proof", "Register", "UnknownWireError", "past", "prove"]
+__all__ = ["Fault", "Proof", "ProofResult", "Register", "UnknownWireError", "past", "prove"]
 
 _FLATTEN = """
 read_rtlil design.il
@@ -75,10 +75,10 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True)
 class Proof:
-    """One promise.
+    """A property of a design, and how it is proved.
 
     Attributes:
-        claim: what is proved, in one sentence.
+        property: what is proved, in one sentence.
         make: the design, and what describes its size; of a small picture when asked for.
         wires: internal wires of the design that ``harness`` looks at, by the name that it uses.
             Submodules are named as in the design, without the numbers that make names unique.
@@ -88,7 +88,7 @@ class Proof:
         fault: a bug with which the proof must fail.
     """
 
-    claim: str
+    property: str
     make: Callable[[bool], tuple[Component, Any]]
     wires: dict[str, str]
     harness: Callable[[Module, SimpleNamespace], None]
@@ -103,7 +103,7 @@ class Register(NamedTuple):
     reset: int | None
 
 
-class Outcome(NamedTuple):
+class ProofResult(NamedTuple):
     """How a proof ended, after how many steps; ``counterexample`` when it is refuted."""
 
     proved: bool
@@ -112,7 +112,7 @@ class Outcome(NamedTuple):
     seconds: float
 
 
-def prove(proof: Proof, planted: bool = False) -> Outcome:
+def prove(proof: Proof, planted: bool = False) -> ProofResult:
     """Try a proof, or refute it with its fault planted.
 
     ToolMissingError without a Yosys; UnknownWireError when the design has no such wire.
@@ -147,7 +147,7 @@ def prove(proof: Proof, planted: bool = False) -> Outcome:
         (folder / "harness.il").write_text(text, encoding="utf-8")
         run_yosys(script, folder)
         report = (folder / "sat.txt").read_text(encoding="utf-8")
-    return Outcome(
+    return ProofResult(
         "Induction step proven: SUCCESS!" in report,
         "model found for base case: FAIL!" in report,
         len(re.findall(r"^\[base case \d+\]", report, re.MULTILINE)),

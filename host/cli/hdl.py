@@ -11,9 +11,17 @@ examples:
 """
 
 import argparse
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from cubestack.hdl.flow.top import TopTable
+    from cubestack.hdl.proofs.prover import Proof
 
 __all__ = ["add_arguments", "run"]
+
+Entry = TypeVar("Entry")
 
 AREA = """How many of the AGLN030's 768 tiles each design takes: a tile is one
 3-input table or one flip-flop. An estimate: Yosys simplifies, a search covers
@@ -24,7 +32,7 @@ examples:
   cubestack hdl area
   cubestack hdl area cubestar "Sun search"
   cubestack hdl area --ice40    a public yardstick beside it: iCE40 cells
-  cubestack hdl area --ice40 --fmax --json    what hdl/flow/area.json tracks"""
+  cubestack hdl area --ice40 --fmax --json    what each area.json in hdl/ tracks"""
 
 VERILOG = """One Verilog file that needs no other: a wrapper with the real pins,
 bidirectional ones too, around the design itself, with a list of the pins and a
@@ -56,8 +64,26 @@ examples:
   cubestack hdl wave whole_frame --text --internal --last 50"""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the subcommands and their options."""
+def _all_tops() -> "TopTable":
+    from cubestack.hdl.cubesense import tops as cubesense
+    from cubestack.hdl.cubestar import tops as cubestar
+
+    return {**cubestar.TOPS, **cubesense.TOPS}
+
+
+def _all_proofs() -> "Mapping[str, Proof]":
+    from cubestack.hdl.proofs import cubesense, cubestar
+
+    return {**cubestar.PROOFS, **cubesense.PROOFS}
+
+
+def add_arguments(
+    parser: argparse.ArgumentParser,
+    tops: "Callable[[], TopTable]" = _all_tops,
+    proofs: "Callable[[], Mapping[str, Proof]]" = _all_proofs,
+) -> None:
+    """Declare the subcommands and their options, for these tops and proofs."""
+    parser.set_defaults(tops=tops, proofs=proofs)
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     area = _subcommand(actions, "area", "tiles of every design", AREA)
     area.add_argument("names", metavar="NAME", nargs="*", help="designs; default: all")
@@ -107,28 +133,33 @@ def _subcommand(
     )
 
 
+def _chosen(table: Mapping[str, Entry], names: list[str], kind: str) -> dict[str, Entry]:
+    """These of a table, all without a name; ValueError when one is not in it."""
+    for name in names:
+        if name not in table:
+            raise ValueError(f"{name!r} is no {kind}; there are {', '.join(table)}")
+    return {name: table[name] for name in names or table}
+
+
 def _area(args: argparse.Namespace) -> int:
-    from cubestack.hdl.flow.area_report import area_json, area_table, areas, designs
+    from cubestack.hdl.flow.area_report import area_json, area_table, areas
+    from cubestack.hdl.flow.top import counted
     from cubestack.host.cli.terminal import progress
 
-    names = args.names or list(designs())
-    for name in names:
-        if name not in designs():
-            raise ValueError(f"{name!r} is no design of one FPGA; there are {', '.join(designs())}")
+    table = _chosen(counted(args.tops()), args.names, "design of one FPGA")
     rows = list(
-        progress(areas(names, args.ice40, args.fmax), len(names), "designs", quiet=args.json)
+        progress(areas(table, args.ice40, args.fmax), len(table), "designs", quiet=args.json)
     )
     print(area_json(rows) if args.json else "\n".join(area_table(rows)))
     return 0
 
 
 def _verilog(args: argparse.Namespace) -> int:
-    from cubestack.hdl.flow.tops import TOPS
+    from cubestack.hdl.flow.top import tops_in
     from cubestack.hdl.flow.verilog import verilog_file
 
-    if args.top not in TOPS:
-        raise ValueError(f"{args.top!r} is no top; there are {', '.join(TOPS)}")
-    text = verilog_file(args.top, TOPS[args.top])
+    (top,) = _chosen(tops_in(args.tops()), [args.top], "top").values()
+    text = verilog_file(args.top, top)
     if args.out is None:
         print(text, end="")
     else:
@@ -137,14 +168,10 @@ def _verilog(args: argparse.Namespace) -> int:
 
 
 def _prove(args: argparse.Namespace) -> int:
-    from cubestack.hdl.proofs.catalogue import PROOFS, verdict_json, verdict_text, verdicts
+    from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
 
-    names = args.names or list(PROOFS)
-    for name in names:
-        if name not in PROOFS:
-            raise ValueError(f"{name!r} is no proof; there are {', '.join(PROOFS)}")
     done = []
-    for verdict in verdicts(names):
+    for verdict in verdicts(_chosen(args.proofs(), args.names, "proof")):
         done.append(verdict)
         if not args.json:
             print(verdict_text(verdict), flush=True)

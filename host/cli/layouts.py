@@ -7,7 +7,7 @@ age        from the mid-exposure of a picture to its attitude in flash, from whe
 power      mean of the whole stack at 3.3 V, with its two LEDs
 energy     for each attitude
 pins       of each FPGA, of the AGLN030's 77
-tiles      of each FPGA, as in hdl/flow/area.json
+tiles      of each FPGA, as in hdl/cubestar/area.json
 
 examples:
   cubestack layouts

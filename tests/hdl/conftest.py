@@ -27,7 +27,6 @@ INITIALISER = re.compile(r"^(\s*reg (?:\[\d+:0\] )?[^$;=]*?) = \d+'h\w+;$", re.M
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "cocotb: simulates a design")
     folder = os.environ.get("HDL_COVERAGE")
     if folder and not hasattr(config, "workerinput"):
         path = Path(folder).resolve()
@@ -94,6 +93,7 @@ class Icarus:
     ) -> None:
         """Run the cocotb ``modules`` on ``design``, or on the Verilog file ``harness`` around it.
 
+        ``harness`` is a file's name without ``.v``, in this folder or with a path.
         ``text`` makes Verilog of the design, as module of the name that it is given.
         Fails with the names of the cocotb tests that failed, the first one's waveform and the end
         of the log.
@@ -101,7 +101,7 @@ class Icarus:
         if SIMULATOR != "icarus" and (harness or not initialised or X_MODULES & {*modules}):
             pytest.skip(f"needs Icarus: {harness or 'unknown levels'}")
         print(f"{design.__name__} {columns}x{rows} COCOTB_RANDOM_SEED={seed + BASE_SEED}")
-        top = harness or "dut"
+        top = Path(harness).name if harness else "dut"
         name = f"{design.__name__}-{columns}x{rows}-{top}-{initialised}-{text.__name__}"
         folder = self._folder / name
         make = partial(

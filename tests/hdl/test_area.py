@@ -5,10 +5,13 @@ import re
 from functools import cache
 from pathlib import Path
 
+import flow_checks
 import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
 
+from cubestack.hdl.cubesense import tops as cubesense
+from cubestack.hdl.cubestar import tops as cubestar
 from cubestack.hdl.flow.area import (
     AGLN030_PINS,
     AGLN030_TILES,
@@ -17,22 +20,26 @@ from cubestack.hdl.flow.area import (
     count_tiles,
 )
 from cubestack.hdl.flow.area_report import (
-    AREA_FILE,
     Area,
     Ice40Count,
     area_json,
     area_table,
-    count_ice40,
-    designs,
     grown,
     ice40_fmax,
+    recorded_areas,
 )
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import have_nextpnr, have_yosys
-from cubestack.hdl.flow.tops import TOPS, pins_of
+from cubestack.hdl.flow.top import Top, counted
 
-#: What to do about growth that is meant.
-WANTED = "if it is worth it: cubestack hdl area --ice40 --fmax --json > hdl/flow/area.json"
+#: Each sensor's designs, and the file with their areas.
+SENSORS = [(counted(sensor.TOPS), sensor.AREA_FILE) for sensor in (cubestar, cubesense)]
+DESIGNS = {name: design for table, _ in SENSORS for name, design in table.items()}
+
+every_design = pytest.mark.parametrize(
+    ("name", "design", "file"),
+    [(name, design, file) for table, file in SENSORS for name, design in table.items()],
+)
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -106,47 +113,41 @@ def test_unknown_cell_is_refused():
 
 @cache
 def tiles(name):
-    return count_tiles(designs()[name]())
+    return count_tiles(DESIGNS[name].make())
 
 
-@pytest.mark.parametrize("name", [name for name in TOPS if name in designs()])
-def test_top_fits_its_part(name):
-    assert tiles(name).flip_flops > 40
-    assert tiles(name).total <= AGLN030_TILES
-
-
-@pytest.mark.parametrize("name", designs())
-def test_no_design_grows_unnoticed(name):
-    area = Area(name, name in TOPS, tiles(name), None)
-    assert not grown(area), f"{grown(area)[0]}; {WANTED}"
+@every_design
+def test_no_design_grows_unnoticed(name, design, file):
+    flow_checks.area_is_as_recorded(name, design, file)
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
-@pytest.mark.parametrize("name", [name for name in TOPS if name in designs()])
-def test_no_top_grows_unnoticed_on_ice40(name):
-    make = designs()[name]
-    area = Area(name, True, TileCount(0, 0), count_ice40(make()))
-    assert not grown(area), f"{grown(area)[0]}; {WANTED}"
+@every_design
+def test_no_top_grows_unnoticed_on_ice40(name, design, file):
+    if isinstance(design, Top):
+        flow_checks.area_is_as_recorded(name, design, file, ice40=True)
 
 
 def test_growth_is_told_in_words():
-    before = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]["cubestar"]
+    file = cubestar.AREA_FILE
+    before = recorded_areas(file)["cubestar"]
     for tiles, message in (
         (before["tiles"], []),
         (int(before["tiles"] * 1.05), []),
         (int(before["tiles"] * 1.05) + 1, ["cubestar grew from 197 to 207 tiles, by more than 5%"]),
     ):
-        assert grown(Area("cubestar", True, TileCount(tiles, 0), None)) == message
+        assert grown(Area("cubestar", True, TileCount(tiles, 0), None), file) == message
     lut4 = before["ice40"]["lut4"]
     big = Ice40Count(lut4 * 2, 0, 0)
-    (message,) = grown(Area("cubestar", True, TileCount(0, 0), big))
+    (message,) = grown(Area("cubestar", True, TileCount(0, 0), big), file)
     assert message == f"cubestar grew from {lut4} to {2 * lut4} iCE40 LUT4s, by more than 5%"
-    assert grown(Area("moon", True, TileCount(0, 0), None)) == ["moon is not in area.json"]
+    assert grown(Area("moon", True, TileCount(0, 0), None), file) == ["moon is not in area.json"]
 
 
-def test_area_file_lists_all_designs_and_no_other():
-    content = json.loads(AREA_FILE.read_text(encoding="utf-8"))
-    assert list(content["designs"]) == list(designs())
+@pytest.mark.parametrize(("table", "file"), SENSORS)
+def test_area_file_lists_all_designs_and_no_other(table, file):
+    content = json.loads(file.read_text(encoding="utf-8"))
+    assert list(content["designs"]) == list(table)
     assert content["part_tiles"] == AGLN030_TILES
 
 
@@ -165,15 +166,17 @@ def test_table_and_json_say_the_same():
 @pytest.mark.skipif(not have_nextpnr(), reason="no placer: pip install cubestack[place]")
 def test_clock_rate_on_ice40_is_above_the_cameras():
     """ALE and ENABLE clock no path from one flip-flop to another, so they have no rate."""
-    rates = ice40_fmax(designs()["cubestar-shared"]())
+    shared = DESIGNS["cubestar-shared"]
+    rates = ice40_fmax(shared.make())
     assert set(rates) == {"PIXCLK"}
-    assert rates["PIXCLK"] > 1e3 / TOPS["cubestar-shared"].clocks[0].period_ns
+    assert rates["PIXCLK"] > 1e3 / shared.clocks[0].period_ns
 
 
 def test_recorded_clock_rates_are_of_the_designs_clocks():
-    for name, entry in json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"].items():
-        clocks = {clock.port for clock in TOPS[name].clocks} if name in TOPS else set()
-        assert set(entry.get("ice40_fmax_mhz", {})) <= clocks
+    for table, file in SENSORS:
+        for name, entry in recorded_areas(file).items():
+            clocks = {clock.port for clock in getattr(table[name], "clocks", ())}
+            assert set(entry.get("ice40_fmax_mhz", {})) <= clocks
 
 
 def test_gray_counter_takes_more_tiles_than_the_matrix_one():
@@ -205,10 +208,9 @@ def test_documented_counts_of_the_next_version():
     for name, pins, *numbers in rows:
         count = tiles(names[name])
         assert [*count, count.total] == [int(number) for number in numbers], name
-        top = TOPS[names[name]]
-        component = top.make()
+        component = DESIGNS[names[name]].make()
         rtlil_text(component)  # a design must be used, Amaranth says
-        assert sum(pin.width for pin in pins_of(component, top.meanings)) == int(pins)
+        assert sum(pin.width for pin in component.pins) == int(pins)
         assert (int(pins) <= AGLN030_PINS) == (name != "CubeStarDouble")
 
 

@@ -40,7 +40,7 @@ class Inverter(Component):
 @pytest.mark.parametrize("text", TEXTS)
 def test_same_text_again_and_in_another_process(text):
     program = (
-        "import sys\nfrom cubestack.hdl import generate\n"
+        "import sys\nfrom cubestack.hdl.flow import generate\n"
         "from cubestack.hdl.cubestar.top import CubeStarTop\n"
         f"sys.stdout.write(generate.{text.__name__}(CubeStarTop(8, 4)))"
     )

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -12,8 +11,8 @@ sys.path.append(str(Path(__file__).parent / "mutants"))
 
 from suites import CounterAlone
 
+from cubestack.hdl.blocks.pinned import pins_of
 from cubestack.hdl.flow.tools import have_yosys
-from cubestack.hdl.flow.tops import pins_of
 from cubestack.hdl.mutants.equivalence import Equivalence
 from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
 
@@ -40,7 +39,7 @@ def every(counter: Netlist) -> list[Mutant]:
 
 @pytest.fixture(scope="module")
 def equivalence(design: CounterAlone, counter: Netlist) -> Equivalence:
-    return Equivalence(counter, pins_of(design, defaultdict(str)), {"rst": 1})
+    return Equivalence(counter, pins_of(design), {"rst": 1})
 
 
 def at(every: list[Mutant], mode: str, wire: str, port: str) -> Mutant:

@@ -1,4 +1,4 @@
-"""The proofs' fast tier: one of the two equal FPGAs; and what the prover does with wrong claims.
+"""The proofs' fast tier: one of two equal FPGAs; and what the prover does with wrong properties.
 
 `cubestack hdl prove` runs all of them.
 """
@@ -13,14 +13,17 @@ from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.flow.tools import have_yosys
-from cubestack.hdl.proofs.catalogue import PROOFS, Verdict, verdict_text
+from cubestack.hdl.proofs import cubesense, cubestar
 from cubestack.hdl.proofs.properties import idle_is_reset
-from cubestack.hdl.proofs.prover import Fault, Outcome, Proof, UnknownWireError, prove
+from cubestack.hdl.proofs.prover import Fault, Proof, ProofResult, UnknownWireError, prove
+from cubestack.hdl.proofs.verdicts import Verdict, verdict_text
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 
+PROOFS = cubestar.PROOFS | cubesense.PROOFS
+
 #: Of these the FPGA without the option is tried.
-OPTION = {f"sun-{claim}-addressing" for claim in ("ack", "scan", "window", "first-pixel")}
+OPTION = {f"sun-{name}-addressing" for name in ("ack", "scan", "window", "first-pixel")}
 
 FAST = [name for name in PROOFS if not name.startswith("nadir") and name not in OPTION]
 
@@ -29,7 +32,7 @@ SHALLOW = [name for name in FAST if name not in ("sun-ack", "sun-scan", "sun-fir
 
 
 @pytest.mark.parametrize("name", FAST)
-def test_claim_is_proved(name: str) -> None:
+def test_property_is_proved(name: str) -> None:
     outcome = prove(PROOFS[name])
     assert outcome.proved
     assert not outcome.counterexample
@@ -61,7 +64,7 @@ class Counter(Component):
         return m
 
 
-def claim(limit: int, wires: dict[str, str] | None = None, fault: str = "counter.row") -> Proof:
+def below(limit: int, wires: dict[str, str] | None = None, fault: str = "counter.row") -> Proof:
     """That the address stays below ``limit``; the counter's clock rests, and its start is open."""
 
     def harness(m: Module, d: SimpleNamespace) -> None:
@@ -71,16 +74,16 @@ def claim(limit: int, wires: dict[str, str] | None = None, fault: str = "counter
 
 
 def test_what_is_false_at_once_has_a_counterexample() -> None:
-    outcome = prove(claim(3))
+    outcome = prove(below(3))
     assert outcome.counterexample
     assert not outcome.proved
 
 
 def test_what_is_true_of_every_state_is_proved() -> None:
-    assert prove(claim(16)).proved
+    assert prove(below(16)).proved
 
 
-@pytest.mark.parametrize("proof", [claim(16, {"x": "counter.colum"}), claim(16, fault="counter.x")])
+@pytest.mark.parametrize("proof", [below(16, {"x": "counter.colum"}), below(16, fault="counter.x")])
 def test_unknown_wire_is_named(proof: Proof) -> None:
     with pytest.raises(UnknownWireError, match=r"the design has no wire counter\.(colum|x)"):
         prove(proof, planted=True)
@@ -97,14 +100,14 @@ def test_a_register_without_reset_must_be_declared() -> None:
 
 
 def test_verdict_says_what_went_wrong() -> None:
-    good, bad = Outcome(True, False, 1, 0.5), Outcome(False, False, 4, 0.5)
-    refuted = Outcome(False, True, 3, 0.5)
-    name = "sun-scan"
-    text = verdict_text(Verdict(name, good, refuted))
+    good, bad = ProofResult(True, False, 1, 0.5), ProofResult(False, False, 4, 0.5)
+    refuted = ProofResult(False, True, 3, 0.5)
+    scan = "sun-scan", PROOFS["sun-scan"]
+    text = verdict_text(Verdict(*scan, good, refuted))
     assert "proved" in text
     assert "reader.scan.line_ends stuck at 0) found after 3 steps" in text
-    assert "NOT PROVED" in verdict_text(Verdict(name, bad, refuted))
-    assert "REFUTED after 3 steps" in verdict_text(Verdict(name, refuted, refuted))
-    assert "NOT FOUND" in verdict_text(Verdict(name, good, bad))
-    assert Verdict(name, good, refuted).good
-    assert not any(Verdict(name, *pair).good for pair in [(bad, refuted), (good, good)])
+    assert "NOT PROVED" in verdict_text(Verdict(*scan, bad, refuted))
+    assert "REFUTED after 3 steps" in verdict_text(Verdict(*scan, refuted, refuted))
+    assert "NOT FOUND" in verdict_text(Verdict(*scan, good, bad))
+    assert Verdict(*scan, good, refuted).good
+    assert not any(Verdict(*scan, *pair).good for pair in [(bad, refuted), (good, good)])

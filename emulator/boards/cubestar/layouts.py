@@ -7,7 +7,6 @@ supply channel "memory" watches the memory with the picture. An FPGA whose bus i
 draws standing by; only accesses draw as much as reading.
 """
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -176,15 +175,14 @@ class Fpga:
 
 
 def fpga_of(layout: Layout) -> Fpga:
-    """Pins of the design, and the tiles that ``hdl/flow/area.json`` has for it."""
+    """Pins of the design, and the tiles that ``hdl/cubestar/area.json`` has for it."""
+    from cubestack.hdl.cubestar.tops import AREA_FILE, TOPS
     from cubestack.hdl.flow.area import AGLN030_PINS, AGLN030_TILES
-    from cubestack.hdl.flow.area_report import AREA_FILE
-    from cubestack.hdl.flow.tops import TOPS, pins_of
+    from cubestack.hdl.flow.area_report import recorded_areas
+    from cubestack.hdl.flow.top import tops_in
 
     name = BOARDS[layout].top
-    top = TOPS[name]
-    component = top.make()
+    component = tops_in(TOPS)[name].make()
     Fragment.get(component, None)  # Amaranth complains of a design that was never made
-    pins = sum(pin.width for pin in pins_of(component, top.meanings))
-    areas = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]
-    return Fpga(pins, int(areas[name]["tiles"]), AGLN030_PINS, AGLN030_TILES)
+    pins = sum(pin.width for pin in component.pins)
+    return Fpga(pins, recorded_areas(AREA_FILE)[name]["tiles"], AGLN030_PINS, AGLN030_TILES)

@@ -187,6 +187,21 @@ class ReadOut:
         return self.columns * self.rows
 
     @property
+    def column_bits(self) -> int:
+        """Bits of a column number, the lower ones of an address."""
+        return (self.columns - 1).bit_length()
+
+    @property
+    def row_bits(self) -> int:
+        """Bits of a row number, the upper ones of an address."""
+        return (self.rows - 1).bit_length()
+
+    @property
+    def address_bits(self) -> int:
+        """Bits of an address, row : column."""
+        return self.row_bits + self.column_bits
+
+    @property
     def scan_rows(self) -> range:
         """Rows that the nadir scan presents from the first to the last column."""
         return range(self.first_row, self.rows, self.scan_step)
@@ -233,5 +248,5 @@ def address_bytes(x: int, y: int, size: ReadOut = FULL_SIZE) -> bytes:
     """
     if not (0 <= x < size.columns and 0 <= y < size.rows):
         raise ValueError(f"pixel ({x}, {y}) is not inside of {size.columns} x {size.rows} pixels")
-    address = y << (size.columns - 1).bit_length() | x
+    address = y << size.column_bits | x
     return address.to_bytes(ADDRESS_BYTES, "big")

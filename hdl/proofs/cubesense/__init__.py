@@ -1,1 +1,5 @@
 """Formal properties of CubeSense's tops."""
+
+from cubestack.hdl.proofs.cubesense.pair import PROOFS
+
+__all__ = ["PROOFS"]

@@ -1,4 +1,4 @@
-"""What is proved of CubeSense's edge data: nadir scan, Sun window and first Sun pixel."""
+"""Formal properties of CubeSense's edge data: nadir scan, Sun window and first Sun pixel."""
 
 from functools import partial
 from types import SimpleNamespace
@@ -7,7 +7,7 @@ from amaranth.hdl import Array, Assert, Module, Mux, Signal, Value
 
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD
 from cubestack.hdl.cubesense.dataflow import Side
-from cubestack.hdl.proofs.cubesense.tops import column_row, fpga
+from cubestack.hdl.proofs.cubesense.made import column_row, fpga
 from cubestack.hdl.proofs.properties import domain, starts_in, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
 
@@ -175,7 +175,7 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
 
 
 def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:
-    """What is proved of one of the two FPGAs."""
+    """Of one of the two FPGAs."""
     make = fpga(side, mcu_addressing)
     option = "-addressing" * mcu_addressing
     return {

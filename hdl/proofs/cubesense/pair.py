@@ -1,35 +1,30 @@
-"""What is proved of CubeSense's FPGAs."""
+"""Formal properties of CubeSense's FPGAs."""
 
 from functools import partial
 from itertools import product
 from types import SimpleNamespace
 
-from amaranth.hdl import (
-    Assert,
-    Cat,
-    Const,
-    Module,
-    Mux,
-    Signal,
-)
-from amaranth.lib.wiring import Component
+from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
 
 from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESS_BYTES,
-    FULL_SIZE,
     Action,
     ReadOut,
     actions,
     link_shows_enables,
 )
-from cubestack.hdl.cubesense.dataflow import Side
+from cubestack.firmware_model.interface.cubesense.pins import FPGA, PREFIXES
+from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs.cubesense.edge import edge_proofs
-from cubestack.hdl.proofs.cubesense.tops import SMALL, column_row, fpga
+from cubestack.hdl.proofs.cubesense.made import column_row, fpga, made
 from cubestack.hdl.proofs.properties import (
-    acknowledges_all_rows,
+    ACKNOWLEDGES,
+    acknowledges,
     domain,
     idle_is_reset,
+    one_sram_driver,
+    outputs_rest,
     starts_in,
     writer_wires,
 )
@@ -79,12 +74,7 @@ def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
 
 
 def _idle(m: Module, d: SimpleNamespace) -> None:
-    for name in ("ACK", "DATA_O", "DATA_OE", "LINK_D_O", "LINK_D_OE", "LINK_C_O", "LINK_C_OE"):
-        m.d.comb += Assert(~d.EN | (getattr(d, name) == 0))
-    for name in ("SRAM_A", "SRAM_D_O", "SRAM_D_OE"):
-        m.d.comb += Assert(~d.EN | (getattr(d, name) == 0))
-    for name in ("SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"):
-        m.d.comb += Assert(~d.EN | getattr(d, name))
+    outputs_rest(m, d, d.EN, FPGA)
     idle_is_reset(m, d, d.EN, {"search.x", "search.y"})
 
 
@@ -95,10 +85,7 @@ _WRITERS = writer_wires("pix_writer", "pix") | writer_wires("link_writer", "link
 
 def _acknowledges(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, d.EN)
-    size = d.size.columns, d.size.rows
-    own = acknowledges_all_rows(m, d, "pix_writer", d.PCLK, *size)
-    other = acknowledges_all_rows(m, d, "link_writer", d.LINK_C_I[0], *size)
-    m.d.comb += Assert(own | other == d.ACK)
+    acknowledges(m, d, d.ACK, pix_writer=d.PCLK, link_writer=d.LINK_C_I[0])
 
 
 # No two drivers on in any settled state.
@@ -108,16 +95,15 @@ _DRIVES_LINK = {Action.SEND_PICTURE, Action.SEND_EDGE}
 
 _DRIVERS = {
     f"{side}_{port}": f"{side}.{port}"
-    for side in ("sun", "nadir")
+    for side in SIDES
     for port in ("DATA_OE", "LINK_D_OE", "LINK_C_OE")
 }
 
 
 def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
     m.d.comb += Assert(d.CONTENTION == 0)
-    for prefix in ("SUN", "NAD"):
-        drives, chip = getattr(d, f"{prefix}_SRAM_D_OE"), getattr(d, f"{prefix}_SRAM_OE_N")
-        m.d.comb += Assert(~drives | chip)
+    for prefix in PREFIXES.values():
+        one_sram_driver(m, d, f"{prefix}SRAM")
     # Each row of the table, listed or not, where the wires can tell it from the others.
     lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
     for levels in product((0, 1), repeat=5):
@@ -134,9 +120,8 @@ def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
         m.d.comb += Assert(~microcontroller_may | ~d.DATA_OE)
 
 
-def _pair(mcu_addressing: bool, small: bool) -> tuple[Component, ReadOut]:
-    size = SMALL if small else FULL_SIZE
-    return CubeSensePair(size, mcu_addressing), size
+def _pair(mcu_addressing: bool, size: ReadOut) -> CubeSensePair:
+    return CubeSensePair(size, mcu_addressing)
 
 
 # The microcontroller's address is the one that is read.
@@ -173,7 +158,7 @@ def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
 
 
 def _proofs(side: Side) -> dict[str, Proof]:
-    """What is proved of one of the two FPGAs."""
+    """Of one of the two FPGAs."""
     return {
         f"{side}-address": Proof(
             "The SRAM address never leaves the picture",
@@ -184,7 +169,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
         ),
         **{
             f"{side}-ack{'-addressing' * mcu_addressing}": Proof(
-                "ACK is high exactly from when all rows of a frame are stored",
+                ACKNOWLEDGES,
                 fpga(side, mcu_addressing),
                 _WRITERS,
                 _acknowledges,
@@ -219,7 +204,7 @@ PROOFS = {
     **{
         f"pair-drivers{'-addressing' * mcu_addressing}": Proof(
             "No wire of the two FPGAs has two drivers in any settled state",
-            partial(_pair, mcu_addressing),
+            made(partial(_pair, mcu_addressing)),
             _DRIVERS,
             partial(_drivers, mcu_addressing),
             Fault("nadir.dataflow.pass_edge", 1),

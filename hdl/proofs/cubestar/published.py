@@ -1,28 +1,60 @@
-"""What is proved of CubeStar's FPGA."""
+"""Formal properties of CubeStar's published board."""
 
+from collections.abc import Callable
+from functools import partial
 from types import SimpleNamespace
 
 from amaranth.hdl import Assert, Module, Mux, Signal, Value
 from amaranth.lib.wiring import Component
 from amaranth.utils import ceil_log2
 
+from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
+from cubestack.firmware_model.interface.pins import Pin
+from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.proofs.properties import (
-    acknowledges_all_rows,
+    ACKNOWLEDGES,
+    acknowledges,
     domain,
     idle_is_reset,
+    outputs_rest,
     starts_in,
     writer_wires,
+    written_is_driven,
 )
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-__all__ = ["PROOFS", "gapped", "inside"]
+__all__ = [
+    "BANK_RESTS",
+    "LAST_COLUMN",
+    "LAST_ROW",
+    "PROOFS",
+    "ack_is_right",
+    "bank_rests",
+    "full",
+    "gapped",
+    "inside",
+]
+
+Make = Callable[[bool], tuple[Component, SimpleNamespace]]
 
 
-def gapped(small: bool) -> SimpleNamespace:
+def _made(
+    design: type[CubeStarBoard], columns: int, rows: int, small: bool
+) -> tuple[Component, SimpleNamespace]:
+    """The design at a size, or so small that a counterexample takes a few clocks."""
+    size = SimpleNamespace(columns=3 if small else columns, rows=3 if small else rows)
+    return design(size.columns, size.rows), size
+
+
+def full(design: type[CubeStarBoard]) -> Make:
+    """The shipped size."""
+    return partial(_made, design, 1024, 512)
+
+
+def gapped(design: type[CubeStarBoard]) -> Make:
     """A size that is no power of two, so that the address could leave it; wide as the shipped."""
-    columns, rows = (3, 3) if small else (1000, 500)
-    return SimpleNamespace(columns=columns, rows=rows)
+    return partial(_made, design, 1000, 500)
 
 
 def inside(address: Value, size: SimpleNamespace) -> Value:
@@ -31,45 +63,24 @@ def inside(address: Value, size: SimpleNamespace) -> Value:
     return (address[:bits] < size.columns) & (address[bits:] < size.rows)
 
 
-def _gapped_top(small: bool) -> tuple[Component, SimpleNamespace]:
-    size = gapped(small)
-    return CubeStarTop(size.columns, size.rows), size
-
-
-def _top(small: bool) -> tuple[Component, SimpleNamespace]:
-    """The shipped size, or one so small that a counterexample takes a few clocks."""
-    columns, rows = (3, 3) if small else (1024, 512)
-    return CubeStarTop(columns, rows), SimpleNamespace(columns=columns, rows=rows)
-
-
 def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.ENABLE)
     for position in (d.written, d.read, d.SRAM_A[:-1]):
         m.d.comb += Assert(inside(position, d.size))
 
 
-def _idle(m: Module, d: SimpleNamespace) -> None:
+def bank_rests(pins: tuple[Pin, ...], m: Module, d: SimpleNamespace) -> None:
+    """Standby of any board with one memory of two banks."""
     standby = ~d.ENABLE
-    position = d.SRAM_A[:-1]
-    for level in (d.ACK, d.DATA, position, d.SRAM_D_O, d.SRAM_D_OE):
-        m.d.comb += Assert(~standby | (level == 0))
-    for level in (d.SRAM_CE_N, d.SRAM_OE_N, d.SRAM_WE_N):
-        m.d.comb += Assert(~standby | level)
+    outputs_rest(m, d, standby, pins, but=["SRAM_A"])
+    m.d.comb += Assert(~standby | (d.SRAM_A[:-1] == 0))
     idle_is_reset(m, d, standby, {"bank"})
 
 
-def _acknowledges(m: Module, d: SimpleNamespace) -> None:
+def ack_is_right(m: Module, d: SimpleNamespace) -> None:
+    """ACK of any board with one writer."""
     starts_in(m, ~d.ENABLE)
-    size = d.size.columns, d.size.rows
-    m.d.comb += Assert(acknowledges_all_rows(m, d, "writer", d.PIXCLK, *size) == d.ACK)
-
-
-def _one_driver(m: Module, d: SimpleNamespace) -> None:
-    """The SRAM drives its bus while its output enable is low."""
-    m.d.comb += [
-        Assert(~d.SRAM_D_OE | d.SRAM_OE_N),
-        Assert(d.SRAM_WE_N | (d.SRAM_D_OE & ~d.SRAM_CE_N)),
-    ]
+    acknowledges(m, d, d.ACK, writer=d.PIXCLK)
 
 
 def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
@@ -92,39 +103,40 @@ def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
+LAST_ROW = Fault("writer.counter.last_row", 1)
+LAST_COLUMN = Fault("writer.counter.last_column", 0)
+
+BANK_RESTS = "With ENABLE low every register but the bank is reset, and the bank rests"
+
 #: By name.
 PROOFS = {
     "cubestar-ack": Proof(
-        "ACK is high exactly from when all rows of a frame are stored",
-        _top,
-        writer_wires("writer", "pix"),
-        _acknowledges,
-        Fault("writer.counter.last_row", 1),
+        ACKNOWLEDGES, full(CubeStarTop), writer_wires("writer", "pix"), ack_is_right, LAST_ROW
     ),
     "cubestar-address": Proof(
         "The SRAM address never leaves the picture, at 1000 x 500 pixels, where it could",
-        _gapped_top,
+        gapped(CubeStarTop),
         {"written": "writer.address", "read": "reader.address"},
         _address_stays_inside,
-        Fault("writer.counter.last_column", 0),
+        LAST_COLUMN,
     ),
     "cubestar-drivers": Proof(
         "FPGA and SRAM never both drive the SRAM's data bus",
-        _top,
+        full(CubeStarTop),
         {},
-        _one_driver,
+        written_is_driven,
         Fault("writer.store", 1),
     ),
     "cubestar-idle": Proof(
-        "With ENABLE low every register but the bank is reset, and the bank rests",
-        _top,
+        BANK_RESTS,
+        full(CubeStarTop),
         {},
-        _idle,
+        partial(bank_rests, PUBLISHED),
         Fault("writer.pix_rst", 0),
     ),
     "cubestar-read": Proof(
         "Each data clock presents the next byte, from the first one on",
-        _top,
+        full(CubeStarTop),
         {"column": "reader.counter.column", "row": "reader.counter.row"},
         _reads_in_order,
         Fault("reader.counter.last_column", 0),

@@ -1,53 +1,40 @@
-"""What is proved of CubeStar's tops for the next version."""
+"""Formal properties of CubeStar's boards on the processor's bus, for the next version."""
 
+from functools import partial
 from types import SimpleNamespace
 
-from amaranth.hdl import Assert, Module, Value
-from amaranth.lib.wiring import Component
+from amaranth.hdl import Assert, Module
 
+from cubestack.firmware_model.interface.cubestar.pins import DOUBLE, SHARED
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
-from cubestack.hdl.proofs.cubestar.published import gapped, inside
+from cubestack.hdl.proofs.cubestar.published import (
+    BANK_RESTS,
+    LAST_COLUMN,
+    LAST_ROW,
+    ack_is_right,
+    bank_rests,
+    full,
+    gapped,
+    inside,
+)
 from cubestack.hdl.proofs.properties import (
-    acknowledges_all_rows,
+    ACKNOWLEDGES,
+    acknowledges,
     idle_is_reset,
+    outputs_rest,
     starts_in,
     writer_wires,
+    written_is_driven,
 )
 from cubestack.hdl.proofs.prover import Fault, Proof
 
 __all__ = ["PROOFS"]
 
-
-def _size(small: bool) -> SimpleNamespace:
-    columns, rows = (3, 3) if small else (1024, 512)
-    return SimpleNamespace(columns=columns, rows=rows)
-
-
-def _shared(small: bool) -> tuple[Component, SimpleNamespace]:
-    size = _size(small)
-    return CubeStarShared(size.columns, size.rows), size
-
-
-def _double(small: bool) -> tuple[Component, SimpleNamespace]:
-    size = _size(small)
-    return CubeStarDouble(size.columns, size.rows), size
-
-
-def _boards(small: bool) -> tuple[Component, SimpleNamespace]:
-    size = _size(small)
-    return CubeStarTwoBoards(size.columns, size.rows), size
-
-
-def _gapped_shared(small: bool) -> tuple[Component, SimpleNamespace]:
-    size = gapped(small)
-    return CubeStarShared(size.columns, size.rows), size
-
-
-def _gapped_double(small: bool) -> tuple[Component, SimpleNamespace]:
-    size = gapped(small)
-    return CubeStarDouble(size.columns, size.rows), size
+_SHARED = full(CubeStarShared)
+_DOUBLE = full(CubeStarDouble)
+_BOARDS = full(CubeStarTwoBoards)
 
 
 def _shared_address(m: Module, d: SimpleNamespace) -> None:
@@ -70,17 +57,10 @@ def _double_address(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-def _acknowledges(m: Module, d: SimpleNamespace) -> None:
-    starts_in(m, ~d.ENABLE)
-    size = d.size.columns, d.size.rows
-    m.d.comb += Assert(acknowledges_all_rows(m, d, "writer", d.PIXCLK, *size) == d.ACK)
-
-
 def _boards_acknowledge(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.BOARD1_ENABLE & ~d.BOARD2_ENABLE)
-    size = d.size.columns, d.size.rows
-    for board, ack in (("board1", d.BOARD1_ACK), ("board2", d.BOARD2_ACK)):
-        m.d.comb += Assert(acknowledges_all_rows(m, d, board, d.PIXCLK, *size) == ack)
+    acknowledges(m, d, d.BOARD1_ACK, board1=d.PIXCLK)
+    acknowledges(m, d, d.BOARD2_ACK, board2=d.PIXCLK)
 
 
 def _boards_idle(m: Module, d: SimpleNamespace) -> None:
@@ -90,48 +70,16 @@ def _boards_idle(m: Module, d: SimpleNamespace) -> None:
         idle_is_reset(m, SimpleNamespace(registers=own), standby, {f"{board}.bank"})
 
 
-def _standby(m: Module, d: SimpleNamespace, srams: tuple[str, ...]) -> Value:
-    """Every output but the SRAMs' addresses is at its reset value; the standby they are in."""
-    standby = ~d.ENABLE
-    for level in (d.ACK, d.AD_LOW_O, d.AD_LOW_OE):
-        m.d.comb += Assert(~standby | (level == 0))
-    for sram in srams:
-        for name in ("D_O", "D_OE"):
-            m.d.comb += Assert(~standby | (getattr(d, f"{sram}_{name}") == 0))
-        for name in ("CE_N", "OE_N", "WE_N"):
-            m.d.comb += Assert(~standby | getattr(d, f"{sram}_{name}"))
-    return standby
-
-
-def _shared_idle(m: Module, d: SimpleNamespace) -> None:
-    standby = _standby(m, d, ("SRAM",))
-    m.d.comb += Assert(~standby | (d.SRAM_A[:-1] == 0))
-    idle_is_reset(m, d, standby, {"bank"})
-
-
 def _double_idle(m: Module, d: SimpleNamespace) -> None:
     """INTO is latched by RNW in standby too, as its docstring says; nothing shows it there."""
-    standby = _standby(m, d, ("SRAM1", "SRAM2"))
-    m.d.comb += Assert(~standby | ((d.SRAM1_A == 0) & (d.SRAM2_A == 0)))
+    outputs_rest(m, d, ~d.ENABLE, DOUBLE)
     for register in d.registers:
         if register.reset is not None:
-            m.d.comb += Assert(~standby | (register.value == register.reset))
-
-
-def _drivers(m: Module, d: SimpleNamespace, sram: str) -> None:
-    """SRAM and FPGA on the SRAM's bus; what is written is driven and selected."""
-
-    def pin(name: str) -> Value:
-        return getattr(d, f"{sram}_{name}")
-
-    m.d.comb += [
-        Assert(~pin("D_OE") | pin("OE_N")),
-        Assert(pin("WE_N") | (pin("D_OE") & ~pin("CE_N"))),
-    ]
+            m.d.comb += Assert(d.ENABLE | (register.value == register.reset))
 
 
 def _shared_drivers(m: Module, d: SimpleNamespace) -> None:
-    _drivers(m, d, "SRAM")
+    written_is_driven(m, d)
     m.d.comb += [
         # The processor lets go of the data lines before it pulls RE_N low.
         Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N)),
@@ -140,8 +88,8 @@ def _shared_drivers(m: Module, d: SimpleNamespace) -> None:
 
 
 def _double_drivers(m: Module, d: SimpleNamespace) -> None:
-    _drivers(m, d, "SRAM1")
-    _drivers(m, d, "SRAM2")
+    written_is_driven(m, d, "SRAM1")
+    written_is_driven(m, d, "SRAM2")
     m.d.comb += Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N & d.ENABLE))
 
 
@@ -170,48 +118,43 @@ def _one_board_drives(m: Module, d: SimpleNamespace) -> None:
     m.d.comb += Assert(~d.CONTENTION | (~d.BOARD1_CS_N & ~d.BOARD2_CS_N))
 
 
-_ACK = "ACK is high exactly from when all rows of a frame are stored"
-_LAST_ROW = Fault("writer.counter.last_row", 1)
+_STORES_INSIDE = "Storing never leaves the picture, at 1000 x 500 pixels, where it could"
 
 #: By name.
 PROOFS = {
     "cubestar-shared-ack": Proof(
-        _ACK, _shared, writer_wires("writer", "pix"), _acknowledges, _LAST_ROW
+        ACKNOWLEDGES, _SHARED, writer_wires("writer", "pix"), ack_is_right, LAST_ROW
     ),
     "cubestar-shared-address": Proof(
-        "Storing never leaves the picture, at 1000 x 500 pixels, where it could",
-        _gapped_shared,
+        _STORES_INSIDE,
+        gapped(CubeStarShared),
         {"written": "writer.address"},
         _shared_address,
-        Fault("writer.counter.last_column", 0),
+        LAST_COLUMN,
     ),
     "cubestar-shared-drivers": Proof(
         "FPGA, SRAM and processor never drive the same data lines",
-        _shared,
+        _SHARED,
         {},
         _shared_drivers,
         Fault("bus.writing", 1),
     ),
     "cubestar-shared-idle": Proof(
-        "With ENABLE low every register but the bank is reset, and the bank rests",
-        _shared,
-        {},
-        _shared_idle,
-        Fault("bus.on", 1),
+        BANK_RESTS, _SHARED, {}, partial(bank_rests, SHARED), Fault("bus.on", 1)
     ),
     "cubestar-double-ack": Proof(
-        _ACK, _double, writer_wires("writer", "pix"), _acknowledges, _LAST_ROW
+        ACKNOWLEDGES, _DOUBLE, writer_wires("writer", "pix"), ack_is_right, LAST_ROW
     ),
     "cubestar-double-address": Proof(
-        "Storing never leaves the picture, at 1000 x 500 pixels, where it could",
-        _gapped_double,
+        _STORES_INSIDE,
+        gapped(CubeStarDouble),
         {"written": "writer.address", "into": "into"},
         _double_address,
-        Fault("writer.counter.last_column", 0),
+        LAST_COLUMN,
     ),
     "cubestar-double-apart": Proof(
         "The memory that is stored in is the camera's alone, the other one the bus's",
-        _double,
+        _DOUBLE,
         {
             "into": "into",
             "address": "bus.address",
@@ -224,21 +167,21 @@ PROOFS = {
     ),
     "cubestar-double-drivers": Proof(
         "FPGA, SRAMs and processor never drive the same data lines",
-        _double,
+        _DOUBLE,
         {},
         _double_drivers,
         Fault("write1", 1),
     ),
     "cubestar-double-idle": Proof(
         "With ENABLE low every register but the latched INTO is reset",
-        _double,
+        _DOUBLE,
         {},
         _double_idle,
         Fault("bus.on", 1),
     ),
     "cubestar-boards-ack": Proof(
-        _ACK,
-        _boards,
+        ACKNOWLEDGES,
+        _BOARDS,
         writer_wires("board1", "pix", "board1.writer")
         | writer_wires("board2", "pix", "board2.writer"),
         _boards_acknowledge,
@@ -246,14 +189,14 @@ PROOFS = {
     ),
     "cubestar-boards-idle": Proof(
         "With its ENABLE low every register of a board but the bank is reset, and the bank rests",
-        _boards,
+        _BOARDS,
         {},
         _boards_idle,
         Fault("board2.writer.pix_rst", 0),
     ),
     "cubestar-boards-drivers": Proof(
         "Two boards drive the bus together only when both are selected",
-        _boards,
+        _BOARDS,
         {},
         _one_board_drives,
         Fault("board2.bus.reading", 1),

@@ -7,7 +7,6 @@ the same netlist counts; a survivor is tried again.
 
 import json
 import os
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -18,8 +17,8 @@ from typing import Any
 from regression import build, simulate
 from suites import Stage, Suite
 
+from cubestack.hdl.blocks.pinned import pins_of
 from cubestack.hdl.flow.generate import verilog_text
-from cubestack.hdl.flow.tops import pins_of
 from cubestack.hdl.mutants.equivalence import Equivalence
 from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
 
@@ -116,7 +115,7 @@ class Scoring:
 
     @cached_property
     def _equivalence(self) -> Equivalence:
-        pins = pins_of(self._design, defaultdict(str))
+        pins = pins_of(self._design)
         return Equivalence(self._netlist, pins, self._suite.standby)
 
     def _done(self) -> dict[str, Result]:

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.hdl.cubesense import tops as cubesense
+from cubestack.hdl.cubestar import tops as cubestar
 from cubestack.hdl.flow import tools
-from cubestack.hdl.flow.area_report import AREA_FILE
+from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.hdl.flow.tools import have_yosys
-from cubestack.hdl.proofs.catalogue import PROOFS
+from cubestack.hdl.proofs.cubestar import PROOFS
 from cubestack.hdl.proofs.prover import Fault
 from cubestack.host.cli.main import main
 
@@ -24,7 +26,7 @@ def test_area_as_text(capsys: pytest.CaptureFixture[str]) -> None:
 def test_area_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["hdl", "area", "--json", "frame gap of 858 clocks", "cubestar"]) == 0
     counted = json.loads(capsys.readouterr().out)["designs"]
-    recorded = json.loads(AREA_FILE.read_text(encoding="utf-8"))["designs"]
+    recorded = recorded_areas(cubestar.AREA_FILE) | recorded_areas(cubesense.AREA_FILE)
     assert list(counted) == ["frame gap of 858 clocks", "cubestar"]
     for name, entry in counted.items():
         assert entry == {key: recorded[name][key] for key in entry}

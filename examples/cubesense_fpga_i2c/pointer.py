@@ -7,10 +7,9 @@ Sun's window; steps along a column read a scanned column. So the pointer replace
 
 from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib.wiring import Component, In, Out
-from amaranth.utils import ceil_log2
 
+from cubesense_fpga_i2c.register_table import PointerBits
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-from cubestack.firmware_model.interface.cubesense.fpga_registers import PointerBits
 
 __all__ = ["MemoryPointer"]
 
@@ -39,7 +38,7 @@ class MemoryPointer(Component):
                 "load": In(3),
                 "byte": In(8),
                 "step": In(1),
-                "address": Out(ceil_log2(read_out.columns) + ceil_log2(read_out.rows)),
+                "address": Out(read_out.address_bits),
                 "down": Out(1),
             }
         )

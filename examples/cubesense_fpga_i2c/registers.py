@@ -1,7 +1,7 @@
 """Registers of a CubeSense FPGA on I2C: commands in, state, Sun and memory out.
 
 CubeSense thesis, section 9.2.1. The registers are those of
-:mod:`cubestack.firmware_model.interface.cubesense.fpga_registers`; all are in the domain of the
+:mod:`cubesense_fpga_i2c.register_table`; all are in the domain of the
 falling SCL.
 """
 
@@ -11,10 +11,9 @@ from operator import or_
 from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import Component, In, Out
-from amaranth.utils import ceil_log2
 
-from cubestack.firmware_model.interface.cubesense.fpga import Action, FpgaCommand, ReadOut
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.pointer import MemoryPointer
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     I2C_COMMANDS,
@@ -27,9 +26,9 @@ from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     command_byte,
     command_of,
 )
-from cubestack.hdl.blocks.i2c_target import I2cTarget
+from cubesense_fpga_i2c.target import I2cTarget
+from cubestack.firmware_model.interface.cubesense.fpga import Action, FpgaCommand, ReadOut
 from cubestack.hdl.cubesense.dataflow import Side
-from cubestack.hdl.cubesense.i2c.pointer import MemoryPointer
 
 __all__ = ["CubeSenseI2cRegisters"]
 
@@ -53,7 +52,7 @@ class CubeSenseI2cRegisters(Component):
         self._side = side
         self._read_out = read_out
         self._domain = domain
-        width = ceil_log2(read_out.columns) + ceil_log2(read_out.rows)
+        width = read_out.address_bits
         super().__init__(
             {
                 "scl": In(1),

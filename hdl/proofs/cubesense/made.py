@@ -1,17 +1,19 @@
-"""CubeSense's FPGA for proofs: at full size, or so small that a counterexample is short."""
+"""CubeSense's designs for proofs: at full size, or so small that a counterexample is short."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
 
 from amaranth.hdl import Value
 from amaranth.lib.wiring import Component
-from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
-__all__ = ["SMALL", "column_row", "fpga"]
+__all__ = ["SMALL", "Make", "column_row", "fpga", "made"]
+
+#: What makes a design, and its size; small when asked for.
+Make = Callable[[bool], tuple[Component, ReadOut]]
 
 #: So small that a counterexample takes a few clocks.
 SMALL = ReadOut(
@@ -19,17 +21,22 @@ SMALL = ReadOut(
 )
 
 
-def fpga(side: Side, mcu_addressing: bool = False) -> Callable[[bool], tuple[Component, ReadOut]]:
-    """What makes the FPGA of a side, for :class:`cubestack.hdl.proofs.prover.Proof`."""
+def made(design: Callable[[ReadOut], Component]) -> Make:
+    """What makes a design for :class:`cubestack.hdl.proofs.prover.Proof`."""
 
     def make(small: bool) -> tuple[Component, ReadOut]:
         size = SMALL if small else FULL_SIZE
-        return CubeSenseFpga(side, size, mcu_addressing), size
+        return design(size), size
 
     return make
 
 
+def fpga(side: Side, mcu_addressing: bool = False) -> Make:
+    """What makes the FPGA of a side."""
+    return made(lambda size: CubeSenseFpga(side, size, mcu_addressing))
+
+
 def column_row(d: SimpleNamespace) -> tuple[Value, Value]:
     """The two halves of the SRAM's address."""
-    bits = ceil_log2(d.size.columns)
+    bits = d.size.column_bits
     return d.SRAM_A[:bits], d.SRAM_A[bits:]

@@ -15,7 +15,7 @@ from instants import ODD, wait
 from pair_reference import SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     RESET_COMMAND,

@@ -18,45 +18,20 @@ How each asynchronous input is brought in:
 """
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal
-from amaranth.lib.wiring import Component, In, Out
 
+from cubesense_fpga_i2c.pins import FPGA
+from cubesense_fpga_i2c.registers import CubeSenseI2cRegisters
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
-from cubestack.hdl.blocks.matrix_counter import MatrixCounter
-from cubestack.hdl.cubesense.dataflow import Side
-from cubestack.hdl.cubesense.i2c.registers import CubeSenseI2cRegisters
+from cubestack.firmware_model.interface.pins import resized
+from cubestack.hdl.blocks.pinned import PinnedComponent
+from cubestack.hdl.cubesense.dataflow import Side, checked
 from cubestack.hdl.cubesense.sun_search import SunSearch
-from cubestack.hdl.cubesense.top import FpgaPins
 from cubestack.hdl.cubesense.writer import add_writer
 
-__all__ = ["PINS", "CubeSenseI2cFpga"]
-
-#: 53 pins, 11 fewer than in table 3.4.
-PINS = (
-    FpgaPins(19, ("SRAM_A",), "SRAM address, row : column"),
-    FpgaPins(8, ("SRAM_D_I", "SRAM_D_O", "SRAM_D_OE"), "SRAM data"),
-    FpgaPins(1, ("SRAM_CE_N",), "SRAM chip enable, low active"),
-    FpgaPins(1, ("SRAM_OE_N",), "SRAM output enable, low active"),
-    FpgaPins(1, ("SRAM_WE_N",), "SRAM write enable, low active"),
-    FpgaPins(8, ("Y",), "pixel data from the camera"),
-    FpgaPins(1, ("HREF",), "high while a line's pixels are sent"),
-    FpgaPins(1, ("PCLK",), "pixel clock"),
-    FpgaPins(1, ("SCL",), "I2C clock, Schmitt trigger; pulled up on the board"),
-    FpgaPins(
-        1,
-        ("SDA_I", "SDA_O", "SDA_OE"),
-        "I2C data, open drain, Schmitt trigger; pulled up there too",
-    ),
-    FpgaPins(1, ("RESET_N",), "reset, low active, with the supply"),
-    FpgaPins(8, ("LINK_D_I", "LINK_D_O", "LINK_D_OE"), "data between the FPGAs"),
-    FpgaPins(
-        2,
-        ("LINK_C_I", "LINK_C_O", "LINK_C_OE"),
-        "bit 0 PCLK, bit 1 HREF between the FPGAs; pulled up",
-    ),
-)
+__all__ = ["CubeSenseI2cFpga"]
 
 
-class CubeSenseI2cFpga(Component):
+class CubeSenseI2cFpga(PinnedComponent):
     """The sun sensor's or the nadir sensor's FPGA.
 
     Bidirectional pins are i / o / oe triples; SDA_O is always 0. With RESET_N low, and in standby,
@@ -66,35 +41,9 @@ class CubeSenseI2cFpga(Component):
 
     def __init__(self, side: Side, read_out: ReadOut = FULL_SIZE) -> None:
         """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
-        if side not in ("sun", "nadir"):
-            raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
-        self.side = side
+        self.side = checked(side)
         self.read_out = read_out
-        super().__init__(
-            {
-                "Y": In(8),
-                "HREF": In(1),
-                "PCLK": In(1),
-                "SCL": In(1, init=1),
-                "SDA_I": In(1, init=1),
-                "SDA_O": Out(1),
-                "SDA_OE": Out(1),
-                "RESET_N": In(1),
-                "LINK_D_I": In(8),
-                "LINK_D_O": Out(8),
-                "LINK_D_OE": Out(1),
-                "LINK_C_I": In(2, init=0b11),
-                "LINK_C_O": Out(2),
-                "LINK_C_OE": Out(1),
-                "SRAM_A": Out(MatrixCounter.address_width(read_out.columns, read_out.rows)),
-                "SRAM_D_I": In(8),
-                "SRAM_D_O": Out(8),
-                "SRAM_D_OE": Out(1),
-                "SRAM_CE_N": Out(1, init=1),
-                "SRAM_OE_N": Out(1, init=1),
-                "SRAM_WE_N": Out(1, init=1),
-            }
-        )
+        super().__init__(resized(FPGA, SRAM_A=read_out.address_bits))
 
     def elaborate(self, platform: object) -> Module:
         """Wire the blocks to the pins."""

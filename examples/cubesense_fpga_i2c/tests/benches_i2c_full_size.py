@@ -8,7 +8,7 @@ from i2c_bench import I2cBench, read
 from pair_reference import SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense.fpga_registers import Register
+from cubesense_fpga_i2c.register_table import Register
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

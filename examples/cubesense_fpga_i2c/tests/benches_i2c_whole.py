@@ -9,12 +9,12 @@ from cocotb.triggers import RisingEdge, Timer
 from instants import now
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     command_byte,
 )
+from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
 
 PERIOD_PS = 10**6
 

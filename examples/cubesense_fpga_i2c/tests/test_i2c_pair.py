@@ -1,11 +1,14 @@
 """The pair on its I2C bus, against an independent master, on Icarus Verilog."""
 
 import os
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+
+HERE = Path(__file__).parent
 
 SMALL = {
     "benches_i2c_registers": ReadOut(
@@ -26,4 +29,4 @@ def test_full_size(simulate: Any) -> None:
 
 @pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes a minute: set I2C_WHOLE")
 def test_whole_read_outs(simulate: Any) -> None:
-    simulate(FULL_SIZE, "benches_i2c_whole", seed=1, harness="i2c_full_frame")
+    simulate(FULL_SIZE, "benches_i2c_whole", seed=1, harness=str(HERE / "i2c_full_frame"))

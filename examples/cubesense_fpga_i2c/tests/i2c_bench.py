@@ -16,13 +16,13 @@ from pair_reference import SIDES, Controls, Half, behaviour
 from small import READ_OUT
 from sram import UNKNOWN, Sram
 
-from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     RESET_COMMAND,
     Register,
     StatusBits,
     command_of,
 )
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
 
 STANDBY = Actions(Action.STANDBY, Action.STANDBY)
 

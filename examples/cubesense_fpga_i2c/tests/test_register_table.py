@@ -2,14 +2,7 @@
 
 import pytest
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    COMMANDS,
-    FULL_SIZE,
-    Action,
-    Actions,
-    actions,
-)
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     I2C_COMMANDS,
@@ -23,6 +16,13 @@ from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     command_byte,
     command_of,
     pointer_bytes,
+)
+from cubestack.firmware_model.interface.cubesense.fpga import (
+    COMMANDS,
+    FULL_SIZE,
+    Action,
+    Actions,
+    actions,
 )
 
 STANDBY = Actions(Action.STANDBY, Action.STANDBY)

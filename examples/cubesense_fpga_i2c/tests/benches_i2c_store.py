@@ -10,12 +10,12 @@ from pair import OTHER, frame
 from pair_reference import NOT_FOUND, SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     Register,
 )
+from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
 
 FAST = 1_000_000
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap

@@ -5,8 +5,7 @@ from enum import Enum
 
 from geometry import GEOMETRY
 
-from cubestack.firmware_model.interface.cubesense.fpga import Action
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     REGISTER_BITS,
@@ -18,6 +17,7 @@ from cubestack.firmware_model.interface.cubesense.fpga_registers import (
     StatusBits,
     command_of,
 )
+from cubestack.firmware_model.interface.cubesense.fpga import Action
 
 BY_NUMBER = {register.address: register for register in REGISTERS}
 STORING = (Action.STORE, Action.STORE_OTHER)

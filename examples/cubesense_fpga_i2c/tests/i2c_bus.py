@@ -14,14 +14,14 @@ from cocotbext.i2c import I2cMaster
 from i2c_model import FpgaModel
 from instants import ODD, now, wait
 
-from cubestack.firmware_model.interface.cubesense.fpga import Actions
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     Register,
     command_byte,
     pointer_bytes,
 )
+from cubestack.firmware_model.interface.cubesense.fpga import Actions
 
 SPEEDS = (100_000, 400_000, 1_000_000)
 

@@ -1,26 +1,30 @@
-"""What is proved of CubeSense's FPGAs on an I2C bus."""
+"""Formal properties of CubeSense's FPGAs on an I2C bus."""
 
 from functools import partial
 from types import SimpleNamespace
 
 from amaranth.hdl import Assert, Module, Signal, Value
 from amaranth.hdl._ast import Initial  # not among the public names, though documented as one
-from amaranth.lib.wiring import Component
 
-from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, ReadOut
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.pair import CubeSenseI2cPair
+from cubesense_fpga_i2c.pins import FPGA
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     GROUP_ADDRESS,
     command_of,
 )
-from cubestack.hdl.cubesense.dataflow import Side
-from cubestack.hdl.cubesense.i2c.pair import CubeSenseI2cPair
-from cubestack.hdl.cubesense.i2c.top import CubeSenseI2cFpga
-from cubestack.hdl.proofs.cubesense.tops import SMALL
+from cubesense_fpga_i2c.top import CubeSenseI2cFpga
+from cubestack.firmware_model.interface.cubesense.fpga import Action
+from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
+from cubestack.hdl.cubesense.dataflow import SIDES, Side
+from cubestack.hdl.proofs.cubesense.made import Make, made
 from cubestack.hdl.proofs.properties import (
-    acknowledges_all_rows,
+    ACKNOWLEDGES,
+    acknowledges,
     domain,
     idle_is_reset,
+    one_sram_driver,
+    outputs_rest,
     starts_in,
     writer_wires,
 )
@@ -55,14 +59,8 @@ def _target_wires(fpga: str = "") -> dict[str, str]:
     return {before + name: wire for name, wire in wires.items()}
 
 
-def _fpga(side: Side, small: bool) -> tuple[Component, ReadOut]:
-    size = SMALL if small else FULL_SIZE
-    return CubeSenseI2cFpga(side, size), size
-
-
-def _pair(small: bool) -> tuple[Component, ReadOut]:
-    size = SMALL if small else FULL_SIZE
-    return CubeSenseI2cPair(size), size
+def _fpga(side: Side) -> Make:
+    return made(partial(CubeSenseI2cFpga, side))
 
 
 # Reset is idle, and so are the other pins in standby.
@@ -74,13 +72,8 @@ def _idle(side: Side, m: Module, d: SimpleNamespace) -> None:
     m.d.comb += standby.eq(d.command.matches(*commands))
     starts_in(m, ~d.RESET_N)
     m.d.comb += Assert(d.RESET_N | (standby & ~d.SDA_OE))
-    for name in ("LINK_D_O", "LINK_D_OE", "LINK_C_O", "LINK_C_OE"):
-        m.d.comb += Assert(~standby | (getattr(d, name) == 0))
-    for name in ("SRAM_A", "SRAM_D_O", "SRAM_D_OE"):
-        m.d.comb += Assert(~standby | (getattr(d, name) == 0))
-    for name in ("SRAM_CE_N", "SRAM_OE_N", "SRAM_WE_N"):
-        m.d.comb += Assert(~standby | getattr(d, name))
-    m.d.comb += Assert(~d.SRAM_D_OE | d.SRAM_OE_N)
+    outputs_rest(m, d, standby, FPGA, but=["SDA_OE"])
+    one_sram_driver(m, d)
     m.d.comb += Assert(~d.SDA_O)
     idle_is_reset(m, d, ~d.RESET_N, {"search.x", "search.y"})
 
@@ -129,7 +122,7 @@ def _one_phase(d: SimpleNamespace, prefix: str = "") -> list[Value]:
 _PAIR_WIRES = {
     **_target_wires("sun"),
     **_target_wires("nadir"),
-    **{f"{side}_LINK_D_OE": f"{side}.LINK_D_OE" for side in ("sun", "nadir")},
+    **{f"{side}_LINK_D_OE": f"{side}.LINK_D_OE" for side in SIDES},
 }
 
 
@@ -137,7 +130,7 @@ def _one_driver(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.RESET_N)
     sun, nadir = (
         SimpleNamespace(**{name: getattr(d, f"{side}_{name}") for name in _target_wires()})
-        for side in ("sun", "nadir")
+        for side in SIDES
     )
 
     def same(*names: str) -> Value:
@@ -166,14 +159,13 @@ def _one_driver(m: Module, d: SimpleNamespace) -> None:
     # Each value of the command, listed or not, turns on the drivers that it should.
     for byte in range(16):
         here = sun.command == byte
-        for side, prefix in (("sun", "SUN"), ("nadir", "NAD")):
+        for side, prefix in PREFIXES.items():
             action = getattr(command_of(byte), side)
             sends = getattr(d, f"{side}_LINK_D_OE") == (action is Action.SEND_PICTURE)
-            reads = getattr(d, f"{prefix}_SRAM_OE_N") == (action is not Action.READ)
+            reads = getattr(d, f"{prefix}SRAM_OE_N") == (action is not Action.READ)
             m.d.comb += Assert(~here | (sends & reads))
-    for prefix in ("SUN", "NAD"):
-        drives, chip = getattr(d, f"{prefix}_SRAM_D_OE"), getattr(d, f"{prefix}_SRAM_OE_N")
-        m.d.comb += Assert(~drives | chip)
+    for prefix in PREFIXES.values():
+        one_sram_driver(m, d, f"{prefix}SRAM")
 
 
 # ACK exactly when all rows are stored.
@@ -188,19 +180,16 @@ _WRITERS = {
 def _acknowledges(m: Module, d: SimpleNamespace) -> None:
     # The bus may be anywhere, so that a counterexample needs no transfer of its own.
     starts_in(m, ~d.store & ~d.store_other)
-    size = d.size.columns, d.size.rows
-    own = acknowledges_all_rows(m, d, "pix_writer", d.PCLK, *size)
-    other = acknowledges_all_rows(m, d, "link_writer", d.LINK_C_I[0], *size)
-    m.d.comb += Assert(own | other == d.ack)
+    acknowledges(m, d, d.ack, pix_writer=d.PCLK, link_writer=d.LINK_C_I[0])
 
 
 def _proofs(side: Side) -> dict[str, Proof]:
-    """What is proved of one of the two FPGAs."""
+    """Of one of the two FPGAs."""
     return {
         f"{side}-idle-i2c": Proof(
             "With RESET_N low every register but the Sun's coordinates is reset; in standby every "
             "pin but SDA is",
-            partial(_fpga, side),
+            _fpga(side),
             _target_wires(),
             partial(_idle, side),
             Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
@@ -208,14 +197,14 @@ def _proofs(side: Side) -> dict[str, Proof]:
         f"{side}-sda-i2c": Proof(
             "SDA is pulled low in transfers to this FPGA only, to acknowledge or to send a 0, and "
             "never moved while SCL is high",
-            partial(_fpga, side),
+            _fpga(side),
             _target_wires(),
             partial(_pulls_sda, side),
             Fault("registers.target.reading", 1),
         ),
         f"{side}-ack-i2c": Proof(
-            "ACK is high exactly from when all rows of a frame are stored",
-            partial(_fpga, side),
+            ACKNOWLEDGES,
+            _fpga(side),
             _WRITERS,
             _acknowledges,
             Fault("pix_writer.ack", 1),
@@ -228,7 +217,7 @@ PROOFS = {
     "pair-drivers-i2c": Proof(
         "Both FPGAs have the same command, which turns on the drivers that it should, and no wire "
         "has two",
-        _pair,
+        made(CubeSenseI2cPair),
         _PAIR_WIRES,
         _one_driver,
         Fault("nadir.registers.target.group", 1),

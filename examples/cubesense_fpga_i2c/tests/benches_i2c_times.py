@@ -14,7 +14,7 @@ from instants import now
 from pair_reference import SIDES
 from small import READ_OUT
 
-from cubestack.firmware_model.interface.cubesense.fpga_registers import (
+from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     Register,
     pointer_bytes,

@@ -1,0 +1,56 @@
+"""The package's tops and proofs through the public flow, as those of the shipped sensors."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import flow_checks
+import pytest
+
+from cubesense_fpga_i2c.proofs import PROOFS
+from cubesense_fpga_i2c.tops import AREA_FILE, TOPS
+from cubestack.hdl.flow.area_report import recorded_areas
+from cubestack.hdl.flow.tools import have_yosys
+from cubestack.hdl.flow.top import Top, counted, tops_in
+from cubestack.hdl.proofs.prover import prove
+
+need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+
+EXAMPLES = Path(__file__).parents[2]
+
+
+@need_yosys
+@pytest.mark.parametrize("name", tops_in(TOPS))
+def test_verilog_file(name: str, tmp_path: Path) -> None:
+    top = tops_in(TOPS)[name]
+    file = flow_checks.written(name, top, tmp_path)
+    flow_checks.icarus_takes_it_without_a_warning(file)
+    flow_checks.yosys_takes_it_without_a_warning(file)
+    if flow_checks.VERILATOR.exists():
+        flow_checks.verilator_takes_it_without_a_warning(file)
+    flow_checks.bidirectional_pins_are_in_the_wrapper_only(file)
+    flow_checks.every_pin_and_every_bit_is_listed(file, top, 53 if top.parts == 1 else None)
+    flow_checks.every_clock_pin_is_constrained(top, tmp_path)
+
+
+@need_yosys
+@pytest.mark.parametrize("name", counted(TOPS))
+def test_area(name: str) -> None:
+    assert list(recorded_areas(AREA_FILE)) == list(counted(TOPS))
+    design = counted(TOPS)[name]
+    flow_checks.area_is_as_recorded(name, design, AREA_FILE, ice40=isinstance(design, Top))
+
+
+@need_yosys
+@pytest.mark.parametrize("name", [name for name in PROOFS if not name.startswith("nadir")])
+def test_proof(name: str) -> None:
+    """One of the two equal FPGAs."""
+    assert prove(PROOFS[name]).proved
+    assert prove(PROOFS[name], planted=True).counterexample
+
+
+def test_command_line_knows_these_designs_alone() -> None:
+    command = [sys.executable, "-m", "cubesense_fpga_i2c", "verilog", "cubestar"]
+    done = subprocess.run(command, cwd=EXAMPLES, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "'cubestar' is no top; there are cubesense-sun-i2c," in done.stderr

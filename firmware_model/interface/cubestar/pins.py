@@ -1,0 +1,124 @@
+"""Pins of CubeStar's FPGA boards, each table in the order of the gateware's ports.
+
+CubeStar thesis, table C.2, for the published board (option 1 of section 3.3). The boards on the
+processor's external bus, options 2 and 3 of that section and two boards of option 2 (section 7.2),
+were not built then: their pins are assumed, and keep those of the published board wherever they
+still serve. So is BANK: the published board has the memory for two images but no pin to choose.
+"""
+
+from cubestack.firmware_model.interface.pins import Pin, sram_pins
+
+__all__ = [
+    "ACK",
+    "AD_HIGH",
+    "AD_LOW",
+    "ALE",
+    "BANK",
+    "BOARD_PREFIXES",
+    "CONTENTION",
+    "CS_N",
+    "DATA",
+    "DCLK",
+    "DOUBLE",
+    "ENABLE",
+    "HEADER",
+    "HSYNC",
+    "INTO",
+    "OWN_PINS",
+    "PIXCLK",
+    "PIXDATA",
+    "PUBLISHED",
+    "RE_N",
+    "RNW",
+    "SHARED",
+    "TWO_BOARDS",
+    "VSYNC",
+    "WE_N",
+]
+
+PIXCLK = Pin("PIXCLK", "input", "pixel clock")
+PIXDATA = Pin("PIXDATA", "input", "pixel data from the image sensor", 8)
+HSYNC = Pin("HSYNC", "input", "low between rows")
+VSYNC = Pin("VSYNC", "input", "low between images")
+ENABLE = Pin("ENABLE", "input", "leave standby")
+RNW = Pin("RNW", "input", "read, not write")
+BANK = Pin("BANK", "input", "image bank, latched by ENABLE; tied low in the published wiring")
+INTO = Pin("INTO", "input", "memory to store in, latched by the falling RNW")
+DCLK = Pin("DCLK", "input", "data clock from the microcontroller")
+ACK = Pin("ACK", "output", "a whole image is stored")
+DATA = Pin("DATA", "output", "stored bytes to the microcontroller", 8)
+AD_HIGH = Pin("AD_HIGH", "input", "bus: address bits 23..16, then 7..0", 8)
+AD_LOW = Pin("AD_LOW", "inout", "bus: address bits 15..8, then the data", 8)
+ALE = Pin("ALE", "input", "bus: address latch enable, high active")
+CS_N = Pin("CS_N", "input", "bus: chip select, low active", level=1)
+RE_N = Pin("RE_N", "input", "bus: read strobe, low active", level=1)
+WE_N = Pin("WE_N", "input", "bus: write strobe, low active", level=1)
+CONTENTION = Pin("CONTENTION", "output", "model only: both boards drive the bus")
+
+_CAMERA = (PIXCLK, PIXDATA, HSYNC, VSYNC)
+_BUS = (AD_HIGH, AD_LOW, ALE, CS_N, RE_N, WE_N)
+_SRAM = sram_pins(20)
+
+#: Positions of the published board's pins on its header.
+HEADER = {
+    PIXDATA: "1-8",
+    ACK: "9",
+    ENABLE: "12",
+    HSYNC: "14",
+    BANK: "15",
+    VSYNC: "16",
+    PIXCLK: "18",
+    RNW: "19",
+    DATA: "23-30",
+    DCLK: "32",
+}
+
+PUBLISHED = (
+    *(
+        pin.but(meaning=f"{pin.meaning} (header {HEADER[pin]})")
+        for pin in (*_CAMERA, ENABLE, RNW, BANK, DCLK, ACK, DATA)
+    ),
+    *_SRAM,
+)
+
+SHARED = (
+    *_CAMERA,
+    ENABLE,
+    RNW.but(meaning="the processor has the memory; else a picture is stored"),
+    BANK.but(meaning="image bank to store in, latched by ENABLE"),
+    ACK,
+    *_BUS,
+    *_SRAM,
+)
+
+DOUBLE = (
+    *_CAMERA,
+    ENABLE,
+    RNW.but(meaning="low: a picture is stored"),
+    INTO,
+    ACK,
+    *_BUS,
+    *(
+        pin.but(pin.replace("SRAM", f"SRAM{n}"), meaning=f"{pin.meaning}, memory {n - 1}")
+        for n in (1, 2)
+        for pin in sram_pins(19)
+    ),
+)
+
+#: What goes before the names of the pins that each of two boards has for itself.
+BOARD_PREFIXES = ("BOARD1_", "BOARD2_")
+
+#: These pins.
+OWN_PINS = (ENABLE, RNW, BANK, ACK, CS_N, *_SRAM)
+
+TWO_BOARDS = (
+    *(pin for pin in SHARED if pin not in OWN_PINS),
+    *(
+        pin.but(f"{prefix}{pin}", meaning=f"board {n}: {pin.meaning}")
+        for n, prefix in enumerate(BOARD_PREFIXES, 1)
+        for name in OWN_PINS
+        for pin in SHARED
+        if pin == name
+    ),
+    CONTENTION,
+)

@@ -1,0 +1,117 @@
+"""What is known of a pin: one declaration for gateware, constraint files, wiring and firmware."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Direction", "Pin", "Port", "resized", "sram_pins"]
+
+#: Seen from the FPGA; "tristate" is an output that can be off.
+Direction = Literal["input", "output", "tristate", "inout"]
+
+
+@dataclass(frozen=True)
+class Port:
+    """One side of a pin in the gateware, which has no bidirectional lines.
+
+    Attributes:
+        name: of the port.
+        output: whether the gateware drives it.
+        width: in bits.
+        level: of an input before anybody drives it, of an output in reset.
+    """
+
+    name: str
+    output: bool
+    width: int
+    level: int = 0
+
+
+class Pin(str):
+    """A pin of an FPGA board, or a bus of them: its name, with what is known of it.
+
+    Attributes:
+        direction: seen from the FPGA.
+        meaning: what it is for.
+        width: number of pins.
+        level: of an input before anybody drives it; of an output that is never off, in reset.
+        enables: bits of the output enable: 0 for none, 1 for all pins, or ``width``.
+        level_in, level_out, enable: the gateware's ports for it; None for what it has not.
+    """
+
+    direction: Direction
+    meaning: str
+    width: int
+    level: int
+    enables: int
+    level_in: str | None
+    level_out: str | None
+    enable: str | None
+
+    def __new__(
+        cls,
+        name: str,
+        direction: Direction,
+        meaning: str,
+        width: int = 1,
+        *,
+        level: int = 0,
+        enables: int = 1,
+        bare: bool = False,
+    ) -> "Pin":
+        """Declare a pin; its ports are NAME, or NAME_I, NAME_O and NAME_OE.
+
+        ``bare``: the level that is driven has the port NAME, although it can be off.
+        """
+        pin = super().__new__(cls, name)
+        pin.direction, pin.meaning, pin.width, pin.level = direction, meaning, width, level
+        switched = direction in ("tristate", "inout")
+        pin.enables = enables if switched else 0
+        pin.enable = f"{name}_OE" if switched else None
+        pin.level_out = None if direction == "input" else name
+        pin.level_in = name if direction == "input" else None
+        if switched:
+            pin.level_out = name if bare else f"{name}_O"
+            pin.level_in = f"{name}_I" if direction == "inout" else None
+        return pin
+
+    def but(self, name: str = "", *, meaning: str = "", width: int = 0) -> "Pin":
+        """The same pin with another name, meaning or width."""
+        return Pin(
+            name or self,
+            self.direction,
+            meaning or self.meaning,
+            width or self.width,
+            level=self.level,
+            enables=self.enables,
+            bare=self.level_out == self,
+        )
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Its ports, input first."""
+        found = []
+        if self.level_in:
+            found.append(Port(self.level_in, False, self.width, self.level))
+        if self.level_out:
+            level = 0 if self.enable else self.level
+            found.append(Port(self.level_out, True, self.width, level))
+        if self.enable:
+            found.append(Port(self.enable, True, self.enables))
+        return tuple(found)
+
+
+def resized(pins: Iterable[Pin], **widths: int) -> tuple[Pin, ...]:
+    """The same pins, with other widths of those that are named."""
+    return tuple(pin.but(width=widths.get(pin, pin.width)) for pin in pins)
+
+
+def sram_pins(address_bits: int, address: str = "SRAM address") -> tuple[Pin, ...]:
+    """Pins to an SRAM of bytes; strobes are low active."""
+    return (
+        Pin("SRAM_A", "output", address, address_bits),
+        Pin("SRAM_D", "inout", "SRAM data", 8),
+        Pin("SRAM_CE_N", "output", "SRAM chip enable, low active", level=1),
+        Pin("SRAM_OE_N", "output", "SRAM output enable, low active", level=1),
+        Pin("SRAM_WE_N", "output", "SRAM write enable, low active", level=1),
+    )

@@ -1,0 +1,49 @@
+"""Components whose ports are the pins of a board, and joining them to each other."""
+
+from collections.abc import Iterable
+
+from amaranth.hdl import Module
+from amaranth.lib.wiring import Component, In, Out
+
+from cubestack.firmware_model.interface.pins import Pin
+
+__all__ = ["PinnedComponent", "connect_ports", "pins_of"]
+
+
+class PinnedComponent(Component):
+    """A whole FPGA, or a model of several: its ports are those of a table of pins.
+
+    Attributes:
+        pins: the table, with the widths that this component has.
+    """
+
+    def __init__(self, pins: Iterable[Pin]) -> None:
+        """Make the ports of ``pins``, in their order."""
+        self.pins = tuple(pins)
+        super().__init__(
+            {
+                port.name: (Out if port.output else In)(port.width, init=port.level)
+                for pin in self.pins
+                for port in pin.ports
+            }
+        )
+
+
+def connect_ports(
+    m: Module, inner: Component, outer: Component, names: Iterable[tuple[str, str]]
+) -> None:
+    """Lead ports of ``inner`` to ports of ``outer``, given as pairs of their names."""
+    members = inner.signature.members
+    for inside, outside in names:
+        port, pin = getattr(inner, inside), getattr(outer, outside)
+        m.d.comb += port.eq(pin) if members[inside].flow is In else pin.eq(port)
+
+
+def pins_of(component: Component) -> tuple[Pin, ...]:
+    """Its table of pins; of a block, which has none, each port as a pin of its own."""
+    if isinstance(component, PinnedComponent):
+        return component.pins
+    return tuple(
+        Pin(name, "input" if member.flow is In else "output", "", len(getattr(component, name)))
+        for name, member in component.signature.members.items()
+    )

@@ -1,1 +1,0 @@
-"""CubeSense's FPGAs on an I2C bus in place of the parallel pins."""

@@ -1,0 +1,67 @@
+"""CubeSense's tops with their clocks, and its blocks, by the names that the command line uses."""
+
+from functools import partial
+from pathlib import Path
+
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.hdl.blocks.frame_gap import FrameGap
+from cubestack.hdl.blocks.frame_writer import FrameWriter
+from cubestack.hdl.blocks.gray_counter import GrayCounter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.cubesense.dataflow import SIDES, Side
+from cubestack.hdl.cubesense.nadir_scan import NadirScan
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubesense.reader import CubeSenseReader
+from cubestack.hdl.cubesense.sun_search import SunSearch
+from cubestack.hdl.cubesense.sun_window import SunWindow
+from cubestack.hdl.cubesense.top import CubeSenseFpga
+from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
+
+__all__ = ["AREA_FILE", "LINK_CLOCK", "PIXEL_CLOCK", "TOPS"]
+
+PIXEL_CLOCK = Clock("PCLK", 74, "OV7620 at 13.5 MHz")
+LINK_CLOCK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
+_CLK = Clock("CLK", 400, "two instructions of the microcontroller at 5 MHz")
+
+_OPTION = ", the microcontroller sets the address"
+
+
+def _fpga(side: Side, mcu_addressing: bool) -> Top:
+    return Top(
+        partial(CubeSenseFpga, side, FULL_SIZE, mcu_addressing),
+        f"CubeSense, {side} sensor's FPGA{_OPTION * mcu_addressing}",
+        (PIXEL_CLOCK, LINK_CLOCK, _CLK),
+        pulled_up=("LINK_C",),
+    )
+
+
+def _pair(mcu_addressing: bool) -> Top:
+    return Top(
+        partial(CubeSensePair, FULL_SIZE, mcu_addressing),
+        f"CubeSense, model of both FPGAs and their link{_OPTION * mcu_addressing}",
+        (*(PIXEL_CLOCK._replace(port=f"{half}_PCLK") for half in ("SUN", "NAD")), _CLK),
+        parts=2,
+    )
+
+
+#: Their tracked area, as ``cubestack hdl area --ice40 --fmax --json`` prints it.
+AREA_FILE = Path(__file__).parent / "area.json"
+
+TOPS: TopTable = {
+    **{
+        f"cubesense-{side}{'-addressing' * addressing}": _fpga(side, addressing)
+        for addressing in (False, True)
+        for side in SIDES
+    },
+    "cubesense-pair": _pair(mcu_addressing=False),
+    "cubesense-pair-addressing": _pair(mcu_addressing=True),
+    "matrix counter 640 x 480": Block(partial(MatrixCounter, 640, 480)),
+    "Gray counter of 307200": Block(partial(GrayCounter, 640 * 480)),
+    "frame writer 640 x 480": Block(partial(FrameWriter, 640, 480)),
+    "frame gap of 858 clocks": Block(partial(FrameGap, 858)),
+    "nadir scan": Block(partial(NadirScan, FULL_SIZE)),
+    "Sun search": Block(partial(SunSearch, FULL_SIZE)),
+    "Sun window": Block(partial(SunWindow, FULL_SIZE)),
+    "CubeSense reader": Block(partial(CubeSenseReader, FULL_SIZE)),
+    "the same, addressing": Block(partial(CubeSenseReader, FULL_SIZE, mcu_addressing=True)),
+}

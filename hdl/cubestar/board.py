@@ -1,0 +1,60 @@
+"""What CubeStar's boards have in common: size, camera, writer, and the processor's bus.
+
+How the camera's pins are brought in: PIXDATA, HSYNC and VSYNC change with PIXCLK and are used in
+its domain only. "Not storing" is that domain's reset: asserted at once, without a clock, released
+through two flip-flops.
+"""
+
+from amaranth.hdl import ClockDomain, ClockSignal, Module, Value
+from amaranth.lib.cdc import ResetSynchronizer
+
+from cubestack.firmware_model.interface.pins import Pin, resized
+from cubestack.hdl.blocks.bus_port import BusPort
+from cubestack.hdl.blocks.frame_writer import FrameWriter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.pinned import PinnedComponent
+
+__all__ = ["CubeStarBoard"]
+
+
+class CubeStarBoard(PinnedComponent):
+    """A board, or a model of two, that stores images of ``columns`` x ``rows`` pixels."""
+
+    _pins: tuple[Pin, ...]
+    _banks: bool  # whether each memory has two images, and its address a bit to tell them apart
+
+    def __init__(self, columns: int = 1024, rows: int = 512) -> None:
+        """Make the board for images of ``columns`` x ``rows`` pixels."""
+        self.columns = columns
+        self.rows = rows
+        width = MatrixCounter.address_width(columns, rows) + self._banks
+        addresses = [pin for pin in self._pins if pin.endswith("_A")]
+        super().__init__(resized(self._pins, **dict.fromkeys(addresses, width)))
+
+    def _add_writer(self, m: Module, storing: Value) -> FrameWriter:
+        """The camera's writer in its domain "pix", in reset unless ``storing``."""
+        m.domains.pix = ClockDomain(async_reset=True, local=True)
+        m.submodules.pix_reset = ResetSynchronizer(~storing, domain="pix")
+        m.submodules.writer = writer = FrameWriter(self.columns, self.rows, domain="pix")
+        m.d.comb += [
+            ClockSignal("pix").eq(self.PIXCLK),
+            writer.pixel.eq(self.PIXDATA),
+            writer.hsync.eq(self.HSYNC),
+            writer.vsync.eq(self.VSYNC),
+            self.ACK.eq(writer.ack),
+        ]
+        return writer
+
+    def _add_bus(self, m: Module, on: Value, address_width: int) -> BusPort:
+        """The processor's external bus."""
+        m.submodules.bus = bus = BusPort(address_width)
+        m.d.comb += [
+            bus.on.eq(on),
+            bus.high.eq(self.AD_HIGH),
+            bus.low.eq(self.AD_LOW_I),
+            bus.ale.eq(self.ALE),
+            bus.cs_n.eq(self.CS_N),
+            bus.re_n.eq(self.RE_N),
+            bus.we_n.eq(self.WE_N),
+        ]
+        return bus
