@@ -27,6 +27,12 @@ LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
+    "hdl": (
+        "blocks",
+        "flow",
+        "cubestar cubesense mutants",
+        "proofs",
+    ),
     "firmware_model": (
         "interface",
         "formats mcu",

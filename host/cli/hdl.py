@@ -15,6 +15,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from cubestack.host.devices.registry import devices
+
 if TYPE_CHECKING:
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
@@ -65,16 +67,11 @@ examples:
 
 
 def _all_tops() -> "TopTable":
-    from cubestack.hdl.cubesense import tops as cubesense
-    from cubestack.hdl.cubestar import tops as cubestar
-
-    return {**cubestar.TOPS, **cubesense.TOPS}
+    return {name: top for device in devices() for name, top in device.tops().items()}
 
 
 def _all_proofs() -> "Mapping[str, Proof]":
-    from cubestack.hdl.proofs import cubesense, cubestar
-
-    return {**cubestar.PROOFS, **cubesense.PROOFS}
+    return {name: proof for device in devices() for name, proof in device.proofs().items()}
 
 
 def add_arguments(

@@ -17,6 +17,8 @@ from cubestack.host.clients.contract import Client, DeviceClient
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
+    from cubestack.hdl.flow.top import TopTable
+    from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.experiments.contract import Experiment
 
 __all__ = [
@@ -109,7 +111,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         experiment: what ``measure`` does with it; None for nothing.
         demo: shows it end to end, with pictures: (arguments of the command) -> found; None for
             nothing.
-        tops: designs of its FPGAs by name, as ``hdl.flow`` takes them.
+        tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
         profiles: names of the firmware's profiles, the default one first.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
@@ -130,8 +132,8 @@ class Device(Generic[BoardT_co, ClientT_co]):
     has_fpga: bool = True
     experiment: Callable[[], Experiment[Any, Any]] | None = None
     demo: Callable[[Any], bool] | None = None
-    tops: Callable[[], Mapping[str, Any]] = dict
-    proofs: Callable[[], Mapping[str, Any]] = dict
+    tops: Callable[[], TopTable] = dict
+    proofs: Callable[[], Mapping[str, Proof]] = dict
     profiles: tuple[str, ...] = ("extended",)
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)

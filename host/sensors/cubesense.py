@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,8 @@ from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
     from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.hdl.flow.top import TopTable
+    from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.clients.cubesense.client import CubeSense
 
 __all__ = ["DEVICE"]
@@ -47,6 +50,18 @@ def _default_scene() -> EarthSunScene:
     return EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
 
 
+def _tops() -> TopTable:
+    from cubestack.hdl.cubesense.tops import TOPS
+
+    return TOPS
+
+
+def _proofs() -> Mapping[str, Proof]:
+    from cubestack.hdl.proofs.cubesense import PROOFS
+
+    return PROOFS
+
+
 DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
     name="cubesense",
     title="CubeSense",
@@ -63,6 +78,8 @@ DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
             "FPGAs that let the processor choose addresses (telecommand 100)",
         ),
     ),
+    tops=_tops,
+    proofs=_proofs,
     conformance=ConformanceNotes(
         keys=frozenset({"Area"}), optional=frozenset({"SetNadirSearch", "NADIR_SEARCH"})
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,8 @@ from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.scene.sky import Scene
+    from cubestack.hdl.flow.top import TopTable
+    from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.clients.cubestar.client import CubeStar
 
 __all__ = ["DEVICE"]
@@ -75,6 +78,18 @@ def _layout_notice(value: str) -> str | None:
     )
 
 
+def _tops() -> TopTable:
+    from cubestack.hdl.cubestar.tops import TOPS
+
+    return TOPS
+
+
+def _proofs() -> Mapping[str, Proof]:
+    from cubestack.hdl.proofs.cubestar import PROOFS
+
+    return PROOFS
+
+
 DEVICE: Device[CubeStarBoard, CubeStar] = Device(
     name="cubestar",
     title="CubeStar",
@@ -95,6 +110,8 @@ DEVICE: Device[CubeStarBoard, CubeStar] = Device(
             notice=_layout_notice,
         ),
     ),
+    tops=_tops,
+    proofs=_proofs,
     conformance=ConformanceNotes(
         effects={
             "StreamDownImage": partial(check_stream, picture_bytes=IMAGE_BYTES),

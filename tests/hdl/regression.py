@@ -135,7 +135,7 @@ def _next(design: Callable[[int, int], Component], module: str, bench: str) -> T
     return Tier(design, 5, 3, (module, "benches_states"), {"BENCH": f"bench_next:{bench}"})
 
 
-#: By the tops' names in ``cubestack.hdl.flow.tops``; some have a further one.
+#: By the tops' names, as the command line has them; some have a further one.
 TIERS = {
     "cubestar": Tier(CubeStarTop, 5, 3, ("benches_read", "benches_modes", "benches_store")),
     "cubestar-shared": _next(CubeStarShared, "benches_shared", "SharedBench"),

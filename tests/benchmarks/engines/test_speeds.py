@@ -7,8 +7,9 @@ import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.factory import make_engine
+from cubestack.hdl.cubesense.tops import TOPS as CUBESENSE
+from cubestack.hdl.cubestar.tops import TOPS as CUBESTAR
 from cubestack.hdl.flow.generate import rtlil_text
-from cubestack.hdl.flow.tops import TOPS
 from tests.benchmarks.engines import speeds
 from tests.benchmarks.engines.icarus import CocotbError, missing_for_cocotb, run_cocotb
 from tests.benchmarks.engines.speeds import ENGINES, absent, measure
@@ -20,7 +21,7 @@ def test_every_top_that_has_a_wiring_is_measured():
     for name, workload in WORKLOADS.items():
         wiring = workload.wiring()
         rtlil_text(wiring.component)  # a design must be used, Amaranth says
-        top = TOPS[name].make()
+        top = {**CUBESTAR, **CUBESENSE}[name].make()
         assert wiring.component.signature.members == top.signature.members
         rtlil_text(top)
         assert [camera.name for camera in wiring.cameras] == list(workload.stored)

@@ -239,7 +239,7 @@ def _star(make: Callable[[int, int], Wiring], script: Callable[[Rng], Iterator[S
     return Board(lambda narrow: make(COLUMNS - narrow, ROWS), COLUMNS, ROWS, 9, script)
 
 
-#: By the top's name in ``cubestack.hdl.flow.tops``.
+#: By the top's name, as the command line has it.
 BOARDS = {
     "cubestar": _star(lambda *size: cubestar_wiring(CubeStarTop(*size)), _cubestar),
     "cubestar-shared": _star(

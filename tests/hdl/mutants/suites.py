@@ -109,7 +109,7 @@ BENCHES = {
     "cubesense-pair": "pair:PairBench",
 }
 
-#: By name: tops as in ``cubestack.hdl.flow.tops``, one's bus, and a block that is done in seconds.
+#: By name: tops as on the command line, one's bus, and a block that is done in seconds.
 SUITES = {
     "cubestar": _suite(
         "cubestar",
