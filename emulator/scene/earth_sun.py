@@ -1,33 +1,33 @@
-"""What a sun and nadir sensor looks at: the Earth below, the Sun, the Moon, and false lights.
+"""What sun and nadir cameras look at: the Earth below, the Sun, the Moon, and false lights.
 
 CubeSense thesis, sections 5.1.3.2 and 5.5. Directions are unit vectors in *scene axes*, which are
 the satellite's body axes at time 0. Each camera has a mounting: the directions of its boresight and
-of its picture's right side in body axes.
-
-A sensor's alpha and beta are the undistorted picture coordinates, x right and y down, in degrees:
-the angle from the boresight is their root sum of squares.
+of its picture's right side in body axes. Alpha and beta are as in ``emulator.scene.angles``.
 """
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.camera.ov7620.fisheye import (
-    FIELD_DEG,
-    angles_from_vector,
-    vector_from_angles,
-)
+from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 
-__all__ = ["EarthSunScene", "Mounting", "Reflection", "SensorTruth"]
+__all__ = ["EarthSunScene", "Mounting", "Reflection", "SensorTruth", "Target"]
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
+
+
+class Target(IntEnum):
+    """What a camera is there to see, which tells a satellite's two cameras apart."""
+
+    SUN = 0
+    NADIR = 1
 
 
 def _unit(name: str, vector: ArrayLike) -> NDArray[np.float64]:
@@ -71,13 +71,13 @@ class Reflection:
     """A false light in one camera's picture: an even disc.
 
     Attributes:
-        camera: that sees it.
+        camera: that sees it, by what it is there for.
         alpha_deg, beta_deg: its centre.
         radius_px: its size.
         level: grey values above black, at the exposure that the published levels belong to.
     """
 
-    camera: Camera
+    camera: Target
     alpha_deg: float
     beta_deg: float
     radius_px: float
@@ -88,11 +88,6 @@ class Reflection:
         for name in ("radius_px", "level"):
             if not getattr(self, name) > 0:
                 raise SceneError(f"{name} must be above 0, not {getattr(self, name)}")
-        if not np.hypot(self.alpha_deg, self.beta_deg) <= FIELD_DEG:
-            raise SceneError(
-                f"at_deg must be within {FIELD_DEG} deg of the boresight, "
-                f"not {self.alpha_deg}, {self.beta_deg}"
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +117,10 @@ class EarthSunScene:
         altitude_km: of the satellite.
         rate_deg_s: body rate (3,) in body axes.
         nadir_camera, sun_camera: how they are mounted.
-        bloom_px: radius of the Sun's image on the boresight of the sun camera at the published
-            exposure, where its level crosses from background to object (thesis: 8 px).
         unevenness: standard deviation of the Earth's brightness, relative (assumed).
         glow_km: scale height of the glow above the limb; 0 for none (assumed).
         reflections: false lights.
-        hot_pixels: pixels of each camera that are stuck at full scale.
-        hot_pairs: pairs of such pixels, side by side.
-        noise: False makes the sensors ideal but for their hot pixels.
-        seed: of noise, surface and hot pixels.
+        seed: of the Earth's surface.
     """
 
     nadir: ArrayLike = (0.0, 0.0, 1.0)
@@ -140,13 +130,9 @@ class EarthSunScene:
     rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
     nadir_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, 1.0)))
     sun_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, -1.0)))
-    bloom_px: float = 7.0
     unevenness: float = 0.1
     glow_km: float = 10.0
     reflections: tuple[Reflection, ...] = ()
-    hot_pixels: int = 0
-    hot_pairs: int = 0
-    noise: bool = True
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -157,10 +143,9 @@ class EarthSunScene:
         rate = np.asarray(self.rate_deg_s, np.float64)
         if rate.shape != (3,) or not np.all(np.isfinite(rate)):
             raise SceneError(f"rate_deg_s must be 3 numbers in deg/s, not {self.rate_deg_s!r}")
-        for name in ("altitude_km", "bloom_px"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise SceneError(f"{name} must be above 0, not {getattr(self, name)}")
-        for name in ("unevenness", "glow_km", "hot_pixels", "hot_pairs", "seed"):
+        if not 0 < self.altitude_km < np.inf:
+            raise SceneError(f"altitude_km must be above 0, not {self.altitude_km}")
+        for name in ("unevenness", "glow_km", "seed"):
             if not 0 <= getattr(self, name) < np.inf:
                 raise SceneError(f"{name} must not be negative, not {getattr(self, name)}")
 
@@ -185,13 +170,13 @@ class EarthSunScene:
         """The Earth below."""
         return Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed)
 
-    def axes(self, camera: Camera, time_ps: int) -> NDArray[np.float64]:
+    def axes(self, camera: Target, time_ps: int) -> NDArray[np.float64]:
         """Rotation (3, 3) from scene axes to a camera's axes at a time."""
-        mounting = self.sun_camera if camera is Camera.SUN else self.nadir_camera
+        mounting = self.sun_camera if camera == Target.SUN else self.nadir_camera
         turned = propagate(_IDENTITY, self.rate_deg_s, time_ps / PS_PER_S)
         return mounting.matrix @ matrix_from_quaternion(turned)
 
-    def seen(self, direction: ArrayLike, camera: Camera, time_ps: int) -> NDArray[np.float64]:
+    def seen(self, direction: ArrayLike, camera: Target, time_ps: int) -> NDArray[np.float64]:
         """``direction`` (3,) of scene axes in a camera's axes at a time."""
         return self.axes(camera, time_ps) @ np.asarray(direction, np.float64)
 
@@ -200,11 +185,14 @@ class EarthSunScene:
         cosine = float(np.dot(np.asarray(direction, np.float64), np.asarray(self.nadir)))
         return cosine > float(np.cos(np.radians(angular_radius_deg(self.altitude_km))))
 
-    def truth(self, camera: Camera, time_ps: int) -> SensorTruth:
-        """What the sensor of ``camera`` should measure at a time."""
-        of_sun = camera is Camera.SUN
+    def truth(self, camera: Target, time_ps: int, field_deg: float = 180.0) -> SensorTruth:
+        """What the sensor of ``camera`` should measure at a time.
+
+        ``field_deg`` is the largest angle from the boresight that its lens images.
+        """
+        of_sun = camera == Target.SUN
         vector = self.seen(self.sun if of_sun else self.nadir, camera, time_ps)
         alpha, beta = angles_from_vector(vector)
-        reach = FIELD_DEG if of_sun else FIELD_DEG + angular_radius_deg(self.altitude_km)
+        reach = field_deg if of_sun else field_deg + angular_radius_deg(self.altitude_km)
         visible = bool(np.hypot(alpha, beta) <= reach) and not (of_sun and self.hidden(self.sun))
         return SensorTruth(vector, alpha, beta, visible)

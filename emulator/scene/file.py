@@ -1,4 +1,4 @@
-"""Scene files: TOML tables with checked keys and values.
+"""Tables of scene files: TOML with checked keys and values.
 
 A reader takes what TOML gave for one key and returns the checked value; SceneError says what it
 must be. :func:`read_table` puts the key in front.
@@ -7,34 +7,59 @@ must be. :func:`read_table` puts the key in front.
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
-
-from cubestack.emulator.scene.picture import SceneError
+from typing import Any, TypeVar
 
 __all__ = [
     "Readers",
     "SceneError",
     "flag",
-    "load_toml",
     "number",
+    "read_scene_file",
     "read_table",
     "several",
+    "subtable",
     "text",
+    "values_for",
     "whole",
 ]
 
 Readers = dict[str, Callable[[Any], Any]]
+V = TypeVar("V")
 
 
-def load_toml(path: Path) -> dict[str, Any]:
-    """What stands in the file; SceneError when it can not be read or is no TOML."""
+class SceneError(ValueError):
+    """A scene that can not be: a wrong value, key, file or picture. The text is one line."""
+
+
+def read_scene_file(
+    path: Path, kinds: Mapping[str, Callable[[dict[str, Any]], V]], right: str
+) -> V:
+    """What the reader of its ``kind`` makes of the file's other keys; ``right`` tells the kinds.
+
+    Raises SceneError for a file that can not be read or is no TOML, and for what its reader
+    refuses by a ValueError.
+    """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise SceneError(f"{path} can not be read: {error.strerror or error}") from None
     except ValueError as error:
         raise SceneError(f"{path} is no TOML file: {error}") from None
+    try:
+        kind = table.pop("kind", None)
+        if not isinstance(kind, str) or kind not in kinds:
+            raise SceneError(f"kind must be {right}, not {kind!r}")
+        return kinds[kind](table)
+    except ValueError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def values_for(owner: Any, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of ``values`` that the dataclass ``owner`` has a field for."""
+    names = {field.name for field in fields(owner)}
+    return {key: value for key, value in values.items() if key in names}
 
 
 def read_table(table: Mapping[str, Any], readers: Readers) -> dict[str, Any]:
@@ -91,5 +116,16 @@ def several(count: int, of: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, 
         if not isinstance(value, list) or len(value) != count:
             raise SceneError(f"must be a list of {count} numbers, not {value!r}")
         return tuple(of(item) for item in value)
+
+    return read
+
+
+def subtable(readers: Readers) -> Callable[[Any], dict[str, Any]]:
+    """A reader of a table, whose keys ``readers`` take."""
+
+    def read(value: Any) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise SceneError(f"must be a table, not {value!r}")
+        return read_table(value, readers)
 
     return read

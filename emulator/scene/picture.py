@@ -1,33 +1,81 @@
-"""Picture files as light: the part of a photograph that the sensor sees, in 8-bit grey values."""
+"""A picture file as light: the part of a photograph that a sensor sees, in 8-bit grey values."""
 
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from PIL import Image, UnidentifiedImageError
 
-from cubestack.emulator.camera.common.optics import COLUMNS, ROWS
+from cubestack.emulator.scene.attitude import unit_quaternion
+from cubestack.emulator.scene.file import SceneError
 
-__all__ = ["FORMATS", "SceneError", "load_picture"]
+__all__ = ["FORMATS", "PictureScene", "check_quaternion", "load_picture"]
 
 FORMATS = ("PNG", "JPEG", "TIFF")
 
 
-class SceneError(ValueError):
-    """A scene that can not be: a wrong value, key, file or picture. The text is one line."""
+@dataclass(frozen=True, eq=False)
+class PictureScene:
+    """A picture file as the light on a sensor: PNG, JPEG or TIFF, grey or colour.
+
+    Attributes:
+        file: the picture.
+        crop: column and row of its first pixel that the sensor sees.
+        exposure_ms: exposure that it was taken with; None: grey values do not scale.
+        quaternion: its attitude (4,) if known.
+        pixels: grey values (rows, columns) of the whole picture, read-only.
+    """
+
+    file: Path
+    crop: tuple[int, int] = (0, 0)
+    exposure_ms: float | None = None
+    quaternion: ArrayLike | None = None
+    pixels: NDArray[np.uint8] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Load the picture; SceneError when there is none, or a value is wrong."""
+        if self.quaternion is not None:
+            check_quaternion(self.quaternion)
+        if self.exposure_ms is not None and not self.exposure_ms > 0:
+            raise SceneError(f"exposure_ms must be above 0, not {self.exposure_ms}")
+        if min(self.crop) < 0:
+            raise SceneError(f"crop must not be negative, not {self.crop[0]},{self.crop[1]}")
+        object.__setattr__(self, "pixels", load_picture(Path(self.file)))
+
+    def part(self, columns: int, rows: int) -> NDArray[np.uint8]:
+        """Grey values (rows, columns) that a sensor of this size sees, C-contiguous.
+
+        Raises SceneError when the picture is too small for it.
+        """
+        (x, y), (height, width) = self.crop, self.pixels.shape
+        if width < x + columns or height < y + rows:
+            raise SceneError(
+                f"{Path(self.file).name} is {width} x {height} pixels; with crop {x},{y} it would "
+                f"have to be at least {x + columns} x {y + rows}"
+            )
+        return np.ascontiguousarray(self.pixels[y : y + rows, x : x + columns])
+
+    def truth(self, time_ps: int) -> NDArray[np.float64] | None:
+        """The picture's attitude if known, whatever the time."""
+        del time_ps
+        return None if self.quaternion is None else unit_quaternion(self.quaternion)
 
 
-def load_picture(
-    file: Path, crop: Sequence[int], size: tuple[int, int] = (COLUMNS, ROWS)
-) -> NDArray[np.uint8]:
-    """Grey values of ``file`` from column and row ``crop`` on, read-only.
+def check_quaternion(quaternion: ArrayLike) -> None:
+    """Raise SceneError unless ``quaternion`` is four numbers of a finite length above 0."""
+    try:
+        unit_quaternion(quaternion)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
 
-    ``size`` is columns and rows of the sensor, CubeStar's unless given; the shape is its reverse.
+
+def load_picture(file: Path) -> NDArray[np.uint8]:
+    """Grey values (rows, columns) of ``file``, read-only.
 
     Raises:
-        SceneError: when the file is missing, damaged, of another format, too small, or so large
-            that Pillow refuses it.
+        SceneError: when the file is missing, damaged, of another format, or so large that Pillow
+            refuses it.
     """
     try:
         with Image.open(file) as image:
@@ -35,9 +83,7 @@ def load_picture(
                 raise SceneError(
                     f"{file.name} is a {image.format} picture; right would be {', '.join(FORMATS)}"
                 )
-            _check_size(file, image.size, crop, size)
-            box = (crop[0], crop[1], crop[0] + size[0], crop[1] + size[1])
-            pixels = _grey(file, image.crop(box))
+            pixels = _grey(file, image)
     except SceneError:
         raise
     except UnidentifiedImageError:
@@ -49,20 +95,6 @@ def load_picture(
         raise SceneError(f"{file.name} can not be read: {reason}") from None
     pixels.flags.writeable = False
     return pixels
-
-
-def _check_size(
-    file: Path, size: tuple[int, int], crop: Sequence[int], sensor: tuple[int, int]
-) -> None:
-    x, y = crop
-    columns, rows = sensor
-    if x < 0 or y < 0:
-        raise SceneError(f"crop must not be negative, not {x},{y}")
-    if size[0] < x + columns or size[1] < y + rows:
-        raise SceneError(
-            f"{file.name} is {size[0]} x {size[1]} pixels; with crop {x},{y} it would have to be "
-            f"at least {x + columns} x {y + rows}"
-        )
 
 
 def _grey(file: Path, image: Image.Image) -> NDArray[np.uint8]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from cubestack.emulator.boards.aramis.board import AramisBoard
     from cubestack.emulator.bus.i2c import I2cBus
-    from cubestack.emulator.camera.common.optics import Optics
+    from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
     from cubestack.emulator.scene.sky import Scene
     from cubestack.emulator.sim.virtual_time import Kernel
@@ -51,22 +51,20 @@ def aramis_board(
     *,
     seed: int = 0,
     baud: int = INTERFACE.baud,
-    lens: Optics | None = None,
     kernel: Kernel | None = None,
     i2c_bus: I2cBus | None = None,
 ) -> AramisBoard:
     """Power up a star tracker that looks at the scene in ``path``, or at Orion."""
     from cubestack.emulator.boards.aramis.board import AramisBoard
-    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
-    from cubestack.emulator.scene.attitude import quaternion_from_pointing
-    from cubestack.emulator.scene.sky import SkyScene, load_scene
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.mt9m001.lens import CONDITION
+    from cubestack.emulator.scene.sky import SkyScene
 
-    lens = lens or aramis_lens()
-    scene: Scene
+    scene: Scene | SkyView
     if path is None:
-        scene = SkyScene(quaternion_from_pointing(*DEFAULT_POINTING_DEG), optics=lens)
+        scene = SkyScene.pointing(*DEFAULT_POINTING_DEG)
     else:
-        scene = load_scene(path, lens)
+        scene = load_scene(path, CONDITION)
     return AramisBoard(
         scene, aramis_catalogue(), seed=seed, baud=baud, kernel=kernel, i2c_bus=i2c_bus
     )
@@ -88,7 +86,7 @@ class AramisSession:
 
 @contextmanager
 def open_aramis(
-    scene: Scene,
+    scene: Scene | SkyView,
     *,
     seed: int = 0,
     field_deg: float = DEFAULT_FIELD_DEG,

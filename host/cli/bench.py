@@ -147,10 +147,9 @@ def _aramis() -> dict[str, float]:
     """The loop of the third sensor, and the wall times of what it spends them on."""
     from cubestack.emulator.camera.common.register_file import RegisterFile
     from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
-    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+    from cubestack.emulator.camera.mt9m001.lens import CONDITION
     from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
     from cubestack.emulator.camera.mt9m001.registers import read_settings
-    from cubestack.emulator.scene.attitude import quaternion_from_pointing
     from cubestack.emulator.scene.sky import SkyScene
     from cubestack.firmware_model.aramis.detection.background import Background
     from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
@@ -158,7 +157,7 @@ def _aramis() -> dict[str, float]:
     from cubestack.firmware_model.mcu.costs import Meter
 
     database = aramis_catalogue()
-    scene = SkyScene(quaternion_from_pointing(84.0, -1.0, 0.0), optics=aramis_lens())
+    scene = SkyScene.pointing(84.0, -1.0)
     with open_aramis(scene) as session:
         session.aramis.activate()
         client, kernel = session.aramis.client, session.board.kernel
@@ -175,7 +174,7 @@ def _aramis() -> dict[str, float]:
         assert shutter is not None
         for _ in range(CAPTURES):
             started = time.perf_counter()
-            picture = imager.picture(scene, shutter, settings)
+            picture = imager.picture(scene, CONDITION, shutter, settings)
             frames.append(time.perf_counter() - started)
     solves: list[float] = []
     for _ in range(CAPTURES):

@@ -34,6 +34,7 @@ from cubestack.host.experiments.cubestar import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.cli.session import Engine
 
@@ -118,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def measure_layout(
-    layout: Layout, scene: Scene, *, seconds: int, seed: int = 0, engine: Engine = "auto"
+    layout: Layout, scene: Scene | SkyView, *, seconds: int, seed: int = 0, engine: Engine = "auto"
 ) -> LayoutResult:
     """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
     from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of

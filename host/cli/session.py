@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.emulator.scene.sky import Scene
 
@@ -96,7 +98,11 @@ class Session:
 
 @contextmanager
 def open_session(
-    scene: Scene, *, seed: int = 0, engine: Engine = "auto", layout: Layout = Layout.COPIED
+    scene: Scene | SkyView,
+    *,
+    seed: int = 0,
+    engine: Engine = "auto",
+    layout: Layout = Layout.COPIED,
 ) -> Iterator[Session]:
     """Power up a CubeStar that looks at ``scene``."""
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -127,7 +133,11 @@ class CubeSenseSession:
 
 @contextmanager
 def open_cubesense(
-    scene: EarthSunScene, *, seed: int = 0, engine: Engine = "auto", mcu_addressing: bool = False
+    scene: EarthSunScene | EarthSunView,
+    *,
+    seed: int = 0,
+    engine: Engine = "auto",
+    mcu_addressing: bool = False,
 ) -> Iterator[CubeSenseSession]:
     """Power up a CubeSense that looks at ``scene``."""
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard

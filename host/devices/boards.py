@@ -15,6 +15,8 @@ from cubestack.firmware_model.interface.cubestar.layouts import Layout
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.bus.i2c import I2cBus
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.emulator.scene.sky import Scene
     from cubestack.emulator.sim.virtual_time import Kernel
@@ -75,20 +77,22 @@ def open_board(
     return DEVICES[device](scene, seed, engine, baud, place)
 
 
-def cubestar_scene(path: Path | None) -> Scene:
+def cubestar_scene(path: Path | None) -> Scene | SkyView:
     """The scene in ``path``; None is Orion's belt."""
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
     from cubestack.emulator.scene.attitude import quaternion_from_pointing
-    from cubestack.emulator.scene.sky import SkyScene, load_scene
+    from cubestack.emulator.scene.sky import SkyScene
 
     if path is not None:
-        return load_scene(path)
+        return load_scene(path, CONDITION)
     return SkyScene(quaternion_from_pointing(*DEFAULT_POINTING_DEG), mag_limit=DEFAULT_MAG_LIMIT)
 
 
-def cubesense_scene(path: Path | None) -> EarthSunScene:
+def cubesense_scene(path: Path | None) -> EarthSunScene | EarthSunView:
     """The scene in ``path``; None has Sun and Earth in view."""
+    from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
     from cubestack.emulator.scene.earth_sun import EarthSunScene
-    from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
 
     if path is not None:
         return load_earth_sun_scene(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from cubestack.host.clients.aramis.client import Attitude
 from cubestack.host.experiments.cubestar import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG, compare
 
 if TYPE_CHECKING:
-    from cubestack.emulator.camera.common.optics import Optics
+    from cubestack.emulator.camera.common.view import SkyCondition, SkyView
     from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
     from cubestack.emulator.scene.sky import Scene
 
@@ -86,13 +86,14 @@ class AramisResult:
 
 def measure_frames(args: argparse.Namespace) -> Iterator[AramisResult]:
     """Measure ``args.frames`` times as the options of `cubestack measure aramis` say."""
-    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+    from cubestack.emulator.camera.common.view import SkyCondition
+    from cubestack.emulator.camera.mt9m001.lens import double_gauss
 
     rng = np.random.default_rng(args.seed)
-    lens = aramis_lens(args.field)
-    scene = _scene(args, lens, rng)
+    condition = SkyCondition(double_gauss(args.field))
+    view = _view(args, condition, rng)
     with open_aramis(
-        scene, seed=args.seed, field_deg=args.field, noise=_noise(args.without)
+        view, seed=args.seed, field_deg=args.field, noise=_noise(args.without)
     ) as session:
         inject_plan(session.board.faults, args.faults)
         _configure(session, args)
@@ -100,8 +101,8 @@ def measure_frames(args: argparse.Namespace) -> Iterator[AramisResult]:
         pristine = session.board.catalogue_flash.copy()
         for number in range(args.frames):
             if number and args.scene is None and args.image is None:
-                scene = _scene(args, lens, rng)
-                session.board.camera.scene = scene
+                view = _view(args, condition, rng)
+                session.board.camera.scene = view
             flips = 0
             if args.bit_flips:
                 session.aramis.deactivate()
@@ -109,29 +110,30 @@ def measure_frames(args: argparse.Namespace) -> Iterator[AramisResult]:
                 flips = session.board.irradiate("flash", args.bit_flips)
                 session.aramis.activate()
             session.aramis.client.pause(float(rng.uniform(0, PHASE_S)))
-            yield _measure(session, args, scene, rng, flips)
+            yield _measure(session, args, view.scene, rng, flips)
 
 
-def _scene(args: argparse.Namespace, lens: Optics, rng: np.random.Generator) -> Scene:
+def _view(args: argparse.Namespace, condition: SkyCondition, rng: np.random.Generator) -> SkyView:
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.attitude import random_quaternion
-    from cubestack.emulator.scene.sky import PictureScene, SkyScene, load_scene
+    from cubestack.emulator.scene.sky import PictureScene, SkyScene
 
     if args.scene is not None:
-        return load_scene(args.scene, lens)
+        return load_scene(args.scene, condition)
     if args.image is not None:
-        return PictureScene(args.image, crop=args.crop, size=(lens.columns, lens.rows))
+        return SkyView(PictureScene(args.image, crop=args.crop), condition)
     along = rng.random() * 2 * np.pi
     rate = (args.rate * np.cos(along), args.rate * np.sin(along), args.roll_rate)
-    return SkyScene(
+    scene = SkyScene(
         quaternion=random_quaternion(rng),
         rate_deg_s=rate,
         mag_limit=args.mag_limit,
         false_stars=args.false_stars,
         false_star_mag=args.false_mags,
-        noise=not args.no_noise,
         seed=int(rng.integers(1 << 31)),
-        optics=lens,
     )
+    return SkyView(scene, replace(condition, noise=not args.no_noise, seed=scene.seed))
 
 
 def _noise(without: list[str]) -> NoiseTerms:
@@ -240,8 +242,8 @@ def _count_wrong(session: AramisSession, truth: NDArray[np.float64] | None) -> i
     from cubestack.emulator.scene.hipparcos import load_sky
     from cubestack.emulator.scene.sky import SkyScene
 
-    scene = session.board.camera.scene
-    if truth is None or not isinstance(scene, SkyScene):
+    camera = session.board.camera
+    if truth is None or not isinstance(camera.scene, SkyScene):
         return None
     named = [star for star in session.aramis.stars() if star.hipparcos is not None]
     if not named:
@@ -249,6 +251,7 @@ def _count_wrong(session: AramisSession, truth: NDArray[np.float64] | None) -> i
     sky = load_sky()
     rows = np.searchsorted(sky.hip, [star.hipparcos or 0 for star in named])
     expected = sky.vectors[rows] @ matrix_from_quaternion(truth).T
-    measured = scene.optics.unproject(np.array([[star.x_px, star.y_px] for star in named]))
+    lens = camera.condition.optics
+    measured = lens.unproject(np.array([[star.x_px, star.y_px] for star in named]))
     cosines = np.clip(np.sum(expected * measured, axis=1), -1, 1)
     return int(np.sum(np.degrees(np.arccos(cosines)) > SAME_STAR_DEG))

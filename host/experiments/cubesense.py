@@ -16,7 +16,8 @@ from cubestack.host.cli.session import CubeSenseSession, open_cubesense
 from cubestack.host.clients.cubesense.client import Measurement, direction
 
 if TYPE_CHECKING:
-    from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
+    from cubestack.emulator.scene.earth_sun import SensorTruth
 
 __all__ = ["SensorResult", "measure_sensors"]
 
@@ -71,14 +72,14 @@ class SensorResult:
 
 def measure_sensors(args: argparse.Namespace) -> Iterator[SensorResult]:
     """Measure ``args.frames`` times with each wanted sensor, as the options say."""
-    from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+    from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 
     rng = np.random.default_rng(args.seed)
     given = None if args.scene is None else load_earth_sun_scene(args.scene)
     sensors = list(Camera) if args.sensor == "both" else [Camera[args.sensor.upper()]]
     search = SEARCHES[args.search]
     with open_cubesense(
-        given or _random_scene(args, sensors[0], rng),
+        given or _random_view(args, sensors[0], rng),
         seed=args.seed,
         engine=args.engine,
         mcu_addressing=search is not NadirSearch.LINES,
@@ -88,34 +89,33 @@ def measure_sensors(args: argparse.Namespace) -> Iterator[SensorResult]:
             session.cubesense.client.command("SetNadirSearch", Search=search)
         for _ in range(args.frames):
             for sensor in sensors:
-                session.board.scene = given or _random_scene(args, sensor, rng)
+                session.board.scene = given or _random_view(args, sensor, rng)
                 session.cubesense.client.pause(float(rng.uniform(0, FRAME_S)))
                 sram = Sram(sensor if args.memory == "own" else 1 - sensor)
                 yield _measure(session, sensor, sram)
 
 
-def _random_scene(
+def _random_view(
     args: argparse.Namespace, sensor: Camera, rng: np.random.Generator
-) -> EarthSunScene:
+) -> EarthSunView:
     """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
     from dataclasses import replace
 
+    from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
     from cubestack.emulator.scene.earth_sun import EarthSunScene
 
     reach = args.sun_angle if sensor is Camera.SUN else args.tilt
     radius, towards = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random()
     angles = (float(radius * np.cos(towards)), float(radius * np.sin(towards)))
-    others = {
-        "altitude_km": args.altitude,
-        "bloom_px": args.bloom,
-        "noise": not args.no_noise,
-        "seed": int(rng.integers(1 << 31)),
-    }
+    seed = int(rng.integers(1 << 31))
     if sensor is Camera.SUN:
-        scene = EarthSunScene.facing(sun_deg=angles, **others)
-        return replace(scene, nadir=-np.asarray(scene.sun))
-    scene = EarthSunScene.facing(nadir_deg=angles, **others)
-    return replace(scene, sun=-np.asarray(scene.nadir))
+        scene = EarthSunScene.facing(sun_deg=angles, altitude_km=args.altitude, seed=seed)
+        scene = replace(scene, nadir=-np.asarray(scene.sun))
+    else:
+        scene = EarthSunScene.facing(nadir_deg=angles, altitude_km=args.altitude, seed=seed)
+        scene = replace(scene, sun=-np.asarray(scene.nadir))
+    condition = FisheyeCondition(bloom_px=args.bloom, noise=not args.no_noise, seed=seed)
+    return EarthSunView(scene, condition)
 
 
 def _measure(session: CubeSenseSession, sensor: Camera, sram: Sram) -> SensorResult:

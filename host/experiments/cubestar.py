@@ -6,7 +6,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.errors import CameraFileError
 
 if TYPE_CHECKING:
+    from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
 
 __all__ = ["FrameResult", "compare", "measure_frames"]
@@ -66,8 +67,8 @@ def measure_frames(args: argparse.Namespace) -> Iterator[FrameResult]:
     """Measure ``args.frames`` frames as the options of `cubestack measure` say."""
     rng = np.random.default_rng(args.seed)
     camera = None if args.camera is None else load_camera(args.camera).cropped(*args.crop)
-    scene, truth = _first_scene(args, rng)
-    session_of = open_session(scene, seed=args.seed, engine=args.engine, layout=args.layout)
+    view, truth = _first_view(args, rng)
+    session_of = open_session(view, seed=args.seed, engine=args.engine, layout=args.layout)
     with session_of as session:
         inject_plan(session.board.faults, args.faults)
         if camera is not None:
@@ -76,35 +77,41 @@ def measure_frames(args: argparse.Namespace) -> Iterator[FrameResult]:
             find_threshold(session.cubestar)
         for number in range(args.frames):
             if number and args.image is None and args.scene is None:
-                scene = _random_scene(args, rng)
-                session.board.camera.scene = scene
-            yield _measure_frame(session, args, scene, truth, rng)
+                view = _random_view(args, rng)
+                session.board.camera.scene = view
+            yield _measure_frame(session, args, view.scene, truth, rng)
 
 
-def _first_scene(
+def _first_view(
     args: argparse.Namespace, rng: np.random.Generator
-) -> tuple[Scene, NDArray[np.float64] | None]:
-    """The scene of the first frame, and the truth of a picture when its camera file has it."""
-    from cubestack.emulator.scene.sky import PictureScene, load_scene
+) -> tuple[SkyView, NDArray[np.float64] | None]:
+    """What is seen in the first frame, and the truth of a picture when its camera file has it."""
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
+    from cubestack.emulator.scene.sky import PictureScene
 
     if args.image is not None:
-        return PictureScene(args.image, crop=args.crop), _picture_truth(args.image, args.camera)
+        view = SkyView(PictureScene(args.image, crop=args.crop), CONDITION)
+        return view, _picture_truth(args.image, args.camera)
     if args.scene is not None:
-        return load_scene(args.scene), None
-    return _random_scene(args, rng), None
+        return load_scene(args.scene, CONDITION), None
+    return _random_view(args, rng), None
 
 
-def _random_scene(args: argparse.Namespace, rng: np.random.Generator) -> Scene:
+def _random_view(args: argparse.Namespace, rng: np.random.Generator) -> SkyView:
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
     from cubestack.emulator.scene.attitude import random_quaternion
     from cubestack.emulator.scene.sky import SkyScene
 
-    return SkyScene(
+    scene = SkyScene(
         quaternion=random_quaternion(rng),
         mag_limit=args.mag_limit,
         false_stars=args.false_stars,
-        noise=not args.no_noise,
         seed=int(rng.integers(1 << 31)),
     )
+    return SkyView(scene, replace(CONDITION, noise=not args.no_noise, seed=scene.seed))
 
 
 def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | None:

@@ -14,6 +14,7 @@ from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Show
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.aramis.client import Aramis
 
@@ -29,7 +30,7 @@ def _client(client: Client) -> Aramis:
 
 
 def _open_board(
-    scene: Scene, *, baud: int | None = None, engine: Engine = "auto", **common: Any
+    scene: Scene | SkyView, *, baud: int | None = None, engine: Engine = "auto", **common: Any
 ) -> AramisBoard:
     from cubestack.emulator.boards.aramis.board import AramisBoard
     from cubestack.emulator.boards.aramis.catalogue import onboard_database
@@ -40,19 +41,17 @@ def _open_board(
     return AramisBoard(scene, catalogue, baud=baud or INTERFACE.baud, **common)
 
 
-def _load_scene(path: Path) -> Scene:
-    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
-    from cubestack.emulator.scene.sky import load_scene
+def _load_scene(path: Path) -> SkyView:
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.mt9m001.lens import CONDITION
 
-    return load_scene(path, aramis_lens())
+    return load_scene(path, CONDITION)
 
 
 def _default_scene() -> Scene:
-    from cubestack.emulator.camera.mt9m001.lens import aramis_lens
-    from cubestack.emulator.scene.attitude import quaternion_from_pointing
     from cubestack.emulator.scene.sky import SkyScene
 
-    return SkyScene(quaternion_from_pointing(*POINTING_DEG), optics=aramis_lens())
+    return SkyScene.pointing(*POINTING_DEG)
 
 
 def _prepare(shown: Shown) -> None:

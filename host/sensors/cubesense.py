@@ -12,6 +12,7 @@ from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
@@ -29,7 +30,11 @@ def _client(client: Client) -> CubeSense:
 
 
 def _open_board(
-    scene: EarthSunScene, *, baud: int | None = None, mcu_addressing: bool = False, **common: Any
+    scene: EarthSunScene | EarthSunView,
+    *,
+    baud: int | None = None,
+    mcu_addressing: bool = False,
+    **common: Any,
 ) -> CubeSenseBoard:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
@@ -38,8 +43,8 @@ def _open_board(
     )
 
 
-def _load_scene(path: Path) -> EarthSunScene:
-    from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+def _load_scene(path: Path) -> EarthSunView:
+    from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 
     return load_earth_sun_scene(path)
 

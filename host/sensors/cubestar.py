@@ -21,6 +21,7 @@ from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
@@ -40,7 +41,11 @@ def _client(client: Client) -> CubeStar:
 
 
 def _open_board(
-    scene: Scene, *, baud: int | None = None, layout: str = Layout.COPIED.value, **common: Any
+    scene: Scene | SkyView,
+    *,
+    baud: int | None = None,
+    layout: str = Layout.COPIED.value,
+    **common: Any,
 ) -> CubeStarBoard:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
@@ -50,10 +55,11 @@ def _open_board(
     )
 
 
-def _load_scene(path: Path) -> Scene:
-    from cubestack.emulator.scene.sky import load_scene
+def _load_scene(path: Path) -> SkyView:
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
 
-    return load_scene(path)
+    return load_scene(path, CONDITION)
 
 
 def _default_scene() -> Scene:

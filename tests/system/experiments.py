@@ -16,7 +16,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,8 @@ from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.catalogue import PAIR_LIMIT_DEG, onboard_catalogue
 from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.scene.attitude import (
     attitude_error_deg,
     matrix_from_quaternion,
@@ -42,7 +44,8 @@ SIDEREAL_DEG_S = 360 / 86164.1
 
 #: The field of table 4.4: 54 x 28 degrees, no distortion.
 FOCAL_PX = 512 / math.tan(math.radians(27))
-PLAIN = Optics(
+PLAIN = replace(
+    LENS,
     focal_length_mm=FOCAL_PX * 0.0056,
     fx=FOCAL_PX,
     fy=FOCAL_PX,
@@ -78,12 +81,12 @@ class Shot:
 class Stack:
     """A board with a client on its serial line."""
 
-    def __init__(self, pair_limit_deg: float = PAIR_LIMIT_DEG, **optics: Any) -> None:
+    def __init__(self, pair_limit_deg: float = PAIR_LIMIT_DEG, optics: Optics = LENS) -> None:
         catalogue = onboard_catalogue(pair_limit_deg=pair_limit_deg)
         self.board = CubeStarBoard(SkyScene.pointing(0, 0), catalogue)
         self.cubestar = CubeStar(NodeClient(self.board.serial(), INTERFACE))
         self.optics = optics
-        if optics:
+        if optics is not LENS:
             self.cubestar.configure(PLAIN_SETTINGS)
 
     def close(self) -> None:
@@ -91,7 +94,9 @@ class Stack:
 
     def shoot(self, hint: "Callable[[Any], None] | None" = None, **scene: Any) -> Shot:
         """Capture and process; ``hint`` is given the true attitude's matrix before."""
-        self.board.camera.scene = sky = SkyScene(**scene, **self.optics)
+        sky = SkyScene(**scene)
+        condition = replace(CONDITION, optics=self.optics, seed=sky.seed)
+        self.board.camera.scene = SkyView(sky, condition)
         client = self.cubestar.client
         client.command("setIDMode", IdMode=IdMode.TRACKING if hint else IdMode.LOST_IN_SPACE)
         if hint is not None:

@@ -1,10 +1,13 @@
 """Centroids that the host reads, against the truth (CubeStar thesis, section 4.1.6)."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import SkyScene
@@ -47,14 +50,14 @@ def test_drawn_stars(session: Any, rng: np.random.Generator) -> None:
 
 
 def test_stars_of_the_sky_without_noise(session: Any) -> None:
-    scene = SkyScene(quaternion_from_pointing(*POINTING_DEG), mag_limit=3.8, noise=False)
-    with session(scene) as opened:
+    scene = SkyScene(quaternion_from_pointing(*POINTING_DEG), mag_limit=3.8)
+    with session(SkyView(scene, replace(CONDITION, noise=False))) as opened:
         opened.cubestar.capture_and_process()
         stars = opened.cubestar.stars()
         matrix = matrix_from_quaternion(opened.board.truth())
     assert len(stars) == STARS
     sky = load_sky()
     rows = np.searchsorted(sky.hip, [star.hipparcos for star in stars])
-    true = scene.optics.project(sky.vectors[rows] @ matrix.T)
+    true = LENS.project(sky.vectors[rows] @ matrix.T)
     errors = np.array([(star.x_px, star.y_px) for star in stars]) - true
     assert np.all(np.abs(errors).mean(axis=0) <= PUBLISHED_MEAN_ERROR_PX)

@@ -1,8 +1,11 @@
 """Same seed and same host bytes at the same virtual times: the same bytes at the same times."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.sky import SkyScene
 
 Wire = list[tuple[bytes, int, int]]
@@ -10,7 +13,7 @@ Wire = list[tuple[bytes, int, int]]
 
 def run(session: Callable[..., Any], seed: int) -> Wire:
     """Bytes that a board sends in a few captures and turns of the loop, each with its time."""
-    scene = SkyScene(SkyScene.pointing(84, -1).quaternion, seed=seed)
+    scene = SkyView(SkyScene.pointing(84, -1), replace(CONDITION, seed=seed))
     with session(scene, seed=seed) as opened:
         wire: Wire = []
         deliver = opened.board.uart.line

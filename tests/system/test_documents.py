@@ -3,17 +3,27 @@
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.scene_file import load_scene
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
+from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
-from cubestack.emulator.scene.sky import SceneError, SkyScene, load_scene
+from cubestack.emulator.scene.sky import SceneError, SkyScene
 
 BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
 EARTH = 'kind = "earth-sun"\n'
 LINK = re.compile(r"\]\(([^)#:]+)\)")
+
+
+def load(path: Path) -> Any:
+    """What the scene file ``path`` gives."""
+    if EARTH in path.read_text(encoding="utf-8"):
+        return load_earth_sun_scene(path)
+    return load_scene(path, CONDITION)
 
 
 def section(text: str, heading: str) -> str:
@@ -25,7 +35,6 @@ def allowed_keys(tmp_path: Path, scene: str) -> set[str]:
     """Keys that a reader of scenes names when it meets one that it does not know."""
     path = tmp_path / "scene.toml"
     path.write_text(scene, encoding="utf-8")
-    load = load_earth_sun_scene if "earth-sun" in scene else load_scene
     with pytest.raises(SceneError, match="unknown key 'colour'; allowed are") as raised:
         load(path)
     return set(str(raised.value).split("allowed are ")[1].split(", "))
@@ -55,12 +64,14 @@ def test_every_key_of_a_scene_is_documented(
 @pytest.mark.parametrize(
     ("heading", "defaults"),
     [
-        ("Keys of `optics`", Optics()),
-        ('Keys of `kind = "sky"`', SkyScene.pointing(0, 0)),
-        ('Keys of `kind = "earth-sun"`', EarthSunScene()),
+        ("Keys of `optics`", (LENS,)),
+        ('Keys of `kind = "sky"`', (SkyScene.pointing(0, 0), CONDITION)),
+        ('Keys of `kind = "earth-sun"`', (EarthSunScene(), FisheyeCondition())),
     ],
 )
-def test_defaults_are_those_of_the_code(root: Path, heading: str, defaults: object) -> None:
+def test_defaults_are_those_of_the_code(
+    root: Path, heading: str, defaults: tuple[object, ...]
+) -> None:
     part = section((root / "docs" / "scenes.md").read_text(encoding="utf-8"), heading)
     checked = 0
     for row in part.splitlines():
@@ -68,7 +79,8 @@ def test_defaults_are_those_of_the_code(root: Path, heading: str, defaults: obje
         keys = re.findall(r"`(\w+)`", cells[1]) if row.startswith("| `") else []
         values = re.findall(r"^-?[\d.]+$", cells[2].replace(", ", "\n"), re.M) if keys else []
         for key, value in zip(keys, values, strict=False):
-            default = getattr(defaults, key, None)
+            owner = next((owner for owner in defaults if hasattr(owner, key)), None)
+            default = getattr(owner, key, None)
             if isinstance(default, int | float):
                 assert default == float(value), key
                 checked += 1
@@ -79,15 +91,15 @@ def test_examples_of_scenes_load(root: Path, tmp_path: Path) -> None:
     sky, picture, earth = BLOCK.findall((root / "docs" / "scenes.md").read_text(encoding="utf-8"))
     path = tmp_path / "scene.toml"
     path.write_text(sky, encoding="utf-8")
-    scene = load_scene(path)
+    scene = load(path).scene
     assert isinstance(scene, SkyScene)
     assert len(scene.poses) == 1
     path.write_text(earth, encoding="utf-8")
-    assert len(load_earth_sun_scene(path).reflections) == 1
+    assert len(load(path).scene.reflections) == 1
     assert tomllib.loads(picture)["kind"] == "picture"
     path.write_text(picture, encoding="utf-8")
     with pytest.raises(SceneError, match=r"night\.jpg"):  # read, but there is no such file here
-        load_scene(path)
+        load(path)
 
 
 def test_links_lead_somewhere(root: Path) -> None:

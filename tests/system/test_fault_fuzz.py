@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.bus.i2c import I2cError, I2cMessage
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.faults.table import FAULTS
-from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -246,7 +244,7 @@ def cubesense() -> Any:
 
 
 def aramis() -> Any:
-    orion = SkyScene(quaternion_from_pointing(84, -1, 0), optics=aramis_lens())
+    orion = SkyScene.pointing(84, -1)
     return open_aramis(orion, seed=4)
 
 

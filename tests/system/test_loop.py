@@ -4,12 +4,15 @@ CubeStar thesis, sections 5.3.6, 6.2 and 6.3.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.attitude import attitude_error_deg, random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -109,12 +112,13 @@ def matched_share(opened: Any, rate_deg_s: float, rng: np.random.Generator) -> f
     detected = matched = 0
     for _ in range(12):
         side = rng.uniform(0, 2 * np.pi)
-        opened.board.camera.scene = SkyScene(
+        scene = SkyScene(
             random_quaternion(rng),
             rate_deg_s=(rate_deg_s * np.cos(side), rate_deg_s * np.sin(side), 0.0),
             mag_limit=3.8,
-            seed=int(rng.integers(1000)),
         )
+        condition = replace(CONDITION, seed=int(rng.integers(1000)))
+        opened.board.camera.scene = SkyView(scene, condition)
         opened.cubestar.capture_and_process()
         detected += len(stars := opened.cubestar.stars())
         matched += sum(star.hipparcos is not None for star in stars)

@@ -13,12 +13,14 @@ from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.ov7620.fisheye import FIELD_DEG
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
+from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth
+from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.hardware import Port
@@ -69,7 +71,7 @@ class CubeSenseBoard(Board):
 
     def __init__(
         self,
-        scene: EarthSunScene,
+        scene: EarthSunScene | EarthSunView,
         *,
         seed: int = 0,
         engine: EngineKind = "auto",
@@ -96,7 +98,7 @@ class CubeSenseBoard(Board):
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(_wiring(mcu_addressing), engine)
-        self.cameras = {camera: Ov7620(scene, camera) for camera in Camera}
+        self.cameras = {camera: Ov7620(scene, Target[camera.name]) for camera in Camera}
         self._failed: set[Camera] = set()
         self._serial_line(baud, lambda: self.program.node)
         self.bench_uart = self._serial_line(
@@ -152,8 +154,6 @@ class CubeSenseBoard(Board):
 
     @scene.setter
     def scene(self, scene: object) -> None:
-        if not isinstance(scene, EarthSunScene):
-            raise TypeError(f"a Sun and nadir sensor sees Earth and Sun, not {scene!r}")
         for camera in self.cameras.values():
             camera.scene = scene
 
@@ -184,7 +184,8 @@ class CubeSenseBoard(Board):
         shutter = self.stored_frame(camera)
         if shutter is None:
             return None
-        return self.scene.truth(camera, shutter.mid_exposure_ps((ROWS - 1) / 2))
+        middle_ps = shutter.mid_exposure_ps((ROWS - 1) / 2)
+        return self.scene.truth(Target[camera.name], middle_ps, FIELD_DEG)
 
     def stored_frame(self, camera: Camera) -> RollingShutter | None:
         """Exposure of the frame of ``camera`` that was stored last; None before."""

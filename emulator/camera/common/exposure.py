@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.optics import Optics
-from cubestack.emulator.camera.common.photometry import electrons_per_second
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.hipparcos import load_sky
@@ -37,25 +36,25 @@ _Z = np.arange(-8.0, 8.0, 1 / 512)
 _PHI = np.array([0.5 * (1 + math.erf(z / math.sqrt(2))) for z in _Z])
 
 
-def star_light(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float32]:
+def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDArray[np.float32]:
     """Mean number of electrons that starlight frees in each pixel, shape (rows, columns)."""
-    vectors, rates = _stars(scene, shutter)
-    phases = _phases(scene, shutter)
+    vectors, rates = _stars(scene, optics, shutter)
+    phases = _phases(scene, optics, shutter)
     pixels, light = [], []
     for phase in phases:
-        places, weights = _instant(scene, shutter, vectors, phase)
+        places, weights = _instant(scene, optics, shutter, vectors, phase)
         pixels.append(places)
         light.append(rates * weights / len(phases))
     if scene.false_stars:
-        false_pixels, false_rates = _false_stars(scene)
-        pixels.append(false_pixels)
-        light.append(false_rates)
+        places, magnitudes = scene.false_lights()
+        pixels.append(places * [optics.columns - 1, optics.rows - 1])
+        light.append(optics.electrons_per_second(magnitudes))
     electrons = np.concatenate(light) * shutter.exposure_s
-    return _spots(np.concatenate(pixels), electrons, scene.optics)
+    return _spots(np.concatenate(pixels), electrons, optics)
 
 
 def star_pixels(
-    scene: SkyScene, shutter: RollingShutter
+    scene: SkyScene, optics: Optics, shutter: RollingShutter
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Where the stars' centres are at the middle of their exposure: for tests and drawings.
 
@@ -63,16 +62,11 @@ def star_pixels(
         Hipparcos numbers (n,) and pixel coordinates (n, 2) of the stars on the sensor.
     """
     sky = load_sky(scene.epoch, _limit(scene))
-    pixels, _ = _instant(scene, shutter, sky.vectors, 0.5)
-    columns, rows = scene.optics.columns, scene.optics.rows
+    pixels, _ = _instant(scene, optics, shutter, sky.vectors, 0.5)
+    columns, rows = optics.columns, optics.rows
     x, y = pixels.T
     seen = (np.abs(x - (columns - 1) / 2) <= columns / 2) & (np.abs(y - (rows - 1) / 2) <= rows / 2)
     return sky.hip[seen], pixels[seen]
-
-
-def _rate(scene: SkyScene, v_mag: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Electrons per second (n,) through the scene's lens."""
-    return electrons_per_second(v_mag, scene.optics.aperture_mm, scene.optics.effective_width_a)
 
 
 def _limit(scene: SkyScene) -> float:
@@ -80,44 +74,39 @@ def _limit(scene: SkyScene) -> float:
 
 
 def _stars(
-    scene: SkyScene, shutter: RollingShutter
+    scene: SkyScene, optics: Optics, shutter: RollingShutter
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit vectors (n, 3) and electrons per second (n,) of the stars that may come into view."""
     sky = load_sky(scene.epoch, _limit(scene))
-    seconds = shutter.exposure_s + scene.optics.rows * shutter.line_s
-    reach = scene.optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
-    boresight = matrix_from_quaternion(scene.truth(_time_ps(scene, shutter, 0.5)))[2]
+    seconds = shutter.exposure_s + optics.rows * shutter.line_s
+    reach = optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
+    boresight = matrix_from_quaternion(scene.truth(_time_ps(optics, shutter, 0.5)))[2]
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
-    return sky.vectors[near], _rate(scene, sky.v_mag[near])
+    return sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
 
 
-def _false_stars(scene: SkyScene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pixels (n, 2) and electrons per second (n,) of lights that no catalogue has."""
-    generator = np.random.default_rng([scene.seed, 0xFA15E])
-    last = [scene.optics.columns - 1, scene.optics.rows - 1]
-    pixels = generator.uniform([0, 0], last, (scene.false_stars, 2))
-    v_mag = generator.uniform(*scene.false_star_mag, scene.false_stars)
-    return pixels, _rate(scene, v_mag)
-
-
-def _phases(scene: SkyScene, shutter: RollingShutter) -> NDArray[np.float64]:
+def _phases(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDArray[np.float64]:
     """Instants to sum over, as fractions of the exposure."""
     # The scale of the picture is largest at its corners, by a fifth or so.
-    px_per_deg = 1.25 * scene.optics.fx * math.pi / 180
+    px_per_deg = 1.25 * optics.fx * math.pi / 180
     travel_px = scene.speed_deg_s * shutter.exposure_s * px_per_deg
-    samples = max(1, math.ceil(travel_px / scene.optics.psf_sigma_px))
+    samples = max(1, math.ceil(travel_px / optics.psf_sigma_px))
     return (np.arange(samples) + 0.5) / samples
 
 
-def _time_ps(scene: SkyScene, shutter: RollingShutter, phase: float) -> int:
+def _time_ps(optics: Optics, shutter: RollingShutter, phase: float) -> int:
     """The instant ``phase`` of the middle row's exposure."""
     exposure_ps = shutter.exposure_lines * shutter.line_ps
-    middle_row = (scene.optics.rows - 1) / 2
+    middle_row = (optics.rows - 1) / 2
     return shutter.mid_exposure_ps(middle_row) + round((phase - 0.5) * exposure_ps)
 
 
 def _instant(
-    scene: SkyScene, shutter: RollingShutter, vectors: NDArray[np.float64], phase: float
+    scene: SkyScene,
+    optics: Optics,
+    shutter: RollingShutter,
+    vectors: NDArray[np.float64],
+    phase: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Stars at the instant ``phase`` of the exposures of their own rows.
 
@@ -125,8 +114,7 @@ def _instant(
         Pixels (n, 2), and weights (n,) of the light there: a star that moves down with the
         read-out is exposed by more rows, each for the full time.
     """
-    now = _time_ps(scene, shutter, phase)
-    optics = scene.optics
+    now = _time_ps(optics, shutter, phase)
     in_camera = vectors @ matrix_from_quaternion(scene.truth(now)).T
     pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
     if not scene.speed_deg_s:

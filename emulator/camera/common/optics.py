@@ -1,13 +1,9 @@
-"""A lens in front of a sensor, by default CubeStar's: directions to pixels and back.
+"""A lens in front of a sensor: directions to pixels and back, magnitudes to electrons.
 
-CubeStar thesis, section 4.1.4 (Brown's model, equations 4.1.3 to 4.1.5), section 4.1.5 (equation
-4.1.6) and section 5.4 (calibration, figure 5.12; focal length by star pairs).
-
-The calibration toolbox fits coefficients that map undistorted points to distorted ones. The
-firmware uses them with inverted signs in equations that map distorted points to undistorted ones,
-which is only nearly the inverse. Our lens is by default the exact inverse of what the firmware
-computes, so that its calibration is right; ``Distortion.TOOLBOX`` is the other reading. Then the
-firmware's undistortion is off by 1.7 px in the mean over the picture, and by 15 px in one corner.
+CubeStar thesis, section 3.4.4 (equation 3.4.2), section 4.1.4 (Brown's model, equations 4.1.3 to
+4.1.5) and section 4.1.5 (equation 4.1.6). Equation 3.4.2 multiplies aperture, transmission,
+bandwidth and the flux of the star; transmission, bandwidth and quantum efficiency are one factor
+here, an effective width.
 """
 
 from dataclasses import dataclass
@@ -15,26 +11,12 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.camera.common.photometry import APERTURE_MM, EFFECTIVE_WIDTH_A
-from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
-from cubestack.firmware_model.interface.cubestar import INTERFACE
+__all__ = ["Distortion", "Optics"]
 
-__all__ = ["COLUMNS", "ROWS", "Distortion", "Optics"]
-
-_CALIBRATION = {
-    field.name: float(field.reset or 0)
-    for command in (
-        "setFocalLength",
-        "setFocalLengthComponents",
-        "setPrincipalPoint",
-        "setRadialDistortionGains",
-        "setTangentalDistortionGains",
-    )
-    for field in INTERFACE.telecommand(command).fields
-}
-"""What the firmware is set to after power-up: the lens is calibrated."""
+PHOTONS_V0 = 1000.0
+"""Flux of a star of V = 0 in photons / (s cm^2 Angstrom) (published, eq. 3.4.2)."""
 
 WIDEST_PSF_PX = 20.0
 """Standard deviation of a spot in px, at most (assumed): few stars would still show."""
@@ -62,7 +44,7 @@ class Distortion(Enum):
     TOOLBOX = "toolbox"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Optics:
     """A lens in front of the sensor. Pixel coordinates have (0, 0) at the first pixel's centre.
 
@@ -76,30 +58,30 @@ class Optics:
             model with the same coefficients in inverted sign.
         psf_sigma_px: standard deviation of the Gaussian spot, px, at most 20; defocus included.
         vignetting: light falls off with this power of the cosine of the field angle; 4 is natural
-            vignetting, 0 is none (nothing is published for this lens).
+            vignetting, 0 is none.
         columns, rows: pixels of the sensor.
         aperture_mm: diameter of the entrance pupil.
         effective_width_a: bandwidth in Angstrom times transmission times quantum efficiency.
         field_stop_deg: diameter of the round field that a light shade lets through; 360 is none.
     """
 
-    focal_length_mm: float = _CALIBRATION["FocalLength"]
-    pixel_pitch_um: float = 1000 * PIXEL_PITCH_MM
-    fx: float = _CALIBRATION["Fx"]
-    fy: float = _CALIBRATION["Fy"]
-    cx: float = _CALIBRATION["Cx"]
-    cy: float = _CALIBRATION["Cy"]
-    k1: float = _CALIBRATION["K1"]
-    k2: float = _CALIBRATION["K2"]
-    p1: float = _CALIBRATION["P1"]
-    p2: float = _CALIBRATION["P2"]
+    focal_length_mm: float
+    pixel_pitch_um: float
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
     distortion: Distortion = Distortion.INVERSE
-    psf_sigma_px: float = 0.9
+    psf_sigma_px: float
     vignetting: float = 0.0
-    columns: int = COLUMNS
-    rows: int = ROWS
-    aperture_mm: float = APERTURE_MM
-    effective_width_a: float = EFFECTIVE_WIDTH_A
+    columns: int
+    rows: int
+    aperture_mm: float
+    effective_width_a: float
     field_stop_deg: float = 360.0
 
     def __post_init__(self) -> None:
@@ -161,6 +143,12 @@ class Optics:
         if self.field_stop_deg < 180:
             light[cosine < np.cos(np.radians(self.field_stop_deg / 2))] = 0
         return light
+
+    def electrons_per_second(self, v_mag: ArrayLike) -> NDArray[np.float64]:
+        """Electrons a second that stars of magnitude ``v_mag`` give on the axis, same shape."""
+        area_cm2 = np.pi * (self.aperture_mm / 20) ** 2
+        flux = PHOTONS_V0 * 10 ** (-0.4 * np.asarray(v_mag, np.float64))
+        return np.asarray(area_cm2 * self.effective_width_a * flux, np.float64)
 
     @property
     def half_field_deg(self) -> float:

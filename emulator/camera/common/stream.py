@@ -63,6 +63,10 @@ class PixelClock:
         """Time of rising edge ``k``."""
         return self.origin_ps + k * PS_PER_S // self.hz
 
+    def end_ps(self, first: int, clocks: int) -> int:
+        """Where a consumer that counts ``clocks`` from edge ``first`` sees their end."""
+        return self.edge_ps(first) + clocks * PS_PER_S // self.hz
+
     def first_edge(self, time_ps: int) -> int:
         """Number of the first rising edge at ``time_ps`` or later."""
         # floor(k * period) >= t exactly when k * period >= t, because t is an integer.

@@ -15,17 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.optics import COLUMNS, ROWS
-from cubestack.emulator.camera.common.photometry import (
-    DN12_PER_DN8,
-    ELECTRONS_PER_DN12,
-    FULL_SCALE_DN12,
-)
+from cubestack.emulator.camera.common.imager import Grey, Light, doubled
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
 __all__ = ["Corrections", "PixelArray", "dark_dn12_per_second", "ideal_counts"]
 
+ELECTRONS_PER_DN12 = 2.28  # per count of 12 bits (published)
+FULL_SCALE_DN12 = 4095  # the converter saturates here
+DN12_PER_DN8 = 16  # only the upper 8 of 12 bits are wired (appendix C)
 DARK_DN12_PER_S_AT_65_C = 1008.0  # published
-DARK_DOUBLING_K = 8.0  # assumed: what silicon usually does
 DARK_NON_UNIFORMITY = 0.1  # assumed: standard deviation, relative
 READ_NOISE_ELECTRONS = 11.4  # assumed: 5 counts of 12 bits
 GAIN_NON_UNIFORMITY = 0.005  # assumed: standard deviation, relative
@@ -35,8 +33,6 @@ PATTERN_LEFT = 0.1  # assumed: share of the pattern that the on-chip correction 
 FACTORY_DEAD = 30  # assumed: pixels without light, known to the sensor
 FACTORY_HOT = 30  # assumed: pixels with much dark current, known to the sensor
 HOT_DN12_PER_S_AT_20_C = 1500.0  # assumed: mean of an exponential distribution
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -56,10 +52,10 @@ class Corrections:
 
 def dark_dn12_per_second(temperature_c: float) -> float:
     """Mean dark signal in counts of 12 bits per second."""
-    return float(DARK_DN12_PER_S_AT_65_C * 2 ** ((temperature_c - 65) / DARK_DOUBLING_K))
+    return doubled(DARK_DN12_PER_S_AT_65_C, temperature_c, 65.0)
 
 
-def ideal_counts(electrons: Image) -> NDArray[np.uint8]:
+def ideal_counts(electrons: Light) -> Grey:
     """What a sensor without noise and defects makes of ``electrons``: upper 8 of 12 bits."""
     return _upper_bits(electrons * np.float32(1 / ELECTRONS_PER_DN12))
 
@@ -72,7 +68,7 @@ class PixelArray:
         generator = np.random.default_rng([seed, 0xD1E])
         shape = (ROWS, COLUMNS)
 
-        def field(sigma: float, shape: tuple[int, ...] = shape) -> Image:
+        def field(sigma: float, shape: tuple[int, ...] = shape) -> Light:
             return np.float32(sigma) * generator.standard_normal(shape, np.float32)
 
         self._gain = 1 + field(GAIN_NON_UNIFORMITY)
@@ -88,13 +84,13 @@ class PixelArray:
 
     def read_out(
         self,
-        electrons: Image,
+        electrons: Light,
         exposure_s: float,
         temperature_c: float,
         corrections: Corrections,
         generator: np.random.Generator,
-        grown_hot: tuple[NDArray[np.int64], Image] | None = None,
-    ) -> NDArray[np.uint8]:
+        grown_hot: tuple[NDArray[np.int64], Light] | None = None,
+    ) -> Grey:
         """One frame of counts, shape (512, 1024).
 
         Args:
@@ -131,15 +127,8 @@ class PixelArray:
         return _upper_bits(signal)
 
 
-def grown_hot_pixels(seed: int, count: int) -> tuple[NDArray[np.int64], Image]:
-    """Flat indices and strengths of ``count`` pixels that radiation has made hot."""
-    generator = np.random.default_rng([seed, 0x407])
-    places = generator.choice(ROWS * COLUMNS, count, replace=False)
-    return places, generator.exponential(size=count).astype(np.float32)
-
-
-def _upper_bits(dn12: Image) -> NDArray[np.uint8]:
+def _upper_bits(dn12: Light) -> Grey:
     """Converts to whole counts of 12 bits, saturated, and takes the upper 8 bits."""
-    counts: Image = np.clip(dn12 + np.float32(0.5), 0, FULL_SCALE_DN12)
+    counts: Light = np.clip(dn12 + np.float32(0.5), 0, FULL_SCALE_DN12)
     counts *= np.float32(1 / DN12_PER_DN8)  # a power of two: exact, so truncation drops 4 bits
     return counts.astype(np.uint8, order="C")

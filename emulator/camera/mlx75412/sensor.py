@@ -13,23 +13,28 @@ CubeStar thesis, appendices C and D. What it leaves open, we take:
 """
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from fractions import Fraction
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.optics import COLUMNS, ROWS
-from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mlx75412.frame_timing import LINE_CLOCKS, exposure_lines, frame_lines
-from cubestack.emulator.camera.mlx75412.imager import Imager
+from cubestack.emulator.camera.mlx75412.imager import Mlx75412Imager
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.mlx75412.pixel_array import Corrections
 from cubestack.emulator.scene.sky import Scene
-from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, REGISTERS, SYNC_APPLY
+from cubestack.firmware_model.interface.cameras.mlx75412 import (
+    COLUMNS,
+    CRYSTAL_HZ,
+    REGISTERS,
+    ROWS,
+    SYNC_APPLY,
+)
 
 __all__ = ["Mlx75412"]
 
@@ -69,23 +74,23 @@ class _Span:
         return self.first + self.clocks
 
 
-class Mlx75412:
+class Mlx75412(StarSensor):
     """One sensor, powered from time 0 on.
 
     Attributes:
-        scene: what it looks at. A new one is seen by the next frame that is rendered.
         line_clocks: pixel clocks of a line.
         active_columns: those of them with HSync high.
-        on_change: called after the output from now on has become another than announced.
     """
 
+    columns, rows, word_bytes = COLUMNS, ROWS, 1
     line_clocks = LINE_CLOCKS
     active_columns = COLUMNS
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Scene | SkyView,
         *,
+        condition: SkyCondition = CONDITION,
         seed: int = 0,
         crystal_hz: int = CRYSTAL_HZ,
         vsync_before_first_frame: bool = False,
@@ -93,83 +98,33 @@ class Mlx75412:
         """Power up with the reset pin high.
 
         Args:
-            scene: what it looks at.
+            scene: what it looks at; with a condition, that counts.
+            condition: what lens and sensor are like, unless ``scene`` says.
             seed: of the part's defects and of the undefined exposures.
             crystal_hz: input clock; PIXCLK has the same frequency.
             vsync_before_first_frame: whether VSync goes low between the undefined and the first
                 good frame.
         """
-        self.scene = scene
-        self.on_change: Callable[[], None] = lambda: None
+        super().__init__(scene, condition, REGISTERS, crystal_hz)
         self._seed = seed
-        self._hz = crystal_hz
         self._vsync_before_first_frame = vsync_before_first_frame
-        self._imager = Imager(seed)
-        self._registers = RegisterFile(REGISTERS)
-        self._clock: PixelClock | None = PixelClock(crystal_hz)
-        self._powered = True
-        self._reset_pin = 1
+        self._imager = Mlx75412Imager(seed)
         self._enables = 0
         self._spans: deque[_Span] = deque(maxlen=REMEMBERED)
         self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)
-        self._rendered: tuple[_Frame, Scene, NDArray[np.uint8]] | None = None
-
-    @property
-    def period(self) -> Fraction:
-        """Time of one pixel clock in ps."""
-        return Fraction(PS_PER_S, self._hz)
-
-    @property
-    def running(self) -> bool:
-        """Whether the part has power and is out of reset."""
-        return self._clock is not None
 
     @property
     def enabled(self) -> bool:
         """Whether it gathers images."""
         return self.running and bool(_ENABLE.of(self._registers.active("MODE_SELECT")))
 
-    @property
-    def temperature_c(self) -> float:
-        """Temperature of the sensor, in degrees Celsius."""
-        return self.scene.temperature_c
-
-    # --- supply and reset -----------------------------------------------------------------------
-
-    def power(self, on: bool, now_ps: int) -> None:
-        """Turn the supply on or off."""
-        self._powered = on
-        self._start_or_stop(now_ps)
-
-    def set_reset_pin(self, level: int, now_ps: int) -> None:
-        """Drive the camera reset pin, low active."""
-        self._reset_pin = level
-        self._start_or_stop(now_ps)
-
-    def _start_or_stop(self, now_ps: int) -> None:
-        run = self._powered and bool(self._reset_pin)
-        if run == self.running:
-            return
-        self._registers.reset()
+    def _restarted(self, now_ps: int) -> None:
         self._spans.clear()
         self._forget_frames(now_ps)
-        self._clock = PixelClock(self._hz, now_ps) if run else None
-        self.on_change()
 
-    # --- control bus ----------------------------------------------------------------------------
-
-    def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
-        """A write message to the 7-bit ``address`` ended; returns whether it was acknowledged.
-
-        Two bytes of register address, then bytes for that register and those that follow.
-        """
-        if not self.running or address != REGISTERS.i2c_address:
-            return False
-        if len(data) < REGISTERS.address_bytes:
-            return True
+    def _write(self, words: list[int], now_ps: int) -> None:
         was_enabled, stale = self.enabled, False
-        self._registers.select(int.from_bytes(data[: REGISTERS.address_bytes]))
-        for byte in data[REGISTERS.address_bytes :]:
+        for byte in words:
             register = self._registers.write(byte)
             if register is REGISTERS["SYNC"]:
                 self._registers.store("SYNC", 0)
@@ -178,14 +133,6 @@ class Mlx75412:
                     stale = True
         if self.enabled != was_enabled or stale:
             self._replan(now_ps, cut=self.enabled != was_enabled)
-        return True
-
-    def i2c_read(self, address: int, count: int, now_ps: int) -> bytes | None:
-        """Read ``count`` bytes from the last register address on; None if not acknowledged."""
-        del now_ps
-        if not self.running or address != REGISTERS.i2c_address:
-            return None
-        return bytes(self._registers.read() for _ in range(count))
 
     # --- pixel lines ----------------------------------------------------------------------------
 
@@ -196,12 +143,14 @@ class Mlx75412:
             return None
         if not self._spans:
             self._append(_Span(0, IDLE_CLOCKS, vsync=0))
-        while self._spans[-1].cut or self._end_ps(clock, self._spans[-1]) <= time_ps:
-            self._append(self._after(clock, self._spans[-1]))
-        span = next(s for s in self._spans if not s.cut and self._end_ps(clock, s) > time_ps)
+        while (last := self._spans[-1]).cut or clock.end_ps(last.first, last.clocks) <= time_ps:
+            self._append(self._after(clock, last))
+        span = next(
+            s for s in self._spans if not s.cut and clock.end_ps(s.first, s.clocks) > time_ps
+        )
         pixels = None
         if span.rows and span.frame is not None:
-            pixels = self._renderer(span.frame)
+            pixels = partial(self._picture, span.frame)
         return StreamSegment(clock.edge_ps(span.first), span.clocks, span.vsync, span.rows, pixels)
 
     def frame_from(self, time_ps: int) -> RollingShutter | None:
@@ -213,10 +162,6 @@ class Mlx75412:
             self.segment_at(time_ps)
         later = (f.shutter for f in self._frames if f.shutter.readout_ps >= time_ps)
         return next(later, None)
-
-    def _end_ps(self, clock: PixelClock, span: _Span) -> int:
-        """Where a consumer that counts from the span's first edge sees its end."""
-        return clock.edge_ps(span.first) + span.clocks * PS_PER_S // self._hz
 
     def _append(self, span: _Span) -> None:
         self._spans.append(span)
@@ -254,10 +199,8 @@ class Mlx75412:
         return _Span(first, ROWS * LINE_CLOCKS, 1, frame, ROWS)
 
     def _corrections(self) -> Corrections:
-        register, value = (
-            REGISTERS["HARDWARE_FEATURES"],
-            self._registers.active("HARDWARE_FEATURES"),
-        )
+        register = REGISTERS["HARDWARE_FEATURES"]
+        value = self._registers.active("HARDWARE_FEATURES")
         return Corrections(
             defects=bool(register.field("DEFECT_CORRECTION").of(value)),
             fixed_pattern=bool(register.field("FPN_CORRECTION").of(value)),
@@ -288,11 +231,10 @@ class Mlx75412:
         while self._frames and self._frames[-1].shutter.readout_ps >= now_ps:
             self._frames.pop()
 
-    def _renderer(self, frame: _Frame) -> Callable[[], NDArray[np.uint8]]:
-        def render() -> NDArray[np.uint8]:
-            if self._rendered is None or self._rendered[:2] != (frame, self.scene):
-                picture = self._imager.picture(self.scene, frame.shutter, frame.corrections)
-                self._rendered = frame, self.scene, picture
-            return self._rendered[2]
+    def _picture(self, frame: _Frame) -> Grey:
+        def render() -> Grey:
+            return self._imager.picture(
+                self.scene, self.condition, frame.shutter, frame.corrections
+            )
 
-        return render
+        return self._once(frame, render)

@@ -1,29 +1,28 @@
 """One frame of a scene on the MT9M001: its lens' light, its noise, its window."""
 
-from functools import lru_cache
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.exposure import star_light
+from cubestack.emulator.camera.common.imager import Grey, Imager, Light, hot_pixels
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.mlx75412.imager import photograph
+from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mt9m001.noise import (
     BLACK_LEVEL,
+    HOT_SHARE,
     NoiseTerms,
     Surroundings,
     counts,
-    hot_pixels,
 )
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
-from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
+from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 
 __all__ = ["Mt9m001Imager"]
 
 
-class Mt9m001Imager:
-    """Renders frames. The same scene, frame time and settings give the same picture."""
+class Mt9m001Imager(Imager[SensorSettings]):
+    """Renders frames of one sensor's window."""
 
     def __init__(
         self, seed: int, noise: NoiseTerms, background_electrons_per_s: float | None
@@ -37,41 +36,36 @@ class Mt9m001Imager:
         )
 
     def picture(
-        self, scene: Scene, shutter: RollingShutter, settings: SensorSettings
-    ) -> NDArray[np.uint8]:
-        """Grey values of the window (rows, columns), C-contiguous."""
+        self,
+        scene: Scene,
+        condition: SkyCondition,
+        shutter: RollingShutter,
+        settings: SensorSettings,
+    ) -> Grey:
+        """Grey values of the window; row 0 of ``shutter`` is the window's first."""
         # The array's row 0 has the time that it would have if it were read.
         readout_ps = shutter.readout_ps - round(settings.row * shutter.line_ps)
-        whole = RollingShutter(
-            readout_ps, shutter.line_ps, shutter.exposure_lines, shutter.programmed_lines
-        )
-        match scene:
-            case SkyScene():
-                full = self._sky(scene, whole, settings)
-            case PictureScene():
-                full = photograph(scene, whole)
-        return _window(full, settings)
+        whole = replace(shutter, readout_ps=readout_ps)
+        return _window(super().picture(scene, condition, whole, settings), settings)
 
-    def _sky(
-        self, scene: SkyScene, shutter: RollingShutter, settings: SensorSettings
-    ) -> NDArray[np.uint8]:
-        light = star_light(scene, shutter)
-        noise = self._noise if scene.noise else NoiseTerms.none()
-        surroundings = Surroundings(scene.temperature_c, self._background)
-        # By frame time, so that a frame nobody looked at does not change the next one's noise.
-        generator = np.random.Generator(np.random.SFC64([scene.seed, max(0, shutter.readout_ps)]))
-        hot = _hot(scene.seed + self._seed, scene.hot_pixels) if scene.hot_pixels else None
-        return counts(
-            light, shutter.exposure_s, _gain(settings), surroundings, noise, generator, hot
-        )
+    def _counts(
+        self,
+        light: Light,
+        exposure_s: float,
+        condition: SkyCondition,
+        settings: SensorSettings,
+        generator: np.random.Generator | None,
+    ) -> Grey:
+        hot = None
+        if condition.hot_pixels:
+            seed = condition.seed + self._seed
+            hot = hot_pixels(seed, condition.hot_pixels, light.size, HOT_SHARE)
+        surroundings = Surroundings(condition.temperature_c, self._background)
+        noise = NoiseTerms.none() if generator is None else self._noise
+        return counts(light, exposure_s, _gain(settings), surroundings, noise, generator, hot)
 
 
-@lru_cache(maxsize=8)
-def _hot(seed: int, count: int) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    return hot_pixels(seed, count, ROWS * COLUMNS)
-
-
-def _gain(settings: SensorSettings) -> float | NDArray[np.float32]:
+def _gain(settings: SensorSettings) -> float | Light:
     """One gain for all pixels, or one for each (1024, 1280)."""
     even, odd_row, odd_column, odd = settings.gains
     if even == odd_row == odd_column == odd:
@@ -81,7 +75,7 @@ def _gain(settings: SensorSettings) -> float | NDArray[np.float32]:
     return np.roll(np.tile(gains, (ROWS // 2, COLUMNS // 2)), settings.row, axis=0)
 
 
-def _window(full: NDArray[np.uint8], settings: SensorSettings) -> NDArray[np.uint8]:
+def _window(full: Grey, settings: SensorSettings) -> Grey:
     if (settings.row, settings.column) == (0, 0) and full.shape == (
         settings.rows,
         settings.columns,

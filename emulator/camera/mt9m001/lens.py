@@ -1,4 +1,4 @@
-"""Lenses of AraMiS' camera unit in front of its MT9M001.
+"""Double Gauss lenses of AraMiS' camera unit in front of its MT9M001.
 
 AraMiS thesis, section 2.3.2 (the simulations' field of more than 21 degrees, the likely lens' 18),
 3.2 (21.5346 degrees, that of the simulated camera's window: its height) and 8.2 (only what lies in
@@ -15,9 +15,16 @@ assumed to be set as wide as removing spikes wants it, which asks for 13 of 25 p
 import math
 
 from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
-__all__ = ["LIKELY_FIELD_DEG", "PUBLISHED_FIELD_DEG", "aramis_lens", "focal_length_mm"]
+__all__ = [
+    "CONDITION",
+    "LIKELY_FIELD_DEG",
+    "PUBLISHED_FIELD_DEG",
+    "double_gauss",
+    "focal_length_mm",
+]
 
 PUBLISHED_FIELD_DEG = 21.53463888888889
 """Of all published simulations and of the published catalogue."""
@@ -35,7 +42,7 @@ def focal_length_mm(field_deg: float) -> float:
     return ROWS * PIXEL_PITCH_MM / 2 / math.tan(math.radians(field_deg / 2))
 
 
-def aramis_lens(
+def double_gauss(
     field_deg: float = PUBLISHED_FIELD_DEG,
     *,
     spot_sigma_px: float = SPOT_SIGMA_PX,
@@ -62,10 +69,6 @@ def aramis_lens(
         fy=focal_px,
         cx=(COLUMNS - 1) / 2,
         cy=(ROWS - 1) / 2,
-        k1=0.0,
-        k2=0.0,
-        p1=0.0,
-        p2=0.0,
         psf_sigma_px=spot_sigma_px,
         columns=COLUMNS,
         rows=ROWS,
@@ -73,3 +76,7 @@ def aramis_lens(
         effective_width_a=EFFECTIVE_WIDTH_A,
         field_stop_deg=field_deg if shade else 360.0,
     )
+
+
+CONDITION = SkyCondition(double_gauss())
+"""What a camera is like when nothing else is said."""

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.camera.common.imager import Grey, Light, doubled
+
 __all__ = [
     "FULL_SCALE",
     "FULL_WELL_ELECTRONS",
@@ -23,7 +25,6 @@ __all__ = [
     "Surroundings",
     "counts",
     "dark_electrons_per_s",
-    "hot_pixels",
     "quantisation_sigma",
 ]
 
@@ -37,10 +38,7 @@ BLACK_LEVEL = 6
 """In counts of 10 bits: between thresholds 4 and 9 of the sensor's own calibration (assumed)."""
 
 DARK_ELECTRONS_PER_S_AT_25_C = 50.0  # assumed
-DARK_DOUBLING_K = 8.0  # assumed: what silicon usually does
 HOT_SHARE = 500.0  # assumed: mean dark current of a hot pixel, in units of the usual one
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ class Surroundings:
 
 def dark_electrons_per_s(temperature_c: float) -> float:
     """Mean dark current of a pixel."""
-    return float(DARK_ELECTRONS_PER_S_AT_25_C * 2 ** ((temperature_c - 25) / DARK_DOUBLING_K))
+    return doubled(DARK_ELECTRONS_PER_S_AT_25_C, temperature_c, 25.0)
 
 
 def quantisation_sigma(gain: float, bits: int = 10) -> float:
@@ -92,22 +90,15 @@ def quantisation_sigma(gain: float, bits: int = 10) -> float:
     return float(FULL_WELL_ELECTRONS / gain / 2**bits / np.sqrt(12))
 
 
-def hot_pixels(seed: int, count: int, pixels: int) -> tuple[NDArray[np.int64], Image]:
-    """Flat indices among ``pixels`` of ``count`` hot ones, and their dark current's multiples."""
-    generator = np.random.default_rng([seed, 0x407])
-    places = generator.choice(pixels, count, replace=False)
-    return places, (HOT_SHARE * generator.exponential(size=count)).astype(np.float32)
-
-
 def counts(
-    light: Image,
+    light: Light,
     exposure_s: float,
-    gain: float | Image,
+    gain: float | Light,
     surroundings: Surroundings,
     terms: NoiseTerms,
-    generator: np.random.Generator,
-    hot: tuple[NDArray[np.int64], Image] | None = None,
-) -> NDArray[np.uint8]:
+    generator: np.random.Generator | None,
+    hot: tuple[NDArray[np.int64], Light] | None = None,
+) -> Grey:
     """One frame, same shape as ``light``, C-contiguous.
 
     Args:
@@ -116,7 +107,7 @@ def counts(
         gain: amplification, one for all or one for each pixel.
         surroundings: dark current and background.
         terms: which kinds of noise there are.
-        generator: source of this frame's noise.
+        generator: source of this frame's noise; None when ``terms`` has none.
         hot: flat indices and multiples of hot pixels.
     """
     surplus = 0.0
@@ -132,7 +123,7 @@ def counts(
     noisy = mean if terms.shot else mean - light
     variance = noisy + np.float32(steady)
     signal = mean
-    if terms.shot or surplus or steady:
+    if generator is not None and (terms.shot or surplus or steady):
         noise = generator.standard_normal(light.shape, np.float32)
         noise *= np.sqrt(variance)
         signal += noise
@@ -142,7 +133,7 @@ def counts(
     signal *= gain * np.float32((FULL_SCALE + 1) / FULL_WELL_ELECTRONS)
     signal += np.float32(BLACK_LEVEL)
     if not terms.quantisation:
-        nearest: Image = np.clip(signal / np.float32(4) + np.float32(0.5), 0, FULL_SCALE // 4)
+        nearest: Light = np.clip(signal / np.float32(4) + np.float32(0.5), 0, FULL_SCALE // 4)
         return nearest.astype(np.uint8)
-    whole: Image = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
+    whole: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
     return (whole.astype(np.uint16) >> 2).astype(np.uint8)

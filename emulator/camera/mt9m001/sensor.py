@@ -13,21 +13,19 @@ What it leaves open, we take:
 """
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
+from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
-from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings, read_settings, write_word
-from cubestack.emulator.scene.sky import Scene, SkyScene
-from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import (
     COLUMNS,
     FRAME_START_CLOCKS,
@@ -65,19 +63,21 @@ class _Frame:
         return self.first + self.settings.rows * self.settings.row_clocks
 
 
-class Mt9m001:
+class Mt9m001(StarSensor):
     """One sensor, powered from time 0 on.
 
     Attributes:
         active_columns: pixel clocks with LINE_VALID high, in the segment handed out last.
         line_clocks: pixel clocks of a line, in the segment handed out last.
-        on_change: called after the output from now on has become another than announced.
     """
+
+    columns, rows, word_bytes = COLUMNS, ROWS, 2
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Scene | SkyView,
         *,
+        condition: SkyCondition = CONDITION,
         seed: int = 0,
         clock_hz: int = PIXEL_CLOCK_HZ,
         noise: NoiseTerms | None = None,
@@ -86,108 +86,41 @@ class Mt9m001:
         """Power up with the reset pin high.
 
         Args:
-            scene: what it looks at; ValueError when its lens is that of another sensor.
+            scene: what it looks at; with a condition, that counts.
+            condition: what lens and sensor are like, unless ``scene`` says.
             seed: of the part's hot pixels.
             clock_hz: master clock; PIXCLK has the same frequency.
-            noise: which terms of noise there are in a scene that wants noise, all unless given.
+            noise: which terms of noise there are in a condition that has noise, all unless given.
             background_electrons_per_s: light from elsewhere in each pixel.
         """
-        self.on_change: Callable[[], None] = lambda: None
+        super().__init__(scene, condition, REGISTERS, clock_hz)
         self._imager = Mt9m001Imager(seed, noise or NoiseTerms(), background_electrons_per_s)
-        self._hz = clock_hz
-        self._registers = RegisterFile(REGISTERS)
         self._settings = read_settings(self._registers)
-        self._clock: PixelClock | None = PixelClock(clock_hz)
-        self._powered = True
-        self._reset_pin = 1
         self._since = 0  # edge of the last start or change: exposing anew begins there
         self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)
-        self._rendered: tuple[_Frame, Scene, NDArray[np.uint8]] | None = None
-        self.scene = scene
         self.active_columns = COLUMNS
         self.line_clocks = self._settings.row_clocks
-
-    @property
-    def scene(self) -> Scene:
-        """What it looks at; a new one is seen by the next frame that is rendered."""
-        return self._scene
-
-    @scene.setter
-    def scene(self, scene: Scene) -> None:
-        if isinstance(scene, SkyScene):
-            size = scene.optics.columns, scene.optics.rows
-        else:
-            size = scene.size
-        if size != (COLUMNS, ROWS):
-            raise ValueError(
-                f"the MT9M001 has {COLUMNS} x {ROWS} pixels, the scene's sensor {size}"
-            )
-        self._scene = scene
-
-    @property
-    def period(self) -> Fraction:
-        """Time of one pixel clock in ps."""
-        return Fraction(PS_PER_S, self._hz)
-
-    @property
-    def running(self) -> bool:
-        """Whether the part has power and is out of reset."""
-        return self._clock is not None
 
     @property
     def enabled(self) -> bool:
         """Whether it sends frames."""
         return self.running and self._settings.enabled
 
-    @property
-    def temperature_c(self) -> float:
-        """Temperature of the sensor, in degrees Celsius."""
-        return self._scene.temperature_c
-
-    # --- supply and reset -----------------------------------------------------------------------
-
-    def power(self, on: bool, now_ps: int) -> None:
-        """Turn the supply on or off."""
-        self._powered = on
-        self._start_or_stop(now_ps)
-
-    def set_reset_pin(self, level: int, now_ps: int) -> None:
-        """Drive the reset pin, low active."""
-        self._reset_pin = level
-        self._start_or_stop(now_ps)
-
-    def _start_or_stop(self, now_ps: int) -> None:
-        run = self._powered and bool(self._reset_pin)
-        if run == self.running:
-            return
-        self._registers.reset()
+    def _restarted(self, now_ps: int) -> None:
         self._settings = read_settings(self._registers)
-        self._clock = PixelClock(self._hz, now_ps) if run else None
         self._frames.clear()
         self._since = 0
-        self.on_change()
 
-    # --- control bus ----------------------------------------------------------------------------
-
-    def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
-        """A write message to the 7-bit ``address`` ended; returns whether it was acknowledged.
-
-        One byte of register address, then 16 bits for that register and those that follow, upper
-        byte first; half a word is dropped.
-        """
+    def _write(self, words: list[int], now_ps: int) -> None:
         clock = self._clock
-        if clock is None or address != REGISTERS.i2c_address:
-            return False
-        if not data:
-            return True
+        assert clock is not None
         self._plan(clock, now_ps)
-        self._registers.select(data[0])
         restart = False
-        for upper, lower in zip(data[1::2], data[2::2], strict=False):
-            restart |= write_word(self._registers, upper << 8 | lower)
+        for word in words:
+            restart |= write_word(self._registers, word)
         before, self._settings = self._settings, read_settings(self._registers, self._settings)
         if before == self._settings and not restart:
-            return True
+            return
         edge = clock.first_edge(now_ps)
         begins = restart or before.enabled != self._settings.enabled
         if begins:
@@ -197,15 +130,6 @@ class Mt9m001:
         while self._frames and self._frames[-1].first >= edge:
             self._frames.pop()
         self.on_change()
-        return True
-
-    def i2c_read(self, address: int, count: int, now_ps: int) -> bytes | None:
-        """Read ``count`` bytes from the last register address on; None if not acknowledged."""
-        del now_ps
-        if not self.running or address != REGISTERS.i2c_address:
-            return None
-        words = b"".join(self._registers.read().to_bytes(2, "big") for _ in range(-(-count // 2)))
-        return words[:count]
 
     # --- pixel lines ----------------------------------------------------------------------------
 
@@ -229,13 +153,11 @@ class Mt9m001:
         frame = self._frames[-1]
         first = frame.first
         for rows, clocks in self._parts(frame.settings):
-            start = clock.edge_ps(first)
-            # Where a consumer that counts from the first edge sees the end.
-            if start + clocks * PS_PER_S // self._hz > time_ps:
+            if clock.end_ps(first, clocks) > time_ps:
                 self.active_columns = frame.settings.columns
                 self.line_clocks = frame.settings.row_clocks
-                pixels = self._renderer(frame, last=rows == 1) if rows else None
-                return StreamSegment(start, clocks, 1, rows, pixels)
+                pixels = partial(self._pixels, frame, last=rows == 1) if rows else None
+                return StreamSegment(clock.edge_ps(first), clocks, 1, rows, pixels)
             first += clocks
         return self._blanking(clock, first, upcoming.first)
 
@@ -293,12 +215,11 @@ class Mt9m001:
         shutter = RollingShutter(row_0, settings.row_clocks * self.period, exposure, exposure)
         return _Frame(first, settings, shutter)
 
-    def _renderer(self, frame: _Frame, *, last: bool) -> Callable[[], NDArray[np.uint8]]:
-        def render() -> NDArray[np.uint8]:
-            if self._rendered is None or self._rendered[:2] != (frame, self._scene):
-                picture = self._imager.picture(self._scene, frame.shutter, frame.settings)
-                self._rendered = frame, self._scene, picture
-            picture = self._rendered[2]
-            return picture[-1:] if last else picture[:-1]
+    def _pixels(self, frame: _Frame, *, last: bool) -> Grey:
+        """The last row of ``frame``, or all others."""
 
-        return render
+        def render() -> Grey:
+            return self._imager.picture(self.scene, self.condition, frame.shutter, frame.settings)
+
+        picture = self._once(frame, render)
+        return picture[-1:] if last else picture[:-1]

@@ -15,31 +15,40 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    PIXELS_PER_DEGREE,
-    ROWS,
-    Camera,
-)
+from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
 __all__ = [
     "DISTORTION",
     "FIELD_DEG",
     "LENSES",
+    "PIXELS_PER_DEGREE",
     "Fisheye",
-    "angles_from_vector",
+    "check_field",
     "distorted",
     "undistorted",
-    "vector_from_angles",
 ]
 
 DISTORTION = (-2.5572e-6, 7.6076e-5, 0.9953, 0.1036)
 """Coefficients of equation 5.2.3, highest power first; radii in px."""
 
+PIXELS_PER_DEGREE = 2.9
+"""Undistorted pixels for one degree of field angle."""
+
 FIELD_DEG = 95.0
 """Largest angle from the boresight that the lens images, half of 190 deg (appendix A.3)."""
 
 _NEWTON_STEPS = 8
+
+
+def check_field(alpha_deg: float, beta_deg: float) -> None:
+    """Raise SceneError for angles of a reflection that no lens images."""
+    if not np.hypot(alpha_deg, beta_deg) <= FIELD_DEG:
+        raise SceneError(
+            f"at_deg must be within {FIELD_DEG} deg of the boresight, not {alpha_deg}, {beta_deg}"
+        )
 
 
 def distorted(radius_px: ArrayLike) -> NDArray[np.float64]:
@@ -58,25 +67,6 @@ def undistorted(radius_px: ArrayLike) -> NDArray[np.float64]:
     for _ in range(_NEWTON_STEPS):
         radius = radius - (distorted(radius) - target) / np.polyval(slope, radius)
     return np.maximum(radius, 0)
-
-
-def vector_from_angles(alpha_deg: ArrayLike, beta_deg: ArrayLike) -> NDArray[np.float64]:
-    """Unit vectors (..., 3) in camera axes of a sensor's two angles in degrees.
-
-    The angles are undistorted picture coordinates: their root sum of squares is the angle from the
-    boresight, and they divide it into x (right) and y (down).
-    """
-    theta, phi = np.radians(np.hypot(alpha_deg, beta_deg)), np.arctan2(beta_deg, alpha_deg)
-    return np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
-    )
-
-
-def angles_from_vector(vector: ArrayLike) -> tuple[float, float]:
-    """A sensor's alpha and beta in degrees of a direction (3,) in camera axes, of any length."""
-    x, y, z = np.asarray(vector, np.float64)
-    theta, phi = np.degrees(np.arctan2(np.hypot(x, y), z)), np.arctan2(y, x)
-    return float(theta * np.cos(phi)), float(theta * np.sin(phi))
 
 
 @dataclass(frozen=True)
@@ -153,5 +143,5 @@ class FieldOfView:
         )
 
 
-LENSES = {Camera.SUN: Fisheye(369, 250), Camera.NADIR: Fisheye(371, 236)}
+LENSES = {Target.SUN: Fisheye(369, 250), Target.NADIR: Fisheye(371, 236)}
 """Each camera's own boresight (table 5.1)."""

@@ -17,19 +17,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.ov7620.fisheye import LENSES, Fisheye, vector_from_angles
-from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    PIXELS_PER_DEGREE,
-    ROWS,
-    Camera,
-)
+from cubestack.emulator.camera.ov7620.fisheye import LENSES, PIXELS_PER_DEGREE, Fisheye
+from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 
 __all__ = ["USUAL_EXPOSURE", "scene_light"]
 
-USUAL_EXPOSURE = {Camera.SUN: 1, Camera.NADIR: 4}
+USUAL_EXPOSURE = {Target.SUN: 1, Target.NADIR: 4}
 """Counts of the exposure register that the published levels belong to.
 
 Sun: 127 us (published). Nadir: "set once", to what is not published; assumed.
@@ -42,7 +37,7 @@ The whole Earth, seen from 750 km with the Sun behind the satellite, then has th
 153, 119 above black.
 """
 
-FILTER = {Camera.SUN: 1e-4, Camera.NADIR: 1.0}
+FILTER = {Target.SUN: 1e-4, Target.NADIR: 1.0}
 """Transmission (published)."""
 
 SUN_EDGE = 65.0
@@ -69,12 +64,15 @@ FAINTEST = 1e-3
 Light = NDArray[np.float32]
 
 
-def scene_light(scene: EarthSunScene, camera: Camera, time_ps: int) -> Light:
-    """Grey values (480, 640) above black that ``camera`` gains in each line time of exposure."""
+def scene_light(scene: EarthSunScene, camera: Target, bloom_px: float, time_ps: int) -> Light:
+    """Grey values (480, 640) above black that ``camera`` gains in each line time of exposure.
+
+    ``bloom_px`` is the radius of the Sun's image on the boresight of the sun camera.
+    """
     lens = LENSES[camera]
     light = np.zeros((ROWS, COLUMNS), np.float32)
     sun = scene.seen(scene.sun, camera, time_ps)
-    earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(Camera.NADIR)
+    earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(Target.NADIR)
     seen, radiance = scene.earth.radiance(
         lens.field.vectors,
         lens.field.pixel_rad,
@@ -85,29 +83,29 @@ def scene_light(scene: EarthSunScene, camera: Camera, time_ps: int) -> Light:
     radiance *= lens.field.lit[seen] * np.float32(earth_level)
     light.ravel()[lens.field.index[seen]] = radiance
     if not scene.hidden(scene.sun):
-        _add_sun(light, scene.bloom_px, camera, sun)
+        _add_sun(light, bloom_px, camera, sun)
     if scene.moon is not None and not scene.hidden(scene.moon):
         moon = scene.seen(scene.moon, camera, time_ps)
         _add_moon(light, lens, moon, earth_level * MOON_RADIANCE * (1 - float(moon @ sun)) / 2)
     for reflection in scene.reflections:
-        if reflection.camera is camera:
+        if reflection.camera == camera:
             centre = lens.project(vector_from_angles(reflection.alpha_deg, reflection.beta_deg))
-            assert centre is not None  # its angles have been checked
+            assert centre is not None  # see check_field
             _add_disc(light, centre, reflection.radius_px, reflection.level / _usual_lines(camera))
     return light
 
 
-def _usual_lines(camera: Camera) -> int:
+def _usual_lines(camera: Target) -> int:
     return USUAL_EXPOSURE[camera] * EXPOSURE_LINES
 
 
-def _add_sun(light: Light, bloom_px: float, camera: Camera, vector: NDArray[np.float64]) -> None:
+def _add_sun(light: Light, bloom_px: float, camera: Target, vector: NDArray[np.float64]) -> None:
     lens = LENSES[camera]
     centre = lens.project(vector)
     if centre is None:
         return
     peak = SUN_EDGE * math.exp(1 / (2 * SUN_SPOT**2))
-    unfiltered = peak / FILTER[Camera.SUN] / _usual_lines(Camera.SUN)
+    unfiltered = peak / FILTER[Target.SUN] / _usual_lines(Target.SUN)
     transmission = _slant_transmission(FILTER[camera], math.dist(centre, (lens.cx, lens.cy)))
     _add_spot(light, centre, SUN_SPOT * bloom_px, unfiltered * transmission)
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
+from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
 __all__ = ["BLACK", "FULL_SCALE", "luminance", "stuck_pixels"]
 
@@ -53,8 +53,11 @@ def luminance(
 
 
 @lru_cache(maxsize=8)
-def stuck_pixels(seed: int, camera: Camera, singles: int, pairs: int) -> NDArray[np.int64]:
-    """Flat indices of ``singles`` stuck pixels and ``pairs`` of them side by side in a row."""
+def stuck_pixels(seed: int, camera: int, singles: int, pairs: int) -> NDArray[np.int64]:
+    """Flat indices of ``singles`` stuck pixels and ``pairs`` of them side by side in a row.
+
+    Each of several cameras, told apart by a number, has its own.
+    """
     generator = np.random.default_rng([seed, camera, 0x407])
     # Slots of four columns, so that no two of them make a run of three.
     slots = 4 * generator.choice(ROWS * COLUMNS // 4, singles + pairs, replace=False)

@@ -15,31 +15,32 @@ CubeSense thesis, sections 3.2 and 6.4.1 and appendix A; OV7620 product specific
 """
 
 from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.image_sensor import ImageSensor
+from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.light import scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK, luminance, stuck_pixels
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
-from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.firmware_model.interface.cameras.ov7620 import (
     CLOCKS_PER_LINE,
+    COLUMNS,
     EXPOSURE_LINES,
     LINES_PER_FRAME,
     PIXEL_CLOCK_HZ,
     REGISTERS,
+    ROWS,
     window_column,
     window_row,
 )
-from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
 
 __all__ = ["Ov7620"]
 
@@ -76,51 +77,42 @@ class _Frame:
     shutter: RollingShutter
 
 
-class Ov7620:
+class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     """One camera of CubeSense, powered from time 0 on.
 
     Attributes:
-        scene: what it looks at. A new one is seen by the next frame that is rendered.
         camera: which of the two it is.
         line_clocks: pixel clocks of a line.
         active_columns: those of them with HREF high, in the segment handed out last.
-        on_change: called after the output from now on has become another than announced.
     """
 
+    scene_types = (EarthSunScene,)
+    sees = "a Sun and nadir sensor sees Earth and Sun"
     line_clocks = CLOCKS_PER_LINE
 
-    def __init__(self, scene: EarthSunScene, camera: Camera) -> None:
-        """Power up."""
-        self.scene = scene
+    def __init__(
+        self,
+        scene: EarthSunScene | EarthSunView,
+        camera: Target,
+        condition: FisheyeCondition | None = None,
+    ) -> None:
+        """Power up; ``condition`` is what lens and sensor are like, unless ``scene`` says."""
+        super().__init__(scene, condition or FisheyeCondition(), REGISTERS, PIXEL_CLOCK_HZ)
         self.camera = camera
         self.active_columns = COLUMNS
-        self.on_change: Callable[[], None] = lambda: None
-        self._registers = RegisterFile(REGISTERS)
         self._sccb = SccbSlave(REGISTERS.i2c_address, self._write)
-        self._clock: PixelClock | None = PixelClock(PIXEL_CLOCK_HZ)
         self._frames: OrderedDict[int, _Frame] = OrderedDict()
-        self._light: tuple[EarthSunScene, int, NDArray[np.float32]] | None = None
-        self._rendered: tuple[_Frame, EarthSunScene, NDArray[np.uint8]] | None = None
+        self._light: tuple[EarthSunScene, float, int, Light] | None = None
 
-    @property
-    def period(self) -> Fraction:
-        """Time of one pixel clock in ps."""
-        return Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+    def _check(self, scene: EarthSunScene, condition: FisheyeCondition) -> None:
+        del condition
+        for reflection in scene.reflections:
+            check_field(reflection.alpha_deg, reflection.beta_deg)
 
-    @property
-    def running(self) -> bool:
-        """Whether the part has power."""
-        return self._clock is not None
-
-    def power(self, on: bool, now_ps: int) -> None:
-        """Turn the supply on or off; registers then have their reset values."""
-        if on == self.running:
-            return
-        self._registers.reset()
+    def _restarted(self, now_ps: int) -> None:
+        del now_ps
         self._sccb = SccbSlave(REGISTERS.i2c_address, self._write)
         self._frames.clear()
-        self._clock = PixelClock(PIXEL_CLOCK_HZ, now_ps) if on else None
-        self.on_change()
 
     # --- control lines --------------------------------------------------------------------------
 
@@ -163,12 +155,10 @@ class Ov7620:
             first = number * FRAME_CLOCKS
             for rows, lines in self._stretches(frame.settings):
                 clocks = lines * CLOCKS_PER_LINE
-                start = clock.edge_ps(first)
-                # Where a consumer that counts from the first edge sees the end.
-                if start + clocks * PS_PER_S // PIXEL_CLOCK_HZ > time_ps:
+                if clock.end_ps(first, clocks) > time_ps:
                     self.active_columns = len(frame.settings.columns)
-                    pixels = self._renderer(frame) if rows else None
-                    return StreamSegment(start, clocks, int(not rows), rows, pixels)
+                    pixels = partial(self._pixels, frame) if rows else None
+                    return StreamSegment(clock.edge_ps(first), clocks, int(not rows), rows, pixels)
                 first += clocks
             number += 1
 
@@ -231,37 +221,34 @@ class Ov7620:
 
     # --- the picture ----------------------------------------------------------------------------
 
-    def _renderer(self, frame: _Frame) -> Callable[[], NDArray[np.uint8]]:
-        def render() -> NDArray[np.uint8]:
-            if self._rendered is None or self._rendered[:2] != (frame, self.scene):
-                self._rendered = frame, self.scene, self._picture(frame)
-            return self._rendered[2]
+    def _pixels(self, frame: _Frame) -> Grey:
+        return self._once(frame, lambda: self._picture(frame))
 
-        return render
-
-    def _picture(self, frame: _Frame) -> NDArray[np.uint8]:
-        scene, settings, shutter = self.scene, frame.settings, frame.shutter
+    def _picture(self, frame: _Frame) -> Grey:
+        condition, settings, shutter = self.condition, frame.settings, frame.shutter
         light = self._light_at(shutter.mid_exposure_ps((ROWS - 1) / 2))
         light = light * np.float32(shutter.exposure_lines)
         if not settings.monochrome:
             light[:-1] = (light[:-1] + light[1:]) / 2
         generator = None
-        if scene.noise:
+        if condition.noise:
             # By frame time, so that a frame nobody looked at does not change the next one's noise.
-            seed = [scene.seed, self.camera, shutter.readout_ps]
+            seed = [condition.seed, self.camera, shutter.readout_ps]
             generator = np.random.Generator(np.random.SFC64(seed))
-        stuck = stuck_pixels(scene.seed, self.camera, scene.hot_pixels, scene.hot_pairs)
+        stuck = stuck_pixels(condition.seed, self.camera, condition.hot_pixels, condition.hot_pairs)
         grey = luminance(light, settings.gain, generator, stuck)
         rows, columns = settings.rows, settings.columns
         window = grey[rows.start : rows.stop, columns.start : columns.stop]
         return np.ascontiguousarray(window[:, ::-1] if settings.mirror else window)
 
-    def _light_at(self, time_ps: int) -> NDArray[np.float32]:
+    def _light_at(self, time_ps: int) -> Light:
         if not np.any(self.scene.rate_deg_s):
             time_ps = 0  # the same at all times
-        if self._light is None or self._light[:2] != (self.scene, time_ps):
-            self._light = self.scene, time_ps, scene_light(self.scene, self.camera, time_ps)
-        return self._light[2]
+        key = self.scene, self.condition.bloom_px, time_ps
+        if self._light is None or self._light[:3] != key:
+            light = scene_light(self.scene, self.camera, self.condition.bloom_px, time_ps)
+            self._light = *key, light
+        return self._light[3]
 
     def _wanted(self, time_ps: int) -> float:
         """Line times of exposure at gain 1 that bring the picture's mean to the level aimed at."""

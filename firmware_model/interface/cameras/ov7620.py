@@ -1,4 +1,4 @@
-"""Control registers and frame timing of the OV7620 image sensor, as far as CubeSense needs them.
+"""Picture, registers and frame timing of the OV7620 image sensor, as far as CubeSense needs them.
 
 OV7620 product specifications, revision 1.3: addresses and bits; CubeSense thesis, section 3.2 and
 appendix A. Registers are written over SCCB, an I2C dialect, with one address byte; writes to other
@@ -15,13 +15,19 @@ from cubestack.firmware_model.interface.cameras.registers import (
 
 __all__ = [
     "CLOCKS_PER_LINE",
+    "COLUMNS",
     "EXPOSURE_LINES",
     "LINES_PER_FRAME",
     "PIXEL_CLOCK_HZ",
     "REGISTERS",
+    "ROWS",
     "window_column",
     "window_row",
 ]
+
+#: Pixels that are sent, of 664 x 492.
+COLUMNS = 640
+ROWS = 480
 
 PIXEL_CLOCK_HZ = 13_500_000
 

@@ -10,6 +10,8 @@ from enum import IntEnum
 from functools import reduce
 from operator import xor
 
+from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
+
 __all__ = [
     "COLUMNS",
     "EDGES_PER_FRAME",
@@ -35,9 +37,6 @@ __all__ = [
     "coefficient",
     "split_coefficient",
 ]
-
-COLUMNS = 640
-ROWS = 480
 
 #: Bytes of a picture, row after row.
 IMAGE_BYTES = COLUMNS * ROWS

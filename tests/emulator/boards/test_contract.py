@@ -12,7 +12,6 @@ from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
@@ -25,14 +24,13 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
-SKY = SkyScene([0, 0, 0, 1], noise=False, mag_limit=1)
-EARTH = EarthSunScene(noise=False)
-WIDE_SKY = SkyScene([0, 0, 0, 1], noise=False, mag_limit=1, optics=aramis_lens())
+SKY = SkyScene([0, 0, 0, 1], mag_limit=1)
+EARTH = EarthSunScene()
 
 BOARDS: dict[str, Callable[..., Board]] = {
     "cubestar": lambda **place: CubeStarBoard(SKY, onboard_catalogue(), seed=3, **place),
     "cubesense": lambda **place: CubeSenseBoard(EARTH, seed=3, **place),
-    "aramis": lambda **place: AramisBoard(WIDE_SKY, None, seed=3, **place),
+    "aramis": lambda **place: AramisBoard(SKY, None, seed=3, **place),
 }
 INTERFACES = {"cubestar": CUBESTAR, "cubesense": CUBESENSE, "aramis": ARAMIS}
 
@@ -114,7 +112,7 @@ def test_a_kernel_that_is_under_way_is_refused() -> None:
 
 def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
     boards = powered(stack)
-    for name, other in (("cubestar", SKY.turned((1, 0, 0))), ("aramis", WIDE_SKY)):
+    for name, other in (("cubestar", SKY.turned((1, 0, 0))), ("aramis", SKY)):
         boards[name].scene = other
         assert boards[name].scene is other
         with pytest.raises(TypeError, match="sees the sky or a picture, not EarthSunScene"):

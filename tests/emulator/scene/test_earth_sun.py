@@ -5,16 +5,16 @@ from scipy.spatial.transform import Rotation
 from cubestack.emulator.scene.earth_sun import (
     EarthSunScene,
     Mounting,
+    Target,
 )
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 
-SUN, NADIR = Camera.SUN, Camera.NADIR
+SUN, NADIR = Target.SUN, Target.NADIR
 S = 10**12
 
 
 def test_both_cameras_look_at_their_object_by_default() -> None:
     scene = EarthSunScene()
-    for camera in Camera:
+    for camera in Target:
         truth = scene.truth(camera, 0)
         np.testing.assert_allclose(truth.vector, [0, 0, 1], atol=1e-15)
         assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((0, 0), abs=1e-12)
@@ -72,7 +72,8 @@ def test_truth_follows_the_body_rate() -> None:
 )
 def test_sun_is_seen_within_the_field(sun_deg: tuple[float, float], visible: bool) -> None:
     scene = EarthSunScene.facing(sun_deg, altitude_km=1e6)
-    assert scene.truth(SUN, 0).visible is visible
+    assert scene.truth(SUN, 0, field_deg=95).visible is visible
+    assert scene.truth(SUN, 0).visible
 
 
 def test_sun_behind_the_earth_is_not_seen() -> None:
@@ -80,9 +81,10 @@ def test_sun_behind_the_earth_is_not_seen() -> None:
     down = Mounting([0, 0, 1])
     for theta, visible in ((63.3, False), (63.7, True)):
         scene = EarthSunScene.facing((theta, 0), sun_camera=down)
-        assert scene.truth(SUN, 0).visible is visible
+        assert scene.truth(SUN, 0, field_deg=95).visible is visible
+    assert scene.truth(SUN, 0).visible
 
 
 def test_earth_is_seen_while_any_of_it_is_in_the_field() -> None:
     for theta, visible in ((158.0, True), (159.0, False)):
-        assert EarthSunScene.facing(nadir_deg=(theta, 0)).truth(NADIR, 0).visible is visible
+        assert EarthSunScene.facing(nadir_deg=(theta, 0)).truth(NADIR, 0, 95).visible is visible

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.scene.picture import SceneError, load_picture
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.picture import PictureScene, load_picture
 
 
 @pytest.fixture
@@ -15,37 +16,38 @@ def values() -> np.ndarray:
 @pytest.mark.parametrize("name", ["a.png", "a.tif", "a.jpg"])
 def test_formats(tmp_path: Path, values: np.ndarray, name: str) -> None:
     Image.fromarray(values).save(tmp_path / name, quality=100)
-    pixels = load_picture(tmp_path / name, (0, 0))
-    assert pixels.shape == (512, 1024)
+    pixels = load_picture(tmp_path / name)
+    assert pixels.shape == values.shape
     assert pixels.dtype == np.uint8
     assert pixels.flags.c_contiguous
     assert not pixels.flags.writeable
-    np.testing.assert_allclose(pixels.astype(int), values[:512, :1024], atol=8)
+    np.testing.assert_allclose(pixels.astype(int), values, atol=8)
 
 
 def test_crop_is_column_and_row(tmp_path: Path, values: np.ndarray) -> None:
     Image.fromarray(values).save(tmp_path / "a.png")
-    np.testing.assert_array_equal(
-        load_picture(tmp_path / "a.png", (76, 88)), values[88:600, 76:1100]
-    )
+    part = PictureScene(tmp_path / "a.png", crop=(76, 88)).part(1000, 500)
+    np.testing.assert_array_equal(part, values[88:588, 76:1076])
+    assert part.flags.c_contiguous
 
 
 def test_sixteen_bits_give_their_upper_eight(tmp_path: Path) -> None:
     wide = np.random.default_rng(2).integers(0, 1 << 16, (512, 1024), np.uint16)
     Image.fromarray(wide).save(tmp_path / "a.png")
-    np.testing.assert_array_equal(load_picture(tmp_path / "a.png", (0, 0)), wide >> 8)
+    np.testing.assert_array_equal(load_picture(tmp_path / "a.png"), wide >> 8)
 
 
 def test_colours_give_their_luma(tmp_path: Path) -> None:
     Image.new("RGB", (1024, 512), (255, 128, 0)).save(tmp_path / "a.png")
     expected = round(0.299 * 255 + 0.587 * 128)  # ITU-R 601
-    assert np.all(np.abs(load_picture(tmp_path / "a.png", (0, 0)).astype(int) - expected) <= 1)
+    assert np.all(np.abs(load_picture(tmp_path / "a.png").astype(int) - expected) <= 1)
 
 
 def test_too_small(tmp_path: Path) -> None:
     Image.new("L", (1024, 600)).save(tmp_path / "small.png")
+    scene = PictureScene(tmp_path / "small.png", crop=(0, 100))
     with pytest.raises(SceneError) as caught:
-        load_picture(tmp_path / "small.png", (0, 100))
+        scene.part(1024, 512)
     assert str(caught.value) == (
         "small.png is 1024 x 600 pixels; with crop 0,100 it would have to be at least 1024 x 612"
     )
@@ -54,7 +56,7 @@ def test_too_small(tmp_path: Path) -> None:
 def test_negative_crop(tmp_path: Path) -> None:
     Image.new("L", (2000, 2000)).save(tmp_path / "a.png")
     with pytest.raises(SceneError, match="crop must not be negative, not -1,0"):
-        load_picture(tmp_path / "a.png", (-1, 0))
+        PictureScene(tmp_path / "a.png", crop=(-1, 0))
 
 
 def test_wrong_formats(tmp_path: Path) -> None:
@@ -62,17 +64,17 @@ def test_wrong_formats(tmp_path: Path) -> None:
     with pytest.raises(
         SceneError, match=r"a\.bmp is a BMP picture; right would be PNG, JPEG, TIFF"
     ):
-        load_picture(tmp_path / "a.bmp", (0, 0))
+        load_picture(tmp_path / "a.bmp")
     (tmp_path / "text.png").write_text("hello")
     with pytest.raises(
         SceneError, match=r"text\.png is no picture; right would be PNG, JPEG, TIFF"
     ):
-        load_picture(tmp_path / "text.png", (0, 0))
+        load_picture(tmp_path / "text.png")
     Image.new("F", (1024, 512)).save(tmp_path / "float.tif")
     with pytest.raises(
         SceneError, match=r"float\.tif has pixels of kind F; right would be 8 or 16"
     ):
-        load_picture(tmp_path / "float.tif", (0, 0))
+        load_picture(tmp_path / "float.tif")
 
 
 def test_damaged_picture(tmp_path: Path) -> None:
@@ -80,7 +82,7 @@ def test_damaged_picture(tmp_path: Path) -> None:
     data = (tmp_path / "a.jpg").read_bytes()
     (tmp_path / "a.jpg").write_bytes(data[: len(data) // 2])
     with pytest.raises(SceneError, match=r"a\.jpg can not be read"):
-        load_picture(tmp_path / "a.jpg", (0, 0))
+        load_picture(tmp_path / "a.jpg")
 
 
 def test_damaged_past_what_pillow_expects(tmp_path: Path, values: np.ndarray) -> None:
@@ -90,11 +92,11 @@ def test_damaged_past_what_pillow_expects(tmp_path: Path, values: np.ndarray) ->
     data[second : second + 4] = b"\x00\xff\x00\xff"  # Pillow raises SyntaxError
     (tmp_path / "a.png").write_bytes(data)
     with pytest.raises(SceneError, match=r"a\.png can not be read: broken PNG file"):
-        load_picture(tmp_path / "a.png", (0, 0))
+        load_picture(tmp_path / "a.png")
 
 
 def test_larger_than_pillow_permits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Image.new("L", (1024, 512)).save(tmp_path / "a.png")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
     with pytest.raises(SceneError, match=r"a\.png can not be read: Image size .* exceeds limit"):
-        load_picture(tmp_path / "a.png", (0, 0))
+        load_picture(tmp_path / "a.png")

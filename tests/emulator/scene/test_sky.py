@@ -1,22 +1,14 @@
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from cubestack.emulator.camera.common.optics import Distortion
 from cubestack.emulator.scene.attitude import (
     attitude_error_deg,
     propagate,
     quaternion_from_pointing,
 )
-from cubestack.emulator.scene.sky import PictureScene, Pose, SceneError, SkyScene, load_scene
-
-
-def save(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+from cubestack.emulator.scene.sky import Pose, SceneError, SkyScene
 
 
 def test_truth_follows_the_rate() -> None:
@@ -48,139 +40,19 @@ def test_turned() -> None:
     assert scene.mag_limit == 3.0
 
 
-def test_sky_from_a_file(tmp_path: Path) -> None:
-    scene = load_scene(
-        save(
-            tmp_path,
-            """
-            kind = "sky"
-            ra_deg = 83.8
-            dec_deg = -5
-            roll_deg = 30.0
-            rate_deg_s = [0.0, 0.1, 0.0]
-            mag_limit = 3.8
-            epoch = 2030.5
-            noise = false
-            seed = 7
-            false_stars = 5
-            false_star_mag = [1.0, 2.0]
-            hot_pixels = 3
-            temperature_c = -10
-            [optics]
-            psf_sigma_px = 1.2
-            distortion = "toolbox"
-            [[poses]]
-            start_s = 10
-            quaternion = [0, 0, 0, 2]
-            """,
-        )
-    )
-    assert isinstance(scene, SkyScene)
-    np.testing.assert_allclose(scene.quaternion, quaternion_from_pointing(83.8, -5, 30))
-    assert tuple(scene.rate_deg_s) == (0.0, 0.1, 0.0)
-    assert (scene.mag_limit, scene.epoch, scene.noise, scene.seed) == (3.8, 2030.5, False, 7)
-    assert (scene.false_stars, scene.false_star_mag, scene.hot_pixels) == (5, (1.0, 2.0), 3)
-    assert scene.temperature_c == -10
-    assert scene.optics.psf_sigma_px == 1.2
-    assert scene.optics.distortion is Distortion.TOOLBOX
-    assert scene.optics.focal_length_mm == 6.28
-    np.testing.assert_allclose(scene.truth(11 * 10**12), [0, 0, 0, 1])
-
-
-def test_shortest_files(tmp_path: Path) -> None:
-    scene = load_scene(save(tmp_path, 'kind = "sky"\nra_deg = 1\ndec_deg = 2'))
-    assert isinstance(scene, SkyScene)
-    assert scene.mag_limit is None
-    assert scene.noise
-    Image.new("L", (1024, 512), 9).save(tmp_path / "p.png")
-    picture = load_scene(save(tmp_path, 'kind = "picture"\nfile = "p.png"'))
-    assert isinstance(picture, PictureScene)
-    assert picture.truth(0) is None
-    assert np.all(picture.pixels == 9)
-
-
-def test_picture_from_a_file(tmp_path: Path) -> None:
-    Image.new("L", (1100, 700), 9).save(tmp_path / "p.png")
-    text = 'kind = "picture"\nfile = "p.png"\ncrop = [70, 180]\nexposure_ms = 5\n'
-    scene = load_scene(save(tmp_path, text + "quaternion = [0, 2, 0, 0]\ntemperature_c = 3"))
-    assert isinstance(scene, PictureScene)
-    assert (scene.crop, scene.exposure_ms, scene.temperature_c) == ((70, 180), 5.0, 3.0)
-    np.testing.assert_array_equal(scene.truth(10**15), [0, 1, 0, 0])
-
-
-POSE = "ra_deg = 1\ndec_deg = 2\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("", 'kind must be "sky" or "picture", not None'),
-        ('kind = "moon"', "not 'moon'"),
-        ('kind = "sky"', "a pose needs either quaternion, or ra_deg and dec_deg"),
-        ('kind = "sky"\nra_deg = 1', "needs both ra_deg and dec_deg"),
-        (f'kind = "sky"\n{POSE}quaternion = [0, 0, 0, 1]', "either quaternion, or ra_deg"),
-        (f'kind = "sky"\n{POSE}magnitude = 3', "unknown key 'magnitude'; allowed are ra_deg, dec"),
-        (f'kind = "sky"\n{POSE}start_s = 3', "unknown key 'start_s'"),
-        (f'kind = "sky"\n{POSE}noise = 1', "noise must be true or false, not 1"),
-        (f'kind = "sky"\n{POSE}seed = 1.5', "seed must be a whole number, not 1.5"),
-        (f'kind = "sky"\n{POSE}seed = -1', "seed must not be negative, not -1"),
-        (f'kind = "sky"\n{POSE}epoch = "now"', "epoch must be a number, not 'now'"),
-        (f'kind = "sky"\n{POSE}epoch = true', "epoch must be a number, not True"),
-        (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2]', "rate_deg_s must be a list of 3 numbers"),
-        (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2, nan]', "rate_deg_s must be a number, not nan"),
-        (f'kind = "sky"\n{POSE}rate_deg_s = [1, 2, -101]', "in deg/s, at most 100 each, not (1.0,"),
-        (f'kind = "sky"\n{POSE}mag_limit = inf', "mag_limit must be a number, not inf"),
-        (f'kind = "sky"\n{POSE}epoch = 1{"0" * 400}', "epoch must be a number, not 1000"),
-        (f'kind = "sky"\n{POSE}false_star_mag = [4, 2]', "must not fall, not from 4 to 2"),
-        (f'kind = "sky"\n{POSE}hot_pixels = 524289', "hot_pixels must be at most 524288"),
-        (f'kind = "sky"\n{POSE}temperature_c = 300', "temperature_c must be in -60..125, not 300"),
-        (f'kind = "sky"\n{POSE}optics = 1', "optics must be a table, not 1"),
-        (f'kind = "sky"\n{POSE}[optics]\nf = 1', "optics: unknown key 'f'; allowed are focal_leng"),
-        (f'kind = "sky"\n{POSE}[optics]\nfx = 0', "optics: fx must be above 0, not 0.0"),
-        (f'kind = "sky"\n{POSE}[optics]\ndistortion = "no"', "one of ['inverse', 'toolbox']"),
-        (f'kind = "sky"\n{POSE}poses = 3', "poses must be tables, each under [[poses]]"),
-        (f'kind = "sky"\n{POSE}[[poses]]\nra_deg = 1', "needs both ra_deg and dec_deg"),
-        (
-            f'kind = "sky"\n{POSE}[[poses]]\n{POSE}start_s = -1',
-            "poses must start one after the oth",
-        ),
-        ('kind = "sky"\nquaternion = [0, 0, 0, 0]', "a quaternion needs a finite length above 0"),
-        ('kind = "picture"', "a picture needs the key file"),
-        (
-            'kind = "picture"\nfile = "x"\nquaternion = [0, 0, 0, 0]',
-            "a quaternion needs a finite length above 0",
-        ),
-        (
-            'kind = "picture"\nfile = "x"\ntemperature_c = 126',
-            "temperature_c must be in -60..125, not 126",
-        ),
-        ('kind = "picture"\nfile = 1', "file must be text, not 1"),
-        ('kind = "picture"\nfile = "none.png"', "none.png can not be read: No such file"),
-        (
-            'kind = "picture"\nfile = "x"\nra_deg = 1',
-            "unknown key 'ra_deg'; allowed are file, crop",
-        ),
-        ("kind =", "is no TOML file"),
-    ],
-)
-def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
-    path = save(tmp_path, text)
-    with pytest.raises(SceneError) as caught:
-        load_scene(path)
-    message = str(caught.value)
-    assert complaint in message
-    assert str(path) in message
-    assert "\n" not in message
-
-
-def test_missing_scene_file(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"none\.toml can not be read: No such file"):
-        load_scene(tmp_path / "none.toml")
+def test_false_lights_are_those_of_the_seed() -> None:
+    sky = SkyScene([0, 0, 0, 1], false_stars=200, false_star_mag=(1.0, 2.0), seed=3)
+    places, magnitudes = sky.false_lights()
+    assert (places.shape, magnitudes.shape) == ((200, 2), (200,))
+    assert 0 <= places.min() < 0.1 < 0.9 < places.max() < 1
+    assert 1 < magnitudes.min() < 1.1 < 1.9 < magnitudes.max() < 2
+    np.testing.assert_array_equal(sky.false_lights()[0], places)
+    assert np.any(replace(sky, seed=4).false_lights()[0] != places)
 
 
 def test_wrong_values_in_python() -> None:
-    with pytest.raises(SceneError, match="hot_pixels must not be negative"):
-        SkyScene([0, 0, 0, 1], hot_pixels=-1)
+    with pytest.raises(SceneError, match="false_stars must not be negative"):
+        SkyScene([0, 0, 0, 1], false_stars=-1)
     with pytest.raises(SceneError, match="rate_deg_s must be 3 numbers"):
         SkyScene([0, 0, 0, 1], rate_deg_s=(0, np.nan, 0))
     with pytest.raises(SceneError, match="a quaternion has 4 numbers"):

@@ -15,7 +15,7 @@ from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, buil
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import read_settings
 from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
@@ -106,11 +106,11 @@ def test_a_scene_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
 
 def test_a_picture_file_as_the_light(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     pointing = quaternion_from_pointing(84.0, -1.0, 20.0)
-    scene = SkyScene(pointing, optics=aramis_lens())
+    scene = SkyScene(pointing)
     settings = read_settings(RegisterFile(REGISTERS))
     settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
     shutter = RollingShutter(10**12, Fraction(31_750_000), 6299, 6299)
-    sky = Mt9m001Imager(0, NoiseTerms(), None).picture(scene, shutter, settings)
+    sky = Mt9m001Imager(0, NoiseTerms(), None).picture(scene, CONDITION, shutter, settings)
     wide = np.pad(sky, ((0, 20), (7, 0)))
     Image.fromarray(wide).save(tmp_path / "sky.png")
     frame = measure(capsys, "--image", tmp_path / "sky.png", "--crop", "7,0")[0]

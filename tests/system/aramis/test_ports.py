@@ -10,7 +10,6 @@ import pytest
 import serial
 from PIL import Image
 
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.aramis import INTERFACE, CatalogueState
@@ -63,7 +62,7 @@ def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
 
 
 def test_the_same_over_i2c() -> None:
-    with open_aramis(SkyScene(TRUTH, optics=aramis_lens())) as session:
+    with open_aramis(SkyScene(TRUTH)) as session:
         bus = session.board.i2c()
         bus.wait(0.1)
         client = I2cClient(bus, INTERFACE, 0x1D, wait=bus.wait)

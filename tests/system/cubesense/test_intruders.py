@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.fisheye import LENSES, angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection
+from cubestack.emulator.camera.ov7620.fisheye import LENSES
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import Measurement
 
@@ -23,7 +25,7 @@ def seen_by(scene: EarthSunScene, camera: Camera, alpha: float, beta: float) -> 
     return mounting.matrix.T @ vector_from_angles(alpha, beta)
 
 
-def measure(opened: Callable[..., Any], scene: EarthSunScene, camera: Camera) -> Measurement:
+def measure(opened: Callable[..., Any], scene: Any, camera: Camera) -> Measurement:
     with opened(scene) as session:
         session.cubesense.client.pause(0.3)
         found: Measurement = session.cubesense.capture_and_detect(camera)
@@ -47,7 +49,8 @@ def test_the_moon_is_too_faint_for_the_sun_sensor(
 def test_hot_pixels_do_not_move_a_direction(
     opened: Callable[..., Any], scene: EarthSunScene, camera: Camera
 ) -> None:
-    found = measure(opened, replace(scene, hot_pixels=200, hot_pairs=50), camera)
+    view = EarthSunView(scene, FisheyeCondition(hot_pixels=200, hot_pairs=50))
+    found = measure(opened, view, camera)
     check(found, TRUTH[camera])
 
 
@@ -55,8 +58,8 @@ def test_a_light_beside_the_earth_is_dropped_from_its_limb(
     opened: Callable[..., Any], scene: EarthSunScene
 ) -> None:
     """A disc on a sample of a scanned row: two edges more, which the fit leaves out."""
-    (sample,) = LENSES[Camera.NADIR].unproject([(511, 79)])
-    light = Reflection(Camera.NADIR, *angles_from_vector(sample), radius_px=9.0, level=200.0)
+    (sample,) = LENSES[Target.NADIR].unproject([(511, 79)])
+    light = Reflection(Target.NADIR, *angles_from_vector(sample), radius_px=9.0, level=200.0)
     with opened(replace(scene, reflections=(light,))) as session:
         session.cubesense.client.pause(0.3)
         found = session.cubesense.capture_and_detect(Camera.NADIR)
@@ -81,6 +84,6 @@ def test_the_first_bright_light_of_the_picture_is_the_sun(
     level: float,
     expected: tuple[float, float],
 ) -> None:
-    light = Reflection(Camera.SUN, 0.0, beta, radius_px=5.0, level=level)
+    light = Reflection(Target.SUN, 0.0, beta, radius_px=5.0, level=level)
     found = measure(opened, replace(scene, reflections=(light,)), Camera.SUN)
     check(found, expected)

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.fisheye import angles_from_vector
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
-from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.host.cli.session import CubeSenseSession
@@ -23,9 +23,9 @@ Wire = list[tuple[bytes, int, int]]
 I2cScheduler = list[dict[Camera, Measurement]]
 
 
-def turning(seed: int = 1, **others: Any) -> EarthSunScene:
+def turning(seed: int = 1) -> EarthSunScene:
     return EarthSunScene.facing(
-        sun_deg=SUN_DEG, nadir_deg=NADIR_DEG, rate_deg_s=(0.5, -1.0, 2.0), seed=seed, **others
+        sun_deg=SUN_DEG, nadir_deg=NADIR_DEG, rate_deg_s=(0.5, -1.0, 2.0), seed=seed
     )
 
 
@@ -58,14 +58,16 @@ def test_every_turn_measures_a_second_further_on(opened: Callable[..., Any]) -> 
             assert found.capture is stored
             # Within the second in which it was taken, what the sensor sees turns by 2.3 deg.
             middle_ps = round((number + 0.4) * PS_PER_S)
-            truth = angles_from_vector(scene.truth(camera, middle_ps).vector)
-            assert np.hypot(found.alpha_deg - truth[0], found.beta_deg - truth[1]) < 1.5
+            truth = scene.truth(Target[camera.name], middle_ps)
+            off = found.alpha_deg - truth.alpha_deg, found.beta_deg - truth.beta_deg
+            assert np.hypot(*off) < 1.5
 
 
 def wire(opened: Callable[..., Any], seed: int) -> tuple[Wire, list[bytes], int]:
     """Bytes that the node sends, each with its time; the memories in the end; and the end."""
     sent: Wire = []
-    with opened(turning(seed, hot_pixels=20), seed=seed) as session:
+    view = EarthSunView(turning(seed), FisheyeCondition(hot_pixels=20, seed=seed))
+    with opened(view, seed=seed) as session:
         deliver = session.board.uart.line
 
         def listen(data: bytes, first_ps: int, byte_ps: int) -> None:

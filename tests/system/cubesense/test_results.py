@@ -1,14 +1,15 @@
 """Every result code, each from a scene or a fault that causes it, read over the serial line."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.fisheye import LENSES, angles_from_vector
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection
+from cubestack.emulator.camera.ov7620.fisheye import LENSES
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.angles import angles_from_vector
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
@@ -20,7 +21,9 @@ NOON = EarthSunScene()
 START_UP = (CaptureResult.START_UP, DetectResult.START_UP)
 
 
-def detect(opened: Callable[..., Any], scene: EarthSunScene, camera: Camera) -> DetectResult:
+def detect(
+    opened: Callable[..., Any], scene: EarthSunScene | EarthSunView, camera: Camera
+) -> DetectResult:
     with opened(scene) as session:
         session.cubesense.client.pause(0.3)
         return session.cubesense.capture_and_detect(camera).detect
@@ -63,14 +66,14 @@ def test_night_side_is_too_few_edges(opened: Callable[..., Any]) -> None:
 
 def test_many_lights_are_too_many_edges(opened: Callable[..., Any]) -> None:
     """Discs around every other sample of rows and columns, four edges each."""
-    lens = LENSES[Camera.NADIR]
+    lens = LENSES[Target.NADIR]
     samples = [(x, y) for x in (191, 319, 447) for y in (79, 207, 335)]
     samples += [(x, y) for x in (255, 383, 511) for y in (143, 271, 399)]
     samples = [(x, y) for x, y in samples if np.hypot(x - lens.cx, y - lens.cy) < 200]
     lights = []
     for vector in lens.unproject(samples):
         alpha, beta = angles_from_vector(vector)
-        lights.append(Reflection(Camera.NADIR, alpha, beta, radius_px=18.0, level=200.0))
+        lights.append(Reflection(Target.NADIR, alpha, beta, radius_px=18.0, level=200.0))
     scene = EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(lights))
     assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_MANY_EDGES
 
@@ -89,9 +92,10 @@ def test_sun_behind_the_camera_is_not_found(
 
 
 def test_hot_pixels_are_no_sun(opened: Callable[..., Any]) -> None:
-    scene = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1), hot_pixels=50, hot_pairs=20)
-    assert detect(opened, scene, Camera.SUN) is DetectResult.SUN_NOT_FOUND
-    assert detect(opened, replace(NOON, hot_pixels=20, hot_pairs=5), Camera.SUN).name == "SUCCESS"
+    dark = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
+    many, few = (FisheyeCondition(hot_pixels=n, hot_pairs=m) for n, m in ((50, 20), (20, 5)))
+    assert detect(opened, EarthSunView(dark, many), Camera.SUN) is DetectResult.SUN_NOT_FOUND
+    assert detect(opened, EarthSunView(NOON, few), Camera.SUN) is DetectResult.SUCCESS
 
 
 def test_dead_camera_times_out_and_the_node_goes_on(opened: Callable[..., Any]) -> None:

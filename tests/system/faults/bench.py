@@ -10,9 +10,7 @@ from smbus2 import i2c_msg
 from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.faults.injection import Injection
-from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -208,7 +206,7 @@ def small_catalogue() -> Database:
 @contextmanager
 def aramis() -> Iterator[Bench]:
     """An AraMiS star tracker that looks at Orion."""
-    scene = SkyScene(quaternion_from_pointing(*ORION_DEG, 20.0), optics=aramis_lens())
+    scene = SkyScene.pointing(*ORION_DEG, 20.0)
     board = AramisBoard(scene, small_catalogue(), seed=4)
     yield Bench("aramis", board, Aramis, NodeClient(board.serial(), ARAMIS))
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
@@ -29,7 +30,8 @@ X, Y = 20, 100
 @pytest.fixture
 def quiet(sense: Bench) -> Bench:
     """A sensor without noise, so that all pictures of the nadir camera are the same."""
-    sense.board.scene = EarthSunScene.facing(nadir_deg=NADIR_DEG, noise=False, hot_pixels=0)
+    still = EarthSunScene.facing(nadir_deg=NADIR_DEG)
+    sense.board.scene = EarthSunView(still, FisheyeCondition(noise=False))
     check_right(measure(sense))
     return sense
 

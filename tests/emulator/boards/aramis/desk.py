@@ -7,7 +7,6 @@ import numpy as np
 
 from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
 from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -28,7 +27,7 @@ def catalogue(stars_per_field: int = 5) -> Database:
 
 
 def scene(**changes: Any) -> SkyScene:
-    return SkyScene(ORION, optics=aramis_lens(), **changes)
+    return SkyScene(ORION, **changes)
 
 
 class Desk:

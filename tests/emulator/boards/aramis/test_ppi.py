@@ -1,6 +1,7 @@
 """The interface on a camera of eight lines, and on the real one's timing."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from cubestack.emulator.boards.aramis.ppi import Ppi
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.stream import StreamSegment
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
@@ -135,8 +136,8 @@ def test_a_change_that_leaves_the_frame_alone_does_not_disturb_it() -> None:
 @pytest.mark.parametrize("start_ms", [0, 40, 66])
 def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> None:
     kernel = Kernel()
-    sky = SkyScene([0, 0, 0, 1], optics=aramis_lens(), noise=False, mag_limit=3.0)
-    camera = Mt9m001(sky)
+    sky = SkyScene([0, 0, 0, 1], mag_limit=3.0)
+    camera = Mt9m001(sky, condition=replace(CONDITION, noise=False))
     ppi = Ppi(kernel, camera)
     ends: list[tuple[int, FrameEnd]] = []
     ppi.on_end = lambda end: ends.append((kernel.now, end))

@@ -184,7 +184,7 @@ def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_that_a_host_sends_stops_the_node(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    board = AramisBoard(scene(noise=False, mag_limit=3.0), None, seed=seed)
+    board = AramisBoard(scene(mag_limit=3.0), None, seed=seed)
     line = board.serial()
     commands = [m for m in INTERFACE.telecommands if m.name != "StreamDownImage"]
     for _ in range(60):

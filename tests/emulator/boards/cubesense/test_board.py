@@ -10,6 +10,7 @@ import pytest
 
 from cubestack.emulator.boards.cubesense.board import BOOT_US, CubeSenseBoard
 from cubestack.emulator.boards.cubesense.gpio import CHANNELS, GpioPins
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
@@ -30,7 +31,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 @pytest.fixture
 def board() -> Iterator[CubeSenseBoard]:
-    made = CubeSenseBoard(EarthSunScene(noise=False), seed=4)
+    made = CubeSenseBoard(EarthSunView(EarthSunScene(), FisheyeCondition(noise=False)), seed=4)
     yield made
     made.close()
 
@@ -139,7 +140,7 @@ def test_a_failed_memory_draws_too_much_each_time_it_is_switched_on(board: CubeS
 def test_truth_is_of_the_frame_that_was_stored(board: CubeSenseBoard) -> None:
     let_pass(board, 500)
     assert board.truth(Camera.NADIR) is None
-    board.scene = EarthSunScene(rate_deg_s=(0, 10.0, 0), noise=False)
+    board.scene = EarthSunScene(rate_deg_s=(0, 10.0, 0))
     start_ms = board.kernel.now / PS_PER_MS
     board.serial().write(bytes.fromhex("1f7f1401011fff"))  # capture and detect: nadir, SRAM2
     let_pass(board, 400)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar.catalogue import PAIR_LIMIT_DEG, onboard_catalogue
-from cubestack.emulator.camera.common.optics import COLUMNS, ROWS, Optics
+from cubestack.emulator.camera.mlx75412.lens import LENS
 
 ALPHA_CENTAURI = {71681: "B", 71683: "A"}
 
@@ -14,8 +14,8 @@ def test_published_number_of_stars() -> None:
 
 
 def test_every_pair_that_a_picture_can_show_is_listed() -> None:
-    x, y = COLUMNS - 0.5, ROWS - 0.5
-    corners = Optics().unproject(np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]]))
+    x, y = LENS.columns - 0.5, LENS.rows - 0.5
+    corners = LENS.unproject(np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]]))
     diagonal = np.degrees(np.arccos(np.clip(corners @ corners.T, -1, 1))).max()
     assert diagonal < PAIR_LIMIT_DEG == pytest.approx(diagonal, abs=0.1)
 

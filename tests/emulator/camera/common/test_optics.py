@@ -1,12 +1,18 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from cubestack.emulator.camera.common.optics import COLUMNS, ROWS, Distortion, Optics
+from cubestack.emulator.camera.common.optics import Distortion
+from cubestack.emulator.camera.mlx75412.lens import EFFECTIVE_WIDTH_A, LENS
+from cubestack.emulator.camera.mlx75412.pixel_array import DN12_PER_DN8, ELECTRONS_PER_DN12
+from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.firmware_model.interface.cubestar import INTERFACE
 
 
 def grid(step: int = 16) -> np.ndarray:
-    y, x = np.mgrid[0:ROWS:step, 0:COLUMNS:step]
+    y, x = np.mgrid[0:512:step, 0:1024:step]
     corners = [[-0.5, -0.5], [1023.5, -0.5], [-0.5, 511.5], [1023.5, 511.5]]
     return np.concatenate([np.stack([x.ravel(), y.ravel()], axis=1), corners])
 
@@ -23,19 +29,19 @@ def firmware_vectors(pixels: np.ndarray) -> np.ndarray:
 
 
 def test_default_lens_makes_the_firmwares_equations_exact() -> None:
-    np.testing.assert_allclose(Optics().unproject(grid()), firmware_vectors(grid()), atol=1e-15)
+    np.testing.assert_allclose(LENS.unproject(grid()), firmware_vectors(grid()), atol=1e-15)
 
 
 @pytest.mark.parametrize("distortion", Distortion)
 def test_there_and_back(distortion: Distortion) -> None:
-    lens = Optics(distortion=distortion)
+    lens = replace(LENS, distortion=distortion)
     np.testing.assert_allclose(lens.project(lens.unproject(grid())), grid(), atol=1e-9)
 
 
 def test_inverse_against_a_general_solver() -> None:
-    lens = Optics()
+    lens = LENS
     generator = np.random.default_rng(5)
-    for pixel in generator.uniform([0, 0], [COLUMNS - 1, ROWS - 1], (20, 2)):
+    for pixel in generator.uniform([0, 0], [1023, 511], (20, 2)):
         vector = firmware_vectors(pixel[None])[0]
 
         def miss(guess: np.ndarray, vector: np.ndarray = vector) -> np.ndarray:
@@ -47,7 +53,7 @@ def test_inverse_against_a_general_solver() -> None:
 
 
 def test_without_distortion_it_is_a_pinhole() -> None:
-    lens = Optics(k1=0, k2=0, p1=0, p2=0)
+    lens = replace(LENS, k1=0, k2=0, p1=0, p2=0)
     angle = np.radians(10)
     pixel = lens.project(np.array([[np.sin(angle), 0, np.cos(angle)]]))[0]
     assert pixel == pytest.approx([539.0 + 6.28 / 0.0056 * np.tan(angle), 175.5])
@@ -56,7 +62,7 @@ def test_without_distortion_it_is_a_pinhole() -> None:
 
 def test_published_field_without_distortion() -> None:
     # 49.1 x 25.7 deg at 6.28 mm, for a centred principal point.
-    lens = Optics(k1=0, k2=0, p1=0, p2=0, cx=511.5, cy=255.5)
+    lens = replace(LENS, k1=0, k2=0, p1=0, p2=0, cx=511.5, cy=255.5)
     left, right, top, bottom = lens.unproject(
         np.array([[-0.5, 255.5], [1023.5, 255.5], [511.5, -0.5], [511.5, 511.5]])
     )
@@ -67,7 +73,7 @@ def test_published_field_without_distortion() -> None:
 def test_toolbox_reading_against_the_toolboxs_own_formula() -> None:
     # Camera Calibration Toolbox: x_d = (1 + kc1 r2 + kc2 r4) x + dx with kc as published.
     kc = (-0.32358, 0.12456, 0.00414, -0.00624)
-    lens = Optics(distortion=Distortion.TOOLBOX)
+    lens = replace(LENS, distortion=Distortion.TOOLBOX)
     generator = np.random.default_rng(6)
     plane = generator.uniform([-0.4, -0.15], [0.4, 0.25], (50, 2))
     vectors = np.concatenate([plane, np.ones((50, 1))], axis=1)
@@ -81,7 +87,7 @@ def test_toolbox_reading_against_the_toolboxs_own_formula() -> None:
 
 
 def test_error_of_the_toolbox_reading_is_as_documented() -> None:
-    lens = Optics(distortion=Distortion.TOOLBOX)
+    lens = replace(LENS, distortion=Distortion.TOOLBOX)
     true, computed = lens.unproject(grid(4)), firmware_vectors(grid(4))
     miss = (true[:, :2] / true[:, 2:] - computed[:, :2] / computed[:, 2:]) * 1147.5
     miss_px = np.linalg.norm(miss, axis=1)
@@ -90,7 +96,7 @@ def test_error_of_the_toolbox_reading_is_as_documented() -> None:
 
 
 def test_what_the_lens_can_not_see_is_nan() -> None:
-    lens = Optics()
+    lens = LENS
     assert lens.half_field_deg == pytest.approx(31.4, abs=0.1)
     angles = np.radians([0, 31, 36, 60, 89, 90, 91, 180])
     along = np.array([np.cos(0.56), np.sin(0.56)])  # towards the farthest corner
@@ -102,7 +108,7 @@ def test_what_the_lens_can_not_see_is_nan() -> None:
 
 
 def test_one_direction_out_of_reach_does_not_hide_the_others() -> None:
-    lens = Optics(k1=-0.62, k2=0, p1=0, p2=0)  # folds right outside of the sensor
+    lens = replace(LENS, k1=-0.62, k2=0, p1=0, p2=0)  # folds right outside of the sensor
     plane = np.linspace(0, 0.55, 200)
     vectors = np.stack([plane, 0 * plane, np.ones(200)], axis=1)
     seen = ~np.isnan(lens.project(vectors)).any(axis=1)
@@ -115,15 +121,54 @@ def test_one_direction_out_of_reach_does_not_hide_the_others() -> None:
 
 def test_vignetting() -> None:
     vectors = np.array([[0, 0, 1.0], [np.sin(0.5), 0, np.cos(0.5)]])
-    np.testing.assert_array_equal(Optics().transmission(vectors), [1, 1])
-    np.testing.assert_allclose(Optics(vignetting=4).transmission(vectors), [1, np.cos(0.5) ** 4])
+    np.testing.assert_array_equal(LENS.transmission(vectors), [1, 1])
+    natural = replace(LENS, vignetting=4)
+    np.testing.assert_allclose(natural.transmission(vectors), [1, np.cos(0.5) ** 4])
 
 
 def test_impossible_lenses_are_refused() -> None:
     with pytest.raises(ValueError, match="psf_sigma_px must be above 0, not 0"):
-        Optics(psf_sigma_px=0)
+        replace(LENS, psf_sigma_px=0)
     with pytest.raises(ValueError, match="psf_sigma_px must be at most 20, not 21"):
-        Optics(psf_sigma_px=21)
+        replace(LENS, psf_sigma_px=21)
     for distortion, k1 in ((Distortion.INVERSE, -1.5), (Distortion.TOOLBOX, 1.5)):
         with pytest.raises(ValueError, match="folds the picture within the sensor"):
-            Optics(k1=k1, distortion=distortion)
+            replace(LENS, k1=k1, distortion=distortion)
+
+
+@pytest.mark.parametrize("name", ["columns", "rows", "aperture_mm", "field_stop_deg"])
+def test_a_lens_without_sensor_aperture_or_field_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} must be above 0"):
+        replace(double_gauss(), **{name: 0})
+
+
+def test_the_firmware_is_calibrated_to_the_lens() -> None:
+    commands = ("FocalLength", "FocalLengthComponents", "PrincipalPoint")
+    commands += ("RadialDistortionGains", "TangentalDistortionGains")
+    reset = {
+        field.name: field.reset
+        for command in commands
+        for field in INTERFACE.telecommand(f"set{command}").fields
+    }
+    names = {"FocalLength": LENS.focal_length_mm} | {
+        name.capitalize(): getattr(LENS, name)
+        for name in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
+    }
+    assert reset == names
+
+
+def test_star_at_the_detection_limit() -> None:
+    electrons = LENS.electrons_per_second(3.8) * 0.3856
+    assert electrons / ELECTRONS_PER_DN12 / DN12_PER_DN8 == pytest.approx(300, abs=1)
+    assert 0.6 * 3000 < EFFECTIVE_WIDTH_A < 0.8 * 6000  # within the published factors
+
+
+def test_flux_against_equation_3_4_2() -> None:
+    # Aperture in cm^2, times width, times 10^((15 - 2M)/5) photons: a hundred in five magnitudes.
+    magnitudes = np.linspace(-1.4, 6, 12)
+    expected = np.pi * 0.25**2 * EFFECTIVE_WIDTH_A * 10 ** ((15 - 2 * magnitudes) / 5)
+    np.testing.assert_allclose(LENS.electrons_per_second(magnitudes), expected)
+    wide = replace(LENS, aperture_mm=10.0)
+    np.testing.assert_allclose(wide.electrons_per_second(magnitudes), 4 * expected)
+    long = replace(LENS, effective_width_a=2 * EFFECTIVE_WIDTH_A)
+    np.testing.assert_allclose(long.electrons_per_second(magnitudes), 2 * expected)

@@ -5,7 +5,9 @@ import numpy as np
 
 from cubestack.emulator.camera.common.exposure import star_light
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.mlx75412.imager import Imager
+from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mlx75412.imager import Mlx75412Imager
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.camera.mlx75412.pixel_array import Corrections, ideal_counts
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 
@@ -13,32 +15,37 @@ LONG = RollingShutter(10**12, Fraction(132_200_000), 2917, 2917)
 ORION = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
 
 
-def picture(scene: SkyScene | PictureScene, shutter: RollingShutter = LONG) -> np.ndarray:
-    return Imager(seed=2).picture(scene, shutter, Corrections())
+def picture(
+    scene: SkyScene | PictureScene,
+    shutter: RollingShutter = LONG,
+    condition: SkyCondition = CONDITION,
+) -> np.ndarray:
+    return Mlx75412Imager(seed=2).picture(scene, condition, shutter, Corrections())
 
 
 def test_noise_repeats_for_the_same_scene_and_frame_only() -> None:
     np.testing.assert_array_equal(picture(ORION), picture(ORION))
-    assert np.any(picture(ORION) != picture(replace(ORION, seed=1)))
+    assert np.any(picture(ORION) != picture(ORION, condition=replace(CONDITION, seed=1)))
     assert np.any(picture(ORION) != picture(ORION, replace(LONG, readout_ps=2 * 10**12)))
 
 
 def test_noise_does_not_depend_on_frames_that_were_not_rendered() -> None:
-    imager = Imager(seed=2)
-    imager.picture(ORION, replace(LONG, readout_ps=5), Corrections())
-    np.testing.assert_array_equal(imager.picture(ORION, LONG, Corrections()), picture(ORION))
+    imager = Mlx75412Imager(seed=2)
+    imager.picture(ORION, CONDITION, replace(LONG, readout_ps=5), Corrections())
+    again = imager.picture(ORION, CONDITION, LONG, Corrections())
+    np.testing.assert_array_equal(again, picture(ORION))
 
 
 def test_without_noise_only_light_is_left() -> None:
-    quiet = replace(ORION, noise=False, temperature_c=65)
-    np.testing.assert_array_equal(picture(quiet), ideal_counts(star_light(quiet, LONG)))
-    assert picture(quiet).flags.c_contiguous
+    quiet = picture(ORION, condition=replace(CONDITION, noise=False, temperature_c=65))
+    np.testing.assert_array_equal(quiet, ideal_counts(star_light(ORION, LENS, LONG)))
+    assert quiet.flags.c_contiguous
 
 
-def test_hot_pixels_come_from_the_scene() -> None:
-    dark = replace(ORION, mag_limit=-5, hot_pixels=0)
-    assert picture(dark).max() < 6
-    assert np.sum(picture(replace(dark, hot_pixels=100)) > 6) > 50
+def test_hot_pixels_come_from_the_condition() -> None:
+    dark = replace(ORION, mag_limit=-5)
+    assert picture(dark, condition=replace(CONDITION, hot_pixels=0)).max() < 6
+    assert np.sum(picture(dark, condition=replace(CONDITION, hot_pixels=100)) > 6) > 50
 
 
 def test_photograph_is_light_as_it_is(striped: PictureScene) -> None:

@@ -1,15 +1,16 @@
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.photometry import DN12_PER_DN8, ELECTRONS_PER_DN12
+from cubestack.emulator.camera.common.imager import hot_pixels
 from cubestack.emulator.camera.mlx75412.pixel_array import (
+    DN12_PER_DN8,
+    ELECTRONS_PER_DN12,
     FACTORY_DEAD,
     FACTORY_HOT,
     READ_NOISE_ELECTRONS,
     Corrections,
     PixelArray,
     dark_dn12_per_second,
-    grown_hot_pixels,
     ideal_counts,
 )
 
@@ -120,15 +121,15 @@ def test_defects_and_their_correction() -> None:
 
 
 def test_grown_hot_pixels_are_not_corrected() -> None:
-    hot = grown_hot_pixels(seed=9, count=50)
+    hot = hot_pixels(9, 50, 512 * 1024)
     counts = frame(flat(0), exposure_s=0.4, grown_hot=hot)
     bright = np.flatnonzero(counts.ravel() > 10)
     assert len(bright) > 20
     assert set(bright) <= set(hot[0])
     cold = frame(flat(0), exposure_s=0.4, temperature_c=-20, grown_hot=hot)
     assert np.sum(cold > 10) == 0
-    np.testing.assert_array_equal(hot[0], grown_hot_pixels(9, 50)[0])
-    assert set(hot[0]) != set(grown_hot_pixels(10, 50)[0])
+    np.testing.assert_array_equal(hot[0], hot_pixels.__wrapped__(9, 50, 512 * 1024)[0])
+    assert set(hot[0]) != set(hot_pixels(10, 50, 512 * 1024)[0])
 
 
 def test_seeds_repeat_a_sensor_and_a_frame() -> None:

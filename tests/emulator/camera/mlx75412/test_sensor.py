@@ -1,11 +1,14 @@
 import itertools
 import logging
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cameras.mlx75412 import (
@@ -327,11 +330,14 @@ def test_pixels_are_rendered_on_demand_and_once(camera: Mlx75412) -> None:
     assert picture.flags.c_contiguous
     assert segment.pixels() is picture
     camera.scene = SkyScene.pointing(200.0, 50.0)
-    assert np.any(segment.pixels() != picture)
+    assert np.any((other := segment.pixels()) != picture)
+    camera.condition = replace(camera.condition, noise=False)
+    assert np.any(segment.pixels() != other)
 
 
 def test_features_reach_the_pixels() -> None:
-    camera = Mlx75412(SkyScene([0, 0, 0, 1], mag_limit=-5, temperature_c=45), seed=1)
+    warm = replace(CONDITION, temperature_c=45)
+    camera = Mlx75412(SkyScene([0, 0, 0, 1], mag_limit=-5), condition=warm, seed=1)
     configure(camera)
 
     def mean(features: int, now_ps: int) -> float:
@@ -361,5 +367,12 @@ def test_published_set_up_only_logs_what_is_not_modelled(caplog: pytest.LogCaptu
     ]
 
 
-def test_temperature_is_the_scenes() -> None:
-    assert Mlx75412(SkyScene([0, 0, 0, 1], temperature_c=-12.5)).temperature_c == -12.5
+def test_a_view_brings_its_condition_and_a_scene_leaves_it() -> None:
+    camera = Mlx75412(SkyScene([0, 0, 0, 1]))
+    assert (camera.condition, camera.temperature_c) == (CONDITION, 20)
+    cold = replace(CONDITION, temperature_c=-12.5)
+    camera.scene = SkyView(SkyScene.pointing(1, 2), cold)
+    camera.scene = other = SkyScene.pointing(3, 4)
+    assert camera.scene is other
+    assert (camera.condition, camera.temperature_c) == (cold, -12.5)
+    assert Mlx75412(SkyView(other, cold)).temperature_c == -12.5

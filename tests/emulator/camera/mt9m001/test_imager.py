@@ -7,7 +7,7 @@ import numpy as np
 
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
@@ -35,16 +35,14 @@ def test_a_window_s_rows_have_their_own_times() -> None:
     scene = SkyScene(
         quaternion_from_pointing(84.0, -1.0, 0.0),
         rate_deg_s=(0.0, 5.0, 0.0),
-        noise=False,
         mag_limit=5.0,
-        hot_pixels=0,
-        optics=aramis_lens(),
     )
+    quiet = replace(CONDITION, noise=False)
     imager = Mt9m001Imager(0, NoiseTerms(), None)
     first_ps = 2 * 10**11
-    whole = imager.picture(scene, shutter(first_ps), WHOLE)
+    whole = imager.picture(scene, quiet, shutter(first_ps), WHOLE)
     window = replace(WHOLE, row=600, rows=300)
     later = shutter(first_ps + int(600 * LINE_PS))
-    np.testing.assert_array_equal(imager.picture(scene, later, window), whole[600:900])
-    earlier = imager.picture(scene, shutter(first_ps), window)
+    np.testing.assert_array_equal(imager.picture(scene, quiet, later, window), whole[600:900])
+    earlier = imager.picture(scene, quiet, shutter(first_ps), window)
     assert (earlier != whole[600:900]).any()

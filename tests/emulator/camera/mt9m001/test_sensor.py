@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.mt9m001.lens import aramis_lens
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412 import lens as other_lens
+from cubestack.emulator.camera.mt9m001.lens import CONDITION, double_gauss
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
-from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from cubestack.firmware_model.interface.cameras.mt9m001 import (
@@ -24,9 +25,11 @@ ROW_CLOCKS = 1524
 ROW_S = ROW_CLOCKS / PIXEL_CLOCK_HZ
 
 
+QUIET = replace(CONDITION, noise=False)
+
+
 def scene(**changes: object) -> SkyScene:
-    orion = quaternion_from_pointing(84.0, -1.0, 0.0)
-    return SkyScene(orion, optics=aramis_lens(), **changes)  # type: ignore[arg-type]
+    return replace(SkyScene.pointing(84.0, -1.0), **changes)
 
 
 def put(camera: Mt9m001, name: str, *words: int, now_ps: int = 0) -> None:
@@ -202,7 +205,7 @@ def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure() -> None:
 
 
 def test_a_window_is_a_part_of_the_picture() -> None:
-    still = scene(noise=False, hot_pixels=0)
+    still = SkyView(scene(), QUIET)
     camera = Mt9m001(still)
     put(camera, "SHUTTER_WIDTH", 6000)
     whole = frame(camera, 0)
@@ -220,11 +223,10 @@ def test_a_window_is_a_part_of_the_picture() -> None:
 
 
 def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
-    dark = scene(noise=False, mag_limit=-5.0, hot_pixels=0)
-    lit = replace(scene(noise=False, hot_pixels=0), optics=aramis_lens(spot_sigma_px=4))
-    camera = Mt9m001(dark)
+    camera = Mt9m001(scene(mag_limit=-5.0), condition=QUIET)
     assert np.unique(frame(camera, 0)).tolist() == [2]  # the black level, rounded
-    bright = Mt9m001(lit)
+    wide = replace(QUIET, optics=double_gauss(spot_sigma_px=4))
+    bright = Mt9m001(scene(), condition=wide)
     put(bright, "SHUTTER_WIDTH", 6000)
     once = frame(bright, 0).astype(int) - 1.5
     put(bright, "GLOBAL_GAIN", gain_register(8.0), now_ps=PS_PER_S)
@@ -239,24 +241,32 @@ def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
 
 
 def test_frames_repeat_with_the_same_seed_and_differ_in_time() -> None:
-    one, two = Mt9m001(scene(seed=5)), Mt9m001(scene(seed=5))
+    one, two, other = (
+        Mt9m001(scene(), condition=replace(CONDITION, seed=seed)) for seed in (5, 5, 6)
+    )
     np.testing.assert_array_equal(frame(one, 0), frame(two, 0))
     assert (frame(one, 0) != frame(one, PS_PER_S)).any()
-    assert (frame(one, 0) != frame(Mt9m001(scene(seed=6)), 0)).any()
+    assert (frame(one, 0) != frame(other, 0)).any()
 
 
-def test_another_sensor_s_scene_is_refused() -> None:
-    with pytest.raises(ValueError, match="1280 x 1024 pixels, the scene's sensor"):
-        Mt9m001(SkyScene([0, 0, 0, 1]))
+def test_another_sensor_s_lens_and_what_is_no_sky_are_refused() -> None:
+    with pytest.raises(ValueError, match="1280 x 1024 pixels, the lens is for 1024 x 512"):
+        Mt9m001(scene(), condition=other_lens.CONDITION)
+    camera = Mt9m001(scene())
+    with pytest.raises(ValueError, match="the lens is for 1024 x 512"):
+        camera.condition = other_lens.CONDITION
+    with pytest.raises(TypeError, match="sees the sky or a picture, not 3"):
+        camera.scene = 3
+    assert camera.condition is CONDITION
 
 
 def test_a_turning_camera_smears_along_its_motion() -> None:
     """At 10 deg/s across, 10 ms of exposure draw 4.7 px."""
-    turning = scene(rate_deg_s=(0.0, 10.0, 0.0), noise=False, mag_limit=4.5, hot_pixels=0)
+    turning = scene(rate_deg_s=(0.0, 10.0, 0.0), mag_limit=4.5)
 
     def spread(sky: SkyScene) -> tuple[float, float]:
         """Variances of the brightest star along the columns and along the rows, px^2."""
-        camera = Mt9m001(sky)
+        camera = Mt9m001(sky, condition=QUIET)
         put(camera, "SHUTTER_WIDTH", 315)
         put(camera, "GLOBAL_GAIN", gain_register(4.0))
         picture = frame(camera, 0)
@@ -270,7 +280,7 @@ def test_a_turning_camera_smears_along_its_motion() -> None:
         )
 
     wide, high = spread(turning)
-    round_wide, round_high = spread(scene(noise=False, mag_limit=4.5, hot_pixels=0))
+    round_wide, round_high = spread(scene(mag_limit=4.5))
     assert round_wide == pytest.approx(round_high, rel=0.1)
     streak_px = 10 * 315 * ROW_S * np.radians(1) * 2692.34
     assert wide - high == pytest.approx(streak_px**2 / 12, rel=0.2)

@@ -5,12 +5,13 @@ from scipy.spatial.transform import Rotation
 from cubestack.emulator.camera.ov7620.fisheye import (
     FIELD_DEG,
     LENSES,
-    angles_from_vector,
+    PIXELS_PER_DEGREE,
     distorted,
     undistorted,
-    vector_from_angles,
 )
-from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.firmware_model.interface.cubesense import codes
 
 
 def towards(theta_deg: float, phi_deg: float) -> np.ndarray:
@@ -23,6 +24,12 @@ def towards(theta_deg: float, phi_deg: float) -> np.ndarray:
 def test_published_radii_of_the_test_ball() -> None:
     assert distorted(182.0) == pytest.approx(168, abs=0.5)
     assert undistorted(168.0) == pytest.approx(182, abs=0.5)
+
+
+def test_the_firmware_knows_the_lens_and_the_picture() -> None:
+    assert codes.PIXELS_PER_DEGREE == PIXELS_PER_DEGREE
+    assert [camera.name for camera in codes.Camera] == [target.name for target in Target]
+    assert list(map(int, codes.Camera)) == list(map(int, Target))
 
 
 def test_rim_is_where_the_field_ends() -> None:
@@ -50,16 +57,16 @@ def test_angles_are_a_turn_away_from_the_boresight() -> None:
 
 
 @pytest.mark.parametrize(
-    ("camera", "centre"), [(Camera.SUN, (369, 250)), (Camera.NADIR, (371, 236))]
+    ("camera", "centre"), [(Target.SUN, (369, 250)), (Target.NADIR, (371, 236))]
 )
-def test_published_boresights(camera: Camera, centre: tuple[float, float]) -> None:
+def test_published_boresights(camera: Target, centre: tuple[float, float]) -> None:
     lens = LENSES[camera]
     np.testing.assert_array_equal(lens.project([0, 0, 2.0]), centre)
     np.testing.assert_array_equal(lens.unproject([centre]), [[0, 0, 1]])
 
 
 def test_right_is_right_and_down_is_down() -> None:
-    lens = LENSES[Camera.NADIR]
+    lens = LENSES[Target.NADIR]
     x, y = lens.project(towards(63.48, 0))
     assert (x, y) == (pytest.approx(371 + float(distorted(63.48 * 2.9))), pytest.approx(236))
     x, y = lens.project(towards(10.0, 90))
@@ -67,7 +74,7 @@ def test_right_is_right_and_down_is_down() -> None:
 
 
 def test_projecting_is_undone() -> None:
-    lens = LENSES[Camera.SUN]
+    lens = LENSES[Target.SUN]
     generator = np.random.default_rng(5)
     for theta, phi in generator.uniform([0, -180], [FIELD_DEG, 180], (200, 2)):
         pixel = lens.project(towards(theta, phi))
@@ -76,14 +83,14 @@ def test_projecting_is_undone() -> None:
 
 
 def test_what_is_outside_the_field_is_not_projected() -> None:
-    lens = LENSES[Camera.SUN]
+    lens = LENSES[Target.SUN]
     assert lens.project(towards(95.001, 20)) is None
     assert lens.project([0, 0, -1.0]) is None
     assert lens.project(towards(94.999, 20)) is not None
 
 
-@pytest.mark.parametrize("camera", list(Camera))
-def test_field_of_view(camera: Camera) -> None:
+@pytest.mark.parametrize("camera", list(Target))
+def test_field_of_view(camera: Target) -> None:
     lens = LENSES[camera]
     field = lens.field
     y, x = np.divmod(field.index, 640)
@@ -106,7 +113,7 @@ def test_field_of_view(camera: Camera) -> None:
 
 
 def test_pixel_angle_is_that_between_neighbours() -> None:
-    lens = LENSES[Camera.NADIR]
+    lens = LENSES[Target.NADIR]
     field = lens.field
     for x, y in [(380, 240), (471, 336), (371, 36), (160, 236)]:
         here, right, down = lens.unproject(

@@ -6,18 +6,18 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistorted
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE, scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
 from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 
-SUN, NADIR = Camera.SUN, Camera.NADIR
+SUN, NADIR = Target.SUN, Target.NADIR
 ROWS, COLUMNS = np.mgrid[:480, :640]
 DOWN = Mounting([0, 0, 1])
 
 
-def levels(scene: EarthSunScene, camera: Camera) -> np.ndarray:
+def levels(scene: EarthSunScene, camera: Target, bloom_px: float = 7.0) -> np.ndarray:
     """Grey values at the exposure of the published levels, without noise and without a limit."""
-    return BLACK + scene_light(scene, camera, 0) * (USUAL_EXPOSURE[camera] * EXPOSURE_LINES)
+    lines = USUAL_EXPOSURE[camera] * EXPOSURE_LINES
+    return BLACK + scene_light(scene, camera, bloom_px, 0) * lines
 
 
 def noon(scene: EarthSunScene) -> EarthSunScene:
@@ -25,7 +25,7 @@ def noon(scene: EarthSunScene) -> EarthSunScene:
     return replace(scene, sun=-np.asarray(scene.nadir))
 
 
-def radius(camera: Camera) -> np.ndarray:
+def radius(camera: Target) -> np.ndarray:
     return np.hypot(COLUMNS - LENSES[camera].cx, ROWS - LENSES[camera].cy)
 
 
@@ -86,7 +86,7 @@ def test_terminator_divides_the_picture() -> None:
 
 @pytest.mark.parametrize("bloom_px", [4.0, 6.0, 7.0, 8.0])
 def test_sun_has_the_size_asked_for_on_the_boresight(bloom_px: float) -> None:
-    picture = levels(EarthSunScene(bloom_px=bloom_px), SUN)
+    picture = levels(EarthSunScene(), SUN, bloom_px)
     size, centre = bright(picture)
     assert size == pytest.approx(bloom_px, abs=0.25)
     np.testing.assert_allclose(centre, [369, 250], atol=1e-9)
@@ -95,7 +95,7 @@ def test_sun_has_the_size_asked_for_on_the_boresight(bloom_px: float) -> None:
 
 
 def test_sun_shrinks_as_published_towards_the_rim() -> None:
-    size, _ = bright(levels(EarthSunScene.facing((90, 0), bloom_px=8), SUN))
+    size, _ = bright(levels(EarthSunScene.facing((90, 0)), SUN, 8.0))
     assert size == pytest.approx(6, abs=0.3)
 
 
@@ -141,9 +141,7 @@ def test_moon_is_small_and_has_phases() -> None:
     assert half == pytest.approx(full / 2, rel=0.01)
     assert crescent == pytest.approx(full * (1 - np.cos(np.radians(30))) / 2, rel=0.01)
     hidden = EarthSunScene(moon=(0, 0, 1))
-    np.testing.assert_array_equal(
-        scene_light(hidden, NADIR, 0), scene_light(replace(hidden, moon=None), NADIR, 0)
-    )
+    np.testing.assert_array_equal(levels(hidden, NADIR), levels(replace(hidden, moon=None), NADIR))
 
 
 def test_reflection_is_an_even_disc_in_its_own_camera() -> None:
@@ -160,6 +158,6 @@ def test_reflection_is_an_even_disc_in_its_own_camera() -> None:
 
 def test_picture_is_that_of_its_instant() -> None:
     scene = EarthSunScene(rate_deg_s=(0, 1.0, 0), unevenness=0)
-    later = scene_light(scene, NADIR, 10 * 10**12)
+    later = scene_light(scene, NADIR, 7.0, 10 * 10**12)
     expected = EarthSunScene.facing(nadir_deg=(-10, 0), unevenness=0)
-    np.testing.assert_allclose(later, scene_light(noon(expected), NADIR, 0), atol=0.02)
+    np.testing.assert_allclose(later, scene_light(noon(expected), NADIR, 7.0, 0), atol=0.02)

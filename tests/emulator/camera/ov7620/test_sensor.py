@@ -9,9 +9,9 @@ import pytest
 from cubestack.emulator.camera.common.stream import StreamSegment
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS, window_column, window_row
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 
 from .sccb_master import US, send
 
@@ -29,8 +29,12 @@ def write(camera: Ov7620, values: dict[str, int], now_ps: int = 0) -> None:
         assert send(camera.on_pin, lambda: camera.sda, data, start) == [0, 0, 0]
 
 
-def make(scene: EarthSunScene, camera: Camera = Camera.NADIR, **values: int) -> Ov7620:
-    made = Ov7620(scene, camera)
+def quiet(scene: EarthSunScene | EarthSunView, camera: Target = Target.NADIR) -> Ov7620:
+    return Ov7620(scene, camera, FisheyeCondition(noise=False))
+
+
+def make(scene: EarthSunScene, camera: Target = Target.NADIR, **values: int) -> Ov7620:
+    made = quiet(scene, camera)
     write(made, MANUAL | {"EXPOSURE": USUAL_EXPOSURE[camera]} | values)
     return made
 
@@ -56,7 +60,7 @@ def picture(camera: Ov7620, frame: int = 3) -> np.ndarray:
 
 @pytest.fixture
 def scene() -> EarthSunScene:
-    return EarthSunScene(noise=False, seed=4)
+    return EarthSunScene(seed=4)
 
 
 def test_published_frame_timing(scene: EarthSunScene) -> None:
@@ -188,21 +192,19 @@ def test_mirror(scene: EarthSunScene) -> None:
 
 
 def test_colour_mode_has_less_detail_from_row_to_row() -> None:
-    spot = Reflection(Camera.SUN, 10, 10, radius_px=1, level=150)
-    scene = EarthSunScene(sun=(0, 0, 1), noise=False, reflections=(spot,))
-    fine = picture(make(scene, Camera.SUN)).astype(int)
-    coarse = picture(make(scene, Camera.SUN, COMMON_H=0x20)).astype(int)
+    spot = Reflection(Target.SUN, 10, 10, radius_px=1, level=150)
+    scene = EarthSunScene(sun=(0, 0, 1), reflections=(spot,))
+    fine = picture(make(scene, Target.SUN)).astype(int)
+    coarse = picture(make(scene, Target.SUN, COMMON_H=0x20)).astype(int)
     assert coarse.max() < fine.max()
     np.testing.assert_allclose(coarse[:-1], (fine[:-1] + fine[1:]) / 2, atol=1)
 
 
 def test_automatic_functions_after_reset_bring_the_mean_to_their_level() -> None:
-    scene = EarthSunScene(noise=False)
-    camera = Ov7620(scene, Camera.NADIR)
+    camera = quiet(EarthSunScene())
     grey = picture(camera)
     assert 85 < grey.mean() < 110  # the brightest pixels may saturate
-    dark = EarthSunScene(sun=(0, 0, 1), noise=False)
-    shutter = Ov7620(dark, Camera.NADIR).frame_from(100 * MS)
+    shutter = quiet(EarthSunScene(sun=(0, 0, 1))).frame_from(100 * MS)
     assert shutter.exposure_lines == 510
 
 
@@ -218,7 +220,7 @@ def test_automatic_gain_acts_on_a_fixed_exposure(scene: EarthSunScene) -> None:
 
 
 def test_reset_bit_restores_the_registers_and_itself(scene: EarthSunScene) -> None:
-    fresh = picture(Ov7620(scene, Camera.NADIR), 9)
+    fresh = picture(quiet(scene), 9)
     camera = make(scene, GAIN=0x3F)
     assert np.any(picture(camera, 3) != fresh)
     write(camera, {"COMMON_A": 0x80}, int(4 * FRAME_PS))
@@ -261,7 +263,7 @@ def test_without_power_there_is_nothing(scene: EarthSunScene) -> None:
     lines = camera.segment_at(segment.start_ps + int(50 * LINE_PS))
     assert lines is not None
     assert lines.pixels is not None
-    np.testing.assert_array_equal(lines.pixels(), picture(Ov7620(scene, Camera.NADIR), 0))
+    np.testing.assert_array_equal(lines.pixels(), picture(quiet(scene), 0))
 
 
 def test_frame_lookup(scene: EarthSunScene) -> None:
@@ -276,28 +278,39 @@ def test_frame_lookup(scene: EarthSunScene) -> None:
 
 
 def test_picture_is_taken_at_the_middle_of_the_exposure_of_the_middle_row() -> None:
-    turning = EarthSunScene(rate_deg_s=(0, 30.0, 0), noise=False, unevenness=0)
+    turning = EarthSunScene(rate_deg_s=(0, 30.0, 0), unevenness=0)
     camera = make(turning, EXPOSURE=200)
     camera.scene = turning
     middle = camera.frame_from(int(3 * FRAME_PS))
     tilt = 30.0 * middle.mid_exposure_ps(239.5) / 10**12
-    still = EarthSunScene.facing(nadir_deg=(-tilt, 0), noise=False, unevenness=0)
+    still = EarthSunScene.facing(nadir_deg=(-tilt, 0), unevenness=0)
     expected = picture(make(replace(still, sun=-np.asarray(still.nadir)), EXPOSURE=200))
     difference = picture(camera).astype(int) - expected
     assert np.mean(difference != 0) < 0.01
 
 
-def test_pictures_are_rendered_once_and_noise_belongs_to_the_frame() -> None:
-    camera = make(EarthSunScene(seed=1, hot_pixels=9))
+def test_pictures_are_rendered_once_and_noise_belongs_to_the_frame(scene: EarthSunScene) -> None:
+    def noisy(seed: int) -> Ov7620:
+        return make(EarthSunView(scene, FisheyeCondition(seed=seed, hot_pixels=9)))
+
+    camera = noisy(1)
     one = picture(camera, 3)
     assert picture(camera, 3) is one
     assert np.any(picture(camera, 4) != one)
     np.testing.assert_array_equal(picture(camera, 3), one)  # rendered anew
-    np.testing.assert_array_equal(picture(make(EarthSunScene(seed=1, hot_pixels=9)), 3), one)
-    assert np.any(picture(make(EarthSunScene(seed=2, hot_pixels=9)), 3) != one)
+    np.testing.assert_array_equal(picture(noisy(1), 3), one)
+    assert np.any(picture(noisy(2), 3) != one)
     hot = np.flatnonzero(one == 255)
     assert hot.size == 9
     assert np.all(picture(camera, 4).ravel()[hot] == 255)
+
+
+def test_a_reflection_beyond_the_field_is_refused(scene: EarthSunScene) -> None:
+    far = Reflection(Target.SUN, 90, 90, radius_px=1, level=1)
+    with pytest.raises(ValueError, match="at_deg must be within 95"):
+        make(replace(scene, reflections=(far,)))
+    with pytest.raises(TypeError, match="sees Earth and Sun, not 3"):
+        make(scene).scene = 3
 
 
 def test_a_new_scene_is_seen_by_the_next_picture(scene: EarthSunScene) -> None:

@@ -4,13 +4,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cubestack.emulator.scene import earth_sun_file
-from cubestack.emulator.scene.earth_sun import Reflection
-from cubestack.emulator.scene.earth_sun_file import load_earth_sun_scene
+from cubestack.emulator.camera.ov7620 import scene_file
+from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
+from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+from cubestack.emulator.scene.earth_sun import Reflection, Target
 from cubestack.emulator.scene.file import SceneError
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 
-SUN, NADIR = Camera.SUN, Camera.NADIR
+SUN, NADIR = Target.SUN, Target.NADIR
 
 
 def save(folder: Path, text: str) -> Path:
@@ -20,7 +20,7 @@ def save(folder: Path, text: str) -> Path:
 
 
 def test_scene_from_a_file(tmp_path: Path) -> None:
-    scene = load_earth_sun_scene(
+    view = load_earth_sun_scene(
         save(
             tmp_path,
             """
@@ -48,6 +48,7 @@ def test_scene_from_a_file(tmp_path: Path) -> None:
             """,
         )
     )
+    scene = view.scene
     truth = scene.truth(NADIR, 0)
     assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((10, -20))
     np.testing.assert_allclose(scene.sun, [0, 0.6, -0.8])
@@ -55,24 +56,24 @@ def test_scene_from_a_file(tmp_path: Path) -> None:
     np.testing.assert_allclose(scene.moon, [1, 0, 0])
     np.testing.assert_allclose(scene.nadir_camera.matrix[2], [1, 0, 0])
     assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
-    assert (scene.altitude_km, scene.bloom_px, scene.unevenness) == (600, 6.5, 0.2)
-    assert (scene.glow_km, scene.hot_pixels, scene.hot_pairs) == (0, 5, 2)
-    assert (scene.noise, scene.seed) == (False, 9)
+    assert (scene.altitude_km, scene.unevenness, scene.glow_km, scene.seed) == (600, 0.2, 0, 9)
+    assert view.condition == FisheyeCondition(6.5, 5, 2, noise=False, seed=9)
     assert tuple(np.asarray(scene.rate_deg_s)) == (0, 0.1, 0)
 
 
 def test_example_in_the_documentation_is_a_scene(tmp_path: Path) -> None:
-    assert earth_sun_file.__doc__ is not None
-    example = earth_sun_file.__doc__.split("::\n", 1)[1].rsplit("\n\n", 1)[0]
-    scene = load_earth_sun_scene(save(tmp_path, textwrap.dedent(example)))
+    assert scene_file.__doc__ is not None
+    example = scene_file.__doc__.split("::\n", 1)[1].rsplit("\n\n", 1)[0]
+    scene = load_earth_sun_scene(save(tmp_path, textwrap.dedent(example))).scene
     assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
     assert scene.truth(NADIR, 0).visible
 
 
 def test_shortest_file(tmp_path: Path) -> None:
-    scene = load_earth_sun_scene(save(tmp_path, 'kind = "earth-sun"'))
-    assert scene.altitude_km == 750
-    assert scene.moon is None
+    view = load_earth_sun_scene(save(tmp_path, 'kind = "earth-sun"'))
+    assert view.scene.altitude_km == 750
+    assert view.scene.moon is None
+    assert view.condition == FisheyeCondition()
 
 
 KIND = 'kind = "earth-sun"\n'

@@ -1,4 +1,4 @@
-"""Scene files for a sun and nadir sensor: TOML, every key but ``kind`` may be left out::
+"""Scene files for sun and nadir cameras: TOML, every key but ``kind`` may be left out::
 
     kind = "earth-sun"
     altitude_km = 750.0
@@ -17,65 +17,64 @@
     radius_px = 4.0
     level = 200.0                  # grey values above black
 
-Directions are in scene axes, the satellite's body axes at time 0; see `EarthSunScene` for the rest.
+Directions are in scene axes, the satellite's body axes at time 0. Each key goes to the scene or to
+the cameras' condition, whichever has it; ``seed`` to both.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cubestack.emulator.camera.ov7620.fisheye import vector_from_angles
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection
+from cubestack.emulator.camera.ov7620.fisheye import check_field
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
 from cubestack.emulator.scene.file import (
     Readers,
     SceneError,
     flag,
-    load_toml,
     number,
+    read_scene_file,
     read_table,
     several,
+    subtable,
+    values_for,
     whole,
 )
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 
 __all__ = ["load_earth_sun_scene"]
 
 
-def load_earth_sun_scene(path: Path) -> EarthSunScene:
-    """The scene that a TOML file describes; SceneError names the key that is wrong."""
-    table = load_toml(path)
-    try:
-        kind = table.pop("kind", None)
-        if kind != "earth-sun":
-            raise SceneError(f'kind must be "earth-sun" for a sun and nadir sensor, not {kind!r}')
-        return _scene(read_table(table, _SCENE))
-    except ValueError as error:
-        raise SceneError(f"{path}: {error}") from None
+def load_earth_sun_scene(path: Path) -> EarthSunView:
+    """What the TOML file ``path`` gives; SceneError names the key that is wrong."""
+    return read_scene_file(path, {"earth-sun": _view}, '"earth-sun" for a sun and nadir sensor')
 
 
-def _scene(values: dict[str, Any]) -> EarthSunScene:
+def _view(table: dict[str, Any]) -> EarthSunView:
+    values = read_table(table, _SCENE)
     angles = {}
     for name in ("sun", "nadir"):
         if f"{name}_deg" in values:
             if name in values:
                 raise SceneError(f"give either {name} or {name}_deg, not both")
             angles[name] = values.pop(f"{name}_deg")
-    scene = EarthSunScene(**values)
-    for name, camera in (("sun", scene.sun_camera), ("nadir", scene.nadir_camera)):
-        if name in angles:
-            values[name] = camera.matrix.T @ vector_from_angles(*angles[name])
-    return EarthSunScene(**values) if angles else scene
+    condition = FisheyeCondition(**values_for(FisheyeCondition, values))
+    values = values_for(EarthSunScene, values)
+    mounted = EarthSunScene(**values)
+    for name, (alpha, beta) in angles.items():
+        camera = mounted.sun_camera if name == "sun" else mounted.nadir_camera
+        values[name] = camera.matrix.T @ vector_from_angles(alpha, beta)
+    return EarthSunView(EarthSunScene(**values), condition)
 
 
 def _mounting(value: Any) -> Mounting:
-    values = _table(value, {"boresight": several(3, number), "right": several(3, number)})
+    values = subtable({"boresight": several(3, number), "right": several(3, number)})(value)
     if "boresight" not in values:
         raise SceneError("needs the key boresight")
     return Mounting(**values)
 
 
-def _camera(value: Any) -> Camera:
-    names = {camera.name.lower(): camera for camera in Camera}
+def _camera(value: Any) -> Target:
+    names = {camera.name.lower(): camera for camera in Target}
     if value not in names:
         raise SceneError(f"must be one of {list(names)}, not {value!r}")
     return names[value]
@@ -84,20 +83,15 @@ def _camera(value: Any) -> Camera:
 def _reflections(value: Any) -> tuple[Reflection, ...]:
     if not isinstance(value, list):
         raise SceneError("must be tables, each under [[reflections]]")
-    return tuple(_reflection(_table(item, _REFLECTION)) for item in value)
+    return tuple(_reflection(subtable(_REFLECTION)(item)) for item in value)
 
 
 def _reflection(values: dict[str, Any]) -> Reflection:
     if missing := _REFLECTION.keys() - values.keys():
         raise SceneError(f"needs the keys {', '.join(sorted(missing))}")
     alpha, beta = values.pop("at_deg")
+    check_field(alpha, beta)
     return Reflection(alpha_deg=alpha, beta_deg=beta, **values)
-
-
-def _table(value: Any, readers: Readers) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise SceneError(f"must be a table, not {value!r}")
-    return read_table(value, readers)
 
 
 _REFLECTION: Readers = {

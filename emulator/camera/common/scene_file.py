@@ -1,0 +1,133 @@
+"""Scene files for cameras that look at the sky: TOML, of one of two kinds::
+
+    kind = "sky"
+    ra_deg = 83.8                  # or quaternion = [x, y, z, w], inertial to camera, scalar last
+    dec_deg = -5.4
+    roll_deg = 30.0                # angle of the picture's up direction, east of north
+    rate_deg_s = [0.0, 0.1, 0.0]   # body rate in camera axes: x right, y down, z out of the lens
+    mag_limit = 3.8                # leave out to see all stars
+
+    kind = "picture"
+    file = "night.jpg"             # relative to the scene file
+    crop = [0, 256]                # column and row of the first pixel used
+
+Each key goes to the scene or to the camera's condition, whichever has it; ``seed`` to both.
+
+A picture is light as it is: the camera gives its grey values unchanged, whatever exposure is set.
+Only an undefined frame differs, in proportion to its exposure. With ``exposure_ms``, the exposure
+that the picture was taken with, it scales with any exposure.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from cubestack.emulator.camera.common.optics import Distortion, Optics
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.file import (
+    Readers,
+    SceneError,
+    flag,
+    number,
+    read_scene_file,
+    read_table,
+    several,
+    subtable,
+    text,
+    values_for,
+    whole,
+)
+from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
+
+__all__ = ["load_scene"]
+
+
+def load_scene(path: Path, condition: SkyCondition) -> SkyView:
+    """What the TOML file ``path`` gives; SceneError names the key that is wrong.
+
+    ``condition`` stands for what the file leaves open of lens and sensor.
+    """
+    kinds = {
+        "sky": lambda table: _sky(table, condition),
+        "picture": lambda table: _picture(table, Path(path).parent, condition),
+    }
+    return read_scene_file(path, kinds, '"sky" or "picture"')
+
+
+def _distortion(value: Any) -> Distortion:
+    try:
+        return Distortion(value)
+    except ValueError:
+        raise SceneError(f"must be one of {[d.value for d in Distortion]}, not {value!r}") from None
+
+
+#: Keys of the table "optics"; the sensor's size is the device's.
+_OPTICS: Readers = {
+    f.name: _distortion if f.name == "distortion" else number
+    for f in fields(Optics)
+    if f.name not in ("columns", "rows")
+}
+_POSE: Readers = {
+    "ra_deg": number,
+    "dec_deg": number,
+    "roll_deg": number,
+    "quaternion": several(4, number),
+    "rate_deg_s": several(3, number),
+}
+_SKY: Readers = _POSE | {
+    "poses": lambda value: value,
+    "epoch": number,
+    "mag_limit": number,
+    "false_stars": whole,
+    "false_star_mag": several(2, number),
+    "noise": flag,
+    "seed": whole,
+    "temperature_c": number,
+    "hot_pixels": whole,
+}
+_PICTURE: Readers = {
+    "file": text,
+    "crop": several(2, whole),
+    "exposure_ms": number,
+    "quaternion": several(4, number),
+    "temperature_c": number,
+}
+
+
+def _sky(table: Mapping[str, Any], condition: SkyCondition) -> SkyView:
+    def lens(value: Any) -> Optics:
+        return replace(condition.optics, **subtable(_OPTICS)(value))
+
+    values = read_table(table, _SKY | {"optics": lens})
+    later = values.pop("poses", [])
+    if not isinstance(later, list) or not all(isinstance(pose, dict) for pose in later):
+        raise SceneError("poses must be tables, each under [[poses]]")
+    poses = tuple(_pose(read_table(pose, _POSE | {"start_s": number})) for pose in later)
+    first = _pose({key: values.pop(key) for key in _POSE if key in values})
+    scene = SkyScene(first.quaternion, first.rate_deg_s, poses, **values_for(SkyScene, values))
+    return SkyView(scene, replace(condition, **values_for(condition, values)))
+
+
+def _pose(values: dict[str, Any]) -> Pose:
+    angles = {"ra_deg", "dec_deg", "roll_deg"} & values.keys()
+    if ("quaternion" in values) == bool(angles):
+        raise SceneError("a pose needs either quaternion, or ra_deg and dec_deg")
+    if angles:
+        if not {"ra_deg", "dec_deg"} <= angles:
+            raise SceneError("a pose with angles needs both ra_deg and dec_deg")
+        ra, dec, roll = (values.pop(k, 0.0) for k in ("ra_deg", "dec_deg", "roll_deg"))
+        values["quaternion"] = quaternion_from_pointing(ra, dec, roll)
+    return Pose(**values)
+
+
+def _picture(table: Mapping[str, Any], folder: Path, condition: SkyCondition) -> SkyView:
+    values = read_table(table, _PICTURE)
+    if "file" not in values:
+        raise SceneError("a picture needs the key file")
+    condition = replace(condition, **values_for(condition, values))
+    values["file"] = folder / values["file"]
+    scene = PictureScene(**values_for(PictureScene, values))
+    scene.part(condition.optics.columns, condition.optics.rows)
+    return SkyView(scene, condition)

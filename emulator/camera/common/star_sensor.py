@@ -1,0 +1,88 @@
+"""What the sensors behind star trackers' lenses share: reset pin, two-wire bus, pictures."""
+
+from typing import ClassVar
+
+from cubestack.emulator.camera.common.image_sensor import ImageSensor
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
+from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
+
+__all__ = ["StarSensor"]
+
+
+class StarSensor(ImageSensor[Scene, SkyCondition]):
+    """A sensor that looks at the sky or at a picture.
+
+    Attributes:
+        columns, rows: its pixels.
+        word_bytes: what one address of its registers holds.
+    """
+
+    scene_types = (SkyScene, PictureScene)
+    sees = "a star tracker sees the sky or a picture"
+    columns: ClassVar[int]
+    rows: ClassVar[int]
+    word_bytes: ClassVar[int]
+
+    def __init__(
+        self, seen: Scene | SkyView, condition: SkyCondition, table: CameraRegisterMap, hz: int
+    ) -> None:
+        """Power up with the reset pin high; see ``ImageSensor``."""
+        self._table = table
+        self._powered = True
+        self._reset_pin = 1
+        super().__init__(seen, condition, table, hz)
+
+    def _check(self, scene: Scene, condition: SkyCondition) -> None:
+        lens = condition.optics
+        if (lens.columns, lens.rows) != (self.columns, self.rows):
+            raise ValueError(
+                f"the {self._table.camera} has {self.columns} x {self.rows} pixels, the lens is "
+                f"for {lens.columns} x {lens.rows}"
+            )
+        if isinstance(scene, PictureScene):
+            scene.part(self.columns, self.rows)
+
+    @property
+    def temperature_c(self) -> float:
+        """Temperature of the sensor, in degrees Celsius."""
+        return self.condition.temperature_c
+
+    def power(self, on: bool, now_ps: int) -> None:
+        """Turn the supply on or off; registers then have their reset values."""
+        self._powered = on
+        self._start_or_stop(on and bool(self._reset_pin), now_ps)
+
+    def set_reset_pin(self, level: int, now_ps: int) -> None:
+        """Drive the reset pin, low active."""
+        self._reset_pin = level
+        self._start_or_stop(self._powered and bool(level), now_ps)
+
+    def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
+        """A write message to the 7-bit ``address`` ended; returns whether it was acknowledged.
+
+        A register's address, then words for that register and those that follow, upper byte
+        first; half a word is dropped.
+        """
+        if not self.running or address != self._table.i2c_address:
+            return False
+        head = self._table.address_bytes
+        if len(data) >= head:
+            self._registers.select(int.from_bytes(data[:head]))
+            ends = range(head + self.word_bytes, len(data) + 1, self.word_bytes)
+            words = [int.from_bytes(data[end - self.word_bytes : end]) for end in ends]
+            self._write(words, now_ps)
+        return True
+
+    def i2c_read(self, address: int, count: int, now_ps: int) -> bytes | None:
+        """Read ``count`` bytes from the last register address on; None if not acknowledged."""
+        del now_ps
+        if not self.running or address != self._table.i2c_address:
+            return None
+        size = self.word_bytes
+        words = (self._registers.read().to_bytes(size) for _ in range(-(-count // size)))
+        return b"".join(words)[:count]
+
+    def _write(self, words: list[int], now_ps: int) -> None:
+        """Write to the selected register and those that follow."""
+        raise NotImplementedError

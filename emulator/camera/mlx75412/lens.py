@@ -1,0 +1,45 @@
+"""The lens of CubeStar in front of its MLX75412: 6 mm focal length at f/1.2.
+
+CubeStar thesis, section 5.4 (calibration, figure 5.12; focal length by star pairs) and 3.4.4.
+
+The calibration toolbox fits coefficients that map undistorted points to distorted ones. The
+firmware uses them with inverted signs in equations that map distorted points to undistorted ones,
+which is only nearly the inverse. This lens is by default the exact inverse of what the firmware
+computes, so that its calibration is right; ``Distortion.TOOLBOX`` is the other reading. Then the
+firmware's undistortion is off by 1.7 px in the mean over the picture, and by 15 px in one corner.
+"""
+
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
+
+__all__ = ["CONDITION", "EFFECTIVE_WIDTH_A", "LENS"]
+
+EFFECTIVE_WIDTH_A = 4780.0
+"""Bandwidth in Angstrom times transmission times quantum efficiency: fitted.
+
+A star of V = 3.8 so gives 300 counts of 8 bits, summed over its spot, in the 385.6 ms of the
+default frame rate, near the published detection limit. The thesis' own factors without a quantum
+efficiency range from 0.6 x 3000 to 0.8 x 6000 Angstrom, so this is a bright lens.
+"""
+
+LENS = Optics(
+    focal_length_mm=6.28,
+    pixel_pitch_um=1000 * PIXEL_PITCH_MM,
+    fx=1147.5,
+    fy=1147.4,
+    cx=539.0,
+    cy=175.5,
+    k1=0.32358,
+    k2=-0.12456,
+    p1=-0.00414,
+    p2=0.00624,
+    psf_sigma_px=0.9,
+    columns=COLUMNS,
+    rows=ROWS,
+    aperture_mm=5.0,  # published
+    effective_width_a=EFFECTIVE_WIDTH_A,
+)
+
+CONDITION = SkyCondition(LENS)
+"""What a camera is like when nothing else is said."""

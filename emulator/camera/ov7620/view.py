@@ -1,0 +1,38 @@
+"""What a sun or nadir camera is like, and what it sees."""
+
+from dataclasses import dataclass
+
+from cubestack.emulator.camera.common.view import View, refuse_negative
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.file import SceneError
+
+__all__ = ["EarthSunView", "FisheyeCondition"]
+
+
+@dataclass(frozen=True)
+class FisheyeCondition:
+    """What a camera behind a fisheye is like.
+
+    Attributes:
+        bloom_px: radius of the Sun's image on the boresight of the sun camera at the published
+            exposure, where its level crosses from background to object (CubeSense thesis: 8 px).
+        hot_pixels: pixels of each camera that are stuck at full scale.
+        hot_pairs: pairs of such pixels, side by side.
+        noise: False makes the sensor ideal but for its hot pixels.
+        seed: of noise and hot pixels.
+    """
+
+    bloom_px: float = 7.0
+    hot_pixels: int = 0
+    hot_pairs: int = 0
+    noise: bool = True
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what can not be."""
+        if not 0 < self.bloom_px < float("inf"):
+            raise SceneError(f"bloom_px must be above 0, not {self.bloom_px}")
+        refuse_negative(self, "hot_pixels", "hot_pairs", "seed")
+
+
+EarthSunView = View[EarthSunScene, FisheyeCondition]

@@ -1,0 +1,25 @@
+"""Directions as a pair of angles, as sun and nadir sensors give them.
+
+Alpha and beta are undistorted picture coordinates in degrees: their root sum of squares is the
+angle from the boresight, and they divide it into x (right) and y (down).
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["angles_from_vector", "vector_from_angles"]
+
+
+def vector_from_angles(alpha_deg: ArrayLike, beta_deg: ArrayLike) -> NDArray[np.float64]:
+    """Unit vectors (..., 3) in camera axes of alpha and beta."""
+    theta, phi = np.radians(np.hypot(alpha_deg, beta_deg)), np.arctan2(beta_deg, alpha_deg)
+    return np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    )
+
+
+def angles_from_vector(vector: ArrayLike) -> tuple[float, float]:
+    """Alpha and beta of a direction (3,) in camera axes, of any length."""
+    x, y, z = np.asarray(vector, np.float64)
+    theta, phi = np.degrees(np.arctan2(np.hypot(x, y), z)), np.arctan2(y, x)
+    return float(theta * np.cos(phi)), float(theta * np.sin(phi))
