@@ -1,5 +1,7 @@
 """CubeSense's telemetry of our own, IDs from 220 on: what a measurement rests on, its times."""
 
+from functools import partial
+
 from cubestack.firmware_model.interface.codec.field import i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubesense.codes import (
@@ -12,13 +14,14 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 
 __all__ = ["EXTENSIONS"]
 
+_extension = partial(Message, extension=True)
+
 
 def _details(camera: Camera) -> Message:
-    return Message(
+    return _extension(
         220 + camera,
         f"Details{camera + 1}",
         f"what the latest measurement of camera {camera + 1} rests on",
-        extension=True,
     ).of(
         i16("X", "centre from the boresight, undistorted column", "px", 100),
         i16("Y", "centre from the boresight, undistorted row", "px", 100),
@@ -39,11 +42,10 @@ def _times(camera: Camera) -> Message:
         ("Centroid", "distortion and fit, or weighted mean and distortion"),
         ("Total", "from the start until the centre is known"),
     )
-    return Message(
+    return _extension(
         222 + camera,
         f"PhaseTimes{camera + 1}",
         f"times of the latest measurement of camera {camera + 1}",
-        extension=True,
     ).of(*(u32(name, meaning, "us") for name, meaning in phases))
 
 
@@ -60,11 +62,10 @@ def _edges(part: int) -> Message:
         for index in range(EDGES_PER_FRAME)
         for axis, line in (("X", "column"), ("Y", "row"))
     ]
-    return Message(
+    return _extension(
         225 + part,
         f"NadirEdges{part + 1}",
         f"edges {first} to {last} that the latest search in the nadir picture found",
-        extension=True,
     ).of(
         u8("Count", "edges found in all, false ones left out"),
         *coordinates,
@@ -74,8 +75,8 @@ def _edges(part: int) -> Message:
 EXTENSIONS = (
     *(_details(camera) for camera in Camera),
     *(_times(camera) for camera in Camera),
-    Message(
-        224, "NadirSearchMode", "how the nadir camera's edges are looked for", extension=True
-    ).of(u8("Search", "way of the search", choices=NadirSearch)),
+    _extension(224, "NadirSearchMode", "how the nadir camera's edges are looked for").of(
+        u8("Search", "way of the search", choices=NadirSearch)
+    ),
     *(_edges(part) for part in range(2)),
 )

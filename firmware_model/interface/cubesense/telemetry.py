@@ -6,6 +6,7 @@ of Identification has seconds before milliseconds.
 """
 
 from collections.abc import Mapping
+from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
@@ -26,7 +27,9 @@ from cubestack.firmware_model.interface.cubesense.extensions import EXTENSIONS
 
 __all__ = ["RESULTS", "SCHEDULES", "TELEMETRIES"]
 
-_HIGH, _MEDIUM, _LOW = Confidence.HIGH, Confidence.MEDIUM, Confidence.LOW
+_high = partial(Message, confidence=Confidence.HIGH)
+_medium = partial(Message, confidence=Confidence.MEDIUM)
+_low = partial(Message, confidence=Confidence.LOW)
 
 #: ID of a camera's result.
 RESULTS: Mapping[Camera, int] = {Camera.SUN: 148, Camera.NADIR: 149}
@@ -74,11 +77,10 @@ def _configuration_fields() -> tuple[Field, ...]:
 
 def _mask(camera: Camera) -> Message:
     limits = (("XMin", COLUMNS), ("XMax", COLUMNS), ("YMin", ROWS), ("YMax", ROWS))
-    return Message(
+    return _medium(
         200 + camera,
         f"Masks{camera + 1}",
         f"areas that detection ignores, camera {camera + 1}; ends included, all 0: none",
-        confidence=_MEDIUM,
     ).of(
         *(
             u16(
@@ -95,7 +97,7 @@ def _mask(camera: Camera) -> Message:
 
 
 _NODE = (
-    Message(128, "Identification", "what the node is, and its uptime", confidence=_HIGH).of(
+    _high(128, "Identification", "what the node is, and its uptime").of(
         u8("NodeType", "type of node"),
         u8("InterfaceVersion", "version of this interface"),
         u8("FirmwareVersionMajor", "firmware version, major"),
@@ -103,15 +105,10 @@ _NODE = (
         u16("RuntimeSeconds", "uptime, whole seconds", "s"),
         u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
     ),
-    Message(129, "SerialNumber", "serial number", confidence=_LOW).of(
+    _low(129, "SerialNumber", "serial number").of(
         Field("bytes6", "SerialNumber", "ASCII; zero behind a shorter one")
     ),
-    Message(
-        130,
-        "CommunicationStatus",
-        "counters and error flags of the host's buses",
-        confidence=_LOW,
-    ).of(
+    _low(130, "CommunicationStatus", "counters and error flags of the host's buses").of(
         u16("TcmdCount", "telecommands received"),
         u16("TlmCount", "telemetry requests received"),
         u8("TcmdBufferOverrun", "1: a telecommand met a full buffer"),
@@ -119,7 +116,7 @@ _NODE = (
         u8("UartProtocolError", "1: byte outside of a frame, or unknown escape"),
         u8("UartMsgIncomplete", "1: frame that never ended"),
     ),
-    Message(131, "TcmdProcessed", "acknowledge of the last telecommand", confidence=_HIGH).of(
+    _high(131, "TcmdProcessed", "acknowledge of the last telecommand").of(
         u8("LastTcmd", "its ID"),
         u8("Processed", "1: processed, 0: not yet", reset=1),
         u8("Error", "its error code, as in the acknowledge", choices=AckError),
@@ -127,12 +124,7 @@ _NODE = (
 )
 
 _STATE = (
-    Message(
-        154,
-        "Power",
-        "supply currents, and memories that drew too much",
-        confidence=_HIGH,
-    ).of(
+    _high(154, "Power", "supply currents, and memories that drew too much").of(
         u16("Current3V3", "of the 3.3 V supply", "mA", 10),
         u16("CurrentSram1", "of SRAM1", "mA", 10),
         u16("CurrentSram2", "of SRAM2", "mA", 10),
@@ -140,13 +132,11 @@ _STATE = (
         u8("OverCurrent1", "1: SRAM1 drew too much since the flag was cleared"),
         u8("OverCurrent2", "1: SRAM2 drew too much since the flag was cleared"),
     ),
-    Message(168, "Configuration", "thresholds and camera settings", confidence=_HIGH).of(
-        *_configuration_fields()
-    ),
-    Message(192, "ImageFrame", "the frame that is ready", confidence=_HIGH).of(
+    _high(168, "Configuration", "thresholds and camera settings").of(*_configuration_fields()),
+    _high(192, "ImageFrame", "the frame that is ready").of(
         Field(f"bytes{FRAME_BYTES}", "Frame", "pixels, row after row")
     ),
-    Message(193, "ImageFrameInfo", "which frame is ready", confidence=_HIGH).of(
+    _high(193, "ImageFrameInfo", "which frame is ready").of(
         u16("FrameNumber", "65535 (ours): none is ready yet", reset=EMPTY_FRAME),
         u8("Checksum", "exclusive or of the frame's bytes (ours)"),
     ),
@@ -156,20 +146,16 @@ _STATE = (
 TELEMETRIES = (
     *_NODE,
     *(
-        Message(
-            identifier,
-            f"Result{camera + 1}",
-            f"latest measurement of camera {camera + 1}",
-            confidence=_MEDIUM,
-        ).of(*_RESULT)
+        _medium(identifier, f"Result{camera + 1}", f"latest measurement of camera {camera + 1}").of(
+            *_RESULT
+        )
         for camera, identifier in RESULTS.items()
     ),
     *(
-        Message(
+        _high(
             identifier,
             f"Result{camera + 1}ThenSram{sram + 1}",
             f"latest measurement of camera {camera + 1}; starts its next one, into SRAM{sram + 1}",
-            confidence=_HIGH,
             starts_measurement=True,
         ).of(*_RESULT)
         for identifier, (camera, sram) in SCHEDULES.items()
