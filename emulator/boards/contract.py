@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
@@ -33,6 +33,10 @@ class UartLink(Protocol):
 
     def uart_silence(self) -> None:
         """Interrupt: the line has been silent for long."""
+
+
+class NodeLink(UartLink, I2cTarget, Protocol):
+    """What a program has behind both ways to the satellite."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +188,11 @@ class Board(ABC):
             cameras or {},
             memories or {},
         )
+
+    def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:
+        """Lead the satellite's serial line and I2C bus to what ``link`` finds in the program."""
+        self._serial_line(baud, link)
+        self.i2c_bus.attach(i2c_address, CurrentTarget(link))
 
     def _serial_line(
         self,

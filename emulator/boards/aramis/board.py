@@ -6,7 +6,6 @@ flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
 """
 
 from collections import deque
-from fractions import Fraction
 from typing import Literal
 
 import numpy as np
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 from cubestack.emulator.boards.aramis.power import ARAMIS_POWER
 from cubestack.emulator.boards.aramis.ppi import Ppi
 from cubestack.emulator.boards.contract import Board
-from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
+from cubestack.emulator.boards.peripherals import I2cCameraBus, NodePeripherals
+from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
@@ -25,7 +25,7 @@ from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
+from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
 from cubestack.firmware_model.aramis.hardware import FrameEnd
@@ -37,7 +37,6 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS, ROWS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
-from cubestack.firmware_model.mcu.requests import CameraTransfer
 
 __all__ = ["AramisBoard"]
 
@@ -99,7 +98,8 @@ class AramisBoard(Board):
         self.camera = Mt9m001(scene, seed=seed, noise=noise)
         self.ppi = Ppi(self.kernel, self.camera)
         self.ppi.on_end = self._frame_ended
-        self._serial_line(baud, lambda: self.program.link)
+        self.camera.on_change = self._camera_changed
+        self._node_link(lambda: self.program.link, baud, i2c_address)
         self._hardware = _Blackfin(self)
         self._frames: deque[RollingShutter] = deque(maxlen=REMEMBERED)
         self._frame = 0
@@ -115,14 +115,13 @@ class AramisBoard(Board):
             self.kernel,
             meter,
             None,
-            _CameraBus(self),
+            I2cCameraBus(self.camera, REGISTERS.i2c_address, CAMERA_BUS_HZ),
             boot,
             power_on_cause=ResetCause.POWER_ON,
             boot_us=BOOT_US,
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
         )
         self.power.on_switch = self._supply_switched
-        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
         self._show_camera()
 
     @property
@@ -188,62 +187,34 @@ class AramisBoard(Board):
 
     def _supply_switched(self, _channel: str, on: bool) -> None:
         self.camera.power(on, self.kernel.now)
+
+    def _camera_changed(self) -> None:
+        self.ppi.lines_changed()
         self._show_camera()
 
     def _show_camera(self) -> None:
         self.power.set_state("camera", "working" if self.camera.enabled else "standby")
 
 
-class _Blackfin:
+class _Blackfin(NodePeripherals):
     """The processor's peripherals, as its program sees them."""
 
     def __init__(self, board: AramisBoard) -> None:
-        self._board = board
+        super().__init__(board)
+        self._ppi = board.ppi
         self.sdram = board.sdram
         self.catalogue_flash = board.catalogue_flash
         self.flash = FlashStore()
         self.reset_cause = int(ResetCause.POWER_ON)
 
     def start_capture(self, target: NDArray[np.uint8]) -> None:
-        self._board.ppi.start(target)
+        self._ppi.start(target)
 
     def stop_capture(self) -> None:
-        self._board.ppi.stop()
+        self._ppi.stop()
 
     def switch_camera(self, on: bool) -> None:
         self._board.power.switch("camera", on)
 
     def camera_current_ma(self) -> float:
         return self._board.power.current_ma("camera")
-
-    def uart_send(self, data: bytes) -> None:
-        self._board.uart.send(data)
-
-    def uart_backlog(self) -> int:
-        return self._board.uart.backlog
-
-    def wake(self) -> None:
-        self._board.processor.wake()
-
-    def uptime_us(self) -> int:
-        return self._board.kernel.now // PS_PER_US
-
-
-class _CameraBus:
-    """The camera's control bus, which nobody else uses."""
-
-    def __init__(self, board: AramisBoard) -> None:
-        self._board = board
-
-    def transfer_ps(self, request: CameraTransfer) -> int:
-        bytes_on_wire = 1 + len(request.data) + (1 + request.read if request.read else 0)
-        starts_and_stop = 3 if request.read else 2
-        bits = Fraction(9 * bytes_on_wire + starts_and_stop)
-        return int(bits * PS_PER_S / CAMERA_BUS_HZ)
-
-    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
-        camera = self._board.camera
-        if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
-            return None
-        self._board._show_camera()
-        return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)

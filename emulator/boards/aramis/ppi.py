@@ -56,7 +56,7 @@ class Ppi:
         """Connect to ``camera``'s lines; nothing is taken before ``start``."""
         self._env = env
         self._camera = camera
-        camera.on_change = self._lines_changed
+        camera.on_change = self.lines_changed
         self.on_end: Callable[[FrameEnd], None] = lambda _end: None
         self.stored: RollingShutter | None = None
         self._changed = env.event()
@@ -76,9 +76,10 @@ class Ppi:
     def stop(self) -> None:
         """Give up the frame that is waited for or taken; no interrupt comes."""
         self._run += self._run % 2
-        self._lines_changed()
+        self.lines_changed()
 
-    def _lines_changed(self) -> None:
+    def lines_changed(self) -> None:
+        """The camera's output from now on is another than it announced."""
         changed, self._changed = self._changed, self._env.event()
         changed.succeed()
 

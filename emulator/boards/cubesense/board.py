@@ -23,7 +23,6 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
-from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.bench import BENCH
@@ -99,8 +98,7 @@ class CubeSenseBoard(Board):
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(_wiring(mcu_addressing), engine)
         self.cameras = {camera: Ov7620(scene, Target[camera.name]) for camera in Camera}
-        self._failed: set[Camera] = set()
-        self._serial_line(baud, lambda: self.program.node)
+        self._node_link(lambda: self.program.node, baud, i2c_address)
         self.bench_uart = self._serial_line(
             bench_baud, lambda: self.program.bench, "bench_uart", "bench protocol", ".bench"
         )
@@ -113,13 +111,7 @@ class CubeSenseBoard(Board):
         self._storing_since_ps: dict[Camera, int] = {}
         self._stored: dict[Camera, RollingShutter] = {}
         meter = Meter(PIC18F45K20)
-        self.hardware = Pic18f45k20(
-            self.kernel,
-            {Port.NODE: self.uart, Port.BENCH: self.bench_uart},
-            self.power,
-            lambda: self.processor.wake(),
-            mcu_addressing=mcu_addressing,
-        )
+        self.hardware = Pic18f45k20(self, mcu_addressing=mcu_addressing)
 
         def boot(_cause: int) -> CubeSenseProgram:
             self.hardware.reset()
@@ -137,7 +129,6 @@ class CubeSenseBoard(Board):
             other_pins=self._lines,
             on_pin=lambda pin, _level: self._pin_changed(pin),
         )
-        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.node))
         self.i2c_bus.attach(register_address, CurrentTarget(lambda: self.program.registers))
 
     @property
@@ -191,21 +182,10 @@ class CubeSenseBoard(Board):
         """Exposure of the frame of ``camera`` that was stored last; None before."""
         return self._stored.get(camera)
 
-    def fail_camera(self, camera: Camera) -> None:
-        """Let a camera die: no clock, no answer on its control lines, whatever is switched."""
-        self._failed.add(camera)
-        self._advance_engine()
-        self.cameras[camera].power(False, self.engine.now_ps)
-        self._connect(camera)
-
-    def fail_memory(self, sram: Sram) -> None:
-        """Let a memory latch up for good: it draws too much whenever it is switched on."""
-        self.power.latch_up(sram.name, lasting=True)
-
     def _connect(self, camera: Camera) -> None:
         sensor, half = self.cameras[camera], HALVES[camera]
         sensor.on_change = lambda: self.engine.stream_changed(half)
-        self.engine.attach(None if camera in self._failed else sensor, half)
+        self.engine.attach(sensor, half)
 
     def _advance_engine(self) -> None:
         """Bring the engine up to now; it may have run ahead, see emulator/sim/processor.py."""
@@ -263,7 +243,7 @@ class CubeSenseBoard(Board):
                 if not on:
                     self._scramble(self.engine.memories[half])
             elif channel == f"{half}_camera":
-                self.cameras[camera].power(on and camera not in self._failed, self.engine.now_ps)
+                self.cameras[camera].power(on, self.engine.now_ps)
 
 
 def _stores(commanded: dict[Camera, Action], camera: Camera) -> bool:

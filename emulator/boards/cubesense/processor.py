@@ -3,12 +3,10 @@
 CubeSense thesis, table 3.3: two serial ports, the converter behind the current monitors, a timer.
 """
 
-from collections.abc import Callable, Mapping
-
+from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.boards.cubesense.gpio import CHANNELS
-from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.sim.power import PowerModel
-from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
+from cubestack.emulator.boards.peripherals import NodePeripherals
+from cubestack.emulator.sim.virtual_time import PS_PER_US
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.interface.cubesense.pins import (
     ADC_FULL_SCALE,
@@ -20,31 +18,21 @@ from cubestack.firmware_model.interface.cubesense.pins import (
 __all__ = ["Pic18f45k20"]
 
 
-class Pic18f45k20:
+class Pic18f45k20(NodePeripherals):
     """The peripherals; see ``firmware_model.cubesense.hardware``."""
 
     serial_number = "CSEMU1"
 
-    def __init__(
-        self,
-        kernel: Kernel,
-        uarts: Mapping[Port, Uart],
-        power: PowerModel,
-        wake: Callable[[], None],
-        *,
-        mcu_addressing: bool,
-    ) -> None:
-        """Power up: ``wake`` ends the program's sleep, ``power`` is what the monitors look at."""
-        self._kernel = kernel
-        self._uarts = uarts
-        self._power = power
-        self._wake = wake
+    def __init__(self, board: Board, *, mcu_addressing: bool) -> None:
+        """Be part of ``board``, whose serial lines are those of ``Port``."""
+        super().__init__(board)
         self._reset_ps = 0
+        self._uarts = dict(zip(Port, board.uarts.values(), strict=True))
         self.mcu_addressing = mcu_addressing
 
     def reset(self) -> None:
         """The part starts anew, its timer from 0."""
-        self._reset_ps = self._kernel.now
+        self._reset_ps = self._board.kernel.now
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
         """Queue ``data`` for ``port``."""
@@ -54,23 +42,20 @@ class Pic18f45k20:
         """Bytes that ``port`` still has to send."""
         return self._uarts[port].backlog
 
-    def wake(self) -> None:
-        """End the program's sleep."""
-        self._wake()
-
     def adc_counts(self, monitor: Monitor) -> int:
         """Result of a conversion, 0 to 1023."""
+        current_ma = self._board.power.current_ma
         match monitor:
             case Monitor.SUPPLY_5V:
-                current = self._power.current_ma()
+                current = current_ma()
             case Monitor.SUPPLY_3V3:
                 # The cameras' own regulator feeds them from the 5 V supply.
                 cameras = (CHANNELS[pin] for pin in CAMERA_POWER.values())
-                current = self._power.current_ma() - sum(map(self._power.current_ma, cameras))
+                current = current_ma() - sum(map(current_ma, cameras))
             case Monitor.SRAM1 | Monitor.SRAM2:
-                current = self._power.current_ma(monitor.value)
+                current = current_ma(monitor.value)
         return min(ADC_FULL_SCALE, round(current / MA_PER_COUNT))
 
     def uptime_us(self) -> int:
         """Time since the latest reset in us."""
-        return (self._kernel.now - self._reset_ps) // PS_PER_US
+        return (self._board.kernel.now - self._reset_ps) // PS_PER_US

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.boards.cubestar.layouts import BOARDS
-from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
+from cubestack.emulator.boards.peripherals import I2cCameraBus, NodePeripherals
+from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
@@ -21,7 +22,7 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
+from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTION_BYTES
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
@@ -32,7 +33,6 @@ from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
-from cubestack.firmware_model.mcu.requests import CameraTransfer
 
 __all__ = ["CubeStarBoard"]
 
@@ -87,7 +87,7 @@ class CubeStarBoard(Board):
         super().__init__(self._layout.power, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(self._layout.wiring(), kind=engine)
         self.camera = Mlx75412(scene, seed=seed)
-        self._serial_line(baud, lambda: self.program.link)
+        self._node_link(lambda: self.program.link, baud, i2c_address)
         self._hardware = _Efm32gg(self)
         self._scramble(self._hardware.external_ram)
         for memory in self.engine.memories.values():
@@ -104,7 +104,7 @@ class CubeStarBoard(Board):
             self.kernel,
             meter,
             self.engine,
-            _CameraBus(self),
+            I2cCameraBus(self.camera, REGISTERS.i2c_address, CAMERA_BUS_HZ),
             boot,
             power_on_cause=ResetCause.POWER_ON,
             boot_us=BOOT_US,
@@ -114,7 +114,6 @@ class CubeStarBoard(Board):
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
-        self.i2c_bus.attach(i2c_address, CurrentTarget(lambda: self.program.link))
         self._pins = dict(self._layout.controls)
         self._accesses = False
         self._storing_since_ps = 0
@@ -210,28 +209,20 @@ class CubeStarBoard(Board):
                 self._scramble(memory)
 
 
-class _Efm32gg:
+class _Efm32gg(NodePeripherals):
     """The processor's peripherals, as its program sees them."""
 
     def __init__(self, board: CubeStarBoard) -> None:
-        self._board = board
+        super().__init__(board)
+        self._camera = board.camera
         bytes_there = EXTERNAL_RAM_BYTES if board._layout.external_ram else 0
         self.external_ram = np.zeros(bytes_there, np.uint8)
         self.retention = bytearray(RETENTION_BYTES)
         self.flash = FlashStore()
         self.reset_cause = int(ResetCause.POWER_ON)
 
-    def uart_send(self, data: bytes) -> None:
-        self._board.uart.send(data)
-
-    def uart_backlog(self) -> int:
-        return self._board.uart.backlog
-
     def bus_read(self, select: int, address: int, count: int) -> bytes:
         return self._board.processor.load(select, address, count, EBI_READ_CYCLES)
-
-    def wake(self) -> None:
-        self._board.processor.wake()
 
     def switch_supply(self, channel: str, on: bool) -> None:
         self._board.power.switch(channel, on)
@@ -239,26 +230,5 @@ class _Efm32gg:
     def supply_current_ma(self, channel: str) -> float:
         return self._board.power.current_ma(channel)
 
-    def uptime_us(self) -> int:
-        return self._board.kernel.now // PS_PER_US
-
     def temperature_c(self) -> float:
-        return self._board.camera.temperature_c
-
-
-class _CameraBus:
-    """The camera's control bus, which nobody else uses."""
-
-    def __init__(self, board: CubeStarBoard) -> None:
-        self._board = board
-
-    def transfer_ps(self, request: CameraTransfer) -> int:
-        bytes_on_wire = 1 + len(request.data) + (1 + request.read if request.read else 0)
-        starts_and_stop = 3 if request.read else 2
-        return (9 * bytes_on_wire + starts_and_stop) * PS_PER_S // CAMERA_BUS_HZ
-
-    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
-        camera = self._board.camera
-        if not camera.i2c_write(REGISTERS.i2c_address, request.data, now_ps):
-            return None
-        return camera.i2c_read(REGISTERS.i2c_address, request.read, now_ps)
+        return self._camera.temperature_c

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.boards.cubesense.board import HALVES
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
@@ -42,11 +43,16 @@ def session(opened: Callable[..., Any], scene: EarthSunScene) -> Any:
         yield made
 
 
+def latch_up(session: CubeSenseSession, memory: Sram) -> None:
+    """For good."""
+    session.board.faults.inject("latch-up", target=memory.name, lasting=True)
+
+
 @pytest.mark.parametrize("failed", Sram)
 def test_with_one_memory_failed_both_cameras_measure_in_the_other(
     session: CubeSenseSession, failed: Sram
 ) -> None:
-    session.board.fail_memory(failed)
+    latch_up(session, failed)
     session.cubesense.client.pause(0.1)
     assert session.cubesense.power().over_current[failed]
     good = Sram(1 - failed)
@@ -67,8 +73,8 @@ def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
 ) -> None:
     """The dead camera gives no clock, yet its half's memory is written and read."""
     alive = Camera(1 - dead)
-    session.board.fail_camera(dead)
-    session.board.fail_memory(Sram(alive))
+    session.board.faults.inject("camera-dead", target=HALVES[dead])
+    latch_up(session, Sram(alive))
     session.cubesense.client.pause(0.1)
     check(session.cubesense.capture_and_detect(alive, Sram(dead)), CaptureResult.STORED_OTHER_SRAM)
     gone = session.cubesense.capture_and_detect(dead, Sram(dead))
@@ -107,7 +113,7 @@ def test_latch_up_is_cut_off_and_cleared_by_command(session: CubeSenseSession) -
 
 
 def test_memory_that_stays_latched_is_cut_off_again(session: CubeSenseSession) -> None:
-    session.board.fail_memory(Sram.SRAM2)
+    latch_up(session, Sram.SRAM2)
     for _ in range(3):
         session.cubesense.client.pause(0.1)
         assert session.cubesense.power().over_current == (False, True)

@@ -101,7 +101,7 @@ def test_hot_pixels_are_no_sun(opened: Callable[..., Any]) -> None:
 def test_dead_camera_times_out_and_the_node_goes_on(opened: Callable[..., Any]) -> None:
     with opened(NOON) as session:
         session.cubesense.client.pause(0.3)
-        session.board.fail_camera(Camera.SUN)
+        session.board.faults.inject("camera-dead", target="sun")
         found = session.cubesense.capture_and_detect(Camera.SUN)
         assert found.capture is CaptureResult.CAMERA_TIMEOUT
         assert found.detect is DetectResult.NONE_SCHEDULED

@@ -119,7 +119,7 @@ def test_memories_hold_noise_of_the_seed_after_power_up() -> None:
 
 def test_a_dead_camera_has_no_clock_and_answers_nothing(board: CubeSenseBoard) -> None:
     let_pass(board, 500)
-    board.fail_camera(Camera.SUN)
+    board.faults.inject("camera-dead", target="sun")
     camera = board.cameras[Camera.SUN]
     assert camera.segment_at(board.kernel.now) is None
     board.power.switch("sun_camera", False)
@@ -129,7 +129,7 @@ def test_a_dead_camera_has_no_clock_and_answers_nothing(board: CubeSenseBoard) -
 
 def test_a_failed_memory_draws_too_much_each_time_it_is_switched_on(board: CubeSenseBoard) -> None:
     let_pass(board, 500)
-    board.fail_memory(Sram.SRAM1)
+    board.faults.inject("latch-up", target="SRAM1", lasting=True)
     assert board.power.current_ma("SRAM1") > 100
     let_pass(board, 100)
     assert not board.power.is_on("SRAM1")  # the firmware has cut it off
