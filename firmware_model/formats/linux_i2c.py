@@ -1,8 +1,8 @@
 """Linux's I2C device files (/dev/i2c-N): their numbers, and their calls as messages on a socket.
 
 Numbers and limits are those of Linux's uapi headers linux/i2c.h and linux/i2c-dev.h. The messages
-are ours; both ends run on one machine, so numbers are in its byte order. On the socket each one
-follows its length (u32):
+are this project's own; both ends run on one machine, so numbers are in its byte order. On the
+socket each one follows its length (u32):
 
 ========  =====================================================================================
 request   key u64, call u8, body; the key names an opened file, 0 is the connection's own
@@ -156,7 +156,7 @@ class RdwrMessage:
 
     Attributes:
         address: 7-bit address.
-        flags: see MessageFlag.
+        flags: of MessageFlag.
         length: bytes to write or to read.
         data: bytes to write; of a read whose length the device sends, the first byte of its buffer.
     """
@@ -174,7 +174,7 @@ class SmbusCall:
     Attributes:
         direction: 1 to read, 0 to write.
         command: command or register.
-        size: see SmbusSize.
+        size: of SmbusSize.
         data: the union i2c_smbus_data, 34 bytes; None for a null pointer.
     """
 

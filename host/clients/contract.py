@@ -6,7 +6,6 @@ Messages come from the interface tables; nothing about one device is written her
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
@@ -44,12 +43,7 @@ class Closable(ABC):
         """Use it in a ``with`` block."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close."""
         self.close()
 

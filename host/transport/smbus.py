@@ -15,7 +15,6 @@ import socket
 import struct
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 from smbus2 import SMBus
@@ -100,12 +99,7 @@ class CubeSMBus(SMBus):
         """Close the bus at the end of a ``with`` block."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close the bus."""
         self.close()
 

@@ -40,15 +40,5 @@ def test_published_values() -> None:
     assert REGISTERS["HARDWARE_FEATURES"].field("HISTOGRAM_REMAP").mask == 0x40
 
 
-def test_tables_are_consistent() -> None:
-    for register in REGISTERS:
-        assert 0 <= register.reset < 1 << (8 * register.width)
-        assert register.reset & ~register.bits == 0
-        masks = [field.mask for field in register.fields]
-        assert sum(masks) == register.bits or not masks
-        assert all(a & b == 0 for i, a in enumerate(masks) for b in masks[:i])
-        assert register.modelled or not any(field.modelled for field in register.fields)
-
-
 def test_only_mode_select_and_sync_act_at_once() -> None:
     assert {r.name for r in REGISTERS if not r.needs_sync} == {"MODE_SELECT", "SYNC"}

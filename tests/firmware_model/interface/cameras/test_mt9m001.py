@@ -45,14 +45,6 @@ def test_every_published_register_is_declared_where_it_is() -> None:
     assert all(r.unit_bits == 16 and r.width == 1 for r in REGISTERS)
 
 
-def test_tables_are_consistent() -> None:
-    for register in REGISTERS:
-        assert register.reset & ~register.bits == 0
-        masks = [field.mask for field in register.fields]
-        assert all(a & b == 0 for i, a in enumerate(masks) for b in masks[:i])
-        assert register.modelled or not any(field.modelled for field in register.fields)
-
-
 def test_published_frame_time() -> None:
     line = COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS
     assert line / PIXEL_CLOCK_HZ == pytest.approx(31.75e-6)

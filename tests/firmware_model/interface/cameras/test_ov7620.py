@@ -73,11 +73,3 @@ def test_timing_is_that_of_ccir_601() -> None:
     line_s = CLOCKS_PER_LINE / PIXEL_CLOCK_HZ
     assert LINES_PER_FRAME * line_s == pytest.approx(33.37e-3, rel=1e-3)
     assert EXPOSURE_LINES * line_s == pytest.approx(127e-6, rel=1e-3)
-
-
-def test_tables_are_consistent() -> None:
-    for register in REGISTERS:
-        assert 0 <= register.reset <= 0xFF
-        masks = [field.mask for field in register.fields]
-        assert all(a & b == 0 for i, a in enumerate(masks) for b in masks[:i])
-        assert register.modelled or not any(field.modelled for field in register.fields)

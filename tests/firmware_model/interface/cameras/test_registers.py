@@ -1,9 +1,12 @@
 import dataclasses
+from itertools import combinations
+from types import ModuleType
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cubestack.firmware_model.interface.cameras import mlx75412, mt9m001, ov7620
 from cubestack.firmware_model.interface.cameras.registers import (
     BitField,
     CameraRegister,
@@ -56,3 +59,14 @@ def test_overlapping_declarations_are_refused() -> None:
         registers(GAIN, dataclasses.replace(CONTROL, name="OTHER", address=0x11))
     with pytest.raises(ValueError, match="declares register GAIN twice"):
         registers(GAIN, dataclasses.replace(GAIN, address=0x20))
+
+
+@pytest.mark.parametrize("sensor", [mlx75412, mt9m001, ov7620], ids=lambda s: s.REGISTERS.camera)
+def test_tables_are_consistent(sensor: ModuleType) -> None:
+    for register in sensor.REGISTERS:
+        assert 0 <= register.reset < 1 << (register.unit_bits * register.width)
+        if sensor is not ov7620:  # which has bits that are set and not declared
+            assert register.reset & ~register.bits == 0
+        masks = [field.mask for field in register.fields]
+        assert not any(one & other for one, other in combinations(masks, 2))
+        assert register.modelled or not any(field.modelled for field in register.fields)
