@@ -88,11 +88,11 @@ class BusPins:
     """
 
     selects: tuple[str, ...]
-    high: str = "AD_HIGH"
-    low: str = "AD_LOW"
-    latch: str = "ALE"
-    read: str = "RE_N"
-    write: str = "WE_N"
+    high: str
+    low: str
+    latch: str
+    read: str
+    write: str
 
     def levels(self, transactions: Transactions, event: int) -> Sequence[tuple[str, int]]:
         """What the microcontroller's lines go to at ``event`` of ``transactions``.

@@ -32,7 +32,14 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     Actions,
     address_bytes,
 )
-from cubestack.firmware_model.interface.cubesense.pins import ENABLE
+from cubestack.firmware_model.interface.cubesense.pins import (
+    ACKNOWLEDGE,
+    CLK,
+    EDGE,
+    ENABLE,
+    RNW,
+    SHIFT,
+)
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
 
@@ -52,8 +59,6 @@ SAMPLE_BYTES = FULL_SIZE.columns
 
 SAMPLE_PIXELS = 64
 """The same for pixels that are addressed one by one."""
-
-_ACK = {Sram.SRAM1: "SUNACK", Sram.SRAM2: "NADACK"}
 
 _ROWS = {command.actions: command for command in COMMANDS + ADDRESSING_COMMANDS}
 
@@ -164,7 +169,7 @@ class Acquisition:
         """Pass ``count`` bytes: at once if the program can choose the address, else clocked."""
         if self._mcu_addressing and count > ADDRESS_BYTES and self.picture_open:
             self._position += count
-            yield SetPin("SHIFT", 0)
+            yield SetPin(SHIFT, 0)
             yield from self._send_address(self._position % IMAGE_BYTES)
             return
         buffer = self._buffer
@@ -206,7 +211,7 @@ class Acquisition:
             x, y = asked
             yield from self._send_address(y * FULL_SIZE.columns + x)
             yield StrobeRead(pixel, self._strobe_cycles)
-            yield SetPin("SHIFT", 0)
+            yield SetPin(SHIFT, 0)
             pixels += 1
             if pixels % SAMPLE_PIXELS == 0:
                 yield from self._supply.sample()
@@ -225,9 +230,9 @@ class Acquisition:
         self._meter.charge(i16_add=2, port_write=2)
         for byte in address_bytes(x, y):
             yield SetPin("DATA_I", byte)
-            yield SetPin("CLK", 1)
-            yield SetPin("CLK", 0)
-        yield SetPin("SHIFT", 1)
+            yield SetPin(CLK, 1)
+            yield SetPin(CLK, 0)
+        yield SetPin(SHIFT, 1)
 
     def _await_ack(self, sram: Sram) -> Routine[bool]:
         """Whether ACK came in time; returns at once when the memory is cut off."""
@@ -236,7 +241,7 @@ class Acquisition:
         stored = False
         while not stored and now_us < deadline_us and self._supply.available(sram):
             timeout_us = min(SAMPLE_US, deadline_us - now_us)
-            stored = yield AwaitPin(_ACK[sram], 1, timeout_us, ACK_POLL_CYCLES)
+            stored = yield AwaitPin(ACKNOWLEDGE[sram], 1, timeout_us, ACK_POLL_CYCLES)
             yield from self._supply.sample()
             now_us = yield ReadTimer()
         return stored
@@ -253,7 +258,7 @@ class Acquisition:
             yield from self._standby()
         row = _ROWS[wanted]
         self._meter.charge(call=1)
-        for pin, level in (("SHIFT", row.shift), ("EDGE", row.edge), ("RNW", row.rnw)):
+        for pin, level in ((SHIFT, row.shift), (EDGE, row.edge), (RNW, row.rnw)):
             assert level is not None
             yield SetPin(pin, level)
         for pin, level in zip(ENABLE, (row.sunen, row.naden), strict=True):

@@ -7,7 +7,12 @@ goes where is assumed.
 
 from amaranth.hdl import Module
 
-from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, OWN_PINS, TWO_BOARDS
+from cubestack.firmware_model.interface.cubestar.pins import (
+    BOARD_PREFIXES,
+    OWN_PINS,
+    SHARED,
+    TWO_BOARDS,
+)
 from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
@@ -15,7 +20,9 @@ from cubestack.hdl.cubestar.shared_top import CubeStarShared
 __all__ = ["CubeStarTwoBoards"]
 
 _OWN = [port.name for pin in OWN_PINS for port in pin.ports]
-_COMMON = ("PIXCLK", "PIXDATA", "HSYNC", "VSYNC", "AD_HIGH", "AD_LOW_I", "ALE", "RE_N", "WE_N")
+_COMMON = [
+    port.name for pin in SHARED if pin not in OWN_PINS for port in pin.ports if not port.output
+]
 
 
 class CubeStarTwoBoards(CubeStarBoard):

@@ -17,16 +17,18 @@ from cubestack.firmware_model.interface.cameras.ov7620 import (
     PIXEL_CLOCK_HZ,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.pins import ACKNOWLEDGE, CONTROLS
 
 __all__ = ["STORES", "pair_scan_ms", "pair_store_ms", "pair_with_cameras"]
 
+_SUN, _NADIR = ACKNOWLEDGE.values()
+
 #: Ways to store: levels of SHIFT, EDGE, RNW, SUNEN and NADEN, and the acknowledges.
 STORES = {
-    "own": ((0, 0, 0, 0, 1), ("SUNACK",)),
-    "linked": ((1, 0, 0, 0, 0), ("NADACK",)),
-    "both": ((0, 0, 0, 0, 0), ("SUNACK", "NADACK")),
+    "own": ((0, 0, 0, 0, 1), (_SUN,)),
+    "linked": ((1, 0, 0, 0, 0), (_NADIR,)),
+    "both": ((0, 0, 0, 0, 0), (_SUN, _NADIR)),
 }
-_CONTROLS = ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN")
 _SCAN_PERIOD = Fraction(PS_PER_S, 1_000_000)
 
 
@@ -75,5 +77,5 @@ def pair_with_cameras() -> RtlEngine:
 
 
 def _command(engine: RtlEngine, *levels: int) -> None:
-    for pin, level in zip(_CONTROLS, levels, strict=True):
+    for pin, level in zip(CONTROLS, levels, strict=True):
         engine.set_pin(pin, level)

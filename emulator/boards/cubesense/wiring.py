@@ -5,6 +5,17 @@ from functools import cache
 
 from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
+from cubestack.firmware_model.interface.cubesense.pins import (
+    ACKNOWLEDGE,
+    CLK,
+    CONTENTION,
+    CONTROLS,
+    DATA,
+    HREF,
+    PCLK,
+    PREFIXES,
+    Y,
+)
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
 __all__ = ["cubesense_wiring"]
@@ -19,28 +30,28 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
     if pair is None:
         pair = CubeSensePair(mcu_addressing=mcu_addressing)
 
+    acks = tuple(ACKNOWLEDGE.values())
+
     def storing(level: Level) -> Collection[str]:
-        controls = (level(name) for name in ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN"))
-        clocks = _clocks_used(*controls)
-        acks = ("SUNACK", "NADACK")
+        clocks = _clocks_used(*(level(name) for name in CONTROLS))
         return [clock for clock, ack in zip(clocks, acks, strict=True) if clock and not level(ack)]
 
     return Wiring(
         pair,
-        cameras=(
-            CameraPins("sun", "SUN_PCLK", "SUN_Y", "SUN_HREF"),
-            CameraPins("nadir", "NAD_PCLK", "NAD_Y", "NAD_HREF"),
+        cameras=tuple(
+            CameraPins(side, *(prefix + pin for pin in (PCLK, Y, HREF)))
+            for side, prefix in PREFIXES.items()
         ),
-        memories=(MemoryPins("sun", "SUN_"), MemoryPins("nadir", "NAD_")),
-        data_clock="CLK",
-        data="DATA",
-        acknowledges=("SUNACK", "NADACK"),
+        memories=tuple(MemoryPins(side, prefix) for side, prefix in PREFIXES.items()),
+        data_clock=CLK,
+        data=DATA,
+        acknowledges=acks,
         storing=storing,
         # Two release the reset, one ends the store, one the line;
         # then the pause between two frames is counted.
         settling_clocks=8 + pair.read_out.frame_gap,
-        contention="CONTENTION",
-        burst_levels=tuple((("CLK", 0), *levels.items()) for levels in _storing_levels()),
+        contention=CONTENTION,
+        burst_levels=tuple(((CLK, 0), *levels.items()) for levels in _storing_levels()),
     )
 
 
@@ -48,13 +59,7 @@ def _storing_levels() -> list[dict[str, int]]:
     """Levels of the control lines in each command that stores a picture."""
     storing = {Action.STORE, Action.STORE_OTHER}
     return [
-        {
-            "SHIFT": command.shift or 0,
-            "EDGE": command.edge or 0,
-            "RNW": command.rnw or 0,
-            "SUNEN": command.sunen,
-            "NADEN": command.naden,
-        }
+        dict(zip(CONTROLS, (level or 0 for level in command.levels), strict=True))
         for command in COMMANDS
         if storing & {*command.actions}
     ]

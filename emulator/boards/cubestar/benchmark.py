@@ -12,6 +12,7 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE_CLOCKS
+from cubestack.firmware_model.interface.cubestar.pins import ACK, ENABLE, RNW
 from cubestack.hdl.cubestar.top import CubeStarTop
 
 __all__ = ["rtl_clocks_per_s", "stored_frame", "strobes_per_s"]
@@ -27,9 +28,9 @@ def rtl_clocks_per_s(rounds: int = ROUNDS) -> float:
 def strobes_per_s(rounds: int = ROUNDS) -> float:
     """Data clock cycles for each second of wall time while that frame is read back."""
     _, engine = stored_frame(skipping=True)
-    engine.set_pin("ENABLE", 0)
-    engine.set_pin("RNW", 1)
-    engine.set_pin("ENABLE", 1)
+    engine.set_pin(ENABLE, 0)
+    engine.set_pin(RNW, 1)
+    engine.set_pin(ENABLE, 1)
     engine.run(engine.now_ps + 1_000_000)
     out = np.empty(len(engine.sram) // 2, np.uint8)
     best = 0.0
@@ -48,9 +49,9 @@ def stored_frame(*, skipping: bool) -> tuple[float, RtlEngine]:
     rng = np.random.default_rng(0)
     image = rng.integers(0, 256, (top.rows, top.columns), dtype=np.uint8)
     engine.attach(RepeatedFrame(image, PERIOD, LINE_CLOCKS))
-    engine.set_pin("ENABLE", 1)
+    engine.set_pin(ENABLE, 1)
     frame_ps = int(top.rows * LINE_CLOCKS * PERIOD)
     start = time.perf_counter()
-    reached = engine.run(2 * frame_ps, ("ACK", 1))
+    reached = engine.run(2 * frame_ps, (ACK, 1))
     wall_s = time.perf_counter() - start
     return float(reached / PERIOD) / wall_s, engine

@@ -22,6 +22,7 @@ from cubestack.emulator.boards.cubestar.wiring import (
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import ENABLE, RNW
 
 __all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
 
@@ -86,8 +87,8 @@ def _stores(pins: Pins, board: str = "") -> bool:
 
 def _copied_states(pins: Pins, _accessed: bool) -> States:
     state = "standby"
-    if pins["ENABLE"]:
-        state = "reading" if pins["RNW"] else "storing"
+    if pins[ENABLE]:
+        state = "reading" if pins[RNW] else "storing"
     return {"fpga": state, "memory": "transfer" if state == "reading" else "standby"}
 
 
@@ -110,7 +111,7 @@ def _two_board_states(pins: Pins, accessed: bool) -> States:
 
 
 _TWO = ("BOARD1_", "BOARD2_")
-_ONE_FPGA = {"ENABLE": 0, "RNW": 0}
+_ONE_FPGA: Mapping[str, int] = {ENABLE: 0, RNW: 0}
 
 #: Every layout.
 BOARDS = {

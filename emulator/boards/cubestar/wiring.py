@@ -5,6 +5,7 @@ from collections.abc import Collection
 from amaranth.lib.wiring import Component
 
 from cubestack.emulator.rtl.wiring import BusPins, CameraPins, Level, Levels, MemoryPins, Wiring
+from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.top import CubeStarTop
@@ -17,9 +18,16 @@ __all__ = [
     "cubestar_wiring",
 ]
 
+_IMAGER = CameraPins("imager", pins.PIXCLK, pins.PIXDATA, pins.HSYNC, pins.VSYNC)
+
 #: A board while it stores, and the external bus between two accesses.
-_STORING: Levels = (("ENABLE", 1), ("RNW", 0))
-_AT_REST: Levels = (("ALE", 0), ("RE_N", 1), ("WE_N", 1))
+_STORING: Levels = ((pins.ENABLE, 1), (pins.RNW, 0))
+_AT_REST: Levels = ((pins.ALE, 0), (pins.RE_N, 1), (pins.WE_N, 1))
+
+
+def _stores(level: Level, board: str = "") -> bool:
+    on, reads, done = (level(board + pin) for pin in (pins.ENABLE, pins.RNW, pins.ACK))
+    return bool(on and not reads and not done)
 
 
 def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
@@ -29,20 +37,19 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
     """
 
     def storing(level: Level) -> Collection[str]:
-        stores = level("ENABLE") and not level("RNW") and not level("ACK")
-        return ("imager",) if stores else ()
+        return ("imager",) if _stores(level) else ()
 
     return Wiring(
         top or CubeStarTop(),
-        cameras=(CameraPins("imager", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"),),
+        cameras=(_IMAGER,),
         memories=(MemoryPins("SRAM"),),
-        data_clock="DCLK",
-        data="DATA",
-        acknowledges=("ACK",),
+        data_clock=pins.DCLK,
+        data=pins.DATA,
+        acknowledges=(pins.ACK,),
         storing=storing,
         # Two release the reset, one ends the store, one the line.
         settling_clocks=8,
-        burst_levels=((("DCLK", 0), *_STORING),),
+        burst_levels=(((pins.DCLK, 0), *_STORING),),
     )
 
 
@@ -55,20 +62,20 @@ def cubestar_double_wiring(top: CubeStarDouble | None = None) -> Wiring:
     """The FPGA board with two memories in turn, "SRAM1" and "SRAM2"."""
     names = ("SRAM1", "SRAM2")
     memories = tuple(MemoryPins(name, part=name) for name in names)
-    return _on_bus(top or CubeStarDouble(), memories, ((*_STORING, *_AT_REST, ("CS_N", 1)),))
+    return _on_bus(top or CubeStarDouble(), memories, ((*_STORING, *_AT_REST, (pins.CS_N, 1)),))
 
 
 def cubestar_two_boards_wiring(boards: CubeStarTwoBoards | None = None) -> Wiring:
     """Two FPGA boards with one shared memory each, "SRAM1" and "SRAM2"."""
-    prefixes = ("BOARD1_", "BOARD2_")
+    prefixes = pins.BOARD_PREFIXES
     memories = tuple(MemoryPins(f"SRAM{n}", prefix) for n, prefix in enumerate(prefixes, 1))
     levels = tuple(
         tuple((f"{board}{pin}", level) for board, own in states for pin, level in own)
         for storing, other in (prefixes, prefixes[::-1])
-        for others in ((("ENABLE", 0),), (("ENABLE", 1), ("RNW", 1)))
+        for others in (((pins.ENABLE, 0),), ((pins.ENABLE, 1), (pins.RNW, 1)))
         for states in [((storing, _STORING), (other, others), ("", _AT_REST))]
     )
-    return _on_bus(boards or CubeStarTwoBoards(), memories, levels, prefixes, "CONTENTION")
+    return _on_bus(boards or CubeStarTwoBoards(), memories, levels, prefixes, pins.CONTENTION)
 
 
 def _on_bus(
@@ -81,22 +88,26 @@ def _on_bus(
     """Boards on the external bus; ``boards`` goes before the names of their own pins."""
 
     def storing(level: Level) -> Collection[str]:
-        stores = any(
-            level(f"{board}ENABLE") and not level(f"{board}RNW") and not level(f"{board}ACK")
-            for board in boards
-        )
+        stores = any(_stores(level, board) for board in boards)
         return ("imager",) if stores else ()
 
     return Wiring(
         component,
-        cameras=(CameraPins("imager", "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"),),
+        cameras=(_IMAGER,),
         memories=memories,
-        data_clock="RE_N",
-        data="AD_LOW_O",
-        acknowledges=tuple(f"{board}ACK" for board in boards),
+        data_clock=pins.RE_N,
+        data=pins.AD_LOW.ports[1].name,
+        acknowledges=tuple(board + pins.ACK for board in boards),
         storing=storing,
         settling_clocks=8,  # as above
         contention=contention,
         burst_levels=burst_levels,
-        bus=BusPins(tuple(f"{board}CS_N" for board in boards)),
+        bus=BusPins(
+            tuple(board + pins.CS_N for board in boards),
+            pins.AD_HIGH,
+            pins.AD_LOW,
+            pins.ALE,
+            pins.RE_N,
+            pins.WE_N,
+        ),
     )

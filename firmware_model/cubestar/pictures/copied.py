@@ -16,6 +16,7 @@ from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
+from cubestack.firmware_model.interface.cubestar.pins import ACK, BANK, ENABLE, RNW
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine, SetPin, StrobeRead
 
@@ -75,7 +76,7 @@ def test_pattern(size: int) -> NDArray[np.uint8]:
 class CopiedPictures:
     """Pictures at the start of the processor's own external RAM."""
 
-    acknowledge = "ACK"
+    acknowledge: str = ACK
     while_storing = True
     iteration_us = ITERATION_US
 
@@ -100,22 +101,22 @@ class CopiedPictures:
 
     def begin(self) -> Routine[None]:
         """Store into the selected bank."""
-        yield SetPin("BANK", self._state.settings.get("SelectImageBank", "Bank"))
-        yield SetPin("RNW", 0)
-        yield SetPin("ENABLE", 1)
+        yield SetPin(BANK, self._state.settings.get("SelectImageBank", "Bank"))
+        yield SetPin(RNW, 0)
+        yield SetPin(ENABLE, 1)
 
     def end(self, stored: bool) -> Routine[None]:
         """Stop."""
-        yield SetPin("ENABLE", 0)
+        yield SetPin(ENABLE, 0)
 
     def fetch(self) -> Routine[bool]:
         """Copy the frame from the FPGA's SRAM to the external RAM (imageTransfer)."""
-        yield SetPin("RNW", 1)
-        yield SetPin("ENABLE", 1)
+        yield SetPin(RNW, 1)
+        yield SetPin(ENABLE, 1)
         self._supply.sample()
         yield StrobeRead(self._hardware.external_ram[:IMAGE_BYTES], self._transfer_cycles)
-        yield SetPin("ENABLE", 0)
-        yield SetPin("RNW", 0)
+        yield SetPin(ENABLE, 0)
+        yield SetPin(RNW, 0)
         return True
 
     def search(self, config: DetectionConfig) -> Routine[Detection]:

@@ -28,6 +28,14 @@ from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import (
+    ACK,
+    BANK,
+    BOARD_PREFIXES,
+    ENABLE,
+    INTO,
+    RNW,
+)
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import BusAccess, Routine, SetPin
 
@@ -42,7 +50,7 @@ class _BusPictures(ABC):
     A place is where a picture can be; ``Retained.image_place`` has that of the newest one.
     """
 
-    acknowledge = "ACK"
+    acknowledge: str = ACK
     while_storing = True
     iteration_us = FAST_ITERATION_US
     memories: tuple[tuple[int, int, int], ...]
@@ -176,19 +184,19 @@ class SharedPictures(_BusPictures):
 
     def start(self) -> Routine[None]:
         """Take the bus."""
-        yield SetPin("ENABLE", 0)
-        yield SetPin("RNW", 1)
-        yield SetPin("ENABLE", 1)
+        yield SetPin(ENABLE, 0)
+        yield SetPin(RNW, 1)
+        yield SetPin(ENABLE, 1)
         self._open = True
 
     def begin(self) -> Routine[None]:
         """Give the bus away and store into the selected bank."""
         self._open = False
         self._state.retained.image_place = self._bank()
-        yield SetPin("ENABLE", 0)
-        yield SetPin("BANK", self._state.retained.image_place)
-        yield SetPin("RNW", 0)
-        yield SetPin("ENABLE", 1)
+        yield SetPin(ENABLE, 0)
+        yield SetPin(BANK, self._state.retained.image_place)
+        yield SetPin(RNW, 0)
+        yield SetPin(ENABLE, 1)
 
     def end(self, stored: bool) -> Routine[None]:
         """Take the bus back."""
@@ -208,18 +216,18 @@ class TwoMemoryPictures(_BusPictures):
 
     def start(self) -> Routine[None]:
         """Take the bus."""
-        yield SetPin("RNW", 1)
-        yield SetPin("ENABLE", 1)
+        yield SetPin(RNW, 1)
+        yield SetPin(ENABLE, 1)
         self._open = True
 
     def begin(self) -> Routine[None]:
         """Store into the other memory; the bus keeps the one of the newest picture."""
-        yield SetPin("INTO", 1 - self._state.retained.image_place)
-        yield SetPin("RNW", 0)
+        yield SetPin(INTO, 1 - self._state.retained.image_place)
+        yield SetPin(RNW, 0)
 
     def end(self, stored: bool) -> Routine[None]:
         """Have the bus for both."""
-        yield SetPin("RNW", 1)
+        yield SetPin(RNW, 1)
         if stored:
             self._state.retained.image_place ^= 1
 
@@ -253,10 +261,10 @@ class TwoBoardPictures(_BusPictures):
         """Store at the other board; the bus keeps the one of the newest picture."""
         self._choose()
         board = self._into & 1
-        yield SetPin(_pin(board, "ENABLE"), 0)
-        yield SetPin(_pin(board, "BANK"), self._into >> 1)
-        yield SetPin(_pin(board, "RNW"), 0)
-        yield SetPin(_pin(board, "ENABLE"), 1)
+        yield SetPin(_pin(board, ENABLE), 0)
+        yield SetPin(_pin(board, BANK), self._into >> 1)
+        yield SetPin(_pin(board, RNW), 0)
+        yield SetPin(_pin(board, ENABLE), 1)
 
     def end(self, stored: bool) -> Routine[None]:
         """Have the bus for both."""
@@ -267,19 +275,19 @@ class TwoBoardPictures(_BusPictures):
     def _choose(self) -> None:
         board = 1 - (self._state.retained.image_place & 1)
         self._into = board | self._bank() << 1
-        self.acknowledge = _pin(board, "ACK")
+        self.acknowledge = _pin(board, ACK)
 
     def _take(self, board: int) -> Routine[None]:
-        yield SetPin(_pin(board, "ENABLE"), 0)
-        yield SetPin(_pin(board, "RNW"), 1)
-        yield SetPin(_pin(board, "ENABLE"), 1)
+        yield SetPin(_pin(board, ENABLE), 0)
+        yield SetPin(_pin(board, RNW), 1)
+        yield SetPin(_pin(board, ENABLE), 1)
 
     def _address_of(self, place: int) -> tuple[int, int]:
         return place & 1, (place >> 1) * IMAGE_BYTES
 
 
 def _pin(board: int, name: str) -> str:
-    return f"BOARD{board + 1}_{name}"
+    return BOARD_PREFIXES[board] + name
 
 
 _KINDS: dict[Layout, type[CopiedPictures | _BusPictures]] = {

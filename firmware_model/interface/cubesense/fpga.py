@@ -64,11 +64,15 @@ class FpgaCommand:
     naden: int
     actions: Actions
 
+    @property
+    def levels(self) -> tuple[int | None, ...]:
+        """Levels of the control lines, in the order of the fields."""
+        return (self.shift, self.edge, self.rnw, self.sunen, self.naden)
+
     def fits(self, shift: int, edge: int, rnw: int, sunen: int, naden: int) -> bool:
         """Whether these levels are this row's."""
-        row = (self.shift, self.edge, self.rnw, self.sunen, self.naden)
-        levels = (shift, edge, rnw, sunen, naden)
-        return all(wanted in (None, level) for wanted, level in zip(row, levels, strict=True))
+        given = (shift, edge, rnw, sunen, naden)
+        return all(row in (None, level) for row, level in zip(self.levels, given, strict=True))
 
 
 _IDLE = Action.STANDBY
