@@ -88,25 +88,18 @@ def number(value: Any) -> float:
     return float(value)
 
 
-def whole(value: Any) -> int:
-    """A whole number."""
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise SceneError(f"must be a whole number, not {value!r}")
-    return value
+def _exactly(kind: type[V], what: str) -> Callable[[Any], V]:
+    def read(value: Any) -> V:
+        if type(value) is not kind:
+            raise SceneError(f"must be {what}, not {value!r}")
+        return value
+
+    return read
 
 
-def flag(value: Any) -> bool:
-    """True or false."""
-    if not isinstance(value, bool):
-        raise SceneError(f"must be true or false, not {value!r}")
-    return value
-
-
-def text(value: Any) -> str:
-    """A string."""
-    if not isinstance(value, str):
-        raise SceneError(f"must be text, not {value!r}")
-    return value
+whole = _exactly(int, "a whole number")
+flag = _exactly(bool, "true or false")
+text = _exactly(str, "text")
 
 
 def several(count: int, of: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]:

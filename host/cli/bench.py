@@ -148,7 +148,6 @@ def _aramis() -> dict[str, float]:
     from cubestack.emulator.camera.common.register_file import RegisterFile
     from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
     from cubestack.emulator.camera.mt9m001.lens import CONDITION
-    from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
     from cubestack.emulator.camera.mt9m001.registers import read_settings
     from cubestack.emulator.scene.sky import SkyScene
     from cubestack.firmware_model.aramis.detection.background import Background
@@ -168,7 +167,7 @@ def _aramis() -> dict[str, float]:
         ratio = (kernel.now - virtual) / PS_PER_S / (time.perf_counter() - wall)
         client.command("StopLoop")
         frames: list[float] = []
-        imager = Mt9m001Imager(0, NoiseTerms(), None)
+        imager = Mt9m001Imager()
         settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(HIGHEST_GAIN,) * 4)
         shutter = session.board.ppi.stored
         assert shutter is not None

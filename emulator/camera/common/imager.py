@@ -41,14 +41,14 @@ class Imager(ABC, Generic[Settings]):
             return _photograph(scene, scene.part(optics.columns, optics.rows), shutter)
         light = star_light(scene, optics, shutter)
         if not condition.noise:
-            return self._counts(light, shutter.exposure_s, condition, settings, None)
+            return self.counts(light, shutter.exposure_s, condition, settings, None)
         # By frame time, so that a frame nobody looked at does not change the next one's noise.
         seed = [condition.seed, max(0, shutter.readout_ps)]
         generator = np.random.Generator(np.random.SFC64(seed))
-        return self._counts(light, shutter.exposure_s, condition, settings, generator)
+        return self.counts(light, shutter.exposure_s, condition, settings, generator)
 
     @abstractmethod
-    def _counts(
+    def counts(
         self,
         light: Light,
         exposure_s: float,
@@ -56,9 +56,14 @@ class Imager(ABC, Generic[Settings]):
         settings: Settings,
         generator: np.random.Generator | None,
     ) -> Grey:
-        """What the sensor makes of ``light``, in electrons; without a generator there is no noise.
+        """Grey values, shape as ``light``.
 
-        Shapes are (rows, columns).
+        Args:
+            light: mean number of electrons that it frees in each pixel, shape (rows, columns).
+            exposure_s: exposure of each pixel.
+            condition: temperature, hot pixels and their seed.
+            settings: as of ``picture``.
+            generator: source of this frame's noise; None for a sensor without noise and defects.
         """
 
 

@@ -1,22 +1,88 @@
-"""One frame of a scene on the MLX75412: its lens' light, its pixels' counts."""
+"""The sensor's pixels: electrons become 8-bit counts, with all that disturbs them.
+
+CubeStar thesis, section 3.4.4 (dark current and its subtraction), appendix C (upper 8 of 12 bits)
+and appendix E: 2.28 electrons per count of 12 bits, dark signal of 1008 counts a second at 65 C.
+Nothing is published about read noise, fixed pattern, defects, and how the dark signal depends on
+temperature; those constants are assumed, at what automotive sensors of that time had.
+
+Shot, dark and read noise are drawn at once, as one normal distribution with the mean and the
+variance of the Poisson and normal parts together. What is lost is the skewness of the Poisson
+part: beside this read noise never more than 0.034. A frame costs one normal field that way.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from cubestack.emulator.camera.common.imager import Grey, Imager, Light, hot_pixels
+from cubestack.emulator.camera.common.imager import Grey, Imager, Light, doubled, hot_pixels
 from cubestack.emulator.camera.common.view import SkyCondition
-from cubestack.emulator.camera.mlx75412.pixel_array import Corrections, PixelArray, ideal_counts
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
-__all__ = ["Mlx75412Imager"]
+__all__ = ["Corrections", "Mlx75412Imager", "dark_dn12_per_second", "ideal_counts"]
+
+ELECTRONS_PER_DN12 = 2.28  # per count of 12 bits (published)
+FULL_SCALE_DN12 = 4095  # the converter saturates here
+DN12_PER_DN8 = 16  # only the upper 8 of 12 bits are wired (appendix C)
+DARK_DN12_PER_S_AT_65_C = 1008.0  # published
+DARK_NON_UNIFORMITY = 0.1  # assumed: standard deviation, relative
+READ_NOISE_ELECTRONS = 11.4  # assumed: 5 counts of 12 bits
+GAIN_NON_UNIFORMITY = 0.005  # assumed: standard deviation, relative
+COLUMN_PATTERN_DN12 = 4.0  # assumed: "very faint vertical noise" (appendix C), standard deviation
+PIXEL_PATTERN_DN12 = 2.0  # assumed: standard deviation
+PATTERN_LEFT = 0.1  # assumed: share of the pattern that the on-chip correction leaves
+FACTORY_DEAD = 30  # assumed: pixels without light, known to the sensor
+FACTORY_HOT = 30  # assumed: pixels with much dark current, known to the sensor
+HOT_DN12_PER_S_AT_20_C = 1500.0  # assumed: mean of an exponential distribution
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Which of the sensor's corrections are on.
+
+    Attributes:
+        defects: known defective pixels take the mean of their neighbours in the row.
+        fixed_pattern: most of the fixed pattern is subtracted.
+        dark: the mean of the dark rows is subtracted.
+    """
+
+    defects: bool = True
+    fixed_pattern: bool = True
+    dark: bool = True
+
+
+def dark_dn12_per_second(temperature_c: float) -> float:
+    """Mean dark signal in counts of 12 bits per second."""
+    return doubled(DARK_DN12_PER_S_AT_65_C, temperature_c, 65.0)
+
+
+def ideal_counts(electrons: Light) -> Grey:
+    """What a sensor without noise and defects makes of ``electrons``: upper 8 of 12 bits."""
+    return _upper_bits(electrons * np.float32(1 / ELECTRONS_PER_DN12))
 
 
 class Mlx75412Imager(Imager[Corrections]):
-    """Renders frames of one sensor."""
+    """Renders frames of one sensor, with its own fixed pattern and its own defects."""
 
     def __init__(self, seed: int = 0) -> None:
-        """Make the imager with the sensor that ``seed`` stands for."""
-        self._pixels = PixelArray(seed)
+        """Make the sensor that ``seed`` stands for."""
+        generator = np.random.default_rng([seed, 0xD1E])
+        shape = (ROWS, COLUMNS)
 
-    def _counts(
+        def field(sigma: float, shape: tuple[int, ...] = shape) -> Light:
+            return np.float32(sigma) * generator.standard_normal(shape, np.float32)
+
+        self._gain = 1 + field(GAIN_NON_UNIFORMITY)
+        self._dark_share = np.maximum(1 + field(DARK_NON_UNIFORMITY), 0)
+        self._pattern = field(COLUMN_PATTERN_DN12, (1, COLUMNS)) + field(PIXEL_PATTERN_DN12)
+        # Away from the outer columns, whose pixels lack a neighbour to correct from.
+        places = generator.choice(ROWS * (COLUMNS - 2), FACTORY_DEAD + FACTORY_HOT, replace=False)
+        rows, columns = np.divmod(places, COLUMNS - 2)
+        self._defects = rows, columns + 1
+        self._gain[rows[:FACTORY_DEAD], columns[:FACTORY_DEAD] + 1] = 0
+        self._hot = rows[FACTORY_DEAD:], columns[FACTORY_DEAD:] + 1
+        self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
+
+    def counts(
         self,
         light: Light,
         exposure_s: float,
@@ -24,11 +90,38 @@ class Mlx75412Imager(Imager[Corrections]):
         settings: Corrections,
         generator: np.random.Generator | None,
     ) -> Grey:
+        """Grey values (512, 1024); see ``Imager``."""
         if generator is None:
             return ideal_counts(light)
-        grown = None
-        if condition.hot_pixels:
-            grown = hot_pixels(condition.seed, condition.hot_pixels, light.size)
-        return self._pixels.read_out(
-            light, exposure_s, condition.temperature_c, settings, generator, grown
+        per_second = dark_dn12_per_second(condition.temperature_c)
+        dark_electrons = np.float32(per_second * exposure_s * ELECTRONS_PER_DN12)
+        hot_electrons = np.float32(
+            HOT_DN12_PER_S_AT_20_C
+            * (per_second / dark_dn12_per_second(20.0))
+            * (exposure_s * ELECTRONS_PER_DN12)
         )
+        mean = self._dark_share * dark_electrons
+        mean += light * self._gain
+        mean[self._hot] += self._hot_share * hot_electrons
+        if condition.hot_pixels:
+            # The sensor does not know of these.
+            places, share = hot_pixels(condition.seed, condition.hot_pixels, light.size)
+            mean.ravel()[places] += share * hot_electrons
+        signal = generator.standard_normal(mean.shape, np.float32)
+        signal *= np.sqrt(mean + np.float32(READ_NOISE_ELECTRONS**2))
+        signal += mean
+        signal *= np.float32(1 / ELECTRONS_PER_DN12)
+        signal += self._pattern * np.float32(PATTERN_LEFT if settings.fixed_pattern else 1)
+        if settings.dark:
+            signal -= np.float32(per_second * exposure_s)
+        if settings.defects:
+            rows, columns = self._defects
+            signal[rows, columns] = (signal[rows, columns - 1] + signal[rows, columns + 1]) / 2
+        return _upper_bits(signal)
+
+
+def _upper_bits(dn12: Light) -> Grey:
+    """Converts to whole counts of 12 bits, saturated, and takes the upper 8 bits."""
+    counts: Light = np.clip(dn12 + np.float32(0.5), 0, FULL_SCALE_DN12)
+    counts *= np.float32(1 / DN12_PER_DN8)  # a power of two: exact, so truncation drops 4 bits
+    return counts.astype(np.uint8, order="C")

@@ -24,9 +24,8 @@ from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mlx75412.frame_timing import LINE_CLOCKS, exposure_lines, frame_lines
-from cubestack.emulator.camera.mlx75412.imager import Mlx75412Imager
+from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
-from cubestack.emulator.camera.mlx75412.pixel_array import Corrections
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mlx75412 import (
     COLUMNS,

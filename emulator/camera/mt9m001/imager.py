@@ -1,4 +1,8 @@
-"""One frame of a scene on the MT9M001: its lens' light, its noise, its window."""
+"""One frame of a scene on the MT9M001: its lens' light, its noise, its window.
+
+Shot, dark, background and read-out noise are drawn at once, as one normal distribution with the
+mean and the variance of all of them together.
+"""
 
 from dataclasses import replace
 
@@ -8,11 +12,14 @@ from cubestack.emulator.camera.common.imager import Grey, Imager, Light, hot_pix
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mt9m001.noise import (
+    BACKGROUND_ELECTRONS_PER_S,
     BLACK_LEVEL,
+    FULL_SCALE,
+    FULL_WELL_ELECTRONS,
     HOT_SHARE,
+    READ_NOISE_ELECTRONS,
     NoiseTerms,
-    Surroundings,
-    counts,
+    dark_electrons_per_s,
 )
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.sky import Scene
@@ -25,15 +32,21 @@ class Mt9m001Imager(Imager[SensorSettings]):
     """Renders frames of one sensor's window."""
 
     def __init__(
-        self, seed: int, noise: NoiseTerms, background_electrons_per_s: float | None
+        self,
+        seed: int = 0,
+        noise: NoiseTerms | None = None,
+        background_electrons_per_s: float = BACKGROUND_ELECTRONS_PER_S,
     ) -> None:
-        """Make the imager with the sensor that ``seed`` stands for, and these terms of noise."""
+        """Make the imager with the sensor that ``seed`` stands for.
+
+        Args:
+            seed: of the part's hot pixels.
+            noise: which terms of noise there are under a condition with noise, all unless given.
+            background_electrons_per_s: light from elsewhere in each pixel.
+        """
         self._seed = seed
-        self._noise = noise
-        usual = Surroundings().background_electrons_per_s
-        self._background = (
-            usual if background_electrons_per_s is None else background_electrons_per_s
-        )
+        self._noise = noise or NoiseTerms()
+        self._background = background_electrons_per_s
 
     def picture(
         self,
@@ -48,7 +61,7 @@ class Mt9m001Imager(Imager[SensorSettings]):
         whole = replace(shutter, readout_ps=readout_ps)
         return _window(super().picture(scene, condition, whole, settings), settings)
 
-    def _counts(
+    def counts(
         self,
         light: Light,
         exposure_s: float,
@@ -56,13 +69,34 @@ class Mt9m001Imager(Imager[SensorSettings]):
         settings: SensorSettings,
         generator: np.random.Generator | None,
     ) -> Grey:
-        hot = None
-        if condition.hot_pixels:
+        """Grey values, same shape as ``light``; see ``Imager``."""
+        terms = NoiseTerms.none() if generator is None else self._noise
+        surplus = self._background * exposure_s if terms.background else 0.0
+        dark = dark_electrons_per_s(condition.temperature_c) * exposure_s
+        if terms.dark:
+            surplus += dark
+        mean = light + np.float32(surplus)
+        if terms.dark and condition.hot_pixels:
             seed = condition.seed + self._seed
-            hot = hot_pixels(seed, condition.hot_pixels, light.size, HOT_SHARE)
-        surroundings = Surroundings(condition.temperature_c, self._background)
-        noise = NoiseTerms.none() if generator is None else self._noise
-        return counts(light, exposure_s, _gain(settings), surroundings, noise, generator, hot)
+            places, share = hot_pixels(seed, condition.hot_pixels, light.size, HOT_SHARE)
+            mean.ravel()[places] += share * np.float32(dark)
+        steady = READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
+        variance = (mean if terms.shot else mean - light) + np.float32(steady)
+        signal = mean
+        if generator is not None and (terms.shot or surplus or steady):
+            noise = generator.standard_normal(light.shape, np.float32)
+            noise *= np.sqrt(variance)
+            signal += noise
+        # The dark rows' mean, which holds the mean dark current, is subtracted on the chip.
+        if terms.dark:
+            signal -= np.float32(dark)
+        signal *= _gain(settings) * np.float32((FULL_SCALE + 1) / FULL_WELL_ELECTRONS)
+        signal += np.float32(BLACK_LEVEL)
+        if not terms.quantisation:
+            nearest: Light = np.clip(signal / np.float32(4) + np.float32(0.5), 0, FULL_SCALE // 4)
+            return nearest.astype(np.uint8)
+        whole: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
+        return (whole.astype(np.uint16) >> 2).astype(np.uint8)
 
 
 def _gain(settings: SensorSettings) -> float | Light:

@@ -16,7 +16,6 @@ from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
-from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import read_settings
 from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
@@ -110,7 +109,7 @@ def test_a_picture_file_as_the_light(capsys: pytest.CaptureFixture[str], tmp_pat
     settings = read_settings(RegisterFile(REGISTERS))
     settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
     shutter = RollingShutter(10**12, Fraction(31_750_000), 6299, 6299)
-    sky = Mt9m001Imager(0, NoiseTerms(), None).picture(scene, CONDITION, shutter, settings)
+    sky = Mt9m001Imager().picture(scene, CONDITION, shutter, settings)
     wide = np.pad(sky, ((0, 20), (7, 0)))
     Image.fromarray(wide).save(tmp_path / "sky.png")
     frame = measure(capsys, "--image", tmp_path / "sky.png", "--crop", "7,0")[0]

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import fsolve
 
 from cubestack.emulator.camera.common.optics import Distortion
+from cubestack.emulator.camera.mlx75412.imager import DN12_PER_DN8, ELECTRONS_PER_DN12
 from cubestack.emulator.camera.mlx75412.lens import EFFECTIVE_WIDTH_A, LENS
-from cubestack.emulator.camera.mlx75412.pixel_array import DN12_PER_DN8, ELECTRONS_PER_DN12
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 

@@ -6,9 +6,8 @@ import numpy as np
 from cubestack.emulator.camera.common.exposure import star_light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
-from cubestack.emulator.camera.mlx75412.imager import Mlx75412Imager
+from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager, ideal_counts
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
-from cubestack.emulator.camera.mlx75412.pixel_array import Corrections, ideal_counts
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 
 LONG = RollingShutter(10**12, Fraction(132_200_000), 2917, 2917)

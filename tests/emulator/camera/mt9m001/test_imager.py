@@ -8,7 +8,6 @@ import numpy as np
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
-from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
@@ -38,7 +37,7 @@ def test_a_window_s_rows_have_their_own_times() -> None:
         mag_limit=5.0,
     )
     quiet = replace(CONDITION, noise=False)
-    imager = Mt9m001Imager(0, NoiseTerms(), None)
+    imager = Mt9m001Imager()
     first_ps = 2 * 10**11
     whole = imager.picture(scene, quiet, shutter(first_ps), WHOLE)
     window = replace(WHOLE, row=600, rows=300)

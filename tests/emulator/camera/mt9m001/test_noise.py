@@ -1,31 +1,44 @@
 """Each term of the noise alone, against its formula in section 3.4 of the AraMiS thesis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.imager import hot_pixels
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.noise import (
     BLACK_LEVEL,
     FULL_WELL_ELECTRONS,
     HOT_SHARE,
     READ_NOISE_ELECTRONS,
     NoiseTerms,
-    Surroundings,
-    counts,
     dark_electrons_per_s,
     quantisation_sigma,
 )
+from cubestack.emulator.camera.mt9m001.registers import read_settings
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 
 SHAPE = (400, 500)
+QUIET = replace(CONDITION, hot_pixels=0)
 LSB8 = FULL_WELL_ELECTRONS / 256  # electrons of a count of 8 bits at gain 1
 
 
 def frame(
-    light: float, terms: NoiseTerms, gain: float = 1.0, seed: int = 1, **surroundings: float
+    light: float | np.ndarray,
+    terms: NoiseTerms,
+    gain: float = 1.0,
+    condition: SkyCondition = QUIET,
+    background: float = 15.0,
 ) -> np.ndarray:
-    electrons = np.full(SHAPE, light, np.float32)
-    generator = np.random.Generator(np.random.SFC64(seed))
-    return counts(electrons, 1.0, gain, Surroundings(**surroundings), terms, generator)
+    electrons = np.broadcast_to(np.float32(light), SHAPE)
+    generator = np.random.Generator(np.random.SFC64(1))
+    settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(gain,) * 4)
+    imager = Mt9m001Imager(0, terms, background)
+    return imager.counts(electrons, 1.0, condition, settings, generator)
 
 
 def only(**terms: bool) -> NoiseTerms:
@@ -66,16 +79,17 @@ def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
     assert dark_electrons_per_s(33) / dark_electrons_per_s(25) == pytest.approx(2)
     gain, warm = 8.0, 65.0
     dark = dark_electrons_per_s(warm)
-    picture = frame(1_500, only(dark=True), gain, temperature_c=warm)
+    condition = replace(QUIET, temperature_c=warm)
+    picture = frame(1_500, only(dark=True), gain, condition)
     rounding = LSB8 / gain / np.sqrt(12)
     assert electrons_sigma(picture, gain) == pytest.approx(np.hypot(dark**0.5, rounding), rel=0.02)
-    plain = frame(1_500, only(), gain, temperature_c=warm)
+    plain = frame(1_500, only(), gain, condition)
     assert picture.mean() == pytest.approx(plain.mean(), abs=0.5)
 
 
 def test_background_adds_its_mean_and_its_noise() -> None:
     gain = 8.0
-    picture = frame(500, only(background=True), gain, background_electrons_per_s=1_000.0)
+    picture = frame(500, only(background=True), gain, background=1_000.0)
     plain = frame(500, only(), gain)
     assert picture.mean() - plain.mean() == pytest.approx(1_000 * gain / LSB8, abs=0.5)
     rounding = LSB8 / gain / np.sqrt(12)
@@ -86,11 +100,9 @@ def test_quantisation_follows_its_formula() -> None:
     assert quantisation_sigma(1.0) == pytest.approx(FULL_WELL_ELECTRONS / 1024 / np.sqrt(12))
     rng = np.random.default_rng(2)
     light = rng.uniform(5_000, 25_000, SHAPE).astype(np.float32)
-    generator = np.random.Generator(np.random.SFC64(3))
 
     def error(terms: NoiseTerms) -> np.ndarray:
-        picture = counts(light, 1.0, 1.0, Surroundings(), terms, generator)
-        return light - (picture - BLACK_LEVEL / 4) * LSB8
+        return light - (frame(light, terms) - BLACK_LEVEL / 4) * LSB8
 
     wired = error(only(quantisation=True))
     # The upper 8 of 10 bits: the error of 8 bits, and on the average what is cut off.
@@ -111,11 +123,7 @@ def test_the_terms_add_up_as_variances() -> None:
 
 def test_hot_pixels_shine_where_they_are_and_scale_with_the_dark_current() -> None:
     places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1], HOT_SHARE)
-    electrons = np.zeros(SHAPE, np.float32)
-    generator = np.random.Generator(np.random.SFC64(1))
-    picture = counts(
-        electrons, 1.0, 1.0, Surroundings(), only(dark=True), generator, (places, shares)
-    )
+    picture = frame(0, only(dark=True), condition=replace(CONDITION, hot_pixels=10, seed=7))
     bright = set(np.flatnonzero(picture > 10).tolist())
     strong = set(places[shares * dark_electrons_per_s(20.0) > 12 * LSB8].tolist())
     assert strong

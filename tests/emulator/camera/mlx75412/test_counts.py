@@ -1,18 +1,21 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.imager import hot_pixels
-from cubestack.emulator.camera.mlx75412.pixel_array import (
+from cubestack.emulator.camera.mlx75412.imager import (
     DN12_PER_DN8,
     ELECTRONS_PER_DN12,
     FACTORY_DEAD,
     FACTORY_HOT,
     READ_NOISE_ELECTRONS,
     Corrections,
-    PixelArray,
+    Mlx75412Imager,
     dark_dn12_per_second,
     ideal_counts,
 )
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
 
 RAW = Corrections(defects=False, fixed_pattern=False, dark=False)
 BITS = DN12_PER_DN8 * ELECTRONS_PER_DN12  # electrons per count of 8 bits
@@ -29,15 +32,11 @@ def frame(
     temperature_c: float = 20.0,
     seed: int = 1,
     part: int = 0,
-    **more: object,
+    hot: int = 0,
 ) -> np.ndarray:
-    return (
-        PixelArray(part)
-        .read_out(
-            electrons, exposure_s, temperature_c, corrections, np.random.default_rng(seed), **more
-        )
-        .astype(float)
-    )
+    condition = replace(CONDITION, temperature_c=temperature_c, hot_pixels=hot, seed=9)
+    imager, generator = Mlx75412Imager(part), np.random.default_rng(seed)
+    return imager.counts(electrons, exposure_s, condition, corrections, generator).astype(float)
 
 
 def test_ideal_counts_are_the_upper_bits() -> None:
@@ -122,11 +121,11 @@ def test_defects_and_their_correction() -> None:
 
 def test_grown_hot_pixels_are_not_corrected() -> None:
     hot = hot_pixels(9, 50, 512 * 1024)
-    counts = frame(flat(0), exposure_s=0.4, grown_hot=hot)
+    counts = frame(flat(0), exposure_s=0.4, hot=50)
     bright = np.flatnonzero(counts.ravel() > 10)
     assert len(bright) > 20
     assert set(bright) <= set(hot[0])
-    cold = frame(flat(0), exposure_s=0.4, temperature_c=-20, grown_hot=hot)
+    cold = frame(flat(0), exposure_s=0.4, temperature_c=-20, hot=50)
     assert np.sum(cold > 10) == 0
     np.testing.assert_array_equal(hot[0], hot_pixels.__wrapped__(9, 50, 512 * 1024)[0])
     assert set(hot[0]) != set(hot_pixels(10, 50, 512 * 1024)[0])
