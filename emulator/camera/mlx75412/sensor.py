@@ -198,13 +198,12 @@ class Mlx75412(StarSensor):
         return _Span(first, ROWS * LINE_CLOCKS, 1, frame, ROWS)
 
     def _corrections(self) -> Corrections:
-        register = REGISTERS["HARDWARE_FEATURES"]
         value = self._registers.active("HARDWARE_FEATURES")
-        return Corrections(
-            defects=bool(register.field("DEFECT_CORRECTION").of(value)),
-            fixed_pattern=bool(register.field("FPN_CORRECTION").of(value)),
-            dark=bool(register.field("DARK_SUBTRACTION").of(value)),
-        )
+
+        def on(name: str) -> bool:
+            return bool(REGISTERS["HARDWARE_FEATURES"].field(name).of(value))
+
+        return Corrections(on("DEFECT_CORRECTION"), on("FPN_CORRECTION"), on("DARK_SUBTRACTION"))
 
     def _replan(self, now_ps: int, *, cut: bool) -> None:
         """Forget what was planned from ``now_ps`` on; with ``cut``, the present span too."""
@@ -231,9 +230,7 @@ class Mlx75412(StarSensor):
             self._frames.pop()
 
     def _picture(self, frame: _Frame) -> Grey:
-        def render() -> Grey:
-            return self._imager.picture(
-                self.scene, self.condition, frame.shutter, frame.corrections
-            )
-
-        return self._once(frame, render)
+        look = self._imager.picture
+        return self._once(
+            frame, lambda: look(self.scene, self.condition, frame.shutter, frame.corrections)
+        )

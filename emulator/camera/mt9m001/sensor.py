@@ -151,11 +151,17 @@ class Mt9m001(StarSensor):
         if not self._frames:
             return self._blanking(clock, self._since, upcoming.first)
         frame = self._frames[-1]
-        first = frame.first
-        for rows, clocks in self._parts(frame.settings):
+        first, row_clocks = frame.first, frame.settings.row_clocks
+        before_last = frame.settings.rows - 1
+        # Rows and clocks of each part of a frame while FRAME_VALID is high.
+        for rows, clocks in (
+            (0, FRAME_START_CLOCKS),
+            (before_last, before_last * row_clocks),
+            (1, row_clocks - FRAME_START_CLOCKS),
+        ):
             if clock.end_ps(first, clocks) > time_ps:
                 self.active_columns = frame.settings.columns
-                self.line_clocks = frame.settings.row_clocks
+                self.line_clocks = row_clocks
                 pixels = partial(self._pixels, frame, last=rows == 1) if rows else None
                 return StreamSegment(clock.edge_ps(first), clocks, 1, rows, pixels)
             first += clocks
@@ -173,19 +179,9 @@ class Mt9m001(StarSensor):
         later = (f.shutter for f in self._frames if f.shutter.readout_ps >= time_ps)
         return next(later, self._next(clock).shutter)
 
-    def _blanking(self, clock: PixelClock, first: int, end: int) -> StreamSegment:
-        return StreamSegment(clock.edge_ps(first), end - first, 0, 0, None)
-
     @staticmethod
-    def _parts(settings: SensorSettings) -> tuple[tuple[int, int], ...]:
-        """Rows and clocks of each part of a frame while FRAME_VALID is high."""
-        before_last = settings.rows - 1
-        after_last = settings.row_clocks - FRAME_START_CLOCKS
-        return (
-            (0, FRAME_START_CLOCKS),
-            (before_last, before_last * settings.row_clocks),
-            (1, after_last),
-        )
+    def _blanking(clock: PixelClock, first: int, end: int) -> StreamSegment:
+        return StreamSegment(clock.edge_ps(first), end - first, 0, 0, None)
 
     def _plan(self, clock: PixelClock, time_ps: int) -> None:
         """Make all frames that have begun by ``time_ps``."""
@@ -217,9 +213,8 @@ class Mt9m001(StarSensor):
 
     def _pixels(self, frame: _Frame, *, last: bool) -> Grey:
         """The last row of ``frame``, or all others."""
-
-        def render() -> Grey:
-            return self._imager.picture(self.scene, self.condition, frame.shutter, frame.settings)
-
-        picture = self._once(frame, render)
+        look = self._imager.picture
+        picture = self._once(
+            frame, lambda: look(self.scene, self.condition, frame.shutter, frame.settings)
+        )
         return picture[-1:] if last else picture[:-1]

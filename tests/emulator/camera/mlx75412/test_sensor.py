@@ -6,7 +6,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.stream import StreamSegment
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
@@ -16,6 +15,8 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import (
     REGISTERS,
     SYNC_APPLY,
 )
+
+from ..streams import segments
 
 MS = 10**9
 LINE_PS = 132_200_000
@@ -37,17 +38,6 @@ def configure(camera: Mlx75412, rate: int = 7, now_ps: int = 0) -> None:
 
 def enable(camera: Mlx75412, now_ps: int, on: bool = True) -> None:
     write(camera, "MODE_SELECT", 0x20 | on, now_ps)
-
-
-def segments(camera: Mlx75412, start_ps: int, count: int) -> list[StreamSegment]:
-    """Consecutive segments, as an engine asks for them."""
-    found = []
-    for _ in range(count):
-        segment = camera.segment_at(start_ps)
-        assert segment is not None
-        found.append(segment)
-        start_ps = segment.start_ps + int(segment.clocks * camera.period)
-    return found
 
 
 @pytest.fixture

@@ -6,13 +6,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.stream import StreamSegment
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS, window_column, window_row
 
+from ..streams import segments
 from .sccb_master import US, send
 
 MS = 10**9
@@ -37,17 +37,6 @@ def make(scene: EarthSunScene, camera: Target = Target.NADIR, **values: int) -> 
     made = quiet(scene, camera)
     write(made, MANUAL | {"EXPOSURE": USUAL_EXPOSURE[camera]} | values)
     return made
-
-
-def segments(camera: Ov7620, start_ps: int, count: int) -> list[StreamSegment]:
-    """Consecutive segments, as an engine asks for them."""
-    found = []
-    for _ in range(count):
-        segment = camera.segment_at(start_ps)
-        assert segment is not None
-        found.append(segment)
-        start_ps = segment.start_ps + int(segment.clocks * camera.period)
-    return found
 
 
 def picture(camera: Ov7620, frame: int = 3) -> np.ndarray:
