@@ -1,1 +1,1 @@
-"""What all camera models share: optics, exposure, pixel stream, registers."""
+"""What camera models share: conditions, optics, exposure, imagers, pixel stream, registers."""
