@@ -140,7 +140,7 @@ _OPENERS: dict[str, Callable[[str, int], Transport]] = {
 
 
 def open_transport(target: str, baud: int) -> Transport:
-    """Open ``target``: a port's path (/dev/ttyUSB0, ./ttyCUBESTAR), tcp:// or rfc2217://HOST:PORT.
+    """Open ``target``: a port's path (/dev/ttyUSB0, ./ttySENSOR), tcp:// or rfc2217://HOST:PORT.
 
     ``baud`` is not for tcp://. Raises TargetError (a ValueError) for a text that names nothing,
     TransportError when it does not open.
