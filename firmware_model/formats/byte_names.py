@@ -24,8 +24,8 @@ def name_answer_byte(interface: Interface, recording: Recording, port: str, inde
     else:
         known = requests
     place = f"{port}: byte {index} from the device"
-    if interface.bench is not None and port.startswith("bench"):
-        letter = interface.bench.find(known[-1]) if known else None
+    if interface.service_port is not None and port.startswith("bench"):
+        letter = interface.service_port.find(known[-1]) if known else None
         return place if letter is None else f"{place}, answer to letter {letter.letter!r}"
     payload = _last_frame(known)
     if not payload:
@@ -43,7 +43,7 @@ def name_answer_byte(interface: Interface, recording: Recording, port: str, inde
 def name_request_byte(interface: Interface, written: bytes, index: int, port: str) -> str:
     """Name of byte ``index`` of all that the host wrote on a serial line."""
     place = f"{port}: byte {index} from the host"
-    if interface.bench is not None and port.startswith("bench"):
+    if interface.service_port is not None and port.startswith("bench"):
         return place
     offset = payload_offset(written, index)
     if offset is None:

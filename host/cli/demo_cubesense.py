@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.bench import BENCH
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera
+from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.host.cli.serving import served
 from cubestack.host.cli.terminal import console, progress_bar
-from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.pictures.earth_sun import annotate_nadir, annotate_sun
 from cubestack.host.pictures.frames import save_picture
@@ -39,8 +39,8 @@ def show(args: argparse.Namespace) -> bool:
     )
     with served("cubesense", scene, args.out / "ttyCUBESENSE") as port:
         cubesense = CubeSense(NodeClient(open_transport(str(port), INTERFACE.baud), INTERFACE))
-        line = open_transport(f"{port}.bench", BENCH.baud)
-        bench = BenchClient(line)
+        line = open_transport(f"{port}.bench", SERVICE_PORT.baud)
+        bench = ServicePortClient(line)
         found = [
             _measure(cubesense, bench, camera, truth, args.out)
             for camera, truth in ((Camera.SUN, SUN_DEG), (Camera.NADIR, NADIR_DEG))
@@ -57,7 +57,11 @@ def show(args: argparse.Namespace) -> bool:
 
 
 def _measure(
-    cubesense: CubeSense, bench: BenchClient, camera: Camera, truth: tuple[float, float], out: Path
+    cubesense: CubeSense,
+    bench: ServicePortClient,
+    camera: Camera,
+    truth: tuple[float, float],
+    out: Path,
 ) -> bool:
     """Measure with one sensor, report, and write its picture; returns whether it found it."""
     measured = cubesense.capture_and_detect(camera)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, get_args
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import Engine
@@ -128,7 +128,7 @@ class CubeSenseSession:
         """Plug clients into ``board``."""
         self.board = board
         self.cubesense = CubeSense(NodeClient(board.serial(), CUBESENSE))
-        self.bench = BenchClient(board.serial("bench_uart"))
+        self.bench = ServicePortClient(board.serial("bench_uart"))
 
 
 @contextmanager

@@ -28,7 +28,7 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
     return open_target(
         text,
         args.device,
-        bench=args.bench,
+        service_port=args.bench,
         baud=args.baud,
         scene=args.scene,
         seed=args.seed,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import Field, Value
-from cubestack.firmware_model.interface.codec.letters import BenchProtocol, Letter
+from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
@@ -23,8 +23,8 @@ from cubestack.host.transport.streams import Transport
 
 __all__ = ["check_writes"]
 
-BENCH_TIMEOUT_S = 3.0
-BENCH_READ_BYTES = 4096
+LETTER_TIMEOUT_S = 3.0
+READ_BYTES = 4096
 
 
 def check_writes(run: CheckRun) -> None:
@@ -39,11 +39,12 @@ def check_writes(run: CheckRun) -> None:
             run.writing(
                 f"register {register.name}: written", partial(_check_register, run, register)
             )
-    if interface.bench is not None:
-        for letter in interface.bench.letters:
+    if interface.service_port is not None:
+        for letter in interface.service_port.letters:
             run.writing(f"bench letter {letter.letter!r}", partial(_check_letter, run, letter))
         run.writing(
-            "bench: no letter of the protocol", partial(_check_no_letter, run, interface.bench)
+            "bench: no letter of the protocol",
+            partial(_check_no_letter, run, interface.service_port),
         )
 
 
@@ -195,11 +196,11 @@ def _check_register(run: CheckRun, register: PointerRegister, seen: list[str]) -
 
 
 def _check_letter(run: CheckRun, letter: Letter, seen: list[str]) -> None:
-    line = _bench_line(run)
+    line = _service_port(run)
     line.write(letter.request)
     answer = bytearray()
     while len(answer) < letter.length:
-        data = line.read(BENCH_READ_BYTES, BENCH_TIMEOUT_S)
+        data = line.read(READ_BYTES, LETTER_TIMEOUT_S)
         if not data:
             break
         answer += data
@@ -208,17 +209,17 @@ def _check_letter(run: CheckRun, letter: Letter, seen: list[str]) -> None:
     seen.append(f"{letter.length} bytes")
 
 
-def _check_no_letter(run: CheckRun, protocol: BenchProtocol, seen: list[str]) -> None:
+def _check_no_letter(run: CheckRun, protocol: LetterProtocol, seen: list[str]) -> None:
     unknown = next(byte for byte in range(256) if protocol.find(byte) is None)
-    line = _bench_line(run)
+    line = _service_port(run)
     line.write(bytes([unknown]))
-    data = line.read(BENCH_READ_BYTES, BENCH_TIMEOUT_S)
+    data = line.read(READ_BYTES, LETTER_TIMEOUT_S)
     if data:
         raise FailedError(f"{unknown:#04x} was answered with {len(data)} bytes")
     seen.append("no answer")
 
 
-def _bench_line(run: CheckRun) -> Transport:
-    if run.target.bench is None:
+def _service_port(run: CheckRun) -> Transport:
+    if run.target.service_port is None:
         raise SkippedError("no line with the bench protocol within reach")
-    return run.target.bench
+    return run.target.service_port

@@ -96,7 +96,7 @@ class Target:
         node: client of the node protocol.
         line: the serial line under it; None on I2C.
         registers: client of the register-pointer protocol; None where it is not within reach.
-        bench: serial line with the bench protocol; None where it is not within reach.
+        service_port: serial line with the one-letter protocol; None where it is not within reach.
         controls: None for a device that is not emulated here.
         device: what it is; None for an interface that nobody registered.
     """
@@ -106,7 +106,7 @@ class Target:
     node: Client
     line: Transport | None = None
     registers: RegisterClient | None = None
-    bench: Transport | None = None
+    service_port: Transport | None = None
     controls: Controls | None = None
     device: AnyDevice | None = None
     on_close: list[Callable[[], None]] = field(default_factory=list)
@@ -129,7 +129,7 @@ def open_target(
     text: str,
     device: str | None = None,
     *,
-    bench: str | None = None,
+    service_port: str | None = None,
     baud: int | None = None,
     scene: Path | None = None,
     seed: int = 0,
@@ -141,7 +141,7 @@ def open_target(
         text: one of the forms in the module's text.
         device: name of the device; not needed for emulated devices, recordings and default I2C
             addresses.
-        bench: another serial line, with the bench protocol.
+        service_port: another serial line, with the one-letter protocol.
         baud: of the node protocol's line; None for the published one.
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.
@@ -154,7 +154,7 @@ def open_target(
         ValueError: a scene file that is none, or a file that can not be written.
     """
     if text.startswith(EMULATED):
-        if bench is not None:
+        if service_port is not None:
             raise TargetError(f"{text} has its bench protocol already: leave out --bench")
         return _open_emulated(text, baud, scene, seed, record)
     if scene is not None:
@@ -166,7 +166,7 @@ def open_target(
         if text.startswith(RECORDED):
             target = _open_recorded(text)
         else:
-            target = _open_real(text, device, bench, baud, tape)
+            target = _open_real(text, device, service_port, baud, tape)
         target.on_close.insert(0, stack.pop_all().close)
         return target
 
@@ -193,8 +193,8 @@ def _open_emulated(
         target = Target(text, interface, NodeClient(lines[0], interface), lines[0])
         bus = board.i2c()
         target.registers = with_i2c(target, bus, bus.wait)
-        if interface.bench is not None and len(lines) > 1:
-            target.bench = lines[1]
+        if interface.service_port is not None and len(lines) > 1:
+            target.service_port = lines[1]
         target.controls, target.device = controls, emulated.device
         target.on_close.append(stack.pop_all().close)
         return target
@@ -203,7 +203,7 @@ def _open_emulated(
 def _open_real(
     text: str,
     name: str | None,
-    bench: str | None,
+    service_port: str | None,
     baud: int | None,
     tape: HostRecorder | None,
 ) -> Target:
@@ -221,21 +221,21 @@ def _open_real(
         target.device = found
         target.on_close.append(line.close)
         bauds = {"uart": baud}
-    if bench is not None:
-        bauds["bench_uart"] = _open_bench(target, bench, tape)
+    if service_port is not None:
+        bauds["bench_uart"] = _open_service_port(target, service_port, tape)
     if tape is not None:
         tape.begin(target.interface.name.lower(), bauds)
     return target
 
 
-def _open_bench(target: Target, text: str, tape: HostRecorder | None) -> int:
-    """Open the line with the bench protocol; returns its baud rate."""
-    if target.interface.bench is None:
+def _open_service_port(target: Target, text: str, tape: HostRecorder | None) -> int:
+    """Open the service port; returns its baud rate."""
+    if target.interface.service_port is None:
         target.close()
         raise TargetError(f"{target.interface.name} has no bench protocol: leave out --bench")
-    baud = target.interface.bench.baud
+    baud = target.interface.service_port.baud
     line = open_transport(text, baud)
-    target.bench = line if tape is None else tape.line(line, "bench_uart", baud)
+    target.service_port = line if tape is None else tape.line(line, "bench_uart", baud)
     target.on_close.append(line.close)
     return baud
 
@@ -329,7 +329,7 @@ def _open_recorded(text: str) -> Target:
     target.registers = with_i2c(target, bus, _no_wait)
     target.device = owner
     if "bench_uart" in recording.bauds:
-        target.bench = RecordedTransport(recording, interface, "bench_uart")
+        target.service_port = RecordedTransport(recording, interface, "bench_uart")
     return target
 
 

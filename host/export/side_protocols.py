@@ -6,7 +6,7 @@ tables; nothing for a device that has none.
 
 from collections.abc import Iterator
 
-from cubestack.firmware_model.interface.codec.letters import BenchProtocol, Letter
+from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
 from cubestack.host.export.field_text import field_details, field_json, field_type
@@ -26,9 +26,9 @@ def side_table(interface: Interface) -> Iterator[str]:
                 f"{field_type(register.field):<13} {register.name:<20} "
                 f"{field_details(register.field)}"
             )
-    if interface.bench is not None:
-        yield from ("", f"BENCH LETTERS at {_line(interface.bench)}")
-        for letter in interface.bench.letters:
+    if interface.service_port is not None:
+        yield from ("", f"BENCH LETTERS at {_line(interface.service_port)}")
+        for letter in interface.service_port.letters:
             yield f"  {letter.letter} {letter.name:<14} {letter.meaning}; answer: {_answer(letter)}"
 
 
@@ -55,17 +55,17 @@ def side_markdown(interface: Interface) -> Iterator[str]:
                 f"{field_type(register.field)} | {register.name} | "
                 f"{field_details(register.field)} |"
             )
-    if interface.bench is not None:
+    if interface.service_port is not None:
         yield from (
             "",
             "## Bench letters",
             "",
-            f"At {_line(interface.bench)}. One byte is a request; others get no answer.",
+            f"At {_line(interface.service_port)}. One byte is a request; others get no answer.",
             "",
             "| letter | name | meaning | answer |",
             "|-|-|-|-|",
         )
-        for letter in interface.bench.letters:
+        for letter in interface.service_port.letters:
             yield f"| {letter.letter} | {letter.name} | {letter.meaning} | {_answer(letter)} |"
 
 
@@ -86,9 +86,9 @@ def side_json(interface: Interface) -> dict[str, object]:
                 for register in interface.registers
             ],
         }
-    if interface.bench is not None:
+    if interface.service_port is not None:
         content["bench"] = {
-            "baud": interface.bench.baud,
+            "baud": interface.service_port.baud,
             "letters": [
                 {
                     "letter": letter.letter,
@@ -97,7 +97,7 @@ def side_json(interface: Interface) -> dict[str, object]:
                     "length": letter.length,
                     "answer": None if letter.answer is None else letter.answer.hex(),
                 }
-                for letter in interface.bench.letters
+                for letter in interface.service_port.letters
             ],
         }
     return content
@@ -116,10 +116,10 @@ def side_c(interface: Interface) -> Iterator[str]:
             yield f"#define {name}_LENGTH {register.length}"
             if field.scale != 1:
                 yield f"#define {name}_SCALE {field.scale:g}"
-    if interface.bench is not None:
+    if interface.service_port is not None:
         yield from ("", "/* Letters on the bench's serial line. */")
-        yield f"#define {upper}_BENCH_BAUD {interface.bench.baud}"
-        for letter in interface.bench.letters:
+        yield f"#define {upper}_BENCH_BAUD {interface.service_port.baud}"
+        for letter in interface.service_port.letters:
             name = f"{upper}_BENCH_{letter.name}"
             yield f"#define {name} '{letter.letter}' /* {letter.meaning} */"
             yield f"#define {name}_LENGTH {letter.length}"
@@ -129,8 +129,8 @@ def _address(registers: PointerMap) -> str:
     return f"I2C address {registers.i2c_address:#04x} (7 bits)"
 
 
-def _line(bench: BenchProtocol) -> str:
-    return f"{bench.baud} baud 8N1"
+def _line(protocol: LetterProtocol) -> str:
+    return f"{protocol.baud} baud 8N1"
 
 
 def _answer(letter: Letter) -> str:

@@ -35,8 +35,8 @@ def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
             if f.name.lower() not in given
             for v in (_choices(f) or [""])
         ]
-    if command == "bench" and not arguments and target.interface.bench is not None:
-        return [letter.letter for letter in target.interface.bench.letters]
+    if command == "bench" and not arguments and target.interface.service_port is not None:
+        return [letter.letter for letter in target.interface.service_port.letters]
     if command == "fault" and controls is not None:
         parameters = controls.fault_parameters.get(arguments[0], ()) if arguments else ()
         given = {word.partition("=")[0] for word in arguments[1:]}

@@ -18,7 +18,7 @@ __all__ = ["PortCommands"]
 RAW_TIMEOUT_S = 0.3
 """Silence after which the answer to raw bytes is over."""
 
-BENCH_TIMEOUT_S = 10.0
+LETTER_TIMEOUT_S = 10.0
 READ_BYTES = 4096
 SHORT_ANSWER = 8
 """Longest answer to a bench letter that is shown."""
@@ -76,7 +76,7 @@ class PortCommands:
 
     def _bench(self, words: list[str]) -> Result:
         check_count(BENCH, words, 1, 1)
-        protocol, line = self._target.interface.bench, self._target.bench
+        protocol, line = self._target.interface.service_port, self._target.service_port
         if protocol is None:
             raise ShellError(f"bench: {self._target.interface.name} has no bench protocol")
         if line is None:
@@ -116,6 +116,6 @@ class PortCommands:
 def _read(line: Transport, length: int) -> bytearray:
     """What comes, until it is ``length`` bytes or the line is silent."""
     answer = bytearray()
-    while len(answer) < length and (data := line.read(READ_BYTES, BENCH_TIMEOUT_S)):
+    while len(answer) < length and (data := line.read(READ_BYTES, LETTER_TIMEOUT_S)):
         answer += data
     return answer

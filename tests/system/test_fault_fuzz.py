@@ -86,7 +86,7 @@ class Fuzzer:
         self.rng = np.random.default_rng(seed)
         self.plugs = {"uart": self.board.serial}
         uarts = [self.board.uart]
-        if interface.bench is not None:
+        if interface.service_port is not None:
             self.plugs["bench"] = lambda: self.board.serial("bench_uart")
             uarts.append(self.board.bench_uart)
         self.lines = {name: plug() for name, plug in self.plugs.items()}

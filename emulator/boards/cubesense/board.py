@@ -25,7 +25,6 @@ from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.bench import BENCH
 from cubestack.firmware_model.interface.cubesense.codes import (
     ROWS,
     Camera,
@@ -36,6 +35,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
@@ -78,7 +78,7 @@ class CubeSenseBoard(Board):
         kernel: Kernel | None = None,
         i2c_bus: I2cBus | None = None,
         mcu_addressing: bool = False,
-        bench_baud: int = BENCH.baud,
+        bench_baud: int = SERVICE_PORT.baud,
         i2c_address: int = INTERFACE.i2c_address,
         register_address: int = REGISTERS.i2c_address,
     ) -> None:

@@ -17,8 +17,12 @@ from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.letters import Letter
-from cubestack.firmware_model.interface.cubesense.bench import BENCH, CAPTURES, DOWNLOADS
 from cubestack.firmware_model.interface.cubesense.codes import IMAGE_BYTES, Camera, Sram
+from cubestack.firmware_model.interface.cubesense.service_port import (
+    CAPTURES,
+    DOWNLOADS,
+    SERVICE_PORT,
+)
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
@@ -30,7 +34,7 @@ LETTERS = 4
 CHUNK_BYTES = 24
 """Bytes of a picture that are read and handed to the UART at once, while as many may still wait."""
 
-_BYTE_US = -(-10 * 1_000_000 // BENCH.baud)
+_BYTE_US = -(-10 * 1_000_000 // SERVICE_PORT.baud)
 
 _CAMERAS: dict[Letter, Camera] = {
     letter: camera for table in (CAPTURES, DOWNLOADS) for camera, letter in table.items()
@@ -63,7 +67,7 @@ class BenchLink:
     def uart_byte(self, byte: int) -> None:
         """Interrupt: a byte came."""
         self._meter.charge(uart_interrupt=1)
-        letter = BENCH.find(byte)
+        letter = SERVICE_PORT.find(byte)
         if letter is None or len(self._letters) >= LETTERS:
             return
         self._letters.append(letter)

@@ -1,4 +1,4 @@
-"""One-letter bench protocols as data: each letter is a request, each answer has a fixed length.
+"""One-letter protocols of service ports as data: a letter is a request, an answer has a length.
 
 A host sends one byte and waits for the whole answer; there are no frames and no error codes. What
 is no letter of the protocol gets no answer.
@@ -6,7 +6,7 @@ is no letter of the protocol gets no answer.
 
 from dataclasses import dataclass
 
-__all__ = ["BenchProtocol", "Letter"]
+__all__ = ["Letter", "LetterProtocol"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Letter:
 
 
 @dataclass(frozen=True)
-class BenchProtocol:
+class LetterProtocol:
     """All letters of a port.
 
     Attributes:

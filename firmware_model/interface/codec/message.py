@@ -19,7 +19,7 @@ from cubestack.firmware_model.interface.codec.field import (
     Value,
     suggestion,
 )
-from cubestack.firmware_model.interface.codec.letters import BenchProtocol
+from cubestack.firmware_model.interface.codec.letters import LetterProtocol
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap
 
 __all__ = [
@@ -190,7 +190,7 @@ class Interface:
         telemetries: by ascending ID.
         ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
         registers: registers behind another I2C address, or None.
-        bench: one-letter protocol on another serial port, or None.
+        service_port: one-letter protocol on another serial port, or None.
     """
 
     name: str
@@ -201,7 +201,7 @@ class Interface:
     telemetries: tuple[Message, ...]
     ack_errors: type[IntEnum]
     registers: PointerMap | None = None
-    bench: BenchProtocol | None = None
+    service_port: LetterProtocol | None = None
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""

@@ -1,15 +1,15 @@
-"""CubeSense's whole interface: node protocol, register-pointer protocol and bench protocol.
+"""CubeSense's whole interface: node protocol, register-pointer protocol, service port.
 
 Node protocol: CubeSpace family with two cameras, interface generation 2, node dialect on the UART.
-The register-pointer and the bench protocol are those of the CubeSense thesis, section 6.4.3 and
-appendix E. Ours where nothing is published: both I2C addresses, the register addresses,
-telecommands from 100 and telemetry from 220 on.
+The register-pointer protocol and that of the service port, for a bench computer, are those of the
+CubeSense thesis, section 6.4.3 and appendix E. Extensions, or assumed where nothing is published:
+both I2C addresses, the register addresses, telecommands from 100 and telemetry from 220 on.
 """
 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense.bench import BENCH
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
 from cubestack.firmware_model.interface.cubesense.telemetry import TELEMETRIES
 
@@ -24,5 +24,5 @@ INTERFACE = Interface(
     telemetries=TELEMETRIES,
     ack_errors=AckError,
     registers=REGISTERS,
-    bench=BENCH,
+    service_port=SERVICE_PORT,
 )

@@ -5,7 +5,6 @@ import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
-from cubestack.firmware_model.interface.cubesense.bench import CAPTURES, DOWNLOADS
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
@@ -14,6 +13,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     Sram,
 )
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.service_port import CAPTURES, DOWNLOADS
 from cubestack.firmware_model.mcu.requests import Request
 
 from .node import BENCH_BYTE_US, Node

@@ -62,7 +62,7 @@ def test_recording_tells_its_device(tmp_path):
     target = open_target(f"recorded:{path}")
     assert target.interface.name == "CubeSense"
     assert target.node.telemetry("Identification")["NodeType"] == 0
-    assert target.bench is not None
+    assert target.service_port is not None
     target.close()
 
 
@@ -82,7 +82,7 @@ def test_recording_of_a_bus_on_which_nothing_was_said(tmp_path):
         open_target(f"recorded:{path}").node.telemetry("Identification")
 
 
-def test_bench_of_a_device_without_one(tmp_path):
+def test_service_port_of_a_device_without_one(tmp_path):
     port = tmp_path / "tty"
     with pytest.raises(HostError):
-        open_target(str(port), "cubestar", bench="x")
+        open_target(str(port), "cubestar", service_port="x")

@@ -11,8 +11,8 @@ from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera
-from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
@@ -70,7 +70,7 @@ def test_changed_default_is_named(recorded, opened, scene, monkeypatch):
 def test_host_programs_run_on_the_recording(recorded):
     cubesense = CubeSense(NodeClient(RecordedTransport(recorded, INTERFACE), INTERFACE))
     assert cubesense.capture_and_detect(Camera.SUN).detected
-    BenchClient(RecordedTransport(recorded, INTERFACE, "bench_uart")).take(Camera.NADIR)
+    ServicePortClient(RecordedTransport(recorded, INTERFACE, "bench_uart")).take(Camera.NADIR)
     power = I2cClient(RecordedI2c(recorded, INTERFACE), INTERFACE).telemetry("Power")
     assert 0 < power["Current5V"] < 200
 

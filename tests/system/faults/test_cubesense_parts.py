@@ -14,7 +14,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     ResetTarget,
     Sram,
 )
-from cubestack.host.clients.cubesense.bench import BenchClient
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.errors import NoAnswerError
 
 from .bench import NADIR_DEG, Bench
@@ -203,7 +203,7 @@ def test_a_latched_camera_draws_on_until_the_cameras_are_reset(
 @pytest.mark.fault
 @pytest.mark.parametrize("kind", ["uart-drop", "uart-corrupt", "uart-delay"])
 def test_the_bench_line_has_faults_of_its_own(sense: Bench, kind: str) -> None:
-    bench = BenchClient(sense.board.serial("bench_uart"), timeout_s=0.5)
+    bench = ServicePortClient(sense.board.serial("bench_uart"), timeout_s=0.5)
     options: dict[str, Any] = {"delay_ms": 1000} if kind == "uart-delay" else {}
     sense.inject(kind, target="bench", direction="to-device", **options)
     with pytest.raises(NoAnswerError):

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.bench import BENCH, CAPTURES, DOWNLOADS
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
@@ -25,6 +24,11 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     split_coefficient,
 )
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense.service_port import (
+    CAPTURES,
+    DOWNLOADS,
+    SERVICE_PORT,
+)
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 
@@ -256,9 +260,9 @@ def test_registers_and_node_protocol_start_with_the_same_settings() -> None:
 
 
 def test_bench_letters_are_the_published_ones() -> None:
-    assert BENCH is INTERFACE.bench
-    assert BENCH.baud == 115_200
-    assert {letter.letter: (letter.length, letter.answer) for letter in BENCH.letters} == {
+    assert SERVICE_PORT is INTERFACE.service_port
+    assert SERVICE_PORT.baud == 115_200
+    assert {letter.letter: (letter.length, letter.answer) for letter in SERVICE_PORT.letters} == {
         "a": (1, b"Y"),
         "q": (1, b"Y"),
         "s": (307_200, None),

@@ -1,21 +1,21 @@
-"""Client of CubeSense's one-letter bench protocol, CubeSense thesis, appendix E."""
+"""Client of CubeSense's service port: one-letter protocol, CubeSense thesis, appendix E."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.codec.letters import Letter
-from cubestack.firmware_model.interface.cubesense.bench import CAPTURES, DOWNLOADS
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
+from cubestack.firmware_model.interface.cubesense.service_port import CAPTURES, DOWNLOADS
 from cubestack.host.clients.contract import Progress
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["BenchClient"]
+__all__ = ["ServicePortClient"]
 
 READ_BYTES = 4096
 
 
-class BenchClient:
+class ServicePortClient:
     """A bench computer at the serial line, which the caller opens and closes."""
 
     def __init__(self, transport: Transport, *, timeout_s: float = 2.0) -> None:

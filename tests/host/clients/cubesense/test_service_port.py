@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera
-from cubestack.host.clients.cubesense.bench import BenchClient
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
 
@@ -37,7 +37,7 @@ PICTURE = np.random.default_rng(4).integers(0, 256, (480, 640), np.uint8)
 @pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"a"), (Camera.SUN, b"q")])
 def test_taking_a_picture(camera: Camera, letter: bytes) -> None:
     line = Line(a=b"Y", q=b"Y")
-    BenchClient(line).take(camera)
+    ServicePortClient(line).take(camera)
     assert line.requests == letter
 
 
@@ -45,7 +45,7 @@ def test_taking_a_picture(camera: Camera, letter: bytes) -> None:
 def test_downloading_a_picture(camera: Camera, letter: bytes) -> None:
     line = Line(**{letter.decode(): PICTURE.tobytes()})
     seen: list[tuple[int, int]] = []
-    picture = BenchClient(line).download(camera, lambda *done: seen.append(done))
+    picture = ServicePortClient(line).download(camera, lambda *done: seen.append(done))
     assert line.requests == letter
     np.testing.assert_array_equal(picture, PICTURE)
     assert seen[0] == (1000, 307_200)
@@ -55,25 +55,25 @@ def test_downloading_a_picture(camera: Camera, letter: bytes) -> None:
 def test_what_came_before_is_dropped() -> None:
     line = Line(s=PICTURE.tobytes())
     line.pending += b"Y" * 5000
-    np.testing.assert_array_equal(BenchClient(line).download(Camera.NADIR), PICTURE)
+    np.testing.assert_array_equal(ServicePortClient(line).download(Camera.NADIR), PICTURE)
 
 
 def test_nothing_beyond_the_answer_is_taken() -> None:
     line = Line(s=PICTURE.tobytes() + b"more")
     line.chunk = 10**6
-    BenchClient(line).download(Camera.NADIR)
+    ServicePortClient(line).download(Camera.NADIR)
     assert line.pending == b"more"
     line = Line(a=b"Yes")
-    BenchClient(line).take(Camera.NADIR)
+    ServicePortClient(line).take(Camera.NADIR)
     assert line.pending == b"es"
 
 
 def test_silence_and_wrong_answers_are_told() -> None:
     line = Line(a=b"N", s=bytes(307_199))
     with pytest.raises(NoAnswerError, match=r"bench letter 'q': 0 bytes of 1 came, .* for 3 s"):
-        BenchClient(line, timeout_s=3.0).take(Camera.SUN)
+        ServicePortClient(line, timeout_s=3.0).take(Camera.SUN)
     assert line.silences == [0.0, 3.0]
     with pytest.raises(BadAnswerError, match="'a' answered with b'N', not b'Y'"):
-        BenchClient(line).take(Camera.NADIR)
+        ServicePortClient(line).take(Camera.NADIR)
     with pytest.raises(NoAnswerError, match="'s': 307199 bytes of 307200 came"):
-        BenchClient(line).download(Camera.NADIR)
+        ServicePortClient(line).download(Camera.NADIR)

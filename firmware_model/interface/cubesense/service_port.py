@@ -1,13 +1,13 @@
-"""CubeSense's one-letter bench protocol.
+"""The one-letter protocol of CubeSense's service port, for a bench computer.
 
 CubeSense thesis, appendix E: 115200 baud, 8N1. Ours, because nothing is said of it: a capture that
 fails is not answered, and the download reads the memory of the camera's own.
 """
 
-from cubestack.firmware_model.interface.codec.letters import BenchProtocol, Letter
+from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.cubesense.codes import IMAGE_BYTES, Camera, Sram
 
-__all__ = ["BENCH", "CAPTURES", "DOWNLOADS"]
+__all__ = ["CAPTURES", "DOWNLOADS", "SERVICE_PORT"]
 
 _STORED = b"Y"
 
@@ -28,4 +28,4 @@ CAPTURES = {Camera.NADIR: _capture("a", Camera.NADIR), Camera.SUN: _capture("q",
 #: Letter that sends the picture in a camera's own memory.
 DOWNLOADS = {Camera.NADIR: _download("s", Camera.NADIR), Camera.SUN: _download("w", Camera.SUN)}
 
-BENCH = BenchProtocol(115_200, (*CAPTURES.values(), *DOWNLOADS.values()))
+SERVICE_PORT = LetterProtocol(115_200, (*CAPTURES.values(), *DOWNLOADS.values()))
