@@ -1,4 +1,4 @@
-"""The camera's part of the program on a bench whose frames end when a test says so."""
+"""The camera's part of the program on a harness whose frames end when a test says so."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from cubestack.firmware_model.aramis.hardware import FrameEnd
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import Reason
 
-from .program_bench import Bench
+from .harness import Harness
 
 ROW_US = 31.75
 
@@ -17,23 +17,23 @@ class Desk:
     """A camera whose frame ends after ``frame_us`` of sleep; None: never."""
 
     def __init__(self) -> None:
-        self.bench = Bench()
-        self.state = State(self.bench.flash)
-        self.camera = Camera(self.bench, self.state, self.bench.meter)
+        self.unit = Harness()
+        self.state = State(self.unit.flash)
+        self.camera = Camera(self.unit, self.state, self.unit.meter)
         self.frame_us: int | None = 50_000
         self.end = FrameEnd.STORED
-        self.bench.on_sleep = self.frame_comes
+        self.unit.on_sleep = self.frame_comes
 
     def frame_comes(self) -> None:
         if self.frame_us is not None:
-            self.bench.us += self.frame_us
+            self.unit.now_us += self.frame_us
             self.camera.frame_ended(self.end)
 
     def start(self) -> Reason | None:
-        return self.bench.run(self.camera.start())
+        return self.unit.perform(self.camera.start())
 
     def take(self) -> Reason | None:
-        return self.bench.run(self.camera.take())
+        return self.unit.perform(self.camera.take())
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_set_up_writes_what_the_settings_say_once(desk: Desk) -> None:
     desk.state.settings.put("SetExposure", {"Rows": 2000})
     desk.state.settings.put("SetGain", {"Gain": 4.0})
     assert desk.start() is None
-    registers = desk.bench.registers
+    registers = desk.unit.registers
     assert registers is not None
     assert (registers[0x09], registers[0x35], registers[0x07]) == (2000, 0x20, 2)
     registers[0x09] = 7
@@ -61,9 +61,9 @@ def test_set_up_writes_what_the_settings_say_once(desk: Desk) -> None:
 
 
 def test_a_silent_or_a_strange_camera(desk: Desk) -> None:
-    registers, desk.bench.registers = desk.bench.registers, None
+    registers, desk.unit.registers = desk.unit.registers, None
     assert desk.start() is Reason.CAMERA_SILENT
-    desk.bench.registers = registers
+    desk.unit.registers = registers
     assert registers is not None
     registers[0x00] = 0x8421  # the colour version
     assert desk.start() is Reason.CAMERA_SILENT
@@ -76,7 +76,7 @@ def test_pictures_alternate_between_two_places(desk: Desk) -> None:
         assert desk.take() is None
         assert desk.state.frames == number
         assert desk.camera.latest == (number - 1) % 2
-    one, two = desk.bench.captures[:2]
+    one, two = desk.unit.captures[:2]
     assert one.shape == two.shape == (1024, 1280)
     assert not np.shares_memory(one, two)
     assert np.shares_memory(one, desk.camera.picture(0))
@@ -87,15 +87,15 @@ def test_the_image_s_time_is_that_of_the_middle_row(desk: Desk) -> None:
     desk.start()
     desk.take()
     age_us = (511.5 + 1500) * ROW_US + 1280 / 48
-    assert desk.bench.us - desk.camera.image_us() == pytest.approx(age_us, abs=2)
+    assert desk.unit.now_us - desk.camera.image_us() == pytest.approx(age_us, abs=2)
 
 
 def test_no_frame_within_three_of_them_is_a_timeout(desk: Desk) -> None:
     desk.start()
     desk.frame_us = None
-    before = desk.bench.us
+    before = desk.unit.now_us
     assert desk.take() is Reason.CAMERA_TIMEOUT
-    assert desk.bench.us - before == pytest.approx(3 * 6300 * ROW_US + 20_000, rel=1e-3)
+    assert desk.unit.now_us - before == pytest.approx(3 * 6300 * ROW_US + 20_000, rel=1e-3)
     assert desk.state.flags == {"CameraTimeout"}
     assert desk.state.frames == 0
     desk.frame_us = 10
@@ -117,37 +117,37 @@ def test_a_frame_that_was_asked_for_before_is_waited_for(desk: Desk) -> None:
     desk.camera.expose()
     desk.camera.frame_ended(FrameEnd.STORED)
     assert desk.take() is None
-    assert len(desk.bench.captures) == 1
+    assert len(desk.unit.captures) == 1
     desk.camera.expose()
     desk.state.settings.put("SetExposure", {"Rows": 100})
-    stopped = desk.bench.stopped
+    stopped = desk.unit.stopped
     desk.start()  # the frame under way has the old exposure
-    assert desk.bench.stopped == stopped + 1
+    assert desk.unit.stopped == stopped + 1
     assert desk.take() is None
-    assert len(desk.bench.captures) == 3
+    assert len(desk.unit.captures) == 3
 
 
 def test_cutting_the_supply_ends_the_wait(desk: Desk) -> None:
     desk.start()
-    desk.bench.on_sleep = desk.camera.cut
+    desk.unit.on_sleep = desk.camera.cut
     assert desk.take() is Reason.CAMERA_OFF
-    assert not desk.bench.camera_on
+    assert not desk.unit.camera_on
     assert desk.start() is Reason.CAMERA_OFF
     assert desk.state.flags == {"CameraOff"}
-    before = desk.bench.us
-    desk.bench.run(desk.camera.restore())
-    assert desk.bench.us - before >= 2_000
-    assert desk.bench.camera_on
-    desk.bench.on_sleep = desk.frame_comes
+    before = desk.unit.now_us
+    desk.unit.perform(desk.camera.restore())
+    assert desk.unit.now_us - before >= 2_000
+    assert desk.unit.camera_on
+    desk.unit.on_sleep = desk.frame_comes
     assert desk.start() is None
     assert desk.take() is None
 
 
 def test_registers_by_address(desk: Desk) -> None:
-    assert desk.bench.run(desk.camera.write(0x35, 0x21))
-    desk.bench.run(desk.camera.select(0x35))
+    assert desk.unit.perform(desk.camera.write(0x35, 0x21))
+    desk.unit.perform(desk.camera.select(0x35))
     assert desk.camera.selected_register == (0x35, 0x21)
-    desk.bench.registers = None
-    desk.bench.run(desk.camera.select(0x35))
+    desk.unit.registers = None
+    desk.unit.perform(desk.camera.select(0x35))
     assert desk.camera.selected_register == (0x35, None)
-    assert not desk.bench.run(desk.camera.write(0x35, 0x21))
+    assert not desk.unit.perform(desk.camera.write(0x35, 0x21))

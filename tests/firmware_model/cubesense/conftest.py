@@ -4,7 +4,7 @@ from cubestack.firmware_model.cubesense.vision.distortion import Projection, Rad
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
-from .bench import Bench
+from .harness import Harness
 
 
 @pytest.fixture
@@ -23,5 +23,5 @@ def stereographic() -> RadiusTable:
 
 
 @pytest.fixture
-def bench() -> Bench:
-    return Bench()
+def unit() -> Harness:
+    return Harness()

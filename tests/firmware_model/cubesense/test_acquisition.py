@@ -28,36 +28,36 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions, actions
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
-from .bench import FRAME_US, READ_OUT_US, Bench
+from .harness import FRAME_US, READ_OUT_US, Harness
 from .scenery import earth, scan, sun, window
 
 
 class Rig:
-    """Acquisition alone, on a bench.
+    """Acquisition alone, on a harness.
 
     Attributes:
         doing: what the FPGAs did, one entry each time that an enable had just gone low.
     """
 
     def __init__(self, *, mcu_addressing: bool = False) -> None:
-        self.bench = Bench(mcu_addressing=mcu_addressing)
-        self.supply = Supply(self.bench, self.bench.meter, State())
-        self.acquisition = Acquisition(self.bench, self.bench.meter, self.supply)
+        self.unit = Harness(mcu_addressing=mcu_addressing)
+        self.supply = Supply(self.unit, self.unit.meter, State())
+        self.acquisition = Acquisition(self.unit, self.unit.meter, self.supply)
         self.run(self.supply.start())
         rng = np.random.default_rng(3)
         for sram in Sram:
-            self.bench.memories[sram] = rng.integers(0, 256, (ROWS, COLUMNS), np.uint8)
+            self.unit.memories[sram] = rng.integers(0, 256, (ROWS, COLUMNS), np.uint8)
         self.doing: list[Actions] = []
-        self.bench.log.clear()
+        self.unit.log.clear()
 
     def run(self, routine: object) -> object:
-        return self.bench.perform(routine)
+        return self.unit.perform(routine)
 
     def entered(self) -> list[Actions]:
         """Rows of the command table that the log went through, standby left out."""
         levels = {"SHIFT": 0, "EDGE": 0, "RNW": 0, "SUNEN": 1, "NADEN": 1}
         rows = []
-        for _, request in self.bench.log:
+        for _, request in self.unit.log:
             if isinstance(request, SetPin) and request.pin in levels:
                 levels[request.pin] = request.level
                 row = actions(*levels.values())
@@ -86,61 +86,61 @@ S = Action.STANDBY
 def test_a_picture_goes_to_the_memory_that_was_asked_for(
     rig: Rig, camera: Camera, sram: Sram, row: Actions
 ) -> None:
-    rig.bench.scenes[camera] = picture = earth(0, 0)
+    rig.unit.scenes[camera] = picture = earth(0, 0)
     other = Sram(1 - sram)
-    kept = rig.bench.memories[other].copy()
+    kept = rig.unit.memories[other].copy()
     result = rig.run(rig.acquisition.store(camera, sram))
     own = sram.value == camera.value
     expected = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
     assert result is expected
-    assert np.array_equal(rig.bench.memories[sram], picture)
-    assert np.array_equal(rig.bench.memories[other], kept)
+    assert np.array_equal(rig.unit.memories[sram], picture)
+    assert np.array_equal(rig.unit.memories[other], kept)
     assert rig.entered()[-1] == row
-    assert rig.bench.pins["SUNEN"] == rig.bench.pins["NADEN"] == 1
+    assert rig.unit.pins["SUNEN"] == rig.unit.pins["NADEN"] == 1
 
 
 @pytest.mark.parametrize("sram", Sram)
 def test_a_dead_camera_costs_two_frames_and_no_picture(rig: Rig, sram: Sram) -> None:
-    rig.bench.scenes[Camera.SUN] = None
-    kept = rig.bench.memories[sram].copy()
-    start_us = rig.bench.now_us
+    rig.unit.scenes[Camera.SUN] = None
+    kept = rig.unit.memories[sram].copy()
+    start_us = rig.unit.now_us
     assert rig.run(rig.acquisition.store(Camera.SUN, sram)) is CaptureResult.CAMERA_TIMEOUT
-    assert 2 * FRAME_US < rig.bench.now_us - start_us < ACK_TIMEOUT_US + 300
-    assert np.array_equal(rig.bench.memories[sram], kept)
-    assert rig.bench.pins["SUNEN"] == rig.bench.pins["NADEN"] == 1
+    assert 2 * FRAME_US < rig.unit.now_us - start_us < ACK_TIMEOUT_US + 300
+    assert np.array_equal(rig.unit.memories[sram], kept)
+    assert rig.unit.pins["SUNEN"] == rig.unit.pins["NADEN"] == 1
 
 
 def test_the_longest_wait_for_a_live_camera_is_no_timeout(rig: Rig) -> None:
-    rig.bench.wait_us = 2 * FRAME_US - READ_OUT_US
+    rig.unit.wait_us = 2 * FRAME_US - READ_OUT_US
     assert rig.run(rig.acquisition.store(Camera.SUN, Sram.SRAM1)) is CaptureResult.STORED_OWN_SRAM
 
 
 @pytest.mark.parametrize("camera", Camera)
 def test_a_latch_up_ends_the_wait_at_once(rig: Rig, camera: Camera) -> None:
-    rig.bench.latched.add(Sram.SRAM2)
-    start_us = rig.bench.now_us
+    rig.unit.latched.add(Sram.SRAM2)
+    start_us = rig.unit.now_us
     result = rig.run(rig.acquisition.store(camera, Sram.SRAM2))
     assert result is CaptureResult.SRAM_OVER_CURRENT
-    assert rig.bench.now_us - start_us < SAMPLE_US + 200
-    assert rig.bench.cut() == {Sram.SRAM2}
-    rig.bench.log.clear()
+    assert rig.unit.now_us - start_us < SAMPLE_US + 200
+    assert rig.unit.cut() == {Sram.SRAM2}
+    rig.unit.log.clear()
     again = rig.run(rig.acquisition.store(camera, Sram.SRAM2))
     assert again is CaptureResult.SRAM_OVER_CURRENT
-    assert rig.bench.log == []  # nothing is tried with a memory that is off
+    assert rig.unit.log == []  # nothing is tried with a memory that is off
 
 
 def test_a_latch_up_of_the_other_memory_does_not_disturb(rig: Rig) -> None:
-    rig.bench.latched.add(Sram.SRAM2)
+    rig.unit.latched.add(Sram.SRAM2)
     assert rig.run(rig.acquisition.store(Camera.SUN, Sram.SRAM1)) is CaptureResult.STORED_OWN_SRAM
-    assert rig.bench.cut() == {Sram.SRAM2}
+    assert rig.unit.cut() == {Sram.SRAM2}
 
 
 @pytest.mark.parametrize("sram", Sram)
 def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
-    rig.bench.memories[sram] = picture = earth(5, 5)
-    lines = NadirLines(EdgeConfig(), rig.bench.meter, buffer=rig.acquisition.buffers[0])
+    rig.unit.memories[sram] = picture = earth(5, 5)
+    lines = NadirLines(EdgeConfig(), rig.unit.meter, buffer=rig.acquisition.buffers[0])
     assert rig.run(rig.acquisition.scan(sram, lines)) is True
-    expected = NadirLines(EdgeConfig(), rig.bench.meter)
+    expected = NadirLines(EdgeConfig(), rig.unit.meter)
     expected.feed(scan(picture))
     assert len(lines.edges) > 10
     assert np.array_equal(lines.edges.points, expected.edges.points)
@@ -151,7 +151,7 @@ def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
 
 @pytest.mark.parametrize("sram", Sram)
 def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
-    rig.bench.memories[sram] = picture = sun(np.array([300.0, 200.0]), 6)
+    rig.unit.memories[sram] = picture = sun(np.array([300.0, 200.0]), 6)
     data = rig.run(rig.acquisition.window(sram))
     assert isinstance(data, np.ndarray)
     assert np.array_equal(data, window(picture))
@@ -159,7 +159,7 @@ def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
     assert rig.entered() == [linked if sram is Sram.SRAM2 else Actions(Action.EDGE, S)]
 
 
-def latch_after(bench: Bench, sram: Sram, strobed: int) -> None:
+def latch_after(unit: Harness, sram: Sram, strobed: int) -> None:
     """Let ``sram`` latch up once so many bytes were read."""
     seen = 0
 
@@ -168,23 +168,23 @@ def latch_after(bench: Bench, sram: Sram, strobed: int) -> None:
         if isinstance(request, StrobeRead):
             seen += len(request.target)
             if seen >= strobed:
-                bench.latched.add(sram)
+                unit.latched.add(sram)
 
-    bench.on_request = count
+    unit.on_request = count
 
 
 def test_a_latch_up_is_noticed_before_the_next_line_is_read(rig: Rig) -> None:
-    latch_after(rig.bench, Sram.SRAM2, 3000)
-    lines = NadirLines(EdgeConfig(), rig.bench.meter)
+    latch_after(rig.unit, Sram.SRAM2, 3000)
+    lines = NadirLines(EdgeConfig(), rig.unit.meter)
     assert rig.run(rig.acquisition.scan(Sram.SRAM2, lines)) is False
-    read = [len(r.target) for _, r in rig.bench.log if isinstance(r, StrobeRead)]
+    read = [len(r.target) for _, r in rig.unit.log if isinstance(r, StrobeRead)]
     assert 3000 <= sum(read) <= 3000 + SAMPLE_BYTES + CHUNK
-    assert rig.bench.cut() == {Sram.SRAM2}
-    assert rig.bench.pins["SUNEN"] == rig.bench.pins["NADEN"] == 1
+    assert rig.unit.cut() == {Sram.SRAM2}
+    assert rig.unit.pins["SUNEN"] == rig.unit.pins["NADEN"] == 1
 
 
 def test_a_latch_up_spoils_the_suns_window(rig: Rig) -> None:
-    latch_after(rig.bench, Sram.SRAM1, 1)
+    latch_after(rig.unit, Sram.SRAM1, 1)
     assert rig.run(rig.acquisition.window(Sram.SRAM1)) is None
 
 
@@ -202,7 +202,7 @@ def parts(rng: np.random.Generator) -> Iterator[tuple[int, int]]:
 @pytest.mark.parametrize("sram", Sram)
 def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
     rig = Rig(mcu_addressing=mcu_addressing)
-    acquisition, picture = rig.acquisition, rig.bench.memories[sram].reshape(-1)
+    acquisition, picture = rig.acquisition, rig.unit.memories[sram].reshape(-1)
     assert rig.run(acquisition.open_picture(sram)) is True
     at = 0
     for skip, read in parts(np.random.default_rng(sram)):
@@ -212,7 +212,7 @@ def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
         at += skip + read
         assert np.array_equal(target, picture[at - read : at])
     assert acquisition.picture_open
-    assert np.array_equal(rig.bench.memories[sram].reshape(-1), picture)
+    assert np.array_equal(rig.unit.memories[sram].reshape(-1), picture)
 
 
 def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
@@ -220,9 +220,9 @@ def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
     for mcu_addressing in (False, True):
         rig = Rig(mcu_addressing=mcu_addressing)
         rig.run(rig.acquisition.open_picture(Sram.SRAM1))
-        start_us = rig.bench.now_us
+        start_us = rig.unit.now_us
         rig.run(rig.acquisition.skip_bytes(IMAGE_BYTES - 64))
-        times.append(rig.bench.now_us - start_us)
+        times.append(rig.unit.now_us - start_us)
     clocked_us, addressed_us = times
     assert clocked_us == pytest.approx(IMAGE_BYTES * 4, rel=0.03)
     assert addressed_us < 30
@@ -233,7 +233,7 @@ def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
     for other in (
         rig.acquisition.store(Camera.NADIR, Sram.SRAM2),
         rig.acquisition.window(Sram.SRAM1),
-        rig.acquisition.scan(Sram.SRAM2, NadirLines(EdgeConfig(), rig.bench.meter)),
+        rig.acquisition.scan(Sram.SRAM2, NadirLines(EdgeConfig(), rig.unit.meter)),
     ):
         rig.run(rig.acquisition.open_picture(Sram.SRAM1))
         rig.run(rig.acquisition.read_bytes(target))
@@ -245,7 +245,7 @@ def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
 def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
     target = np.zeros(5000, np.uint8)
     rig.run(rig.acquisition.open_picture(Sram.SRAM1))
-    latch_after(rig.bench, Sram.SRAM1, 1000)
+    latch_after(rig.unit, Sram.SRAM1, 1000)
     rig.run(rig.acquisition.read_bytes(target))
     assert not rig.acquisition.picture_open
     assert not target[1000 + SAMPLE_BYTES + CHUNK :].any()
@@ -254,8 +254,8 @@ def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
 
 def test_single_pixels_by_address() -> None:
     rig = Rig(mcu_addressing=True)
-    rig.bench.memories[Sram.SRAM2] = picture = earth(-12, 4)
-    meter = rig.bench.meter
+    rig.unit.memories[Sram.SRAM2] = picture = earth(-12, 4)
+    meter = rig.unit.meter
     answer = rig.run(rig.acquisition.answer(Sram.SRAM2, around_samples(EdgeConfig(), meter)))
     assert isinstance(answer, tuple)
     edges, pixels = answer
@@ -263,7 +263,7 @@ def test_single_pixels_by_address() -> None:
     lines.feed(scan(picture))
     assert {*map(tuple, edges.points)} == {*map(tuple, lines.edges.points)}
     assert pixels < 250
-    latch_after(rig.bench, Sram.SRAM2, 10)
+    latch_after(rig.unit, Sram.SRAM2, 10)
     search = around_samples(EdgeConfig(), meter)
     assert rig.run(rig.acquisition.answer(Sram.SRAM2, search)) is None
 
@@ -284,11 +284,11 @@ def test_an_addressed_pixel_costs_what_the_table_says() -> None:
     def search() -> Iterator[tuple[int, int]]:
         for x, y in asked:
             value = yield int(x), int(y)
-            assert value == rig.bench.memories[Sram.SRAM1][y, x]
+            assert value == rig.unit.memories[Sram.SRAM1][y, x]
 
     rig.run(rig.acquisition.answer(Sram.SRAM1, search()))
-    strobed = [us for us, r in rig.bench.log if isinstance(r, StrobeRead)]
-    cost = rig.bench.meter.table.operations["address_byte"].cycles
+    strobed = [us for us, r in rig.unit.log if isinstance(r, StrobeRead)]
+    cost = rig.unit.meter.table.operations["address_byte"].cycles
     assert np.diff(strobed) == pytest.approx(cost / 5, abs=1)
 
 

@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, ResetTarg
 from cubestack.firmware_model.interface.cubesense.pins import CAMERA_SCL, CAMERA_SDA
 from cubestack.firmware_model.mcu.requests import ReadPin, Request, SetPin
 
-from .bench import Bench
+from .harness import Harness
 
 AT_START = {
     "COMMON_A": 0x00,
@@ -29,48 +29,50 @@ AT_START = {
 }
 
 
-def capture(bench: Bench, camera: Camera = Camera.SUN) -> None:
-    bench.command("CaptureOnly", Camera=camera, Sram=Sram(camera))
+def capture(unit: Harness, camera: Camera = Camera.SUN) -> None:
+    unit.command("CaptureOnly", Camera=camera, Sram=Sram(camera))
 
 
-def test_both_cameras_are_set_up_at_start(bench: Bench) -> None:
-    assert bench.cameras[Camera.SUN].registers == {**AT_START, "EXPOSURE": 1}
-    assert bench.cameras[Camera.NADIR].registers == {**AT_START, "EXPOSURE": 4}
+def test_both_cameras_are_set_up_at_start(unit: Harness) -> None:
+    assert unit.cameras[Camera.SUN].registers == {**AT_START, "EXPOSURE": 1}
+    assert unit.cameras[Camera.NADIR].registers == {**AT_START, "EXPOSURE": 4}
 
 
-def test_clock_phases_are_those_of_a_400_khz_bus(bench: Bench) -> None:
-    for camera in bench.cameras.values():
+def test_clock_phases_are_those_of_a_400_khz_bus(unit: Harness) -> None:
+    for camera in unit.cameras.values():
         low_ns, high_ns = camera.phases_ns
         assert 1300 <= low_ns < 4000
         assert 600 <= high_ns < 2000
 
 
-def test_the_emulated_camera_reads_the_same(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_emulated_camera_reads_the_same(
+    unit: Harness, caplog: pytest.LogCaptureFixture
+) -> None:
     written: list[tuple[int, int]] = []
     slave = SccbSlave(REGISTERS.i2c_address, lambda at, value, _ps: written.append((at, value)))
     lines = {CAMERA_SCL[Camera.NADIR]: "SCL", CAMERA_SDA[Camera.NADIR]: "SDA"}
 
     def replay(request: Request) -> None:
         if isinstance(request, SetPin) and request.pin in lines:
-            slave.on_pin(lines[request.pin], request.level, 1000 * bench.now_ns)
+            slave.on_pin(lines[request.pin], request.level, 1000 * unit.now_ns)
         if isinstance(request, ReadPin) and request.pin in lines:
             assert slave.sda == 0
 
-    bench.on_request = replay
-    bench.cameras[Camera.NADIR].writes.clear()
+    unit.on_request = replay
+    unit.cameras[Camera.NADIR].writes.clear()
     with caplog.at_level(logging.WARNING):
-        bench.command("Reset", Target=ResetTarget.CAMERAS)
-    assert written == bench.cameras[Camera.NADIR].writes
+        unit.command("Reset", Target=ResetTarget.CAMERAS)
+    assert written == unit.cameras[Camera.NADIR].writes
     assert len(written) == len(AT_START) + 1
     assert not caplog.records
 
 
-def test_a_register_takes_about_a_hundred_requests(bench: Bench) -> None:
-    bench.log.clear()
-    bench.command("CameraSettings1", Exposure=77, Gain=1)
-    capture(bench)
+def test_a_register_takes_about_a_hundred_requests(unit: Harness) -> None:
+    unit.log.clear()
+    unit.command("CameraSettings1", Exposure=77, Gain=1)
+    capture(unit)
     pins = (CAMERA_SCL[Camera.SUN], CAMERA_SDA[Camera.SUN])
-    moves = [r for _, r in bench.log if isinstance(r, SetPin | ReadPin) and r.pin in pins]
+    moves = [r for _, r in unit.log if isinstance(r, SetPin | ReadPin) and r.pin in pins]
     assert len(moves) / (len(AT_START) + 1) < 100
 
 
@@ -86,78 +88,78 @@ def test_a_register_takes_about_a_hundred_requests(bench: Bench) -> None:
     ],
 )
 def test_a_setting_reaches_its_camera_before_the_next_picture(
-    bench: Bench, sent: dict[str, int], register: str, value: int
+    unit: Harness, sent: dict[str, int], register: str, value: int
 ) -> None:
-    bench.command("CameraSettings2", **sent)
-    capture(bench, Camera.NADIR)
-    assert bench.cameras[Camera.NADIR].registers[register] == value
-    assert bench.cameras[Camera.SUN].registers[register] == {**AT_START, "EXPOSURE": 1}[register]
+    unit.command("CameraSettings2", **sent)
+    capture(unit, Camera.NADIR)
+    assert unit.cameras[Camera.NADIR].registers[register] == value
+    assert unit.cameras[Camera.SUN].registers[register] == {**AT_START, "EXPOSURE": 1}[register]
 
 
-def test_auto_adjust_switches_the_automatic_functions(bench: Bench) -> None:
-    bench.command("AutoAdjust1", Enabled=1)
-    capture(bench)
-    registers = bench.cameras[Camera.SUN].registers
+def test_auto_adjust_switches_the_automatic_functions(unit: Harness) -> None:
+    unit.command("AutoAdjust1", Enabled=1)
+    capture(unit)
+    registers = unit.cameras[Camera.SUN].registers
     assert (registers["COMMON_B"], registers["COMMON_A"], registers["COMMON_I"]) == (1, 0x24, 0)
-    bench.command("AutoAdjust1", Enabled=0)
-    capture(bench)
+    unit.command("AutoAdjust1", Enabled=0)
+    capture(unit)
     assert registers == {**AT_START, "EXPOSURE": 1}
 
 
-def test_registers_are_written_again_only_when_a_setting_changed(bench: Bench) -> None:
-    camera = bench.cameras[Camera.SUN]
+def test_registers_are_written_again_only_when_a_setting_changed(unit: Harness) -> None:
+    camera = unit.cameras[Camera.SUN]
     camera.writes.clear()
-    capture(bench)
+    capture(unit)
     assert camera.writes == []
-    bench.command("CameraSettings1", Exposure=2)
-    capture(bench)
+    unit.command("CameraSettings1", Exposure=2)
+    capture(unit)
     assert len(camera.writes) == len(AT_START) + 1
-    capture(bench)
+    capture(unit)
     assert len(camera.writes) == len(AT_START) + 1
 
 
-def test_the_new_exposure_has_settled_before_a_frame_is_looked_for(bench: Bench) -> None:
-    bench.command("CameraSettings1", Exposure=2)
-    bench.log.clear()
-    capture(bench)
+def test_the_new_exposure_has_settled_before_a_frame_is_looked_for(unit: Harness) -> None:
+    unit.command("CameraSettings1", Exposure=2)
+    unit.log.clear()
+    capture(unit)
     written_us = max(
-        us for us, r in bench.log if isinstance(r, SetPin) and r.pin == CAMERA_SDA[Camera.SUN]
+        us for us, r in unit.log if isinstance(r, SetPin) and r.pin == CAMERA_SDA[Camera.SUN]
     )
-    (stored_us,) = (us for us, request in bench.log if request == SetPin("SUNEN", 0))
+    (stored_us,) = (us for us, request in unit.log if request == SetPin("SUNEN", 0))
     assert 0 <= stored_us - written_us - EXPOSURE_SETTLE_US < 300
     # The rest of one frame, another one, and the blanking of the next.
     assert EXPOSURE_SETTLE_US > (525 + 45) * 858 / 13.5
 
 
-def test_a_camera_reset_cycles_the_supply_and_sets_up_again(bench: Bench) -> None:
-    bench.command("CameraSettings1", Exposure=9)
-    capture(bench)
-    bench.log.clear()
-    bench.command("Reset", Target=ResetTarget.CAMERAS)
-    power = [r for _, r in bench.log if isinstance(r, SetPin) and r.pin.endswith("POWER")]
+def test_a_camera_reset_cycles_the_supply_and_sets_up_again(unit: Harness) -> None:
+    unit.command("CameraSettings1", Exposure=9)
+    capture(unit)
+    unit.log.clear()
+    unit.command("Reset", Target=ResetTarget.CAMERAS)
+    power = [r for _, r in unit.log if isinstance(r, SetPin) and r.pin.endswith("POWER")]
     assert power == [
         SetPin("SUN_POWER", 0),
         SetPin("NAD_POWER", 0),
         SetPin("SUN_POWER", 1),
         SetPin("NAD_POWER", 1),
     ]
-    assert bench.cameras[Camera.SUN].registers == {**AT_START, "EXPOSURE": 9}
+    assert unit.cameras[Camera.SUN].registers == {**AT_START, "EXPOSURE": 9}
 
 
-def test_a_camera_without_an_answer_is_tried_before_each_picture(bench: Bench) -> None:
-    camera = bench.cameras[Camera.SUN]
+def test_a_camera_without_an_answer_is_tried_before_each_picture(unit: Harness) -> None:
+    camera = unit.cameras[Camera.SUN]
     camera.answers = False
-    bench.command("CameraSettings1", Exposure=9)
+    unit.command("CameraSettings1", Exposure=9)
     camera.writes.clear()
     for _ in range(2):
-        bench.log.clear()
-        capture(bench)
-        reads = [r for _, r in bench.log if isinstance(r, ReadPin)]
+        unit.log.clear()
+        capture(unit)
+        reads = [r for _, r in unit.log if isinstance(r, ReadPin)]
         assert len(reads) == 1  # and no byte after it
         assert camera.levels == {"SCL": 1, "SDA": 1}
-        assert not bench.program.cameras.acknowledged(Camera.SUN)
-        assert bench.program.cameras.acknowledged(Camera.NADIR)
+        assert not unit.program.cameras.acknowledged(Camera.SUN)
+        assert unit.program.cameras.acknowledged(Camera.NADIR)
     camera.answers = True
-    capture(bench)
+    capture(unit)
     assert camera.registers == {**AT_START, "EXPOSURE": 9}
-    assert bench.program.cameras.acknowledged(Camera.SUN)
+    assert unit.program.cameras.acknowledged(Camera.SUN)

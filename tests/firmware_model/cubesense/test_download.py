@@ -12,33 +12,33 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.mcu.requests import Request
 
-from .node import Node
+from .links_harness import Links
 
 
 @pytest.fixture
-def node() -> Node:
-    node = Node()
+def node() -> Links:
+    node = Links()
     node.pictures[:] = np.random.default_rng(5).integers(0, 256, node.pictures.shape)
     return node
 
 
-def ready(node: Node) -> int:
+def ready(node: Links) -> int:
     return int(node.telemetry("ImageFrameInfo")["FrameNumber"])
 
 
-def shown(node: Node, number: int) -> bytes:
+def shown(node: Links, number: int) -> bytes:
     """The frame, which must be ready."""
     assert ready(node) == number
     return bytes(node.telemetry("ImageFrame")["Frame"])
 
 
-def expected(node: Node, sram: Sram, size: ImageSize) -> list[bytes]:
+def expected(node: Links, sram: Sram, size: ImageSize) -> list[bytes]:
     square = thumbnail(node.pictures[sram].reshape(480, 640), size)
     return [frame.tobytes() for frame in square.reshape(-1, 128)]
 
 
 @pytest.mark.parametrize("size", ImageSize)
-def test_a_download_reads_the_picture_once(node: Node, size: ImageSize) -> None:
+def test_a_download_reads_the_picture_once(node: Links, size: ImageSize) -> None:
     sram = Sram(size % 2)
     node.command("StartImageDownload", Sram=sram, Size=size)
     download = node.commands.download
@@ -53,7 +53,7 @@ def test_a_download_reads_the_picture_once(node: Node, size: ImageSize) -> None:
     assert node.read + node.skipped <= IMAGE_BYTES
 
 
-def test_frames_in_any_order(node: Node) -> None:
+def test_frames_in_any_order(node: Links) -> None:
     size = ImageSize.SIDE_128
     frames = expected(node, Sram.SRAM2, size)
     node.command("StartImageDownload", Sram=Sram.SRAM2, Size=size)
@@ -62,14 +62,14 @@ def test_frames_in_any_order(node: Node) -> None:
         assert shown(node, int(number)) == frames[number]
 
 
-def test_going_back_begins_anew_and_going_on_does_not(node: Node) -> None:
+def test_going_back_begins_anew_and_going_on_does_not(node: Links) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_256)
     for number, begun in ((200, 1), (300, 1), (299, 2), (299, 3), (301, 3)):
         node.command("NextImageFrame", Frame=number)
         assert len(node.opened) == begun
 
 
-def test_a_measurement_in_between_costs_a_new_beginning_only(node: Node) -> None:
+def test_a_measurement_in_between_costs_a_new_beginning_only(node: Links) -> None:
     size = ImageSize.SIDE_64
     frames = expected(node, Sram.SRAM1, size)
     node.command("StartImageDownload", Size=size)
@@ -80,7 +80,7 @@ def test_a_measurement_in_between_costs_a_new_beginning_only(node: Node) -> None
     assert len(node.opened) == 10
 
 
-def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Node) -> None:
+def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Links) -> None:
     size = ImageSize.SIDE_64
     for begun, (sram, number) in enumerate(((Sram.SRAM1, 10), (Sram.SRAM2, 15)), start=1):
         node.send("StartImageDownload", Sram=sram, Size=size)
@@ -90,7 +90,7 @@ def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Node) -> Non
         assert len(node.opened) == begun
 
 
-def test_no_frame_is_ready_from_the_request_on(node: Node) -> None:
+def test_no_frame_is_ready_from_the_request_on(node: Links) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     seen: list[int] = []
     node.send("NextImageFrame", Frame=0)  # the one that is ready already
@@ -101,7 +101,7 @@ def test_no_frame_is_ready_from_the_request_on(node: Node) -> None:
     assert ready(node) == 0
 
 
-def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Node) -> None:
+def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Links) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=12)
     node.send("NextImageFrame", Frame=14)
@@ -111,7 +111,7 @@ def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Node) -> 
     assert node.telemetry("TcmdProcessed")["Processed"] == 1
 
 
-def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Node) -> None:
+def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Links) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=14)
     seen = set()
@@ -131,7 +131,7 @@ def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Node
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile"])
-def test_a_memory_without_supply_has_no_frame(node: Node, when: str) -> None:
+def test_a_memory_without_supply_has_no_frame(node: Links, when: str) -> None:
     size = ImageSize.SIDE_64
     node.command("StartImageDownload", Size=size)
     node.send("NextImageFrame", Frame=15)
@@ -148,7 +148,7 @@ def test_a_memory_without_supply_has_no_frame(node: Node, when: str) -> None:
     assert shown(node, 15) == expected(node, Sram.SRAM1, size)[15]
 
 
-def test_frames_beyond_the_picture_need_no_memory(node: Node) -> None:
+def test_frames_beyond_the_picture_need_no_memory(node: Links) -> None:
     node.off = {Sram.SRAM1}
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     assert shown(node, 0) == bytes(128)

@@ -5,9 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.thumbnail import thumbnail
-from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import (
@@ -18,13 +16,13 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
-from .bench import Bench
+from .harness import Harness
 from .scenery import earth
 
 EARTH = earth(5.0, 3.0)
 IMAGE = REGISTERS["IMAGE"].address
 
-Turn = Callable[[Bench, np.random.Generator], None]
+Turn = Callable[[Harness, np.random.Generator], None]
 
 
 def some_bytes(rng: np.random.Generator, most: int) -> bytes:
@@ -35,23 +33,21 @@ def some_bytes(rng: np.random.Generator, most: int) -> bytes:
     return np.where(rng.random(count) < 0.33, special, plain).astype(np.uint8).tobytes()
 
 
-def uart(bench: Bench, rng: np.random.Generator) -> None:
-    bench.uart(some_bytes(rng, 40))
-    bench.received()
+def uart(unit: Harness, rng: np.random.Generator) -> None:
+    unit.uart(some_bytes(rng, 40))
     if rng.random() < 0.2:
-        bench.program.node.uart_silence()
+        unit.program.node.uart_silence()
 
 
-def framed(bench: Bench, rng: np.random.Generator) -> None:
+def framed(unit: Harness, rng: np.random.Generator) -> None:
     """A frame as it should be, with a random ID, length and parameters."""
-    bench.program.node.uart_silence()
+    unit.program.node.uart_silence()
     identifier = int(rng.integers(0, 256))
     message = INTERFACE.find(identifier)
     right = message.length if message is not None and identifier < 128 else 0
     length = right if rng.random() < 0.8 else int(rng.integers(0, 40))
     data = rng.integers(0, 256 if rng.random() < 0.5 else 3, length, np.uint8).tobytes()
-    bench.uart(encode_frame(bytes([identifier]) + data))
-    answers = bench.received()
+    answers = unit.frames(bytes([identifier]) + data)
     if identifier < 128:
         (answer,) = answers
         assert AckError(answer[0]) in AckError
@@ -59,27 +55,29 @@ def framed(bench: Bench, rng: np.random.Generator) -> None:
         assert [len(answer) for answer in answers] == ([message.length] if message else [])
 
 
-def letters(bench: Bench, rng: np.random.Generator) -> None:
-    bench.uart(some_bytes(rng, 6), Port.BENCH)
-    bench.program.bench.uart_silence()
-    bench.sent[Port.BENCH].clear()
-    bench.backlog[Port.BENCH] = int(rng.integers(0, 100))
+def letters(unit: Harness, rng: np.random.Generator) -> None:
+    unit.letters(some_bytes(rng, 6))
+    unit.program.bench.uart_silence()
+    unit.bench_sent.clear()
+    unit.bench_backlog = int(rng.integers(0, 100))
 
 
-def i2c(bench: Bench, rng: np.random.Generator) -> None:
+def i2c(unit: Harness, rng: np.random.Generator) -> None:
     """A transfer to either address."""
     registers = bool(rng.integers(0, 2))
     pointer = [None, int(rng.integers(0, 256)), IMAGE, int(rng.integers(0, 20))][rng.integers(0, 4)]
     if rng.random() < 0.5:
-        bench.i2c_write(some_bytes(rng, 30), registers=registers)
+        data = some_bytes(rng, 30)
+        unit.write_register(*data) if registers else unit.i2c_write(data)
     else:
-        bench.i2c_read(int(rng.integers(0, 300)), pointer, registers=registers)
+        read = unit.read_register if registers else unit.i2c_read
+        read(int(rng.integers(0, 300)), pointer)
 
 
-def transitions(bench: Bench, rng: np.random.Generator) -> None:
+def transitions(unit: Harness, rng: np.random.Generator) -> None:
     """Starts, bytes and stops in any order, as a disturbed bus may bring them."""
     for _ in range(20):
-        link = (bench.program.node, bench.program.registers)[rng.integers(0, 2)]
+        link = (unit.program.node, unit.program.registers)[rng.integers(0, 2)]
         match rng.integers(0, 5):
             case 0:
                 link.i2c_start(bool(rng.integers(0, 2)))
@@ -92,56 +90,56 @@ def transitions(bench: Bench, rng: np.random.Generator) -> None:
                 link.i2c_stop()
 
 
-def latch_up(bench: Bench, rng: np.random.Generator) -> None:
+def latch_up(unit: Harness, rng: np.random.Generator) -> None:
     if rng.random() < 0.1:
-        bench.latched.add(Sram(rng.integers(0, 2)))
+        unit.latched.add(Sram(rng.integers(0, 2)))
 
 
-def stays_sane(bench: Bench) -> None:
+def stays_sane(unit: Harness) -> None:
     """All three protocols still do what they should."""
-    link, registers = bench.program.node, bench.program.registers
+    link, registers = unit.program.node, unit.program.registers
     link.uart_silence()
     link.i2c_stop()
     registers.i2c_stop()
-    bench.backlog = dict.fromkeys(Port, 0)
-    bench.run()
-    bench.received()
-    bench.sent[Port.BENCH].clear()
-    bench.command("ClearOverCurrent", Selection=2)
-    assert bench.send("Reset", Target=3) == 0
-    bench.run()
-    assert bench.telemetry("Identification")["InterfaceVersion"] == INTERFACE.version
-    bench.scenes[Camera.NADIR] = EARTH
-    bench.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)
-    assert bench.telemetry("Result2")["Detect"] == DetectResult.SUCCESS
-    bench.command("StartImageDownload", Sram=Sram.SRAM2, Size=ImageSize.SIDE_64)
-    bench.command("NextImageFrame", Frame=15)
-    data = bench.telemetry("ImageFrame")["Frame"]
+    unit.backlog = unit.bench_backlog = 0
+    unit.run()
+    unit.received()
+    unit.bench_sent.clear()
+    unit.command("ClearOverCurrent", Selection=2)
+    assert unit.send("Reset", Target=3) == 0
+    unit.run()
+    assert unit.telemetry("Identification")["InterfaceVersion"] == INTERFACE.version
+    unit.scenes[Camera.NADIR] = EARTH
+    unit.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)
+    assert unit.telemetry("Result2")["Detect"] == DetectResult.SUCCESS
+    unit.command("StartImageDownload", Sram=Sram.SRAM2, Size=ImageSize.SIDE_64)
+    unit.command("NextImageFrame", Frame=15)
+    data = unit.telemetry("ImageFrame")["Frame"]
     assert data == thumbnail(EARTH, ImageSize.SIDE_64).reshape(-1, 128)[15].tobytes()
-    assert bench.i2c_write(b"\x28\x09") == 2
-    bench.run()
-    assert bench.i2c_read(3, 0x83) == bytes([40, 1, 0])
-    assert bench.i2c_read(1, 0x00, registers=True) == b"\x09"
-    bench.uart(b"s", Port.BENCH)
-    bench.run()
-    assert bench.sent[Port.BENCH] == EARTH.tobytes()
+    assert unit.i2c_write(b"\x28\x09") == 2
+    unit.run()
+    assert unit.i2c_read(3, 0x83) == bytes([40, 1, 0])
+    assert unit.read_register(1, 0x00) == b"\x09"
+    unit.letters(b"s")
+    unit.run()
+    assert unit.bench_sent == EARTH.tobytes()
 
 
 @pytest.mark.parametrize(("seed", "mcu_addressing"), [(0, False), (1, True)])
 def test_nonsense_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) -> None:
-    bench = Bench(mcu_addressing=mcu_addressing)
+    unit = Harness(mcu_addressing=mcu_addressing)
     rng = np.random.default_rng(seed)
     turns: tuple[Turn, ...] = (uart, framed, framed, letters, i2c, i2c, transitions, latch_up)
     for _ in range(1500):
-        turns[rng.integers(0, len(turns))](bench, rng)
-        bench.run(until_us=bench.now_us + int(rng.integers(0, 30_000)))
-    stays_sane(bench)
+        turns[rng.integers(0, len(turns))](unit, rng)
+        unit.run(until_us=unit.now_us + int(rng.integers(0, 30_000)))
+    stays_sane(unit)
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_nonsense_in_the_middle_of_anything(seed: int) -> None:
     """Interrupts come at every request of the program, not only where it sleeps."""
-    bench = Bench()
+    unit = Harness()
     rng = np.random.default_rng(100 + seed)
     turns: tuple[Turn, ...] = (framed, i2c, transitions, letters)
     busy = False
@@ -150,10 +148,10 @@ def test_nonsense_in_the_middle_of_anything(seed: int) -> None:
         nonlocal busy
         if not busy and rng.random() < 0.02:
             busy = True
-            turns[rng.integers(0, len(turns))](bench, rng)
+            turns[rng.integers(0, len(turns))](unit, rng)
             busy = False
 
-    bench.on_request = interrupt
-    bench.run(until_us=bench.now_us + 15_000_000)
-    bench.on_request = lambda _request: None
-    stays_sane(bench)
+    unit.on_request = interrupt
+    unit.run(until_us=unit.now_us + 15_000_000)
+    unit.on_request = lambda _request: None
+    stays_sane(unit)

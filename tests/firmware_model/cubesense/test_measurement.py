@@ -1,4 +1,4 @@
-"""Measurements on a bench: results, every result code, times, settings, and what is left whole."""
+"""Measurements: results, every result code, times, settings, and what is left whole."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
-from .bench import FRAME_US, READ_OUT_US, Bench
+from .harness import FRAME_US, READ_OUT_US, Harness
 from .scenery import (
     SUN_BORESIGHT,
     chequered,
@@ -41,17 +41,17 @@ from .scenery import (
 TICK_US = 51.2
 
 
-def measure(bench: Bench, camera: Camera, sram: Sram | None = None) -> dict[str, Any]:
+def measure(unit: Harness, camera: Camera, sram: Sram | None = None) -> dict[str, Any]:
     """Capture and detect; the result's telemetry."""
-    bench.command("CaptureAndDetect", Camera=camera, Sram=camera if sram is None else sram)
-    return result(bench, camera)
+    unit.command("CaptureAndDetect", Camera=camera, Sram=camera if sram is None else sram)
+    return result(unit, camera)
 
 
-def result(bench: Bench, camera: Camera) -> dict[str, Any]:
+def result(unit: Harness, camera: Camera) -> dict[str, Any]:
     return {
-        **bench.telemetry(f"Result{camera + 1}"),
-        **bench.telemetry(f"Details{camera + 1}"),
-        **bench.telemetry(f"PhaseTimes{camera + 1}"),
+        **unit.telemetry(f"Result{camera + 1}"),
+        **unit.telemetry(f"Details{camera + 1}"),
+        **unit.telemetry(f"PhaseTimes{camera + 1}"),
     }
 
 
@@ -63,9 +63,9 @@ def sun_at(alpha: float, beta: float) -> NDArray[np.uint8]:
     return sun(place(alpha, beta, SUN_BORESIGHT), 6)
 
 
-def edges_of(bench: Bench) -> set[tuple[float, float]]:
+def edges_of(unit: Harness) -> set[tuple[float, float]]:
     """Edges of the latest nadir picture, px, as telemetry hands them out."""
-    values = {**bench.telemetry("NadirEdges1"), **bench.telemetry("NadirEdges2")}
+    values = {**unit.telemetry("NadirEdges1"), **unit.telemetry("NadirEdges2")}
     return {(values[f"X{n}"], values[f"Y{n}"]) for n in range(1, values["Count"] + 1)}
 
 
@@ -74,9 +74,9 @@ def edges_of(bench: Bench) -> set[tuple[float, float]]:
 
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (25.0, -40.0), (-60.0, 35.0)])
-def test_the_sun_with_either_memory(bench: Bench, sram: Sram, truth: tuple[float, float]) -> None:
-    bench.scenes[Camera.SUN] = picture = sun_at(*truth)
-    measured = measure(bench, Camera.SUN, sram)
+def test_the_sun_with_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
+    unit.scenes[Camera.SUN] = picture = sun_at(*truth)
+    measured = measure(unit, Camera.SUN, sram)
     own = sram is Sram.SRAM1
     stored = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
     assert codes(measured) == (stored, DetectResult.SUCCESS)
@@ -94,9 +94,11 @@ def test_the_sun_with_either_memory(bench: Bench, sram: Sram, truth: tuple[float
 
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (15.0, -25.0), (-40.0, 30.0)])
-def test_the_earth_with_either_memory(bench: Bench, sram: Sram, truth: tuple[float, float]) -> None:
-    bench.scenes[Camera.NADIR] = picture = earth(*truth)
-    measured = measure(bench, Camera.NADIR, sram)
+def test_the_earth_with_either_memory(
+    unit: Harness, sram: Sram, truth: tuple[float, float]
+) -> None:
+    unit.scenes[Camera.NADIR] = picture = earth(*truth)
+    measured = measure(unit, Camera.NADIR, sram)
     own = sram is Sram.SRAM2
     stored = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
     assert codes(measured) == (stored, DetectResult.SUCCESS)
@@ -111,35 +113,35 @@ def test_the_earth_with_either_memory(bench: Bench, sram: Sram, truth: tuple[flo
     assert (measured["Points"], measured["Sram"]) == (expected.edges, sram)
     assert measured["Radius"] == pytest.approx(63.5 * 2.9, abs=0.5)
     assert (measured["FirstX"], measured["FirstY"], measured["PixelsRead"]) == (0, 0, 9920)
-    assert edges_of(bench) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in lines.edges.points}
+    assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in lines.edges.points}
 
 
-def test_a_picture_stays_whole_while_it_is_measured(bench: Bench) -> None:
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
+def test_a_picture_stays_whole_while_it_is_measured(unit: Harness) -> None:
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
     for camera in Camera:
-        measure(bench, camera)
+        measure(unit, camera)
     for camera in Camera:
-        assert np.array_equal(bench.memories[Sram(camera)], bench.scenes[camera])
+        assert np.array_equal(unit.memories[Sram(camera)], unit.scenes[camera])
 
 
-def test_a_capture_alone_schedules_no_detection(bench: Bench) -> None:
-    bench.scenes[Camera.SUN] = sun_at(3, 4)
-    measure(bench, Camera.SUN)
-    bench.log.clear()
-    bench.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM2)
-    measured = result(bench, Camera.SUN)
+def test_a_capture_alone_schedules_no_detection(unit: Harness) -> None:
+    unit.scenes[Camera.SUN] = sun_at(3, 4)
+    measure(unit, Camera.SUN)
+    unit.log.clear()
+    unit.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM2)
+    measured = result(unit, Camera.SUN)
     assert codes(measured) == (CaptureResult.STORED_OTHER_SRAM, DetectResult.NONE_SCHEDULED)
-    assert not any(isinstance(request, StrobeRead) for _, request in bench.log)
+    assert not any(isinstance(request, StrobeRead) for _, request in unit.log)
     assert (measured["Search"], measured["Centroid"]) == (0, 0)
 
 
 # --- result codes -----------------------------------------------------------------------------
 
 
-def no_memory(bench: Bench, sram: Sram) -> None:
-    bench.latched.add(sram)
-    bench.run(until_us=bench.now_us + 10_000)
-    assert bench.cut() == {sram}
+def no_memory(unit: Harness, sram: Sram) -> None:
+    unit.latched.add(sram)
+    unit.run(until_us=unit.now_us + 10_000)
+    assert unit.cut() == {sram}
 
 
 def noise(rows: int) -> NDArray[np.uint8]:
@@ -160,28 +162,28 @@ def noise(rows: int) -> NDArray[np.uint8]:
     ids=["dark", "bright", "chequered", "rectangle"],
 )
 def test_a_nadir_picture_that_is_no_earth(
-    bench: Bench, picture: NDArray[np.uint8], detect: DetectResult
+    unit: Harness, picture: NDArray[np.uint8], detect: DetectResult
 ) -> None:
-    bench.scenes[Camera.NADIR] = earth(1, 2)
-    measure(bench, Camera.NADIR)
-    bench.scenes[Camera.NADIR] = picture
-    measured = measure(bench, Camera.NADIR)
+    unit.scenes[Camera.NADIR] = earth(1, 2)
+    measure(unit, Camera.NADIR)
+    unit.scenes[Camera.NADIR] = picture
+    measured = measure(unit, Camera.NADIR)
     assert codes(measured) == (CaptureResult.STORED_OWN_SRAM, detect)
     assert (measured["Alpha"], measured["Beta"]) == (0, 0)
 
 
-def test_a_sun_picture_without_sun(bench: Bench) -> None:
-    measured = measure(bench, Camera.SUN)
+def test_a_sun_picture_without_sun(unit: Harness) -> None:
+    measured = measure(unit, Camera.SUN)
     assert codes(measured) == (CaptureResult.STORED_OWN_SRAM, DetectResult.SUN_NOT_FOUND)
     assert (measured["FirstX"], measured["FirstY"]) == (0x3FF, 0x1FF)
 
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_dead_camera(bench: Bench, camera: Camera, sram: Sram) -> None:
-    bench.scenes[camera] = None
-    bench.cameras[camera].answers = False
-    measured = measure(bench, camera, sram)
+def test_a_dead_camera(unit: Harness, camera: Camera, sram: Sram) -> None:
+    unit.scenes[camera] = None
+    unit.cameras[camera].answers = False
+    measured = measure(unit, camera, sram)
     assert codes(measured) == (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
     assert 2 * FRAME_US < measured["Total"] < 75_000
     assert measured["Wait"] == measured["Total"]
@@ -190,71 +192,71 @@ def test_a_dead_camera(bench: Bench, camera: Camera, sram: Sram) -> None:
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
 def test_a_camera_that_sent_no_picture_is_set_up_again(
-    bench: Bench, camera: Camera, sram: Sram
+    unit: Harness, camera: Camera, sram: Sram
 ) -> None:
-    registers = dict(bench.cameras[camera].registers)
-    other = dict(bench.cameras[Camera(1 - camera)].registers)
-    scene, bench.scenes[camera] = bench.scenes[camera], None
-    bench.cameras[camera].power_up()  # after a dip of its supply
-    bench.cameras[camera].writes.clear()
-    measure(bench, camera, sram)
-    assert not bench.cameras[camera].writes
-    bench.scenes[camera] = scene
-    measure(bench, camera, sram)
-    assert bench.cameras[camera].registers == registers
-    assert bench.cameras[Camera(1 - camera)].registers == other
+    registers = dict(unit.cameras[camera].registers)
+    other = dict(unit.cameras[Camera(1 - camera)].registers)
+    scene, unit.scenes[camera] = unit.scenes[camera], None
+    unit.cameras[camera].power_up()  # after a dip of its supply
+    unit.cameras[camera].writes.clear()
+    measure(unit, camera, sram)
+    assert not unit.cameras[camera].writes
+    unit.scenes[camera] = scene
+    measure(unit, camera, sram)
+    assert unit.cameras[camera].registers == registers
+    assert unit.cameras[Camera(1 - camera)].registers == other
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_a_memory_that_is_off(bench: Bench, camera: Camera) -> None:
-    no_memory(bench, Sram.SRAM1)
-    measured = measure(bench, camera, Sram.SRAM1)
+def test_a_memory_that_is_off(unit: Harness, camera: Camera) -> None:
+    no_memory(unit, Sram.SRAM1)
+    measured = measure(unit, camera, Sram.SRAM1)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
 
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_latch_up_while_the_picture_is_stored(bench: Bench, camera: Camera, sram: Sram) -> None:
+def test_a_latch_up_while_the_picture_is_stored(unit: Harness, camera: Camera, sram: Sram) -> None:
     enable = SetPin(("SUNEN", "NADEN")[camera], 0)
 
     def latch(request: Request) -> None:
         if request == enable:
-            bench.latched.add(sram)
+            unit.latched.add(sram)
 
-    bench.on_request = latch
-    measured = measure(bench, camera, sram)
+    unit.on_request = latch
+    measured = measure(unit, camera, sram)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
-    assert bench.cut() == {sram}
+    assert unit.cut() == {sram}
 
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_latch_up_under_the_search(bench: Bench, camera: Camera, sram: Sram) -> None:
+def test_a_latch_up_under_the_search(unit: Harness, camera: Camera, sram: Sram) -> None:
     def latch(request: Request) -> None:
         if isinstance(request, StrobeRead):
-            bench.latched.add(sram)
+            unit.latched.add(sram)
 
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
-    bench.on_request = latch
-    measured = measure(bench, camera, sram)
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
+    unit.on_request = latch
+    measured = measure(unit, camera, sram)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
-    bench.on_request = lambda _request: None
-    bench.command("ClearOverCurrent", Selection=sram)
-    assert codes(measure(bench, camera, sram))[1] is DetectResult.SUCCESS
+    unit.on_request = lambda _request: None
+    unit.command("ClearOverCurrent", Selection=sram)
+    assert codes(measure(unit, camera, sram))[1] is DetectResult.SUCCESS
 
 
-def test_results_are_pending_until_they_are_there(bench: Bench) -> None:
-    bench.scenes[Camera.NADIR] = earth(5, 6)
+def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
+    unit.scenes[Camera.NADIR] = earth(5, 6)
     seen: list[tuple[CaptureResult, DetectResult]] = []
 
     def note(request: Request) -> None:
-        now = codes(bench.telemetry("Result2"))
+        now = codes(unit.telemetry("Result2"))
         if now not in seen[-1:]:
             seen.append(now)
 
-    assert bench.send("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2) == 0
-    bench.on_request = note
-    bench.run()
+    assert unit.send("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2) == 0
+    unit.on_request = note
+    unit.run()
     assert seen == [
         (CaptureResult.PENDING, DetectResult.PENDING),
         (CaptureResult.STORED_OWN_SRAM, DetectResult.PENDING),
@@ -268,13 +270,13 @@ def test_results_are_pending_until_they_are_there(bench: Bench) -> None:
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("other_is_dead", [False, True])
 def test_a_camera_measures_with_the_other_memory_when_its_own_is_off(
-    bench: Bench, camera: Camera, other_is_dead: bool
+    unit: Harness, camera: Camera, other_is_dead: bool
 ) -> None:
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(-20, 10), earth(-20, 10)
-    no_memory(bench, Sram(camera))
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(-20, 10), earth(-20, 10)
+    no_memory(unit, Sram(camera))
     if other_is_dead:
-        bench.scenes[Camera(1 - camera)] = None
-    measured = measure(bench, camera, Sram(1 - camera))
+        unit.scenes[Camera(1 - camera)] = None
+    measured = measure(unit, camera, Sram(1 - camera))
     assert codes(measured) == (CaptureResult.STORED_OTHER_SRAM, DetectResult.SUCCESS)
     assert error_deg((measured["Alpha"], measured["Beta"]), (-20, 10)) < 0.1
 
@@ -284,14 +286,14 @@ def test_a_camera_measures_with_the_other_memory_when_its_own_is_off(
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("wait_us", [3_000, 17_500, 36_000])
-def test_times_are_the_timers(bench: Bench, camera: Camera, wait_us: int) -> None:
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
-    bench.wait_us = wait_us
-    bench.log.clear()
-    measured = measure(bench, camera)
+def test_times_are_the_timers(unit: Harness, camera: Camera, wait_us: int) -> None:
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
+    unit.wait_us = wait_us
+    unit.log.clear()
+    measured = measure(unit, camera)
     # From the command to the FPGAs to the end of the job, nothing else takes long.
-    enabled_us = next(us for us, r in bench.log if isinstance(r, SetPin) and r.pin == "SHIFT")
-    assert measured["Total"] == pytest.approx(bench.now_us - enabled_us, abs=300)
+    enabled_us = next(us for us, r in unit.log if isinstance(r, SetPin) and r.pin == "SHIFT")
+    assert measured["Total"] == pytest.approx(unit.now_us - enabled_us, abs=300)
     assert measured["Wait"] == pytest.approx(wait_us, abs=200)
     assert measured["Store"] == microseconds(READ_OUT_TICKS)
     assert measured["Store"] == pytest.approx(READ_OUT_US, abs=TICK_US)
@@ -301,13 +303,13 @@ def test_times_are_the_timers(bench: Bench, camera: Camera, wait_us: int) -> Non
         assert us == int(round(us / TICK_US) * TICK_US)
 
 
-def test_the_published_times(bench: Bench) -> None:
+def test_the_published_times(unit: Harness) -> None:
     """Section 7.4 measures 70.4 ms and 245.0 ms, 48 ms of it imaging, sigma 11 ms."""
-    bench.scenes[Camera.SUN] = sun(place(0, 0, SUN_BORESIGHT), 7)
-    bench.scenes[Camera.NADIR] = earth(5, -5)
+    unit.scenes[Camera.SUN] = sun(place(0, 0, SUN_BORESIGHT), 7)
+    unit.scenes[Camera.NADIR] = earth(5, -5)
     totals = {}
     for camera in Camera:
-        measured = measure(bench, camera)
+        measured = measure(unit, camera)
         assert measured["Wait"] + measured["Store"] == pytest.approx(48_000, abs=200)
         totals[camera] = measured["Total"] / 1000
     assert totals[Camera.SUN] == pytest.approx(70.4, abs=1.5)  # ours sorts out cut chords
@@ -315,68 +317,68 @@ def test_the_published_times(bench: Bench) -> None:
     assert totals[Camera.NADIR] == pytest.approx(186, abs=3)
 
 
-def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(bench: Bench) -> None:
-    bench.scenes[Camera.SUN] = sun_at(3, 4)
-    before = measure(bench, Camera.SUN)["Total"]
-    bench.command("CameraSettings1", Exposure=5)
-    start_us = bench.now_us
-    after = measure(bench, Camera.SUN)["Total"]
+def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness) -> None:
+    unit.scenes[Camera.SUN] = sun_at(3, 4)
+    before = measure(unit, Camera.SUN)["Total"]
+    unit.command("CameraSettings1", Exposure=5)
+    start_us = unit.now_us
+    after = measure(unit, Camera.SUN)["Total"]
     assert after == pytest.approx(before, abs=60)
-    assert bench.now_us - start_us > after + 36_000
+    assert unit.now_us - start_us > after + 36_000
 
 
 # --- settings ---------------------------------------------------------------------------------
 
 
-def test_thresholds(bench: Bench) -> None:
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
-    bench.command("DetectionThreshold2", Threshold=200)  # above the Earth
-    assert measure(bench, Camera.NADIR)["Detect"] == DetectResult.TOO_FEW_EDGES
-    before = measure(bench, Camera.SUN)["Points"]
-    bench.command("DetectionThreshold1", Threshold=120)
-    assert measure(bench, Camera.SUN)["Points"] > before
+def test_thresholds(unit: Harness) -> None:
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
+    unit.command("DetectionThreshold2", Threshold=200)  # above the Earth
+    assert measure(unit, Camera.NADIR)["Detect"] == DetectResult.TOO_FEW_EDGES
+    before = measure(unit, Camera.SUN)["Points"]
+    unit.command("DetectionThreshold1", Threshold=120)
+    assert measure(unit, Camera.SUN)["Points"] > before
 
 
-def test_the_boresight_moves_the_suns_centre(bench: Bench) -> None:
-    bench.scenes[Camera.SUN] = sun(np.array([369.0, 250.0]), 6)
-    bench.command("Boresight1", X=359.5, Y=253.25)
-    measured = measure(bench, Camera.SUN)
+def test_the_boresight_moves_the_suns_centre(unit: Harness) -> None:
+    unit.scenes[Camera.SUN] = sun(np.array([369.0, 250.0]), 6)
+    unit.command("Boresight1", X=359.5, Y=253.25)
+    measured = measure(unit, Camera.SUN)
     factors = distortion_of(INTERFACE.telecommand("Distortion1").reset_values())
     table = fine_table(Meter(PIC18F45K20), Projection.EQUIDISTANT, factors)
     config = SunConfig(table, boresight=(359.5, 253.25))
-    expected = find_sun(window(bench.memories[Sram.SRAM1]), config, Meter(PIC18F45K20))
+    expected = find_sun(window(unit.memories[Sram.SRAM1]), config, Meter(PIC18F45K20))
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)
     assert measured["X"] == pytest.approx(9.5, abs=0.3)
 
 
-def test_a_mask_hides_the_sun_and_part_of_the_limb(bench: Bench) -> None:
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
+def test_a_mask_hides_the_sun_and_part_of_the_limb(unit: Harness) -> None:
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
     x, y = place(3, 4, SUN_BORESIGHT).astype(int)
-    bench.command("Mask1", Area=5, XMin=x - 20, XMax=x + 20, YMin=y - 20, YMax=y + 20)
-    assert measure(bench, Camera.SUN)["Detect"] == DetectResult.SUN_NOT_FOUND
-    measure(bench, Camera.NADIR)
-    before = edges_of(bench)
-    bench.command("Mask2", Area=1, XMin=0, XMax=300, YMin=0, YMax=479)
-    measured = measure(bench, Camera.NADIR)
+    unit.command("Mask1", Area=5, XMin=x - 20, XMax=x + 20, YMin=y - 20, YMax=y + 20)
+    assert measure(unit, Camera.SUN)["Detect"] == DetectResult.SUN_NOT_FOUND
+    measure(unit, Camera.NADIR)
+    before = edges_of(unit)
+    unit.command("Mask2", Area=1, XMin=0, XMax=300, YMin=0, YMax=479)
+    measured = measure(unit, Camera.NADIR)
     left = {edge for edge in before if edge[0] > 300}
-    assert edges_of(bench) == left < before
+    assert edges_of(unit) == left < before
     assert measured["Detect"] == DetectResult.SUCCESS
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_new_distortion_coefficients_make_a_new_table_once(bench: Bench, camera: Camera) -> None:
-    bench.scenes[Camera.SUN], bench.scenes[Camera.NADIR] = sun_at(40, 20), earth(20, 30)
+def test_new_distortion_coefficients_make_a_new_table_once(unit: Harness, camera: Camera) -> None:
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(40, 20), earth(20, 30)
     name = f"Distortion{camera + 1}"
-    before = measure(bench, camera)
+    before = measure(unit, camera)
     values = dict(INTERFACE.telecommand(name).reset_values())
     values |= {"Mantissa0": 0, "Mantissa1": 9900, "Exponent1": 4}
     durations, results = [], []
     for sent in (values, None, INTERFACE.telecommand(name).reset_values()):
         if sent is not None:
-            bench.command(name, **sent)
-        start_us = bench.now_us
-        results.append(measure(bench, camera))
-        durations.append(bench.now_us - start_us)
+            unit.command(name, **sent)
+        start_us = unit.now_us
+        results.append(measure(unit, camera))
+        durations.append(unit.now_us - start_us)
     changed, same, reset = results
     assert durations[0] - durations[1] > 300_000  # Newton's method for 227 radii, on this part
     assert durations[2] == pytest.approx(durations[1], rel=0.2)  # the constant table
@@ -396,37 +398,37 @@ def test_new_distortion_coefficients_make_a_new_table_once(bench: Bench, camera:
 def test_a_search_around_samples_reads_few_pixels_and_finds_the_same(
     search: NadirSearch, most: int
 ) -> None:
-    bench = Bench(mcu_addressing=True)
-    bench.scenes[Camera.NADIR] = earth(-15, 20)
-    lines = measure(bench, Camera.NADIR)
-    all_edges = edges_of(bench)
-    bench.command("SetNadirSearch", Search=search)
-    samples = measure(bench, Camera.NADIR)
-    assert edges_of(bench) == all_edges
+    unit = Harness(mcu_addressing=True)
+    unit.scenes[Camera.NADIR] = earth(-15, 20)
+    lines = measure(unit, Camera.NADIR)
+    all_edges = edges_of(unit)
+    unit.command("SetNadirSearch", Search=search)
+    samples = measure(unit, Camera.NADIR)
+    assert edges_of(unit) == all_edges
     assert (samples["X"], samples["Y"]) == pytest.approx((lines["X"], lines["Y"]), abs=0.02)
     assert samples["PixelsRead"] < most < 9920 == lines["PixelsRead"]
     assert samples["Search"] < lines["Search"] * (0.25 if most < 1000 else 0.6)
-    linked = measure(bench, Camera.NADIR, Sram.SRAM1)  # no addresses over the link
+    linked = measure(unit, Camera.NADIR, Sram.SRAM1)  # no addresses over the link
     assert linked["PixelsRead"] == 9920
     assert (linked["X"], linked["Y"]) == (lines["X"], lines["Y"])
 
 
-def test_without_the_option_every_line_is_scanned(bench: Bench) -> None:
-    bench.scenes[Camera.NADIR] = earth(-15, 20)
-    assert bench.send("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES) != 0
-    measured = measure(bench, Camera.NADIR)
+def test_without_the_option_every_line_is_scanned(unit: Harness) -> None:
+    unit.scenes[Camera.NADIR] = earth(-15, 20)
+    assert unit.send("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES) != 0
+    measured = measure(unit, Camera.NADIR)
     assert (measured["Detect"], measured["PixelsRead"]) == (DetectResult.SUCCESS, 9920)
 
 
 def test_a_latch_up_under_a_search_by_address() -> None:
-    bench = Bench(mcu_addressing=True)
-    bench.scenes[Camera.NADIR] = earth(-15, 20)
-    bench.command("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES)
+    unit = Harness(mcu_addressing=True)
+    unit.scenes[Camera.NADIR] = earth(-15, 20)
+    unit.command("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES)
 
     def latch(request: Request) -> None:
         if isinstance(request, StrobeRead):
-            bench.latched.add(Sram.SRAM2)
+            unit.latched.add(Sram.SRAM2)
 
-    bench.on_request = latch
-    measured = measure(bench, Camera.NADIR)
+    unit.on_request = latch
+    measured = measure(unit, Camera.NADIR)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)

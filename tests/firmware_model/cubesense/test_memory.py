@@ -4,7 +4,7 @@ from cubestack.firmware_model.cubesense.memory import CAPACITY, Memory, budget, 
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig, NadirLines
 from cubestack.firmware_model.interface.cubesense.codes import Sram
 
-from .bench import Bench
+from .harness import Harness
 from .scenery import chequered
 
 
@@ -33,18 +33,18 @@ def test_what_shares_a_place_fits_into_it() -> None:
         assert sum(buffer.size for buffer in budget() if buffer.inside == name) <= size[name]
 
 
-def test_the_programs_buffers_are_as_large_as_the_budget_says(bench: Bench) -> None:
+def test_the_programs_buffers_are_as_large_as_the_budget_says(unit: Harness) -> None:
     size = sizes()
-    acquisition = bench.program.acquisition
+    acquisition = unit.program.acquisition
     scanned, window = acquisition.buffers
     assert scanned.nbytes == size["scanned pixels"]
     assert window.nbytes == size["Sun window"]
     assert np.shares_memory(scanned, window)
-    assert bench.program.commands.download.data.nbytes == size["image frame"]
-    lines = NadirLines(EdgeConfig(), bench.meter, buffer=scanned)
+    assert unit.program.commands.download.data.nbytes == size["image frame"]
+    lines = NadirLines(EdgeConfig(), unit.meter, buffer=scanned)
     assert np.shares_memory(lines.space, scanned)
-    bench.memories[Sram.SRAM2] = chequered()
-    bench.perform(acquisition.scan(Sram.SRAM2, lines))
+    unit.memories[Sram.SRAM2] = chequered()
+    unit.perform(acquisition.scan(Sram.SRAM2, lines))
     assert lines.edges.full
     assert lines.edges.points.nbytes == size["edges"]
 

@@ -2,7 +2,6 @@
 
 import pytest
 
-from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.supply import (
     OFF_TIME_US,
     OVER_CURRENT_MA,
@@ -18,109 +17,109 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.pins import SRAM_POWER, Monitor
 from cubestack.firmware_model.mcu.requests import Request, SetPin, Sleep
 
-from .bench import Bench
+from .harness import Harness
 
 
-def over_current(bench: Bench) -> set[Sram]:
-    power = bench.telemetry("Power")
+def over_current(unit: Harness) -> set[Sram]:
+    power = unit.telemetry("Power")
     return {sram for sram in Sram if power[f"OverCurrent{sram + 1}"]}
 
 
-def test_both_memories_and_cameras_are_on_after_start_up(bench: Bench) -> None:
-    assert bench.cut() == set()
-    assert all(bench.pins[pin] for pin in ("SUN_POWER", "NAD_POWER"))
-    assert over_current(bench) == set()
+def test_both_memories_and_cameras_are_on_after_start_up(unit: Harness) -> None:
+    assert unit.cut() == set()
+    assert all(unit.pins[pin] for pin in ("SUN_POWER", "NAD_POWER"))
+    assert over_current(unit) == set()
 
 
 @pytest.mark.parametrize("sram", Sram)
-def test_a_latch_up_while_idle_is_cut_within_one_sample_time(bench: Bench, sram: Sram) -> None:
-    bench.log.clear()
-    bench.latched.add(sram)
-    start_us = bench.now_us
-    bench.run(until_us=start_us + 2 * SAMPLE_US)
-    (cut_us,) = (us for us, request in bench.log if request == SetPin(SRAM_POWER[sram], 0))
+def test_a_latch_up_while_idle_is_cut_within_one_sample_time(unit: Harness, sram: Sram) -> None:
+    unit.log.clear()
+    unit.latched.add(sram)
+    start_us = unit.now_us
+    unit.run(until_us=start_us + 2 * SAMPLE_US)
+    (cut_us,) = (us for us, request in unit.log if request == SetPin(SRAM_POWER[sram], 0))
     assert cut_us - start_us <= SAMPLE_US + 200
-    assert bench.cut() == over_current(bench) == {sram}
+    assert unit.cut() == over_current(unit) == {sram}
 
 
 @pytest.mark.parametrize("target", [ResetTarget.CAMERAS, ResetTarget.MCU])
-def test_the_memories_are_watched_through_every_wait(bench: Bench, target: ResetTarget) -> None:
+def test_the_memories_are_watched_through_every_wait(unit: Harness, target: ResetTarget) -> None:
     """A reset of the cameras waits for 100 ms; one of the program, for the UART."""
-    bench.backlog[Port.NODE] = 200
+    unit.backlog = 200
     latched_us: list[int] = []
 
     def latch(request: Request) -> None:
         if isinstance(request, Sleep) and not request.wakeable and not latched_us:
-            latched_us.append(bench.now_us)
-            bench.latched.add(Sram.SRAM1)
+            latched_us.append(unit.now_us)
+            unit.latched.add(Sram.SRAM1)
 
-    bench.log.clear()
+    unit.log.clear()
     message = INTERFACE.telecommand("Reset")
-    bench.i2c_write(bytes([message.id]) + message.pack(Target=target))
-    bench.on_request = latch
-    bench.run()
-    cut_us = next(us for us, request in bench.log if request == SetPin("SRAM1_POWER", 0))
+    unit.i2c_write(bytes([message.id]) + message.pack(Target=target))
+    unit.on_request = latch
+    unit.run()
+    cut_us = next(us for us, request in unit.log if request == SetPin("SRAM1_POWER", 0))
     assert cut_us - latched_us[0] <= SAMPLE_US + 200
 
 
-def test_it_stays_off_until_the_host_clears_it(bench: Bench) -> None:
-    bench.latched.add(Sram.SRAM2)
-    bench.run(until_us=bench.now_us + 1_000_000)
-    assert bench.cut() == {Sram.SRAM2}
-    bench.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
-    assert bench.cut() == over_current(bench) == {Sram.SRAM2}
-    bench.command("ClearOverCurrent", Selection=SramSelection.BOTH)
-    assert bench.cut() == over_current(bench) == set()
+def test_it_stays_off_until_the_host_clears_it(unit: Harness) -> None:
+    unit.latched.add(Sram.SRAM2)
+    unit.run(until_us=unit.now_us + 1_000_000)
+    assert unit.cut() == {Sram.SRAM2}
+    unit.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
+    assert unit.cut() == over_current(unit) == {Sram.SRAM2}
+    unit.command("ClearOverCurrent", Selection=SramSelection.BOTH)
+    assert unit.cut() == over_current(unit) == set()
 
 
 @pytest.mark.parametrize("cleared_after_us", [20_000, 500_000])
-def test_it_is_off_for_a_while_at_least(bench: Bench, cleared_after_us: int) -> None:
-    bench.log.clear()
-    bench.latched.add(Sram.SRAM2)
-    bench.run(until_us=bench.now_us + cleared_after_us)
-    bench.command("ClearOverCurrent", Selection=SramSelection.SRAM2)
-    (off_us, _), (on_us, last) = ((us, r) for us, r in bench.log if isinstance(r, SetPin))
+def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) -> None:
+    unit.log.clear()
+    unit.latched.add(Sram.SRAM2)
+    unit.run(until_us=unit.now_us + cleared_after_us)
+    unit.command("ClearOverCurrent", Selection=SramSelection.SRAM2)
+    (off_us, _), (on_us, last) = ((us, r) for us, r in unit.log if isinstance(r, SetPin))
     assert last == SetPin("SRAM2_POWER", 1)
     assert on_us - off_us == pytest.approx(max(OFF_TIME_US, cleared_after_us), abs=SAMPLE_US + 1000)
     assert on_us - off_us >= OFF_TIME_US
 
 
-def test_a_lasting_latch_up_is_cut_again(bench: Bench) -> None:
+def test_a_lasting_latch_up_is_cut_again(unit: Harness) -> None:
     def latch_again(request: Request) -> None:
         if request == SetPin(SRAM_POWER[Sram.SRAM1], 1):
-            bench.latched.add(Sram.SRAM1)
+            unit.latched.add(Sram.SRAM1)
 
-    bench.latched.add(Sram.SRAM1)
-    bench.on_request = latch_again
-    bench.run(until_us=bench.now_us + 10_000)
-    bench.log.clear()
-    bench.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
-    bench.run(until_us=bench.now_us + 10_000)
-    switched = [request for _, request in bench.log if isinstance(request, SetPin)]
+    unit.latched.add(Sram.SRAM1)
+    unit.on_request = latch_again
+    unit.run(until_us=unit.now_us + 10_000)
+    unit.log.clear()
+    unit.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
+    unit.run(until_us=unit.now_us + 10_000)
+    switched = [request for _, request in unit.log if isinstance(request, SetPin)]
     assert switched == [SetPin("SRAM1_POWER", 1), SetPin("SRAM1_POWER", 0)]
-    assert over_current(bench) == {Sram.SRAM1}
+    assert over_current(unit) == {Sram.SRAM1}
 
 
-def test_clearing_does_not_touch_a_memory_that_works(bench: Bench) -> None:
-    bench.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM1)
-    kept = bench.memories[Sram.SRAM1].copy()
-    bench.log.clear()
-    start_us = bench.now_us
-    bench.command("ClearOverCurrent", Selection=SramSelection.BOTH)
-    assert (bench.memories[Sram.SRAM1] == kept).all()
-    assert not any(isinstance(request, SetPin) for _, request in bench.log)
-    assert bench.now_us - start_us < SAMPLE_US + 1_000
+def test_clearing_does_not_touch_a_memory_that_works(unit: Harness) -> None:
+    unit.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM1)
+    kept = unit.memories[Sram.SRAM1].copy()
+    unit.log.clear()
+    start_us = unit.now_us
+    unit.command("ClearOverCurrent", Selection=SramSelection.BOTH)
+    assert (unit.memories[Sram.SRAM1] == kept).all()
+    assert not any(isinstance(request, SetPin) for _, request in unit.log)
+    assert unit.now_us - start_us < SAMPLE_US + 1_000
 
 
 @pytest.mark.parametrize(("ma", "cut"), [(OVER_CURRENT_MA - 1, False), (OVER_CURRENT_MA + 1, True)])
-def test_the_limit(bench: Bench, ma: float, cut: bool) -> None:
-    bench.memory_ma = ma
-    bench.run(until_us=bench.now_us + 10_000)
-    assert bench.cut() == (set(Sram) if cut else set())
+def test_the_limit(unit: Harness, ma: float, cut: bool) -> None:
+    unit.memory_ma = ma
+    unit.run(until_us=unit.now_us + 10_000)
+    assert unit.cut() == (set(Sram) if cut else set())
 
 
-def test_currents_are_shown_to_a_tenth_within_the_converters_step(bench: Bench) -> None:
-    power = bench.telemetry("Power")
+def test_currents_are_shown_to_a_tenth_within_the_converters_step(unit: Harness) -> None:
+    power = unit.telemetry("Power")
     shown = {
         Monitor.SUPPLY_3V3: power["Current3V3"],
         Monitor.SRAM1: power["CurrentSram1"],
@@ -128,7 +127,7 @@ def test_currents_are_shown_to_a_tenth_within_the_converters_step(bench: Bench) 
         Monitor.SUPPLY_5V: power["Current5V"],
     }
     for monitor, ma in shown.items():
-        assert ma == pytest.approx(bench.supply_ma.get(monitor, bench.memory_ma), abs=0.16)
-    bench.latched.add(Sram.SRAM1)
-    bench.run(until_us=bench.now_us + 10_000)
-    assert bench.telemetry("Power")["CurrentSram1"] == 0
+        assert ma == pytest.approx(unit.supply_ma.get(monitor, unit.memory_ma), abs=0.16)
+    unit.latched.add(Sram.SRAM1)
+    unit.run(until_us=unit.now_us + 10_000)
+    assert unit.telemetry("Power")["CurrentSram1"] == 0

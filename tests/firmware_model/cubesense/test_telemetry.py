@@ -24,7 +24,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
 
-from .node import Node
+from .links_harness import Links
 
 Values = dict[str, Any]
 
@@ -32,7 +32,7 @@ UPTIME_US = 70_123_456
 OVER = 0x10000
 
 
-def no_two_alike(node: Node) -> None:
+def no_two_alike(node: Links) -> None:
     """Give everything that telemetry shows a value of its own."""
     node.now_us = UPTIME_US
     state = node.state
@@ -187,7 +187,7 @@ EXPECTED: dict[str, Callable[[], Values]] = {
 
 @pytest.mark.parametrize("name", [message.name for message in INTERFACE.telemetries])
 def test_every_field_shows_its_source(name: str) -> None:
-    node = Node()
+    node = Links()
     no_two_alike(node)
     expected = EXPECTED[name]()
     assert node.telemetry(name) == pytest.approx(expected)
@@ -202,14 +202,14 @@ def test_every_frame_is_expected() -> None:
     "flag", ["TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete"]
 )
 def test_each_flag_is_shown_alone(flag: str) -> None:
-    node = Node()
+    node = Links()
     node.state.flags.add(flag)
     values = node.telemetry("CommunicationStatus")
     assert {name for name, value in values.items() if value and "Count" not in name} == {flag}
 
 
 def test_after_start_up() -> None:
-    node = Node()
+    node = Links()
     for number in (1, 2):
         values = node.telemetry(f"Result{number}")
         assert values == {"Alpha": 0, "Beta": 0, "Capture": 0, "Detect": 0}
@@ -226,7 +226,7 @@ def test_after_start_up() -> None:
 
 
 def test_uptime_wraps_at_16_bits_of_seconds() -> None:
-    node = Node()
+    node = Links()
     node.now_us = (0x10000 + 5) * 1_000_000 + 999_999
     values = node.telemetry("Identification")
     assert (values["RuntimeSeconds"], values["RuntimeMilliseconds"]) == (5, 999)
@@ -236,13 +236,13 @@ def test_uptime_wraps_at_16_bits_of_seconds() -> None:
     ("text", "sent"), [("", bytes(6)), ("A1", b"A1\0\0\0\0"), ("12345678", b"123456"), ("é", b"?")]
 )
 def test_serial_numbers_are_six_bytes_of_ascii(text: str, sent: bytes) -> None:
-    node = Node()
+    node = Links()
     node.serial_number = text
     assert node.telemetry("SerialNumber")["SerialNumber"] == sent.ljust(6, b"\0")
 
 
 def test_a_frame_and_its_checksum_belong_together() -> None:
-    node = Node()
+    node = Links()
     node.pictures[:] = np.random.default_rng(3).integers(0, 256, node.pictures.shape)
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     node.command("NextImageFrame", Frame=12)

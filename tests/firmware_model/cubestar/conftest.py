@@ -1,4 +1,4 @@
-"""A bench with the program on it, and skies to look at."""
+"""The program on fake hardware, and skies to look at."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
-from .bench import Bench
+from .harness import Harness
 from .sky import Sky, take
 
 
@@ -31,5 +31,5 @@ def sky(catalogue: StarCatalogue, pose: Rotation) -> Sky:
 
 
 @pytest.fixture
-def bench(catalogue: StarCatalogue) -> Bench:
-    return Bench(catalogue)
+def unit(catalogue: StarCatalogue) -> Harness:
+    return Harness(catalogue)

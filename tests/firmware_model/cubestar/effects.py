@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
-from .bench import Bench
+from .harness import Harness
 from .sky import Sky
 
-Effect = Callable[[Bench, Sky], None]
+Effect = Callable[[Harness, Sky], None]
 EFFECTS: dict[str, Effect] = {}
 
 
@@ -21,7 +21,7 @@ def telecommand(name: str) -> Callable[[Effect], Effect]:
     return register
 
 
-def shown(bench: Bench, frame: str, **values: float) -> None:
+def shown(unit: Harness, frame: str, **values: float) -> None:
     """Telemetry ``frame`` shows exactly these ``values``."""
-    found = bench.telemetry(frame)
+    found = unit.telemetry(frame)
     assert found == pytest.approx(values, rel=1e-6), f"{frame} shows {found}"

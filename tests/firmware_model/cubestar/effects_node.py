@@ -10,269 +10,269 @@ from cubestack.firmware_model.interface.cubestar import (
 )
 from cubestack.firmware_model.mcu.requests import Pay, Request, SetPin
 
-from .bench import Bench
 from .effects import shown, telecommand
+from .harness import Harness
 from .sky import Sky
 
 # --- node ---------------------------------------------------------------------------------------
 
 
 @telecommand("TogglePowerSW")
-def toggle_power_sw(bench: Bench, _: Sky) -> None:
-    bench.command("TogglePowerSW")
-    assert bench.switches == {"memory": True, "imager": False}
-    assert bench.telemetry("PowerStatus")["Status"] == 0
-    bench.command("TogglePowerSW")
-    assert bench.switches == {"memory": True, "imager": True}
-    assert bench.telemetry("PowerStatus")["Status"] == 1
-    bench.command("CaptureImage")
-    assert bench.status() is TaskStatus.CAPTURED
+def toggle_power_sw(unit: Harness, _: Sky) -> None:
+    unit.command("TogglePowerSW")
+    assert unit.switches == {"memory": True, "imager": False}
+    assert unit.telemetry("PowerStatus")["Status"] == 0
+    unit.command("TogglePowerSW")
+    assert unit.switches == {"memory": True, "imager": True}
+    assert unit.telemetry("PowerStatus")["Status"] == 1
+    unit.command("CaptureImage")
+    assert unit.status() is TaskStatus.CAPTURED
 
 
 @telecommand("Reset")
-def reset(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=7)
-    bench.command("SaveConfig")
-    bench.command("Exposure", exposure=9)
-    bench.command("SetDiscardDelay", Delay=1)
-    bench.telemetry("IDMargin")
-    bench.uart(b"noise")
-    bench.command("TogglePowerSW")
-    bench.command("Reset")
-    assert bench.resets == [ResetCause.SYSTEM_REQUEST]
-    assert bench.telemetry("ExtendedIdentification")["TcmdCount"] == 0
-    assert bench.flags() == set()
-    shown(bench, "Exposure", exposure=7)
-    assert bench.telemetry("LoopStatus")["DiscardDelay"] == 70
-    assert bench.switches["imager"]
+def reset(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=7)
+    unit.command("SaveConfig")
+    unit.command("Exposure", exposure=9)
+    unit.command("SetDiscardDelay", Delay=1)
+    unit.telemetry("IDMargin")
+    unit.uart(b"noise")
+    unit.command("TogglePowerSW")
+    unit.command("Reset")
+    assert unit.resets == [ResetCause.SYSTEM_REQUEST]
+    assert unit.telemetry("ExtendedIdentification")["TcmdCount"] == 0
+    assert unit.flags() == set()
+    shown(unit, "Exposure", exposure=7)
+    assert unit.telemetry("LoopStatus")["DiscardDelay"] == 70
+    assert unit.switches["imager"]
 
 
 @telecommand("MCUReset")
-def mcu_reset(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=9)
-    bench.command("TestSRAM")
-    bench.command("MCUReset")
-    assert bench.resets == [ResetCause.SYSTEM_REQUEST]
-    shown(bench, "Exposure", exposure=9)
-    assert bench.telemetry("SRAMTestResults")["TestResult"] == MemoryTest.NOT_RUN
-    assert bench.telemetry("ExtendedIdentification")["TcmdCount"] == 3
-    assert bench.telemetry("ExtendedIdentification")["ResetCause"] == ResetCause.SYSTEM_REQUEST
+def mcu_reset(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=9)
+    unit.command("TestSRAM")
+    unit.command("MCUReset")
+    assert unit.resets == [ResetCause.SYSTEM_REQUEST]
+    shown(unit, "Exposure", exposure=9)
+    assert unit.telemetry("SRAMTestResults")["TestResult"] == MemoryTest.NOT_RUN
+    assert unit.telemetry("ExtendedIdentification")["TcmdCount"] == 3
+    assert unit.telemetry("ExtendedIdentification")["ResetCause"] == ResetCause.SYSTEM_REQUEST
 
 
 @telecommand("setDelayTimerTimeout")
-def set_delay_timer_timeout(bench: Bench, _: Sky) -> None:
-    bench.command("setDelayTimerTimeout", Time=0.4)
-    shown(bench, "DelayTime", Timeout=0.4)
-    start_us = bench.now_us
-    bench.send("Trigger")
-    bench.run(until_us=start_us + 3_000_000)
-    enabled = [us for us, what in bench.log if what == SetPin("ENABLE", 1)]
+def set_delay_timer_timeout(unit: Harness, _: Sky) -> None:
+    unit.command("setDelayTimerTimeout", Time=0.4)
+    shown(unit, "DelayTime", Timeout=0.4)
+    start_us = unit.now_us
+    unit.send("Trigger")
+    unit.run(until_us=start_us + 3_000_000)
+    enabled = [us for us, what in unit.log if what == SetPin("ENABLE", 1)]
     assert enabled[0] - start_us == pytest.approx(400_000 + 70_000, abs=5_000)
 
 
 @telecommand("ClearWDGResetCounter")
-def clear_wdg_reset_counter(bench: Bench, _: Sky) -> None:
-    bench.command("TestWDG")
-    bench.command("ClearWDGResetCounter")
-    assert bench.telemetry("ExtendedIdentification")["WDGResetCount"] == 0
-    assert bench.telemetry("LogStatus")["WDGcounter"] == 0
+def clear_wdg_reset_counter(unit: Harness, _: Sky) -> None:
+    unit.command("TestWDG")
+    unit.command("ClearWDGResetCounter")
+    assert unit.telemetry("ExtendedIdentification")["WDGResetCount"] == 0
+    assert unit.telemetry("LogStatus")["WDGcounter"] == 0
 
 
 @telecommand("ClearErrorFlags")
-def clear_error_flags(bench: Bench, _: Sky) -> None:
-    bench.command("IDStars")
-    assert bench.flags() == {"StatusError"}
-    bench.command("ClearErrorFlags")
-    assert bench.flags() == set()
+def clear_error_flags(unit: Harness, _: Sky) -> None:
+    unit.command("IDStars")
+    assert unit.flags() == {"StatusError"}
+    unit.command("ClearErrorFlags")
+    assert unit.flags() == set()
 
 
 # --- image sensor ---------------------------------------------------------------------------------
 
 
 @telecommand("Exposure")
-def exposure(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=1000)
-    shown(bench, "Exposure", exposure=1000)
-    bench.command("CaptureImage")
-    assert bench.camera_value("EXPOSURE") == 1000
-    assert bench.camera_value("EXPOSURE_RULE") == 0
-    bench.command("Exposure", exposure=0)
-    bench.command("CaptureImage")
-    assert bench.camera_value("EXPOSURE_RULE") == 2
+def exposure(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=1000)
+    shown(unit, "Exposure", exposure=1000)
+    unit.command("CaptureImage")
+    assert unit.camera_value("EXPOSURE") == 1000
+    assert unit.camera_value("EXPOSURE_RULE") == 0
+    unit.command("Exposure", exposure=0)
+    unit.command("CaptureImage")
+    assert unit.camera_value("EXPOSURE_RULE") == 2
 
 
 @telecommand("WriteTo_IS_Register")
-def write_to_is_register(bench: Bench, _: Sky) -> None:
-    bench.command("WriteTo_IS_Register", Reg=0x26, DataH=0, DataL=0x77)
-    assert bench.camera_writes[-1] == bytes([0x85, 0x26, 0x77])
+def write_to_is_register(unit: Harness, _: Sky) -> None:
+    unit.command("WriteTo_IS_Register", Reg=0x26, DataH=0, DataL=0x77)
+    assert unit.camera_writes[-1] == bytes([0x85, 0x26, 0x77])
 
 
 @telecommand("ReadFrom_IS_Register")
-def read_from_is_register(bench: Bench, _: Sky) -> None:
-    bench.camera[0x8527] = 0x42
-    bench.command("ReadFrom_IS_Register", Reg=0x27)
-    shown(bench, "IS_Register", DataH=0, DataL=0x42)
+def read_from_is_register(unit: Harness, _: Sky) -> None:
+    unit.camera[0x8527] = 0x42
+    unit.command("ReadFrom_IS_Register", Reg=0x27)
+    shown(unit, "IS_Register", DataH=0, DataL=0x42)
 
 
 @telecommand("SetCameraRegisterPage")
-def set_camera_register_page(bench: Bench, _: Sky) -> None:
-    bench.command("SetCameraRegisterPage", Page=0x81)
-    assert bench.telemetry("LoopStatus")["CameraPage"] == 0x81
-    bench.command("WriteTo_IS_Register", Reg=0x02, DataH=0, DataL=0x46)
-    assert bench.camera == {0x8102: 0x46}
-    bench.command("ReadFrom_IS_Register", Reg=0x02)
-    shown(bench, "IS_Register", DataH=0, DataL=0x46)
+def set_camera_register_page(unit: Harness, _: Sky) -> None:
+    unit.command("SetCameraRegisterPage", Page=0x81)
+    assert unit.telemetry("LoopStatus")["CameraPage"] == 0x81
+    unit.command("WriteTo_IS_Register", Reg=0x02, DataH=0, DataL=0x46)
+    assert unit.camera == {0x8102: 0x46}
+    unit.command("ReadFrom_IS_Register", Reg=0x02)
+    shown(unit, "IS_Register", DataH=0, DataL=0x46)
 
 
 @telecommand("WriteCameraRegister")
-def write_camera_register(bench: Bench, _: Sky) -> None:
-    bench.command("WriteCameraRegister", Address=0x840B, Value=3)
-    assert bench.camera == {0x840B: 3}
+def write_camera_register(unit: Harness, _: Sky) -> None:
+    unit.command("WriteCameraRegister", Address=0x840B, Value=3)
+    assert unit.camera == {0x840B: 3}
 
 
 @telecommand("SelectCameraRegister")
-def select_camera_register(bench: Bench, _: Sky) -> None:
-    bench.camera[0x851D] = 7
-    bench.command("SelectCameraRegister", Address=0x851D)
-    shown(bench, "CameraRegister", Address=0x851D, Value=7, Valid=1)
-    bench.camera_refuses = lambda _data: True
-    bench.command("SelectCameraRegister", Address=0x851C)
-    shown(bench, "CameraRegister", Address=0x851C, Value=0, Valid=0)
+def select_camera_register(unit: Harness, _: Sky) -> None:
+    unit.camera[0x851D] = 7
+    unit.command("SelectCameraRegister", Address=0x851D)
+    shown(unit, "CameraRegister", Address=0x851D, Value=7, Valid=1)
+    unit.camera_refuses = lambda _data: True
+    unit.command("SelectCameraRegister", Address=0x851C)
+    shown(unit, "CameraRegister", Address=0x851C, Value=0, Valid=0)
 
 
 @telecommand("SetFrameRate")
-def set_frame_rate(bench: Bench, _: Sky) -> None:
-    bench.command("SetFrameRate", FrameRate=30)
-    assert bench.telemetry("LoopStatus")["FrameRate"] == 30
-    bench.command("CaptureImage")
-    assert bench.camera_value("FRAMES_PER_SECOND") == 30
+def set_frame_rate(unit: Harness, _: Sky) -> None:
+    unit.command("SetFrameRate", FrameRate=30)
+    assert unit.telemetry("LoopStatus")["FrameRate"] == 30
+    unit.command("CaptureImage")
+    assert unit.camera_value("FRAMES_PER_SECOND") == 30
 
 
 @telecommand("SetDiscardDelay")
-def set_discard_delay(bench: Bench, _: Sky) -> None:
-    bench.command("SetDiscardDelay", Delay=20)
-    assert bench.telemetry("LoopStatus")["DiscardDelay"] == 20
-    bench.command("CaptureImage")
-    assert bench.telemetry("PhaseTimes")["Discard"] == pytest.approx(20_000, abs=100)
+def set_discard_delay(unit: Harness, _: Sky) -> None:
+    unit.command("SetDiscardDelay", Delay=20)
+    assert unit.telemetry("LoopStatus")["DiscardDelay"] == 20
+    unit.command("CaptureImage")
+    assert unit.telemetry("PhaseTimes")["Discard"] == pytest.approx(20_000, abs=100)
 
 
 @telecommand("SelectImageBank")
-def select_image_bank(bench: Bench, _: Sky) -> None:
-    bench.command("SelectImageBank", Bank=1)
-    assert bench.telemetry("LoopStatus")["Bank"] == 1
-    bench.command("CaptureImage")
-    assert bench.pins["BANK"] == 1
+def select_image_bank(unit: Harness, _: Sky) -> None:
+    unit.command("SelectImageBank", Bank=1)
+    assert unit.telemetry("LoopStatus")["Bank"] == 1
+    unit.command("CaptureImage")
+    assert unit.pins["BANK"] == 1
 
 
 # --- configuration, tests and operation -----------------------------------------------------------
 
 
 @telecommand("SaveConfig")
-def save_config(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=5)
-    bench.command("setPrincipalPoint", Cx=1.5, Cy=2.5)
-    bench.command("SaveConfig")
-    bench.power_on()
-    shown(bench, "Exposure", exposure=5)
-    shown(bench, "PrincipalPoint", Cx=1.5, Cy=2.5)
+def save_config(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=5)
+    unit.command("setPrincipalPoint", Cx=1.5, Cy=2.5)
+    unit.command("SaveConfig")
+    unit.power_on()
+    shown(unit, "Exposure", exposure=5)
+    shown(unit, "PrincipalPoint", Cx=1.5, Cy=2.5)
 
 
 @telecommand("ReadConfig")
-def read_config(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=5)
-    bench.command("SaveConfig")
-    bench.command("Exposure", exposure=6)
-    bench.command("ReadConfig")
-    shown(bench, "Exposure", exposure=5)
+def read_config(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=5)
+    unit.command("SaveConfig")
+    unit.command("Exposure", exposure=6)
+    unit.command("ReadConfig")
+    shown(unit, "Exposure", exposure=5)
 
 
 @telecommand("ClearConfig")
-def clear_config(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=5)
-    bench.command("SaveConfig")
-    bench.command("ClearConfig")
-    shown(bench, "Exposure", exposure=0)
-    bench.command("Exposure", exposure=6)
-    bench.power_on()
-    shown(bench, "Exposure", exposure=0)
+def clear_config(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=5)
+    unit.command("SaveConfig")
+    unit.command("ClearConfig")
+    shown(unit, "Exposure", exposure=0)
+    unit.command("Exposure", exposure=6)
+    unit.power_on()
+    shown(unit, "Exposure", exposure=0)
 
 
 @telecommand("TestSRAM")
-def sram_test(bench: Bench, _: Sky) -> None:
-    bench.command("CaptureImage")
-    bench.command("TestSRAM")
-    shown(bench, "SRAMTestResults", TestResult=MemoryTest.PASSED)
-    bench.command("DetectStars")
-    assert "StatusError" in bench.flags()  # the picture is lost
+def sram_test(unit: Harness, _: Sky) -> None:
+    unit.command("CaptureImage")
+    unit.command("TestSRAM")
+    shown(unit, "SRAMTestResults", TestResult=MemoryTest.PASSED)
+    unit.command("DetectStars")
+    assert "StatusError" in unit.flags()  # the picture is lost
 
     def stuck(request: Request) -> None:
         if isinstance(request, Pay):
-            bench.external_ram[777_777] |= 0x10
+            unit.external_ram[777_777] |= 0x10
 
-    bench.on_request = stuck
-    bench.command("TestSRAM")
-    shown(bench, "SRAMTestResults", TestResult=MemoryTest.FAILED)
+    unit.on_request = stuck
+    unit.command("TestSRAM")
+    shown(unit, "SRAMTestResults", TestResult=MemoryTest.FAILED)
 
 
 @telecommand("TestWDG")
-def wdg_test(bench: Bench, _: Sky) -> None:
-    bench.command("Exposure", exposure=9)
-    start_us = bench.now_us
-    bench.send("TestWDG")
-    bench.run(until_us=start_us + WATCHDOG_US // 2)
-    assert bench.telemetry("TcmdProcessed") == {"Processed": 0}  # it hangs, but answers
-    bench.run()
-    assert bench.now_us - start_us == pytest.approx(WATCHDOG_US, rel=0.01)
-    assert bench.resets == [ResetCause.WATCHDOG]
-    values = bench.telemetry("ExtendedIdentification")
+def wdg_test(unit: Harness, _: Sky) -> None:
+    unit.command("Exposure", exposure=9)
+    start_us = unit.now_us
+    unit.send("TestWDG")
+    unit.run(until_us=start_us + WATCHDOG_US // 2)
+    assert unit.telemetry("TcmdProcessed") == {"Processed": 0}  # it hangs, but answers
+    unit.run()
+    assert unit.now_us - start_us == pytest.approx(WATCHDOG_US, rel=0.01)
+    assert unit.resets == [ResetCause.WATCHDOG]
+    values = unit.telemetry("ExtendedIdentification")
     assert values["ResetCause"] == ResetCause.WATCHDOG
     assert values["WDGResetCount"] == 1
     assert values["TlmCount"] == 1  # counted while it hung
-    shown(bench, "Exposure", exposure=9)
-    bench.command("TestWDG")
-    assert bench.telemetry("LogStatus")["WDGcounter"] == 2
+    shown(unit, "Exposure", exposure=9)
+    unit.command("TestWDG")
+    assert unit.telemetry("LogStatus")["WDGcounter"] == 2
 
 
 @telecommand("CaptureAndProcess")
-def capture_and_process(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureAndProcess")
-    assert bench.status() is TaskStatus.CALCULATED
-    values = bench.telemetry("AttitudeQuaternion")
+def capture_and_process(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureAndProcess")
+    assert unit.status() is TaskStatus.CALCULATED
+    values = unit.telemetry("AttitudeQuaternion")
     assert (values["Valid"], values["FrameCounter"]) == (True, 1)
-    bench.frame_us = None
-    bench.command("CaptureAndProcess")
-    assert bench.status() is TaskStatus.CAPTURE_FAILED
-    values = bench.telemetry("AttitudeQuaternion")
+    unit.frame_us = None
+    unit.command("CaptureAndProcess")
+    assert unit.status() is TaskStatus.CAPTURE_FAILED
+    values = unit.telemetry("AttitudeQuaternion")
     assert (values["Valid"], values["FrameCounter"]) == (False, 1)
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == 0
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
 
 
 @telecommand("ProcessImage")
-def process_image(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureImage")
-    bench.log.clear()
-    bench.command("ProcessImage")
-    assert not any(isinstance(what, SetPin) for _, what in bench.log)
-    assert bench.status() is TaskStatus.CALCULATED
+def process_image(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureImage")
+    unit.log.clear()
+    unit.command("ProcessImage")
+    assert not any(isinstance(what, SetPin) for _, what in unit.log)
+    assert unit.status() is TaskStatus.CALCULATED
 
 
 @telecommand("Trigger")
-def trigger(bench: Bench, _: Sky) -> None:
-    bench.send("Trigger")
-    bench.run(until_us=bench.now_us + 3_900_000)
-    values = bench.telemetry("LoopStatus")
+def trigger(unit: Harness, _: Sky) -> None:
+    unit.send("Trigger")
+    unit.run(until_us=unit.now_us + 3_900_000)
+    values = unit.telemetry("LoopStatus")
     assert values["Running"]
     assert values["Iterations"] == 4
 
 
 @telecommand("StopLoop")
-def stop_loop(bench: Bench, _: Sky) -> None:
-    bench.send("Trigger")
-    bench.run(until_us=bench.now_us + 1_200_000)
-    bench.command("StopLoop")
-    assert bench.telemetry("LoopStatus")["Iterations"] == 2  # the one under way was finished
-    assert not bench.telemetry("LoopStatus")["Running"]
-    bench.run(until_us=bench.now_us + 5_000_000)
-    assert bench.telemetry("LoopStatus")["Iterations"] == 2
+def stop_loop(unit: Harness, _: Sky) -> None:
+    unit.send("Trigger")
+    unit.run(until_us=unit.now_us + 1_200_000)
+    unit.command("StopLoop")
+    assert unit.telemetry("LoopStatus")["Iterations"] == 2  # the one under way was finished
+    assert not unit.telemetry("LoopStatus")["Running"]
+    unit.run(until_us=unit.now_us + 5_000_000)
+    assert unit.telemetry("LoopStatus")["Iterations"] == 2

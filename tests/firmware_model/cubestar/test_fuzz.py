@@ -6,7 +6,7 @@ import pytest
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 
-from .bench import Bench
+from .harness import Harness
 from .sky import Sky
 
 UART_BYTES = 100_000
@@ -14,40 +14,40 @@ I2C_MESSAGES = 10_000
 STREAM = INTERFACE.telecommand("StreamDownImage").id
 
 
-def stays_sane(bench: Bench) -> None:
+def stays_sane(unit: Harness) -> None:
     """The node is in command, and a picture still gives an attitude."""
-    bench.program.link.uart_silence()
-    bench.run(until_us=bench.now_us + 200_000_000)  # what was accepted comes to its end
-    bench.received()
-    assert bench.send("StopLoop") == AckError.OK
-    bench.run()
-    bench.command("Reset")
-    assert bench.telemetry("Identification")["InterfaceVersion"] == 3
-    assert bench.i2c_read(1, 131) == b"\1"
-    bench.command("ClearConfig")
-    bench.command("CaptureAndProcess")
-    assert bench.telemetry("AttitudeQuaternion")["Valid"]
+    unit.program.link.uart_silence()
+    unit.run(until_us=unit.now_us + 200_000_000)  # what was accepted comes to its end
+    unit.received()
+    assert unit.send("StopLoop") == AckError.OK
+    unit.run()
+    unit.command("Reset")
+    assert unit.telemetry("Identification")["InterfaceVersion"] == 3
+    assert unit.i2c_read(1, 131) == b"\1"
+    unit.command("ClearConfig")
+    unit.command("CaptureAndProcess")
+    assert unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_random_bytes_on_the_uart(bench: Bench, sky: Sky, seed: int) -> None:
-    bench.picture = sky.picture
+def test_random_bytes_on_the_uart(unit: Harness, sky: Sky, seed: int) -> None:
+    unit.picture = sky.picture
     rng = np.random.default_rng(seed)
     data = rng.integers(0, 256, UART_BYTES, dtype=np.uint8)
     # As likely as any other byte in one half of the noise, every third byte in the other.
     special = rng.choice(np.array([0x1F, 0x7F, 0xFF], np.uint8), UART_BYTES)
     data = np.where(rng.random(UART_BYTES) < 0.33 * seed, special, data)
     for start in range(0, UART_BYTES, 1000):
-        bench.uart(data[start : start + 1000].tobytes())
-        bench.run(until_us=bench.now_us + 1000 * 174)
-    bench.program.link.uart_silence()
-    assert bench.flags() >= {"UART_ProtocolError"}
-    stays_sane(bench)
+        unit.uart(data[start : start + 1000].tobytes())
+        unit.run(until_us=unit.now_us + 1000 * 174)
+    unit.program.link.uart_silence()
+    assert unit.flags() >= {"UART_ProtocolError"}
+    stays_sane(unit)
 
 
-def test_random_frames_on_the_uart(bench: Bench, sky: Sky) -> None:
+def test_random_frames_on_the_uart(unit: Harness, sky: Sky) -> None:
     """Frames as they should be, with random IDs, lengths and parameters."""
-    bench.picture = sky.picture
+    unit.picture = sky.picture
     rng = np.random.default_rng(11)
     for _ in range(3000):
         identifier = int(rng.integers(0, 256))
@@ -55,8 +55,8 @@ def test_random_frames_on_the_uart(bench: Bench, sky: Sky) -> None:
         right = message.length if message is not None and identifier < 128 else 0
         length = right if rng.random() < 0.8 else int(rng.integers(0, 200))
         if identifier == STREAM:
-            continue  # 90 s of bench time each
-        answers = bench.uart(encode_frame(bytes([identifier]) + rng.bytes(length)))
+            continue  # 90 s of unit time each
+        answers = unit.uart(encode_frame(bytes([identifier]) + rng.bytes(length)))
         if identifier < 128:
             (answer,) = answers
             assert AckError(answer[0]) in AckError
@@ -64,13 +64,13 @@ def test_random_frames_on_the_uart(bench: Bench, sky: Sky) -> None:
             assert answers == []
         else:
             assert [len(answer) for answer in answers] == [message.length]
-        bench.run(until_us=bench.now_us + int(rng.integers(0, 200_000)))
-        assert not bench.received()
-    stays_sane(bench)
+        unit.run(until_us=unit.now_us + int(rng.integers(0, 200_000)))
+        assert not unit.received()
+    stays_sane(unit)
 
 
-def test_random_messages_on_i2c(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
+def test_random_messages_on_i2c(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
     rng = np.random.default_rng(12)
     for _ in range(I2C_MESSAGES):
         identifier = int(rng.integers(0, 256))
@@ -78,30 +78,30 @@ def test_random_messages_on_i2c(bench: Bench, sky: Sky) -> None:
             continue
         match rng.integers(0, 4):
             case 0:
-                bench.i2c_write(bytes([identifier]) + rng.bytes(int(rng.integers(0, 12))))
+                unit.i2c_write(bytes([identifier]) + rng.bytes(int(rng.integers(0, 12))))
             case 1:
-                bench.i2c_write(rng.bytes(int(rng.integers(0, 300))))
+                unit.i2c_write(rng.bytes(int(rng.integers(0, 300))))
             case 2:
-                bench.i2c_read(int(rng.integers(0, 300)), identifier)
+                unit.i2c_read(int(rng.integers(0, 300)), identifier)
             case 3:
-                bench.i2c_read(int(rng.integers(0, 40)))
-        bench.run(until_us=bench.now_us + int(rng.integers(0, 50_000)))
-    assert bench.flags() >= {
+                unit.i2c_read(int(rng.integers(0, 40)))
+        unit.run(until_us=unit.now_us + int(rng.integers(0, 50_000)))
+    assert unit.flags() >= {
         "I2C_WaitForIDReadRequestError",
         "I2C_TCMD_TooFewParm",
         "I2C_TCMD_TooManyparm",
         "TcmdIDError",
         "TlmIDError",
     }
-    stays_sane(bench)
+    stays_sane(unit)
 
 
-def test_random_transitions_on_i2c(bench: Bench, sky: Sky) -> None:
+def test_random_transitions_on_i2c(unit: Harness, sky: Sky) -> None:
     """Starts, bytes and stops in any order, as a disturbed bus may bring them."""
-    bench.picture = sky.picture
+    unit.picture = sky.picture
     rng = np.random.default_rng(13)
     for _ in range(I2C_MESSAGES):
-        link = bench.program.link
+        link = unit.program.link
         match rng.integers(0, 5):
             case 0:
                 link.i2c_start(bool(rng.integers(0, 2)))
@@ -112,20 +112,20 @@ def test_random_transitions_on_i2c(bench: Bench, sky: Sky) -> None:
                 assert 0 <= link.i2c_read() <= 255
             case 4:
                 link.i2c_stop()
-        bench.run(until_us=bench.now_us + int(rng.integers(0, 10_000)))
-    bench.program.link.i2c_stop()
-    stays_sane(bench)
+        unit.run(until_us=unit.now_us + int(rng.integers(0, 10_000)))
+    unit.program.link.i2c_stop()
+    stays_sane(unit)
 
 
-def test_a_flood_of_good_frames_whose_answers_find_no_room(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
+def test_a_flood_of_good_frames_whose_answers_find_no_room(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
     flood = encode_frame(bytes([143])) + encode_frame(b"\x10") + encode_frame(b"\x80")
     answers = 0
     for _ in range(3000):
-        answers += len(bench.uart(flood))  # none of them is cut short
-        bench.backlog = min(bench.backlog + 120, 2048)
-        bench.run(until_us=bench.now_us + 2_600)
+        answers += len(unit.uart(flood))  # none of them is cut short
+        unit.backlog = min(unit.backlog + 120, 2048)
+        unit.run(until_us=unit.now_us + 2_600)
     assert 3 <= answers < 9000
-    bench.backlog = 0
-    assert "UART_TcmdBufOfError" in bench.flags()
-    stays_sane(bench)
+    unit.backlog = 0
+    assert "UART_TcmdBufOfError" in unit.flags()
+    stays_sane(unit)

@@ -8,29 +8,29 @@ from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 
-from .bench import Bench
+from .harness import Harness
 from .sky import Sky, attitude_of, error_deg, take
 
 
-def mode_flag(bench: Bench) -> MatchMode:
-    return MatchMode(bench.telemetry("LoopStatus")["ModeFlag"])
+def mode_flag(unit: Harness) -> MatchMode:
+    return MatchMode(unit.telemetry("LoopStatus")["ModeFlag"])
 
 
-def process(bench: Bench, picture: np.ndarray) -> dict[str, float]:
+def process(unit: Harness, picture: np.ndarray) -> dict[str, float]:
     """Capture and process; telemetry AttitudeQuaternion."""
-    bench.command("ClearErrorFlags")
-    bench.picture = picture
-    bench.command("CaptureAndProcess")
-    return bench.telemetry("AttitudeQuaternion")
+    unit.command("ClearErrorFlags")
+    unit.picture = picture
+    unit.command("CaptureAndProcess")
+    return unit.telemetry("AttitudeQuaternion")
 
 
-def hint(bench: Bench, attitude: Rotation) -> None:
+def hint(unit: Harness, attitude: Rotation) -> None:
     """A rough boresight, 3 deg off."""
     boresight = attitude.inv().as_matrix()[:, 2]
     declination = np.arcsin(boresight[2])
     off = np.deg2rad(3) / np.cos(declination)
     right_ascension = np.arctan2(boresight[1], boresight[0]) + off
-    bench.command("setTrackingMode", RightAscension=right_ascension, Declination=declination)
+    unit.command("setTrackingMode", RightAscension=right_ascension, Declination=declination)
 
 
 def turned(pose: Rotation, degrees: float) -> Rotation:
@@ -39,9 +39,9 @@ def turned(pose: Rotation, degrees: float) -> Rotation:
 
 
 @pytest.fixture
-def tracking(bench: Bench) -> Bench:
-    bench.command("setIDMode", IdMode=IdMode.TRACKING)
-    return bench
+def tracking(unit: Harness) -> Harness:
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    return unit
 
 
 DARK = np.zeros((512, 1024), np.uint8)
@@ -51,34 +51,34 @@ DARK = np.zeros((512, 1024), np.uint8)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_picture_gives_its_attitude(bench: Bench, catalogue: StarCatalogue, seed: int) -> None:
+def test_a_picture_gives_its_attitude(unit: Harness, catalogue: StarCatalogue, seed: int) -> None:
     true = Rotation.random(rng=np.random.default_rng(seed))
     sky = take(catalogue, true)
-    values = process(bench, sky.picture)
-    assert bench.status() is TaskStatus.CALCULATED
+    values = process(unit, sky.picture)
+    assert unit.status() is TaskStatus.CALCULATED
     assert values["Valid"]
     assert values["Mode"] == MatchMode.LOST_IN_SPACE
     assert error_deg(attitude_of(values), true) < 0.005
-    assert values["Matched"] == bench.telemetry("NumIdStars")["numIdStars"] >= 4
+    assert values["Matched"] == unit.telemetry("NumIdStars")["numIdStars"] >= 4
 
 
 def test_the_attitude_belongs_to_the_picture_that_the_stars_came_from(
-    bench: Bench, sky: Sky
+    unit: Harness, sky: Sky
 ) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureImage")
-    bench.command("DetectStars")
-    bench.command("IDStars")
-    at_ms = bench.now_us / 1000
-    bench.command("CaptureImage")
-    bench.command("EstimateAttitude")
-    values = bench.telemetry("AttitudeQuaternion")
+    unit.picture = sky.picture
+    unit.command("CaptureImage")
+    unit.command("DetectStars")
+    unit.command("IDStars")
+    at_ms = unit.now_us / 1000
+    unit.command("CaptureImage")
+    unit.command("EstimateAttitude")
+    values = unit.telemetry("AttitudeQuaternion")
     assert values["FrameCounter"] == 1
     assert values["ImageTime"] < at_ms
 
 
 def test_stars_weigh_as_much_as_they_were_confirmed(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, catalogue: StarCatalogue, pose: Rotation
+    unit: Harness, monkeypatch: pytest.MonkeyPatch, catalogue: StarCatalogue, pose: Rotation
 ) -> None:
     given: list[np.ndarray] = []
 
@@ -88,34 +88,34 @@ def test_stars_weigh_as_much_as_they_were_confirmed(
 
     sky = take(catalogue, pose)
     monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", weigh)
-    process(bench, sky.picture)
-    details = [bench.telemetry("IDStarsDetails") for _ in sky.stars]
+    process(unit, sky.picture)
+    details = [unit.telemetry("IDStarsDetails") for _ in sky.stars]
     measured, inertial, weights = given
     assert list(weights) == [values["ValidationVotes"] for values in details]
     assert pose.apply(inertial) == pytest.approx(measured, abs=1e-3)
 
 
-def test_a_failure_leaves_the_last_attitude_but_not_its_validity(bench: Bench, sky: Sky) -> None:
-    good = process(bench, sky.picture)
-    failed = process(bench, DARK)
+def test_a_failure_leaves_the_last_attitude_but_not_its_validity(unit: Harness, sky: Sky) -> None:
+    good = process(unit, sky.picture)
+    failed = process(unit, DARK)
     assert failed == good | {"Valid": False}
-    assert not bench.telemetry("PerformanceParameters")["AttitudeSuccess"]
+    assert not unit.telemetry("PerformanceParameters")["AttitudeSuccess"]
 
 
 def test_identifying_again_takes_the_validity_back_until_the_attitude_is_there(
-    bench: Bench, sky: Sky
+    unit: Harness, sky: Sky
 ) -> None:
-    process(bench, sky.picture)
-    bench.command("IDStars")
-    assert not bench.telemetry("AttitudeQuaternion")["Valid"]
-    bench.command("EstimateAttitude")
-    assert bench.telemetry("AttitudeQuaternion")["Valid"]
+    process(unit, sky.picture)
+    unit.command("IDStars")
+    assert not unit.telemetry("AttitudeQuaternion")["Valid"]
+    unit.command("EstimateAttitude")
+    assert unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
-def test_the_attitude_survives_power_off_in_flash(bench: Bench, sky: Sky) -> None:
-    good = process(bench, sky.picture)
-    bench.power_on()
-    assert bench.telemetry("AttitudeQuaternion") == good | {"Valid": False}
+def test_the_attitude_survives_power_off_in_flash(unit: Harness, sky: Sky) -> None:
+    good = process(unit, sky.picture)
+    unit.power_on()
+    assert unit.telemetry("AttitudeQuaternion") == good | {"Valid": False}
 
 
 # --- steps that can not be done -------------------------------------------------------------------
@@ -131,57 +131,59 @@ def test_the_attitude_survives_power_off_in_flash(bench: Bench, sky: Sky) -> Non
         ("ProcessImage", TaskStatus.DETECTION_FAILED, "StatusError"),
     ],
 )
-def test_a_step_without_its_input(bench: Bench, name: str, failed: TaskStatus, flag: str) -> None:
-    bench.command(name)
-    assert bench.status() is failed
-    assert bench.flags() == {flag}
+def test_a_step_without_its_input(unit: Harness, name: str, failed: TaskStatus, flag: str) -> None:
+    unit.command(name)
+    assert unit.status() is failed
+    assert unit.flags() == {flag}
 
 
-def test_too_few_stars(bench: Bench, catalogue: StarCatalogue, pose: Rotation) -> None:
-    process(bench, DARK)
-    assert bench.status() is TaskStatus.DETECTION_FAILED
-    assert bench.flags() == {"LessThanThreeStarsDetected"}
-    process(bench, take(catalogue, pose, most=2).picture)
-    assert bench.status() is TaskStatus.IDENTIFICATION_FAILED
-    assert bench.flags() == {"LessThanThreeStarsDetected"}
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == 2
+def test_too_few_stars(unit: Harness, catalogue: StarCatalogue, pose: Rotation) -> None:
+    process(unit, DARK)
+    assert unit.status() is TaskStatus.DETECTION_FAILED
+    assert unit.flags() == {"LessThanThreeStarsDetected"}
+    process(unit, take(catalogue, pose, most=2).picture)
+    assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
+    assert unit.flags() == {"LessThanThreeStarsDetected"}
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 2
 
 
-def test_stars_that_are_not_in_the_catalogue(bench: Bench) -> None:
+def test_stars_that_are_not_in_the_catalogue(unit: Harness) -> None:
     picture = DARK.copy()
     for x, y in ((200, 100), (500, 130), (820, 400), (300, 350)):
         picture[y : y + 4, x : x + 4] = 90
-    process(bench, picture)
-    assert bench.status() is TaskStatus.IDENTIFICATION_FAILED
-    assert bench.flags() >= {"LessThanThreeStarsID"} or bench.flags() >= {"IDError"}
-    assert bench.telemetry("NumIdStars")["numIdStars"] == 0
+    process(unit, picture)
+    assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
+    assert unit.flags() >= {"LessThanThreeStarsID"} or unit.flags() >= {"IDError"}
+    assert unit.telemetry("NumIdStars")["numIdStars"] == 0
 
 
 def test_stars_that_determine_no_attitude(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, sky: Sky
+    unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky
 ) -> None:
     def refuse(*_arguments: object) -> None:
         raise AttitudeError("the vectors all point the same way")
 
     monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", refuse)
-    process(bench, sky.picture)
-    assert bench.status() is TaskStatus.CALCULATION_FAILED
-    assert bench.flags() == {"QuestindexError"}
-    assert mode_flag(bench) is MatchMode.LOST_IN_SPACE
-    assert not bench.telemetry("AttitudeQuaternion")["Valid"]
+    process(unit, sky.picture)
+    assert unit.status() is TaskStatus.CALCULATION_FAILED
+    assert unit.flags() == {"QuestindexError"}
+    assert mode_flag(unit) is MatchMode.LOST_IN_SPACE
+    assert not unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
 # --- modes ----------------------------------------------------------------------------------------
 
 
-def test_lost_in_space_stays_so_when_asked_to(bench: Bench, sky: Sky) -> None:
+def test_lost_in_space_stays_so_when_asked_to(unit: Harness, sky: Sky) -> None:
     for _ in range(2):
-        assert process(bench, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
-        assert bench.flags() == set()
-        assert mode_flag(bench) is MatchMode.TRACKING  # the firmware's own flag
+        assert process(unit, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
+        assert unit.flags() == set()
+        assert mode_flag(unit) is MatchMode.TRACKING  # the firmware's own flag
 
 
-def test_tracking_without_attitude_and_hint_starts_lost_in_space(tracking: Bench, sky: Sky) -> None:
+def test_tracking_without_attitude_and_hint_starts_lost_in_space(
+    tracking: Harness, sky: Sky
+) -> None:
     assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
     assert tracking.flags() == {"IDModeError"}
     assert process(tracking, sky.picture)["Mode"] == MatchMode.TRACKING
@@ -189,7 +191,7 @@ def test_tracking_without_attitude_and_hint_starts_lost_in_space(tracking: Bench
 
 
 def test_a_hint_gives_an_assisted_match_and_then_tracking(
-    tracking: Bench, sky: Sky, pose: Rotation
+    tracking: Harness, sky: Sky, pose: Rotation
 ) -> None:
     hint(tracking, pose)
     assert mode_flag(tracking) is MatchMode.ASSISTED
@@ -199,7 +201,7 @@ def test_a_hint_gives_an_assisted_match_and_then_tracking(
 
 
 def test_a_wrong_hint_steps_back_to_lost_in_space(
-    tracking: Bench, sky: Sky, pose: Rotation
+    tracking: Harness, sky: Sky, pose: Rotation
 ) -> None:
     hint(tracking, turned(pose, 150))
     assert not process(tracking, sky.picture)["Valid"]
@@ -211,7 +213,7 @@ def test_a_wrong_hint_steps_back_to_lost_in_space(
 
 
 def test_a_new_hint_replaces_the_attitude(
-    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
 ) -> None:
     process(tracking, sky.picture)
     elsewhere = turned(pose, 90)
@@ -222,7 +224,7 @@ def test_a_new_hint_replaces_the_attitude(
 
 
 def test_a_hint_is_used_up_by_the_first_fix(
-    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
 ) -> None:
     hint(tracking, pose)
     process(tracking, sky.picture)
@@ -234,7 +236,12 @@ def test_a_hint_is_used_up_by_the_first_fix(
 
 @pytest.mark.parametrize(("degrees", "kept"), [(0.1333, True), (0.29, True), (0.35, False)])
 def test_tracking_follows_up_to_its_rate(
-    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation, degrees: float, kept: bool
+    tracking: Harness,
+    catalogue: StarCatalogue,
+    sky: Sky,
+    pose: Rotation,
+    degrees: float,
+    kept: bool,
 ) -> None:
     process(tracking, sky.picture)
     moved = turned(pose, degrees)
@@ -249,7 +256,7 @@ def test_tracking_follows_up_to_its_rate(
         assert mode_flag(tracking) is MatchMode.ASSISTED
 
 
-def test_failures_lead_one_step_back_each(tracking: Bench, sky: Sky) -> None:
+def test_failures_lead_one_step_back_each(tracking: Harness, sky: Sky) -> None:
     process(tracking, sky.picture)
     two_stars = DARK.copy()
     two_stars[100:104, 100:104] = two_stars[300:304, 700:704] = 80
@@ -262,7 +269,7 @@ def test_failures_lead_one_step_back_each(tracking: Bench, sky: Sky) -> None:
 
 
 def test_two_stars_are_enough_for_tracking(
-    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
 ) -> None:
     process(tracking, sky.picture)
     values = process(tracking, take(catalogue, pose, most=2).picture)
@@ -271,7 +278,7 @@ def test_two_stars_are_enough_for_tracking(
 
 
 def test_too_few_stars_are_no_sign_of_a_rate(
-    tracking: Bench, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
 ) -> None:
     process(tracking, sky.picture)
     process(tracking, take(catalogue, pose, most=1).picture)
@@ -279,7 +286,7 @@ def test_too_few_stars_are_no_sign_of_a_rate(
 
 
 def test_the_mode_flag_is_in_flash_and_only_written_when_it_changes(
-    tracking: Bench, sky: Sky
+    tracking: Harness, sky: Sky
 ) -> None:
     for _ in range(3):
         process(tracking, sky.picture)
@@ -289,7 +296,7 @@ def test_the_mode_flag_is_in_flash_and_only_written_when_it_changes(
 
 
 def test_a_mode_flag_without_an_attitude_does_not_count(
-    tracking: Bench, sky: Sky, pose: Rotation
+    tracking: Harness, sky: Sky, pose: Rotation
 ) -> None:
     hint(tracking, pose)
     tracking.power_on()  # the flag is in flash, the hint is gone
@@ -311,28 +318,28 @@ def empty_half(catalogue: StarCatalogue) -> StarCatalogue:
 
 
 def test_a_boresight_where_the_catalogue_is_empty(catalogue: StarCatalogue, sky: Sky) -> None:
-    bench = Bench(empty_half(catalogue))
-    bench.command("setIDMode", IdMode=IdMode.TRACKING)
+    unit = Harness(empty_half(catalogue))
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
     for declination, flags in (
         (-1.5, {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}),
         (1.5, set()),
     ):
-        bench.command("setTrackingMode", RightAscension=0.3, Declination=declination)
-        process(bench, sky.picture)
-        assert bench.status() is TaskStatus.IDENTIFICATION_FAILED
+        unit.command("setTrackingMode", RightAscension=0.3, Declination=declination)
+        process(unit, sky.picture)
+        assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
         known = {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}
-        assert bench.flags() & known == flags
-        performance = bench.telemetry("PerformanceParameters")
+        assert unit.flags() & known == flags
+        performance = unit.telemetry("PerformanceParameters")
         assert performance["LessThanThreeStarsInFoV"] == bool(flags)
 
 
 def test_nothing_is_said_about_the_catalogue_when_lost_in_space(
     catalogue: StarCatalogue, pose: Rotation
 ) -> None:
-    bench = Bench(empty_half(catalogue))
+    unit = Harness(empty_half(catalogue))
     south = Rotation.from_euler("x", 180, degrees=True)
-    process(bench, take(catalogue, south).picture)
-    assert "LessThanThreeStarsInFoV" not in bench.flags()
+    process(unit, take(catalogue, south).picture)
+    assert "LessThanThreeStarsInFoV" not in unit.flags()
 
 
 @pytest.mark.parametrize(
@@ -343,43 +350,43 @@ def test_nothing_is_said_about_the_catalogue_when_lost_in_space(
         ({"MaxNoise": 1}, "MaxNoiseDetected"),
     ],
 )
-def test_why_a_search_stopped(bench: Bench, sky: Sky, limits: dict[str, int], flag: str) -> None:
+def test_why_a_search_stopped(unit: Harness, sky: Sky, limits: dict[str, int], flag: str) -> None:
     picture = sky.picture.copy()
     picture[200:220, 600:630] = 200  # the Moon
     picture[3::30, 3::30] |= 60  # hot pixels
-    bench.picture = picture
-    bench.command("CaptureImage")
-    bench.command("setDetectionVariables", **limits)
-    bench.command("DetectStars")
-    assert bench.flags() - {"LessThanThreeStarsDetected"} == {flag}
+    unit.picture = picture
+    unit.command("CaptureImage")
+    unit.command("setDetectionVariables", **limits)
+    unit.command("DetectStars")
+    assert unit.flags() - {"LessThanThreeStarsDetected"} == {flag}
 
 
 # --- times ----------------------------------------------------------------------------------------
 
 
-def test_times_are_those_of_the_charged_cycles(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureImage")
-    start_us = bench.now_us
-    bench.command("DetectStars")
-    detect_us = bench.now_us - start_us
-    bench.command("IDStars")
-    bench.command("SelectBestStars")
-    bench.command("EstimateAttitude")
-    assert bench.telemetry("PhaseTimes")["Detect"] == pytest.approx(detect_us, abs=100)
-    parts = bench.telemetry("DetectionTimingOne")
+def test_times_are_those_of_the_charged_cycles(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureImage")
+    start_us = unit.now_us
+    unit.command("DetectStars")
+    detect_us = unit.now_us - start_us
+    unit.command("IDStars")
+    unit.command("SelectBestStars")
+    unit.command("EstimateAttitude")
+    assert unit.telemetry("PhaseTimes")["Detect"] == pytest.approx(detect_us, abs=100)
+    parts = unit.telemetry("DetectionTimingOne")
     assert parts["MaxStarSearchTime"] > 10
-    whole = bench.telemetry("DetectionTimingTwo")
+    whole = unit.telemetry("DetectionTimingTwo")
     assert whole["StarDetectionTime"] == whole["MaxStarDetectionTime"]
     assert sum(parts.values()) == pytest.approx(whole["StarDetectionTime"], abs=2.5)
-    assert bench.telemetry("TimingSummary")["DetectionTime"] == whole["StarDetectionTime"]
+    assert unit.telemetry("TimingSummary")["DetectionTime"] == whole["StarDetectionTime"]
 
 
-def test_the_longest_time_is_kept(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureImage")
-    bench.command("DetectStars")
-    bench.command("setDetectionRegion", Yend=40)
-    bench.command("DetectStars")
-    times = bench.telemetry("DetectionTimingTwo")
+def test_the_longest_time_is_kept(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureImage")
+    unit.command("DetectStars")
+    unit.command("setDetectionRegion", Yend=40)
+    unit.command("DetectStars")
+    times = unit.telemetry("DetectionTimingTwo")
     assert 0 < times["StarDetectionTime"] < times["MaxStarDetectionTime"]

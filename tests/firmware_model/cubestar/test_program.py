@@ -19,48 +19,48 @@ from cubestack.firmware_model.mcu.requests import (
     StrobeRead,
 )
 
-from .bench import BOOT_US, Bench
+from .harness import Harness
 from .sky import Sky, attitude_of, error_deg, take
 
 # --- one iteration after the other ----------------------------------------------------------------
 
 
-def test_the_period_is_exactly_one_second(bench: Bench) -> None:
-    bench.start_loop(20.5)
-    times = bench.stored_us()[1:]  # the first one includes the camera's set-up
+def test_the_period_is_exactly_one_second(unit: Harness) -> None:
+    unit.start_loop(20.5)
+    times = unit.stored_us()[1:]  # the first one includes the camera's set-up
     assert len(times) == 20
     assert {later - earlier for earlier, later in pairwise(times)} == {ITERATION_US}
-    assert "TimingError" not in bench.flags()
+    assert "TimingError" not in unit.flags()
 
 
-def test_host_traffic_does_not_move_the_iterations(bench: Bench) -> None:
-    start_us = bench.start_loop(0.5)
+def test_host_traffic_does_not_move_the_iterations(unit: Harness) -> None:
+    start_us = unit.start_loop(0.5)
     rng = np.random.default_rng(5)
     for now_us in sorted(rng.integers(600_000, 12_000_000, 400)):
-        bench.run(until_us=start_us + int(now_us))
-        bench.telemetry("LogStatus")
+        unit.run(until_us=start_us + int(now_us))
+        unit.telemetry("LogStatus")
         if rng.random() < 0.2:
-            bench.send("ClearErrorFlags")
-    times = bench.stored_us()[1:]
+            unit.send("ClearErrorFlags")
+    times = unit.stored_us()[1:]
     assert len(times) > 10
     assert np.diff(times) == pytest.approx(ITERATION_US, abs=1_000)
-    assert len(bench.resets) == bench.telemetry("LoopStatus")["Iterations"]
+    assert len(unit.resets) == unit.telemetry("LoopStatus")["Iterations"]
 
 
-def test_delays_at_the_start_do_not_add_up(bench: Bench) -> None:
-    start_us = bench.start_loop(0.9)
+def test_delays_at_the_start_do_not_add_up(unit: Harness) -> None:
+    start_us = unit.start_loop(0.9)
     for number in range(1, 11):
-        bench.run(until_us=start_us + number * ITERATION_US)
-        bench.telemetry("LogStatus")  # an interrupt at the very moment
-    bench.run(until_us=start_us + 11 * ITERATION_US)
-    times = bench.stored_us()
+        unit.run(until_us=start_us + number * ITERATION_US)
+        unit.telemetry("LogStatus")  # an interrupt at the very moment
+    unit.run(until_us=start_us + 11 * ITERATION_US)
+    times = unit.stored_us()
     assert times[10] - times[1] == pytest.approx(9 * ITERATION_US, abs=50)
 
 
 def test_an_iteration_processes_the_previous_picture_while_the_next_is_stored(
-    bench: Bench, sky: Sky
+    unit: Harness, sky: Sky
 ) -> None:
-    bench.picture = sky.picture
+    unit.picture = sky.picture
     order: list[str] = []
 
     def note(request: Request) -> None:
@@ -74,13 +74,13 @@ def test_an_iteration_processes_the_previous_picture_while_the_next_is_stored(
             order.append(names.get(request, request.pin))
         elif isinstance(request, AwaitPin | StrobeRead | Reset | CameraTransfer):
             order.append(type(request).__name__)
-        status = bench.status().name
+        status = unit.status().name
         if status.endswith("ING") and status != "CAPTURING" and status not in order:
             order.append(status)
 
-    bench.start_loop(0.9)
-    bench.on_request = note
-    bench.run(until_us=bench.now_us + 1_100_000)
+    unit.start_loop(0.9)
+    unit.on_request = note
+    unit.run(until_us=unit.now_us + 1_100_000)
     begin, end = order.index("CameraTransfer"), order.index("Reset", order.index("CameraTransfer"))
     assert order[begin : end + 1] == [
         "CameraTransfer",  # enable the sensor
@@ -103,69 +103,69 @@ def test_an_iteration_processes_the_previous_picture_while_the_next_is_stored(
 
 
 def test_the_attitude_of_a_picture_comes_one_iteration_later(
-    bench: Bench, catalogue: StarCatalogue, pose: Rotation
+    unit: Harness, catalogue: StarCatalogue, pose: Rotation
 ) -> None:
     poses = [pose * Rotation.from_euler("z", 3 * step, degrees=True) for step in range(4)]
-    start_us = bench.start_loop(0.1)
+    start_us = unit.start_loop(0.1)
     for number, true in enumerate(poses):
-        bench.picture = take(catalogue, true).picture
-        bench.run(until_us=start_us + ITERATION_US * (number + 1) - 50_000)
-        values = bench.telemetry("AttitudeQuaternion")
+        unit.picture = take(catalogue, true).picture
+        unit.run(until_us=start_us + ITERATION_US * (number + 1) - 50_000)
+        values = unit.telemetry("AttitudeQuaternion")
         assert values["FrameCounter"] == number
         if number:
             assert values["Valid"]
             assert error_deg(attitude_of(values), poses[number - 1]) < 0.01
-            stored_at = bench.stored_us()[number - 1]
+            stored_at = unit.stored_us()[number - 1]
             # Mid-exposure of the middle row: half the exposure before the read-out's middle.
             assert values["ImageTime"] == pytest.approx(stored_at / 1000 + 386 - 227, abs=2)
 
 
-def test_what_survives_the_reset(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("setIDMargin", Margin=0.0012)
-    bench.command("IDStars")
-    start_us = bench.start_loop(1.98)
-    before = bench.telemetry("AttitudeQuaternion")
+def test_what_survives_the_reset(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("setIDMargin", Margin=0.0012)
+    unit.command("IDStars")
+    start_us = unit.start_loop(1.98)
+    before = unit.telemetry("AttitudeQuaternion")
     assert before["Valid"]
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
-    assert bench.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] > 10
-    bench.run(until_us=start_us + 2_005_000)
-    assert bench.resets == [ResetCause.SYSTEM_REQUEST] * 2
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
+    assert unit.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] > 10
+    unit.run(until_us=start_us + 2_005_000)
+    assert unit.resets == [ResetCause.SYSTEM_REQUEST] * 2
     # RAM is lost ...
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == 0
-    assert bench.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] == 0
-    assert bench.telemetry("NumIdStars")["numIdStars"] == 0
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
+    assert unit.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] == 0
+    assert unit.telemetry("NumIdStars")["numIdStars"] == 0
     # ... settings, counters, flags, picture and attitude are not.
-    assert bench.telemetry("IDMargin")["Margin"] == 0.0012
-    assert bench.telemetry("ExtendedIdentification")["TcmdCount"] == 3
-    assert bench.telemetry("LoopStatus")["Iterations"] == 2
-    assert bench.flags() == {"StatusError"}
-    assert bench.telemetry("AttitudeQuaternion") == before
-    assert np.array_equal(bench.external_ram[: sky.picture.size], sky.picture.reshape(-1))
+    assert unit.telemetry("IDMargin")["Margin"] == 0.0012
+    assert unit.telemetry("ExtendedIdentification")["TcmdCount"] == 3
+    assert unit.telemetry("LoopStatus")["Iterations"] == 2
+    assert unit.flags() == {"StatusError"}
+    assert unit.telemetry("AttitudeQuaternion") == before
+    assert np.array_equal(unit.external_ram[: sky.picture.size], sky.picture.reshape(-1))
 
 
 def test_results_can_be_read_until_shortly_before_the_next_iteration(
-    bench: Bench, sky: Sky
+    unit: Harness, sky: Sky
 ) -> None:
-    bench.picture = sky.picture
-    start_us = bench.start_loop(1.98)
+    unit.picture = sky.picture
+    start_us = unit.start_loop(1.98)
     due_us = start_us + 2 * ITERATION_US
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
-    bench.run(until_us=due_us - RESET_LEAD_US - 100)
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
-    bench.run(until_us=due_us - RESET_LEAD_US + 2_000)
-    assert bench.telemetry("DetectionSummary")["NumStarsDetected"] == 0
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
+    unit.run(until_us=due_us - RESET_LEAD_US - 100)
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
+    unit.run(until_us=due_us - RESET_LEAD_US + 2_000)
+    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
 
 
-def test_the_phases_fill_the_second(bench: Bench) -> None:
-    bench.start_loop(3.9)
-    values = bench.telemetry("PhaseTimes")
+def test_the_phases_fill_the_second(unit: Harness) -> None:
+    unit.start_loop(3.9)
+    values = unit.telemetry("PhaseTimes")
     total = sum(values[name] for name in ("Idle", "Discard", "Capture", "Transfer"))
     assert total == pytest.approx(ITERATION_US, abs=1_000)
     assert values["Discard"] == pytest.approx(70_000, abs=10)
     assert values["Idle"] + values["LoopTotal"] == pytest.approx(ITERATION_US, abs=100)
-    times = bench.telemetry("StartAndLoopTime")
-    assert times["StartupTime"] == BOOT_US / 1000
+    times = unit.telemetry("StartAndLoopTime")
+    assert times["StartupTime"] == Harness.boot_us / 1000
     assert times["LoopTime"] == pytest.approx(values["LoopTotal"] / 1000, abs=0.5)
     assert times["MaxLoopTime"] > times["LoopTime"]  # the first one set the camera up
 
@@ -173,87 +173,87 @@ def test_the_phases_fill_the_second(bench: Bench) -> None:
 # --- trouble --------------------------------------------------------------------------------------
 
 
-def test_a_failed_capture_leaves_nothing_to_process(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    start_us = bench.start_loop(1.9)
-    assert bench.telemetry("AttitudeQuaternion")["FrameCounter"] == 1
-    bench.camera_refuses = lambda _data: True
-    bench.run(until_us=start_us + 2_900_000)
-    assert bench.telemetry("AttitudeQuaternion")["FrameCounter"] == 2  # processed all the same
-    written = bench.flash.writes["attitude"]
-    bench.run(until_us=start_us + 5_900_000)
-    assert bench.flash.writes["attitude"] == written
-    bench.camera_refuses = lambda _data: False
-    bench.run(until_us=start_us + 7_900_000)
-    values = bench.telemetry("AttitudeQuaternion")
+def test_a_failed_capture_leaves_nothing_to_process(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    start_us = unit.start_loop(1.9)
+    assert unit.telemetry("AttitudeQuaternion")["FrameCounter"] == 1
+    unit.camera_refuses = lambda _data: True
+    unit.run(until_us=start_us + 2_900_000)
+    assert unit.telemetry("AttitudeQuaternion")["FrameCounter"] == 2  # processed all the same
+    written = unit.flash.writes["attitude"]
+    unit.run(until_us=start_us + 5_900_000)
+    assert unit.flash.writes["attitude"] == written
+    unit.camera_refuses = lambda _data: False
+    unit.run(until_us=start_us + 7_900_000)
+    values = unit.telemetry("AttitudeQuaternion")
     assert values["Valid"]
     assert values["FrameCounter"] == 3
-    assert np.diff(bench.stored_us()[-2:]) == pytest.approx(ITERATION_US, abs=10_000)
+    assert np.diff(unit.stored_us()[-2:]) == pytest.approx(ITERATION_US, abs=10_000)
 
 
-def test_a_latch_up_in_the_loop_costs_one_picture(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
+def test_a_latch_up_in_the_loop_costs_one_picture(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
 
     def strike(request: Request) -> None:
         if isinstance(request, AwaitPin):
-            bench.on_request = lambda _request: None
-            bench.program.supply.overcurrent("imager")
-            bench.never_stored()
+            unit.on_request = lambda _request: None
+            unit.program.supply.overcurrent("imager")
+            unit.never_stored()
 
-    start_us = bench.start_loop(2.95)
-    bench.on_request = strike
-    bench.run(until_us=start_us + 9_950_000)
-    assert bench.switches["imager"]
-    assert bench.telemetry("SupplyReport")["PowerCycles"] == 1
-    assert "ImageCaptureError" in bench.flags()
-    assert bench.telemetry("AttitudeQuaternion")["Valid"]
-    assert np.diff(bench.stored_us()[-3:]) == pytest.approx(ITERATION_US, abs=10_000)
+    start_us = unit.start_loop(2.95)
+    unit.on_request = strike
+    unit.run(until_us=start_us + 9_950_000)
+    assert unit.switches["imager"]
+    assert unit.telemetry("SupplyReport")["PowerCycles"] == 1
+    assert "ImageCaptureError" in unit.flags()
+    assert unit.telemetry("AttitudeQuaternion")["Valid"]
+    assert np.diff(unit.stored_us()[-3:]) == pytest.approx(ITERATION_US, abs=10_000)
 
 
-def test_a_latch_up_at_the_reset_is_not_forgotten(bench: Bench) -> None:
-    start_us = bench.start_loop(0.9)
+def test_a_latch_up_at_the_reset_is_not_forgotten(unit: Harness) -> None:
+    start_us = unit.start_loop(0.9)
     pays = []
 
     def strike(request: Request) -> None:
         # While the last charged cycles are paid is when the last interrupt can come.
         if isinstance(request, Pay):
-            pays.append(bench.now_us)
-            bench.program.supply.overcurrent("memory")
+            pays.append(unit.now_us)
+            unit.program.supply.overcurrent("memory")
 
-    bench.on_request = strike
-    bench.run(until_us=start_us + ITERATION_US - 5_000)
+    unit.on_request = strike
+    unit.run(until_us=start_us + ITERATION_US - 5_000)
     assert len(pays) == 2
-    assert not bench.switches["memory"]
-    assert bench.resets == [ResetCause.SYSTEM_REQUEST]
-    bench.on_request = lambda _request: None
-    bench.run(until_us=start_us + 2 * ITERATION_US)
-    assert bench.switches["memory"]
-    assert bench.telemetry("SupplyReport")["PowerCycles"] == 1
+    assert not unit.switches["memory"]
+    assert unit.resets == [ResetCause.SYSTEM_REQUEST]
+    unit.on_request = lambda _request: None
+    unit.run(until_us=start_us + 2 * ITERATION_US)
+    assert unit.switches["memory"]
+    assert unit.telemetry("SupplyReport")["PowerCycles"] == 1
 
 
-def test_a_lasting_short_circuit_leaves_the_node_in_command(bench: Bench) -> None:
+def test_a_lasting_short_circuit_leaves_the_node_in_command(unit: Harness) -> None:
     def shorted(_request: Request) -> None:
-        if bench.switches["imager"]:
-            bench.program.supply.overcurrent("imager")
+        if unit.switches["imager"]:
+            unit.program.supply.overcurrent("imager")
 
-    bench.on_request = shorted
-    start_us = bench.start_loop(5.0)
-    assert bench.telemetry("LoopStatus")["Iterations"] >= 3
-    assert bench.telemetry("SupplyReport")["LatchUps"] > 5
-    assert not bench.switches["imager"]
-    bench.send("StopLoop")
-    bench.run(until_us=start_us + 8_000_000)
-    assert not bench.telemetry("LoopStatus")["Running"]
-    bench.on_request = lambda _request: None
-    bench.run()
-    bench.command("CaptureImage")
-    assert bench.telemetry("PowerStatus")["Status"] == 1
+    unit.on_request = shorted
+    start_us = unit.start_loop(5.0)
+    assert unit.telemetry("LoopStatus")["Iterations"] >= 3
+    assert unit.telemetry("SupplyReport")["LatchUps"] > 5
+    assert not unit.switches["imager"]
+    unit.send("StopLoop")
+    unit.run(until_us=start_us + 8_000_000)
+    assert not unit.telemetry("LoopStatus")["Running"]
+    unit.on_request = lambda _request: None
+    unit.run()
+    unit.command("CaptureImage")
+    assert unit.telemetry("PowerStatus")["Status"] == 1
 
 
-def test_the_time_from_reset_to_the_main_loop(bench: Bench) -> None:
-    assert bench.telemetry("StartAndLoopTime")["StartupTime"] == BOOT_US / 1000
-    bench.command("CaptureImage")
-    bench.command("MCUReset")
-    assert bench.telemetry("StartAndLoopTime")["StartupTime"] == BOOT_US / 1000
-    bench.command("TestWDG")
-    assert bench.telemetry("StartAndLoopTime")["StartupTime"] == BOOT_US / 1000
+def test_the_time_from_reset_to_the_main_loop(unit: Harness) -> None:
+    assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000
+    unit.command("CaptureImage")
+    unit.command("MCUReset")
+    assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000
+    unit.command("TestWDG")
+    assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000

@@ -17,10 +17,10 @@ from cubestack.firmware_model.interface.cubestar import (
 )
 from cubestack.firmware_model.node.identification import FIRMWARE_VERSION, SERIAL_NUMBER
 
-from .bench import BOOT_US, FRAME_US, Bench
+from .harness import FRAME_US, Harness
 from .sky import Sky
 
-Check = Callable[[Bench, Sky], None]
+Check = Callable[[Harness, Sky], None]
 CHECKS: dict[str, Check] = {}
 
 SUPPORTED = [message.name for message in INTERFACE.telemetries if message.supported]
@@ -59,32 +59,32 @@ def telemetry(name: str) -> Callable[[Check], Check]:
 
 
 @pytest.mark.parametrize("name", [name for name in SUPPORTED if name not in ELSEWHERE])
-def test_every_frame_shows_the_state(name: str, bench: Bench, sky: Sky) -> None:
-    CHECKS[name](bench, sky)
+def test_every_frame_shows_the_state(name: str, unit: Harness, sky: Sky) -> None:
+    CHECKS[name](unit, sky)
 
 
 def test_every_frame_is_tested_once() -> None:
     assert sorted([*CHECKS, *ELSEWHERE]) == sorted(SUPPORTED)
 
 
-def test_a_frame_that_is_not_supported_is_not_answered(bench: Bench) -> None:
+def test_a_frame_that_is_not_supported_is_not_answered(unit: Harness) -> None:
     for message in INTERFACE.telemetries:
-        answered = bench.uart(encode_frame(bytes([message.id]))) != []
+        answered = unit.uart(encode_frame(bytes([message.id]))) != []
         assert answered == message.supported
 
 
 @pytest.mark.parametrize("name", SUPPORTED)
-def test_every_frame_is_whole_at_any_time(name: str, bench: Bench, sky: Sky) -> None:
+def test_every_frame_is_whole_at_any_time(name: str, unit: Harness, sky: Sky) -> None:
     message = INTERFACE.telemetry(name)
 
     def asked() -> None:
-        (answer,) = bench.uart(encode_frame(bytes([message.id])))
+        (answer,) = unit.uart(encode_frame(bytes([message.id])))
         assert len(answer) == message.length
 
-    bench.picture = sky.picture
-    bench.on_request = lambda _request: asked()
-    bench.send("CaptureAndProcess")
-    bench.run()
+    unit.picture = sky.picture
+    unit.on_request = lambda _request: asked()
+    unit.send("CaptureAndProcess")
+    unit.run()
     asked()
 
 
@@ -92,9 +92,9 @@ def test_every_frame_is_whole_at_any_time(name: str, bench: Bench, sky: Sky) -> 
 
 
 @telemetry("Identification")
-def identification(bench: Bench, _: Sky) -> None:
-    bench.now_us = 65_536_000_000 + 7_654_321
-    values = bench.telemetry("Identification")
+def identification(unit: Harness, _: Sky) -> None:
+    unit.now_us = 65_536_000_000 + 7_654_321
+    values = unit.telemetry("Identification")
     assert values == {
         "NodeType": NODE_TYPE,
         "InterfaceVersion": 3,
@@ -106,11 +106,11 @@ def identification(bench: Bench, _: Sky) -> None:
 
 
 @telemetry("ExtendedIdentification")
-def extended_identification(bench: Bench, _: Sky) -> None:
-    bench.command("TestWDG")
-    bench.command("Exposure")
-    bench.telemetry("IDMode")
-    assert bench.telemetry("ExtendedIdentification") == {
+def extended_identification(unit: Harness, _: Sky) -> None:
+    unit.command("TestWDG")
+    unit.command("Exposure")
+    unit.telemetry("IDMode")
+    assert unit.telemetry("ExtendedIdentification") == {
         "SerialNumber": SERIAL_NUMBER,
         "Temperature": 21.5,
         "ResetCause": ResetCause.WATCHDOG,
@@ -121,29 +121,29 @@ def extended_identification(bench: Bench, _: Sky) -> None:
 
 
 @telemetry("ErrorFlags")
-def error_flags(bench: Bench, _: Sky) -> None:
-    assert not any(bench.telemetry("ErrorFlags").values())
-    bench.command("IDStars")
-    bench.uart(b"noise")
-    raised = {name for name, up in bench.telemetry("ErrorFlags").items() if up}
+def error_flags(unit: Harness, _: Sky) -> None:
+    assert not any(unit.telemetry("ErrorFlags").values())
+    unit.command("IDStars")
+    unit.uart(b"noise")
+    raised = {name for name, up in unit.telemetry("ErrorFlags").items() if up}
     assert raised == {"StatusError", "UART_ProtocolError"}
 
 
 @telemetry("TcmdProcessed")
-def processed(bench: Bench, _: Sky) -> None:
-    bench.send("Exposure")
-    assert bench.telemetry("TcmdProcessed") == {"Processed": 0}
-    bench.run()
-    assert bench.telemetry("TcmdProcessed") == {"Processed": 1}
+def processed(unit: Harness, _: Sky) -> None:
+    unit.send("Exposure")
+    assert unit.telemetry("TcmdProcessed") == {"Processed": 0}
+    unit.run()
+    assert unit.telemetry("TcmdProcessed") == {"Processed": 1}
 
 
 @telemetry("TaskStatus")
-def task_status(bench: Bench, sky: Sky) -> None:
+def task_status(unit: Harness, sky: Sky) -> None:
     seen = []
-    bench.picture = sky.picture
-    bench.on_request = lambda _request: seen.append(bench.telemetry("TaskStatus")["taskStatus"])
-    bench.send("CaptureAndProcess")
-    bench.run()
+    unit.picture = sky.picture
+    unit.on_request = lambda _request: seen.append(unit.telemetry("TaskStatus")["taskStatus"])
+    unit.send("CaptureAndProcess")
+    unit.run()
     steps = [TaskStatus(value) for value in dict.fromkeys(seen)]
     assert steps == [  # between some of them no time passes
         TaskStatus.POWERED_UP,
@@ -153,44 +153,44 @@ def task_status(bench: Bench, sky: Sky) -> None:
         TaskStatus.CALCULATING,
         TaskStatus.CALCULATED,
     ]
-    assert bench.telemetry("TaskStatus")["taskStatus"] == TaskStatus.CALCULATED
+    assert unit.telemetry("TaskStatus")["taskStatus"] == TaskStatus.CALCULATED
 
 
 @telemetry("StartAndLoopTime")
-def start_and_loop_time(bench: Bench, _: Sky) -> None:
-    assert bench.telemetry("StartAndLoopTime") == {
-        "StartupTime": BOOT_US // 1000,
+def start_and_loop_time(unit: Harness, _: Sky) -> None:
+    assert unit.telemetry("StartAndLoopTime") == {
+        "StartupTime": Harness.boot_us // 1000,
         "LoopTime": 0,
         "MaxLoopTime": 0,
     }
-    bench.send("Trigger")
-    bench.run(until_us=bench.now_us + 1_900_000)
-    times = bench.telemetry("StartAndLoopTime")
+    unit.send("Trigger")
+    unit.run(until_us=unit.now_us + 1_900_000)
+    times = unit.telemetry("StartAndLoopTime")
     assert times["LoopTime"] == pytest.approx(70 + FRAME_US / 1000 + 404, abs=3)
     assert times["MaxLoopTime"] > times["LoopTime"]
 
 
 @telemetry("SRAMTestResults")
-def memory_test(bench: Bench, _: Sky) -> None:
-    assert bench.telemetry("SRAMTestResults") == {"TestResult": MemoryTest.NOT_RUN}
-    bench.command("TestSRAM")
-    assert bench.telemetry("SRAMTestResults") == {"TestResult": MemoryTest.PASSED}
+def memory_test(unit: Harness, _: Sky) -> None:
+    assert unit.telemetry("SRAMTestResults") == {"TestResult": MemoryTest.NOT_RUN}
+    unit.command("TestSRAM")
+    assert unit.telemetry("SRAMTestResults") == {"TestResult": MemoryTest.PASSED}
 
 
 @telemetry("PowerStatus")
-def power_status(bench: Bench, _: Sky) -> None:
-    bench.currents["imager"] = 71.2
+def power_status(unit: Harness, _: Sky) -> None:
+    unit.currents["imager"] = 71.2
     currents = {"Current": 71.2, "MaxCurrent": 71.2, "MinCurrent": 52.8}
-    assert bench.telemetry("PowerStatus") == {"Status": 1, **currents}
+    assert unit.telemetry("PowerStatus") == {"Status": 1, **currents}
 
 
 @telemetry("LogStatus")
-def log_status(bench: Bench, _: Sky) -> None:
-    bench.command("TestWDG")
-    bench.command("IDStars")
-    bench.now_us = 99_999 * 1_000_000
-    bench.currents["imager"] = 60.1
-    values = bench.telemetry("LogStatus")
+def log_status(unit: Harness, _: Sky) -> None:
+    unit.command("TestWDG")
+    unit.command("IDStars")
+    unit.now_us = 99_999 * 1_000_000
+    unit.currents["imager"] = 60.1
+    values = unit.telemetry("LogStatus")
     assert {name for name, value in values.items() if value is True} == {"StatusError"}
     assert {name: value for name, value in values.items() if not isinstance(value, bool)} == {
         "Temp": 21.5,
@@ -205,11 +205,11 @@ def log_status(bench: Bench, _: Sky) -> None:
 
 
 @telemetry("SupplyReport")
-def supply_report(bench: Bench, _: Sky) -> None:
-    bench.program.supply.overcurrent("imager")
-    bench.run()
-    bench.program.supply.overcurrent("imager")
-    assert bench.telemetry("SupplyReport") == {
+def supply_report(unit: Harness, _: Sky) -> None:
+    unit.program.supply.overcurrent("imager")
+    unit.run()
+    unit.program.supply.overcurrent("imager")
+    assert unit.telemetry("SupplyReport") == {
         "SramCurrent": 2.0,
         "ImagerCurrent": 0.0,
         "LatchUps": 2,
@@ -218,15 +218,15 @@ def supply_report(bench: Bench, _: Sky) -> None:
 
 
 @telemetry("LoopStatus")
-def loop_status(bench: Bench, _: Sky) -> None:
-    bench.command("setTrackingMode", RightAscension=0.0, Declination=0.0)
-    bench.command("SetFrameRate", FrameRate=9)
-    bench.command("SetDiscardDelay", Delay=71)
-    bench.command("SelectImageBank", Bank=1)
-    bench.command("SetCameraRegisterPage", Page=0x84)
-    bench.send("Trigger")
-    bench.run(until_us=bench.now_us + 1_900_000)
-    assert bench.telemetry("LoopStatus") == {
+def loop_status(unit: Harness, _: Sky) -> None:
+    unit.command("setTrackingMode", RightAscension=0.0, Declination=0.0)
+    unit.command("SetFrameRate", FrameRate=9)
+    unit.command("SetDiscardDelay", Delay=71)
+    unit.command("SelectImageBank", Bank=1)
+    unit.command("SetCameraRegisterPage", Page=0x84)
+    unit.send("Trigger")
+    unit.run(until_us=unit.now_us + 1_900_000)
+    assert unit.telemetry("LoopStatus") == {
         "Iterations": 2,
         "ModeFlag": MatchMode.ASSISTED,
         "FrameRate": 9,
@@ -241,60 +241,60 @@ def loop_status(bench: Bench, _: Sky) -> None:
 
 
 @telemetry("ImageSetup")
-def image_setup(bench: Bench, _: Sky) -> None:
-    assert bench.telemetry("ImageSetup") == {"FirstLine": 0, "Width": 1024, "Height": 512}
+def image_setup(unit: Harness, _: Sky) -> None:
+    assert unit.telemetry("ImageSetup") == {"FirstLine": 0, "Width": 1024, "Height": 512}
 
 
 @telemetry("IS_Register")
-def sensor_register(bench: Bench, _: Sky) -> None:
-    assert bench.telemetry("IS_Register") == {"DataH": 0, "DataL": 0}
-    bench.camera[0x8511] = 0xC3
-    bench.command("ReadFrom_IS_Register", Reg=0x11)
-    assert bench.telemetry("IS_Register") == {"DataH": 0, "DataL": 0xC3}
+def sensor_register(unit: Harness, _: Sky) -> None:
+    assert unit.telemetry("IS_Register") == {"DataH": 0, "DataL": 0}
+    unit.camera[0x8511] = 0xC3
+    unit.command("ReadFrom_IS_Register", Reg=0x11)
+    assert unit.telemetry("IS_Register") == {"DataH": 0, "DataL": 0xC3}
 
 
 @telemetry("CameraRegister")
-def camera_register(bench: Bench, _: Sky) -> None:
-    assert bench.telemetry("CameraRegister") == {"Address": 0, "Value": 0, "Valid": 0}
-    bench.camera[0x8511] = 0xC3
-    bench.command("ReadFrom_IS_Register", Reg=0x11)
-    assert bench.telemetry("CameraRegister") == {"Address": 0x8511, "Value": 0xC3, "Valid": 1}
+def camera_register(unit: Harness, _: Sky) -> None:
+    assert unit.telemetry("CameraRegister") == {"Address": 0, "Value": 0, "Valid": 0}
+    unit.camera[0x8511] = 0xC3
+    unit.command("ReadFrom_IS_Register", Reg=0x11)
+    assert unit.telemetry("CameraRegister") == {"Address": 0x8511, "Value": 0xC3, "Valid": 1}
 
 
 @telemetry("ImageBlock")
-def image_block(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureImage")
+def image_block(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureImage")
     lit = int(np.flatnonzero(sky.picture)[0]) // 128
-    bench.command("ImageBlockSet", BlockNumber=lit, BlockSize=2)
+    unit.command("ImageBlockSet", BlockNumber=lit, BlockSize=2)
     expected = sky.picture.reshape(-1, 128)[lit].tobytes()
     assert any(expected)
-    assert bench.telemetry("ImageBlock") == {"Block": expected}
+    assert unit.telemetry("ImageBlock") == {"Block": expected}
 
 
 @telemetry("UploadStatus")
-def upload_status(bench: Bench, _: Sky) -> None:
-    bench.command("UploadImage")
+def upload_status(unit: Harness, _: Sky) -> None:
+    unit.command("UploadImage")
     for number in (7, 9, 9):
-        bench.command("UploadBlock", BlockNumber=number, Data=bytes(128))
-    assert bench.telemetry("UploadStatus") == {"NextBlock": 10, "BlocksReceived": 3}
+        unit.command("UploadBlock", BlockNumber=number, Data=bytes(128))
+    assert unit.telemetry("UploadStatus") == {"NextBlock": 10, "BlocksReceived": 3}
 
 
 @telemetry("CameraTiming")
-def camera_timing(bench: Bench, _: Sky) -> None:
-    assert not any(bench.telemetry("CameraTiming").values())
-    bench.command("CaptureImage")
-    values = bench.telemetry("CameraTiming")
+def camera_timing(unit: Harness, _: Sky) -> None:
+    assert not any(unit.telemetry("CameraTiming").values())
+    unit.command("CaptureImage")
+    values = unit.telemetry("CameraTiming")
     assert values["SetupTime"] > values["ExposureUpdateTime"] >= 1
     assert values["CaptureTime"] == 70 + FRAME_US // 1000
 
 
 @telemetry("TimingSummary")
-def timing_summary(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureAndProcess")
-    phases = bench.telemetry("PhaseTimes")
-    values = bench.telemetry("TimingSummary")
+def timing_summary(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureAndProcess")
+    phases = unit.telemetry("PhaseTimes")
+    values = unit.telemetry("TimingSummary")
     captured = phases["Discard"] + phases["Capture"] + phases["Transfer"]
     assert values["ImageCaptureTime"] == pytest.approx(captured / 1000, abs=0.5)
     assert values["DetectionTime"] == pytest.approx(phases["Detect"] / 1000, abs=0.5)
@@ -303,51 +303,51 @@ def timing_summary(bench: Bench, sky: Sky) -> None:
 
 
 @telemetry("PhaseTimes")
-def phase_times(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.run(until_us=bench.now_us + 250_000)
-    bench.command("CaptureAndProcess")
-    values = bench.telemetry("PhaseTimes")
-    assert values["Idle"] == pytest.approx(250_000 + BOOT_US, abs=100)
+def phase_times(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.run(until_us=unit.now_us + 250_000)
+    unit.command("CaptureAndProcess")
+    values = unit.telemetry("PhaseTimes")
+    assert values["Idle"] == pytest.approx(250_000 + Harness.boot_us, abs=100)
     assert all(value > 0 for name, value in values.items() if name != "LoopTotal")
     assert values["LoopTotal"] == 0
 
 
 @telemetry("DetectionThresholdValues")
-def thresholds(bench: Bench, _: Sky) -> None:
-    bench.command("setDetectionThresholds", DetectionThreshold=40, StarThreshold=30)
+def thresholds(unit: Harness, _: Sky) -> None:
+    unit.command("setDetectionThresholds", DetectionThreshold=40, StarThreshold=30)
     values = {"DarkThreshold": 0, "DetectionThreshold": 40, "StarThreshold": 30}
-    assert bench.telemetry("DetectionThresholdValues") == values
-    bench.picture = np.full((512, 1024), 17, np.uint8)
-    bench.command("CaptureAndProcess")
-    assert bench.telemetry("DetectionThresholdValues") == values | {"DarkThreshold": 17}
+    assert unit.telemetry("DetectionThresholdValues") == values
+    unit.picture = np.full((512, 1024), 17, np.uint8)
+    unit.command("CaptureAndProcess")
+    assert unit.telemetry("DetectionThresholdValues") == values | {"DarkThreshold": 17}
 
 
 # --- ends of ranges -------------------------------------------------------------------------------
 
 
-def test_counters_wrap_or_saturate_on_the_wire(bench: Bench) -> None:
-    retained = bench.program.commands._state.retained
+def test_counters_wrap_or_saturate_on_the_wire(unit: Harness) -> None:
+    retained = unit.program.commands._state.retained
     retained.telecommands = retained.telemetry = 65_536 + 5
     retained.watchdog_resets = retained.latch_ups = 70_000
     retained.iterations = 2**40
     retained.longest_loop_us = 10**9
-    values = bench.telemetry("ExtendedIdentification")
+    values = unit.telemetry("ExtendedIdentification")
     assert (values["TcmdCount"], values["TlmCount"]) == (5, 5)
     assert values["WDGResetCount"] == 65_535
-    assert bench.telemetry("SupplyReport")["LatchUps"] == 65_535
-    assert bench.telemetry("LoopStatus")["Iterations"] == 2**32 - 1
-    assert bench.telemetry("StartAndLoopTime")["MaxLoopTime"] == 65_535
+    assert unit.telemetry("SupplyReport")["LatchUps"] == 65_535
+    assert unit.telemetry("LoopStatus")["Iterations"] == 2**32 - 1
+    assert unit.telemetry("StartAndLoopTime")["MaxLoopTime"] == 65_535
 
 
-def test_asking_changes_nothing_but_the_count_of_requests(bench: Bench, sky: Sky) -> None:
-    bench.command("setIDMode", IdMode=IdMode.TRACKING)
-    bench.picture = sky.picture
-    bench.command("CaptureAndProcess")
+def test_asking_changes_nothing_but_the_count_of_requests(unit: Harness, sky: Sky) -> None:
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    unit.picture = sky.picture
+    unit.command("CaptureAndProcess")
     steady = [
         name
         for name in SUPPORTED
         if not INTERFACE.telemetry(name).steps and name != "ExtendedIdentification"
     ]
-    first = {name: bench.telemetry(name) for name in steady}
-    assert first == {name: bench.telemetry(name) for name in steady}
+    first = {name: unit.telemetry(name) for name in steady}
+    assert first == {name: unit.telemetry(name) for name in steady}

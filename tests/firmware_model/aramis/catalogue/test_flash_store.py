@@ -7,7 +7,7 @@ from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
 
-from ..program_bench import Bench
+from ..harness import Harness
 from ..sky import database
 
 
@@ -25,22 +25,22 @@ class Desk:
     """A store whose flash holds a catalogue."""
 
     def __init__(self, catalogue: Database) -> None:
-        self.bench = Bench()
+        self.unit = Harness()
         self.image = catalogue.pack()
         self.coded = flash_image(self.image)
-        self.bench.catalogue_flash[: len(self.coded)] = self.coded
-        self.store = CatalogueStore(self.bench, self.bench.meter)
+        self.unit.catalogue_flash[: len(self.coded)] = self.coded
+        self.store = CatalogueStore(self.unit, self.unit.meter)
 
     def load(self) -> bool:
-        return self.bench.run(self.store.load())
+        return self.unit.perform(self.store.load())
 
     def flip_flash(self, *bits: int) -> None:
         for bit in bits:
-            self.bench.catalogue_flash[bit // 8] ^= np.uint8(1 << bit % 8)
+            self.unit.catalogue_flash[bit // 8] ^= np.uint8(1 << bit % 8)
 
     @property
     def ram(self) -> np.ndarray:
-        return self.bench.sdram[CATALOGUE_AT : CATALOGUE_AT + len(self.image)]
+        return self.unit.sdram[CATALOGUE_AT : CATALOGUE_AT + len(self.image)]
 
 
 def test_what_was_written_is_loaded(desk: Desk) -> None:
@@ -62,7 +62,7 @@ def test_loading_takes_the_flash_s_time_and_a_little_more(desk: Desk) -> None:
     desk.load()
     flash_us = len(desk.coded) / 2 * 0.070
     assert flash_us < desk.store.load_us < 2 * flash_us
-    assert desk.store.loaded_us == desk.bench.us
+    assert desk.store.loaded_us == desk.unit.now_us
 
 
 def test_single_errors_all_over_the_flash_are_corrected(desk: Desk) -> None:
@@ -103,22 +103,22 @@ def test_three_errors_that_look_like_one_do_not_pass_the_checksum(desk: Desk) ->
 
 
 def test_an_erased_flash_holds_no_catalogue() -> None:
-    bench = Bench()
-    store = CatalogueStore(bench, bench.meter)
-    assert not bench.run(store.load())
+    unit = Harness()
+    store = CatalogueStore(unit, unit.meter)
+    assert not unit.perform(store.load())
     assert store.state is CatalogueState.MISSING
-    bench.catalogue_flash[:] = 0
-    assert not bench.run(store.load())
+    unit.catalogue_flash[:] = 0
+    assert not unit.perform(store.load())
     assert store.state is CatalogueState.MISSING
 
 
 @pytest.mark.parametrize("content", [b"", b"x", b"ARAM" + bytes(100)])
 def test_contents_that_are_no_catalogue_are_refused(content: bytes) -> None:
-    bench = Bench()
+    unit = Harness()
     coded = flash_image(content)
-    bench.catalogue_flash[: len(coded)] = coded
-    store = CatalogueStore(bench, bench.meter)
-    assert not bench.run(store.load())
+    unit.catalogue_flash[: len(coded)] = coded
+    store = CatalogueStore(unit, unit.meter)
+    assert not unit.perform(store.load())
     assert store.state in (CatalogueState.DAMAGED, CatalogueState.MISSING)
 
 
@@ -129,12 +129,12 @@ def test_a_catalogue_longer_than_the_flash_is_refused() -> None:
 
 def test_damaged_ram_is_noticed_before_use_and_loaded_anew(desk: Desk) -> None:
     desk.load()
-    assert desk.bench.run(desk.store.ensure())
+    assert desk.unit.perform(desk.store.ensure())
     assert desk.store.loads == 1
     for place in (0, 100, len(desk.image) // 2, len(desk.image) - 1):
         errors = desk.store.ram_errors
         desk.ram[place] ^= 0x10
-        assert desk.bench.run(desk.store.ensure())
+        assert desk.unit.perform(desk.store.ensure())
         assert desk.store.ram_errors == errors + 1
         assert desk.ram.tobytes() == desk.image
 
@@ -143,9 +143,9 @@ def test_damaged_ram_and_damaged_flash_leave_nothing(desk: Desk) -> None:
     desk.load()
     desk.ram[77] ^= 1
     desk.flip_flash(72 * 300, 72 * 300 + 1)
-    assert not desk.bench.run(desk.store.ensure())
+    assert not desk.unit.perform(desk.store.ensure())
     assert desk.store.state is CatalogueState.DAMAGED
-    assert not desk.bench.run(desk.store.ensure())
+    assert not desk.unit.perform(desk.store.ensure())
 
 
 def test_a_reload_spares_the_good_copy_what_flash_has_lost(desk: Desk) -> None:
@@ -156,18 +156,18 @@ def test_a_reload_spares_the_good_copy_what_flash_has_lost(desk: Desk) -> None:
     assert desk.store.database is database
     assert (desk.store.lost, desk.store.failures) == (1, 1)
     assert desk.store.state is CatalogueState.GOOD
-    assert desk.bench.run(desk.store.ensure())
+    assert desk.unit.perform(desk.store.ensure())
     assert desk.ram.tobytes() == desk.image
 
 
 def test_a_pass_comes_in_slices_of_a_few_milliseconds(desk: Desk) -> None:
     ended, longest, slices = False, 0, 0
     while not ended:
-        before = desk.bench.us
-        ended = desk.bench.run(desk.store.load_step())
+        before = desk.unit.now_us
+        ended = desk.unit.perform(desk.store.load_step())
         assert desk.store.loading is not ended
         if not ended:
-            longest = max(longest, desk.bench.us - before)
+            longest = max(longest, desk.unit.now_us - before)
         slices += 1
     assert slices > 10
     assert longest < 5_000
@@ -175,14 +175,14 @@ def test_a_pass_comes_in_slices_of_a_few_milliseconds(desk: Desk) -> None:
 
 
 def test_refreshing_repairs_the_flash_from_ram(desk: Desk) -> None:
-    assert not desk.bench.run(desk.store.refresh())  # nothing in RAM yet
+    assert not desk.unit.perform(desk.store.refresh())  # nothing in RAM yet
     desk.load()
     desk.flip_flash(72 * 300, 72 * 300 + 1, 72 * 500)
-    before_us = desk.bench.us
-    assert desk.bench.run(desk.store.refresh())
-    np.testing.assert_array_equal(desk.bench.catalogue_flash[: len(desk.coded)], desk.coded)
+    before_us = desk.unit.now_us
+    assert desk.unit.perform(desk.store.refresh())
+    np.testing.assert_array_equal(desk.unit.catalogue_flash[: len(desk.coded)], desk.coded)
     sectors = -(-len(desk.coded) // SECTOR_BYTES)
-    assert desk.bench.us - before_us > sectors * 800_000 + len(desk.coded) // 2 * 10
+    assert desk.unit.now_us - before_us > sectors * 800_000 + len(desk.coded) // 2 * 10
 
 
 def test_random_upsets_at_one_in_a_million_never_leave_a_wrong_byte(desk: Desk) -> None:

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 
-from ..bench import Bench
+from ..harness import Harness
 from ..sky import Sky, attitude_of, error_deg, take
 
 
@@ -16,14 +16,14 @@ def true(request: pytest.FixtureRequest) -> Rotation:
 
 
 @pytest.fixture
-def solved(bench: Bench, true: Rotation) -> Bench:
-    bench.picture = take(bench.catalogue, true).picture
-    bench.command("CaptureAndProcess")
-    assert bench.telemetry("AttitudeQuaternion")["Valid"]
-    return bench
+def solved(unit: Harness, true: Rotation) -> Harness:
+    unit.picture = take(unit.catalogue, true).picture
+    unit.command("CaptureAndProcess")
+    assert unit.telemetry("AttitudeQuaternion")["Valid"]
+    return unit
 
 
-def test_the_quaternion_in_both_precisions(solved: Bench, true: Rotation) -> None:
+def test_the_quaternion_in_both_precisions(solved: Harness, true: Rotation) -> None:
     exact = solved.telemetry("AttitudeQuaternion")
     assert error_deg(attitude_of(exact), true) < 0.01
     for frame in ("Quaternion", "AttitudeData"):
@@ -32,7 +32,7 @@ def test_the_quaternion_in_both_precisions(solved: Bench, true: Rotation) -> Non
             assert printed[f"Qbar{index}"] == pytest.approx(exact[f"Q{index}"], abs=0.51e-4)
 
 
-def test_the_boresight(solved: Bench, true: Rotation) -> None:
+def test_the_boresight(solved: Harness, true: Rotation) -> None:
     x, y, z = true.inv().apply([0, 0, 1])
     values = solved.telemetry("AttitudeData")
     assert [values[f"BSV{axis}"] for axis in "XYZ"] == pytest.approx([x, y, z], abs=3e-4)
@@ -46,33 +46,33 @@ def test_the_boresight(solved: Bench, true: Rotation) -> None:
     assert values["Declination"] == pytest.approx(angles["Declination"], abs=0.51e-4)
 
 
-def test_before_the_first_attitude(bench: Bench) -> None:
-    values = bench.telemetry("AttitudeQuaternion")
+def test_before_the_first_attitude(unit: Harness) -> None:
+    values = unit.telemetry("AttitudeQuaternion")
     assert values == {
         **{"Q0": 0, "Q1": 0, "Q2": 0, "Q3": 1},
         **{"FrameCounter": 0, "ImageTime": 0, "Matched": 0, "Valid": False},
         "Mode": MatchMode.LOST_IN_SPACE,
     }
-    assert bench.telemetry("Quaternion") == {"Qbar0": 0, "Qbar1": 0, "Qbar2": 0, "Qbar3": 1}
-    assert bench.telemetry("SphereicalCoordinates")["Declination"] == pytest.approx(np.pi / 2)
+    assert unit.telemetry("Quaternion") == {"Qbar0": 0, "Qbar1": 0, "Qbar2": 0, "Qbar3": 1}
+    assert unit.telemetry("SphereicalCoordinates")["Declination"] == pytest.approx(np.pi / 2)
 
 
-def test_results_and_performance_count_the_same(bench: Bench, sky: Sky) -> None:
-    bench.command("setIDMode", IdMode=IdMode.TRACKING)
-    bench.picture = np.maximum(sky.picture, 4)
-    bench.picture[480:500, 30:60] = 200
-    bench.picture[450, 800:804] = 90
-    bench.command("CaptureAndProcess")
-    results = bench.telemetry("Results")
-    performance = bench.telemetry("PerformanceParameters")
-    summary = bench.telemetry("DetectionSummary")
+def test_results_and_performance_count_the_same(unit: Harness, sky: Sky) -> None:
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    unit.picture = np.maximum(sky.picture, 4)
+    unit.picture[480:500, 30:60] = 200
+    unit.picture[450, 800:804] = 90
+    unit.command("CaptureAndProcess")
+    results = unit.telemetry("Results")
+    performance = unit.telemetry("PerformanceParameters")
+    summary = unit.telemetry("DetectionSummary")
     assert results == {
         "DarkValue": 4,
         "Detected": summary["NumStarsDetected"],
         "Invalid": summary["NumInvalidStars"],
         "Noise": summary["AmountOfNoise"],
         "IDMode": IdMode.TRACKING,
-        "ID": bench.telemetry("NumIdStars")["numIdStars"],
+        "ID": unit.telemetry("NumIdStars")["numIdStars"],
     }
     assert results["Invalid"] > 0
     assert results["Noise"] > 0
@@ -90,51 +90,51 @@ def test_results_and_performance_count_the_same(bench: Bench, sky: Sky) -> None:
     ] == list(results.values())
 
 
-def outcome(bench: Bench) -> set[str]:
+def outcome(unit: Harness) -> set[str]:
     """Names of the bits of PerformanceParameters that are set."""
     return {
-        name for name, value in bench.telemetry("PerformanceParameters").items() if value is True
+        name for name, value in unit.telemetry("PerformanceParameters").items() if value is True
     }
 
 
-def test_how_far_a_picture_came(bench: Bench, sky: Sky) -> None:
-    assert outcome(bench) == set()
-    bench.picture = sky.picture
+def test_how_far_a_picture_came(unit: Harness, sky: Sky) -> None:
+    assert outcome(unit) == set()
+    unit.picture = sky.picture
     captured, detected = {"ImageCaptureSuccess"}, {"ImageCaptureSuccess", "DetectionSuccess"}
-    bench.command("CaptureImage")
-    assert outcome(bench) == captured
-    bench.command("DetectStars")
-    assert outcome(bench) == detected
-    bench.command("IDStars")
-    assert outcome(bench) == detected | {"IdentificationSuccess"}
-    bench.command("EstimateAttitude")
-    assert outcome(bench) == detected | {"IdentificationSuccess", "AttitudeSuccess"}
-    bench.frame_us = None
-    bench.command("CaptureAndProcess")
-    assert outcome(bench) == set()
+    unit.command("CaptureImage")
+    assert outcome(unit) == captured
+    unit.command("DetectStars")
+    assert outcome(unit) == detected
+    unit.command("IDStars")
+    assert outcome(unit) == detected | {"IdentificationSuccess"}
+    unit.command("EstimateAttitude")
+    assert outcome(unit) == detected | {"IdentificationSuccess", "AttitudeSuccess"}
+    unit.frame_us = None
+    unit.command("CaptureAndProcess")
+    assert outcome(unit) == set()
 
 
-def test_processing_that_takes_too_long(bench: Bench) -> None:
-    bench.command("CaptureTestPatern", TestPaternType=0)
-    bench.command("setDetectionRegion", StepSize=1)
-    bench.command("setDetectionThresholds", DetectionThreshold=255, StarThreshold=255)
-    bench.command("DetectStars")
-    assert bench.telemetry("DetectionTimingTwo")["StarDetectionTime"] < 500
-    assert "ProcessingTimeError" not in outcome(bench)
-    bench.program.commands._processing.latest_ms["detection"] = 501.0
-    assert "ProcessingTimeError" in outcome(bench)
+def test_processing_that_takes_too_long(unit: Harness) -> None:
+    unit.command("CaptureTestPatern", TestPaternType=0)
+    unit.command("setDetectionRegion", StepSize=1)
+    unit.command("setDetectionThresholds", DetectionThreshold=255, StarThreshold=255)
+    unit.command("DetectStars")
+    assert unit.telemetry("DetectionTimingTwo")["StarDetectionTime"] < 500
+    assert "ProcessingTimeError" not in outcome(unit)
+    unit.program.commands._processing.latest_ms["detection"] = 501.0
+    assert "ProcessingTimeError" in outcome(unit)
 
 
-def test_flags_that_performance_repeats(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureImage")
-    bench.command("setDetectionVariables", MaxStars=3)
-    bench.command("DetectStars")
-    assert "MaxStarsDetected" in outcome(bench)
-    assert "CommsError" not in outcome(bench)
-    bench.i2c_read(1)
-    assert "CommsError" in outcome(bench)
-    bench.command("ClearErrorFlags")
-    assert not outcome(bench) & {"MaxStarsDetected", "CommsError"}
-    bench.uart(b"x")
-    assert "CommsError" in outcome(bench)
+def test_flags_that_performance_repeats(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureImage")
+    unit.command("setDetectionVariables", MaxStars=3)
+    unit.command("DetectStars")
+    assert "MaxStarsDetected" in outcome(unit)
+    assert "CommsError" not in outcome(unit)
+    unit.i2c_read(1)
+    assert "CommsError" in outcome(unit)
+    unit.command("ClearErrorFlags")
+    assert not outcome(unit) & {"MaxStarsDetected", "CommsError"}
+    unit.uart(b"x")
+    assert "CommsError" in outcome(unit)

@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 
-from ..bench import Bench
+from ..harness import Harness
 from ..sky import Sky, take, undistort
 
 STEPPING = [message.name for message in INTERFACE.telemetries if message.steps]
@@ -14,24 +14,24 @@ VECTOR_STEP = 1e-4
 
 
 @pytest.fixture
-def solved(bench: Bench, sky: Sky) -> Bench:
-    """A bench that has identified the sky, in which one spot is no star."""
-    bench.picture = sky.picture.copy()
-    bench.picture[480:484, 30:34] = 70
-    bench.command("CaptureAndProcess")
-    bench.command("SelectBestStars")
-    return bench
+def solved(unit: Harness, sky: Sky) -> Harness:
+    """A unit that has identified the sky, in which one spot is no star."""
+    unit.picture = sky.picture.copy()
+    unit.picture[480:484, 30:34] = 70
+    unit.command("CaptureAndProcess")
+    unit.command("SelectBestStars")
+    return unit
 
 
-def records(bench: Bench, frame: str, count: int) -> dict[int, dict[str, float]]:
-    read = [bench.telemetry(frame) for _ in range(count)]
+def records(unit: Harness, frame: str, count: int) -> dict[int, dict[str, float]]:
+    read = [unit.telemetry(frame) for _ in range(count)]
     return {int(values["StarNumber"]): values for values in read}
 
 
-def truth(bench: Bench, sky: Sky) -> dict[int, int]:
+def truth(unit: Harness, sky: Sky) -> dict[int, int]:
     """Number of each detected star that is in the sky -> its index there."""
     found = {}
-    for number, values in records(bench, "StarPositions", len(sky.stars) + 1).items():
+    for number, values in records(unit, "StarPositions", len(sky.stars) + 1).items():
         place = np.array([values["X_Coordinate"], values["Y_Coordinate"]])
         distance = np.linalg.norm(sky.pixels - place, axis=1)
         if distance.min() < 1:
@@ -44,7 +44,7 @@ def truth(bench: Bench, sky: Sky) -> dict[int, int]:
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_each_read_gives_the_next_star_and_wraps(solved: Bench, sky: Sky, frame: str) -> None:
+def test_each_read_gives_the_next_star_and_wraps(solved: Harness, sky: Sky, frame: str) -> None:
     stars = len(sky.stars) + (frame not in OF_IDENTIFIED_STARS)
     numbers = [solved.telemetry(frame)["StarNumber"] for _ in range(2 * stars + 1)]
     assert len(set(numbers[:stars])) == stars
@@ -53,7 +53,7 @@ def test_each_read_gives_the_next_star_and_wraps(solved: Bench, sky: Sky, frame:
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_frames_step_on_their_own(solved: Bench, frame: str) -> None:
+def test_frames_step_on_their_own(solved: Harness, frame: str) -> None:
     first = solved.telemetry(frame)
     for other in STEPPING:
         if other != frame:
@@ -63,7 +63,7 @@ def test_frames_step_on_their_own(solved: Bench, frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_new_results_start_over(solved: Bench, frame: str) -> None:
+def test_new_results_start_over(solved: Harness, frame: str) -> None:
     first = solved.telemetry(frame)
     solved.telemetry(frame)
     solved.command("ProcessImage")
@@ -71,8 +71,8 @@ def test_new_results_start_over(solved: Bench, frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", STEPPING)
-def test_without_a_star_there_is_none(bench: Bench, frame: str) -> None:
-    values = bench.telemetry(frame)
+def test_without_a_star_there_is_none(unit: Harness, frame: str) -> None:
+    values = unit.telemetry(frame)
     assert values["StarNumber"] == 255
     identity = next((values[name] for name in ("Identity", "ID") if name in values), 65535)
     assert identity == 65535
@@ -81,7 +81,7 @@ def test_without_a_star_there_is_none(bench: Bench, frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", [frame for frame in STEPPING if frame in OF_IDENTIFIED_STARS])
-def test_a_failed_identification_leaves_none(solved: Bench, frame: str) -> None:
+def test_a_failed_identification_leaves_none(solved: Harness, frame: str) -> None:
     solved.command("setIDMargin", Margin=0.0001)
     solved.command("setFocalLength", FocalLength=7.0)
     solved.command("ProcessImage")
@@ -92,7 +92,7 @@ def test_a_failed_identification_leaves_none(solved: Bench, frame: str) -> None:
 # --- detected stars -------------------------------------------------------------------------------
 
 
-def test_summary(solved: Bench, sky: Sky) -> None:
+def test_summary(solved: Harness, sky: Sky) -> None:
     solved.picture = np.maximum(solved.picture, 3)
     solved.picture[51, 900:903] = 99  # noise
     solved.picture[300:320, 60:90] = 99  # too large; its rest is met again
@@ -104,7 +104,7 @@ def test_summary(solved: Bench, sky: Sky) -> None:
     assert values["ImageDarkValue"] == 3
 
 
-def test_positions(solved: Bench, sky: Sky) -> None:
+def test_positions(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     ideal = undistort(sky.pixels)
     for number, values in records(solved, "StarPositions", len(sky.stars) + 1).items():
@@ -118,7 +118,7 @@ def test_positions(solved: Bench, sky: Sky) -> None:
             assert (values["Size"], values["Intensity"]) == (16, 16 * 70)
 
 
-def test_directions_in_the_camera(solved: Bench, sky: Sky) -> None:
+def test_directions_in_the_camera(solved: Harness, sky: Sky) -> None:
     catalogue = solved.catalogue.vectors[sky.stars].astype(float)
     body = sky.attitude.apply(catalogue)
     for frame, axes in (
@@ -134,7 +134,7 @@ def test_directions_in_the_camera(solved: Bench, sky: Sky) -> None:
 # --- identified stars -----------------------------------------------------------------------------
 
 
-def test_identities(solved: Bench, sky: Sky) -> None:
+def test_identities(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     assert solved.telemetry("NumIdStars")["numIdStars"] == len(stars)
     details = records(solved, "IDStarsDetails", len(stars))
@@ -156,7 +156,7 @@ def test_identities(solved: Bench, sky: Sky) -> None:
         assert place == pytest.approx(sky.pixels[star], abs=0.05)
 
 
-def test_details_of_every_detected_star(solved: Bench, sky: Sky) -> None:
+def test_details_of_every_detected_star(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     ideal = undistort(sky.pixels)
     for number, values in records(solved, "StarDetails", len(stars) + 1).items():
@@ -170,13 +170,13 @@ def test_details_of_every_detected_star(solved: Bench, sky: Sky) -> None:
             assert (values["ID"], values["ValidationVote"], values["confidance"]) == (65535, 0, 0)
 
 
-def test_match_summary(solved: Bench, sky: Sky) -> None:
+def test_match_summary(solved: Harness, sky: Sky) -> None:
     count = len(sky.stars)
     values = solved.telemetry("MatchSummary")
     assert (values["Detected"], values["Matched"]) == (count + 1, count)
     assert values["MaxVotes"] == count - 1
     assert values["MeanConfidence"] == pytest.approx((count - 1) / count, abs=1e-6)
-    fresh = Bench(solved.catalogue).telemetry("MatchSummary")
+    fresh = Harness(solved.catalogue).telemetry("MatchSummary")
     assert not any(fresh.values())
 
 
@@ -184,7 +184,7 @@ def test_match_summary(solved: Bench, sky: Sky) -> None:
 
 
 def test_the_selected_stars_are_the_brightest_of_those_with_most_votes(
-    solved: Bench, sky: Sky
+    solved: Harness, sky: Sky
 ) -> None:
     stars = truth(solved, sky)
     positions = records(solved, "StarPositions", len(stars) + 1)
@@ -193,7 +193,7 @@ def test_the_selected_stars_are_the_brightest_of_those_with_most_votes(
     assert [chosen[f"Star{n}Index"] for n in (1, 2, 3)] == by_light[:3]
 
 
-def test_details_of_the_selected_stars(solved: Bench, sky: Sky) -> None:
+def test_details_of_the_selected_stars(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     positions = records(solved, "StarPositions", len(stars) + 1)
     bodies = records(solved, "BodyUnitVectors", len(stars) + 1)
@@ -213,16 +213,16 @@ def test_details_of_the_selected_stars(solved: Bench, sky: Sky) -> None:
         assert values[f"S{n}Conf"] == round(100 * (len(stars) - 1) / len(stars))
 
 
-def test_fewer_than_three_can_be_selected(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureAndProcess")
-    bench.command("setIDMode", IdMode=0)  # tracking needs two stars
-    bench.picture = take(bench.catalogue, sky.attitude, most=2).picture
-    bench.command("CaptureAndProcess")
-    bench.command("SelectBestStars")
-    chosen = bench.telemetry("BestStarIndex")
+def test_fewer_than_three_can_be_selected(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureAndProcess")
+    unit.command("setIDMode", IdMode=0)  # tracking needs two stars
+    unit.picture = take(unit.catalogue, sky.attitude, most=2).picture
+    unit.command("CaptureAndProcess")
+    unit.command("SelectBestStars")
+    chosen = unit.telemetry("BestStarIndex")
     assert sorted([chosen["Star1Index"], chosen["Star2Index"]]) == [0, 1]
     assert chosen["Star3Index"] == 255
-    values = bench.telemetry("Star3Details")
+    values = unit.telemetry("Star3Details")
     assert values.pop("S3CatNum") == 65535
     assert not any(values.values())

@@ -8,7 +8,7 @@ from cubestack.firmware_model.cubestar.reports.tables import SETTINGS_SHOWN, TIM
 from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
 
-from ..bench import Bench
+from ..harness import Harness
 from ..sky import Sky
 
 
@@ -20,8 +20,8 @@ def test_every_field_of_the_frame_shows_something(frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", SETTINGS_SHOWN)
-def test_a_frame_shows_the_setting_that_its_field_is_named_after(bench: Bench, frame: str) -> None:
-    values = bench.telemetry(frame)
+def test_a_frame_shows_the_setting_that_its_field_is_named_after(unit: Harness, frame: str) -> None:
+    values = unit.telemetry(frame)
     for field, command, parameter in SETTINGS_SHOWN[frame]:
         assert command in SETTING_COMMANDS
         declared = INTERFACE.telecommand(command).field(parameter)
@@ -34,26 +34,26 @@ def test_a_frame_shows_the_setting_that_its_field_is_named_after(bench: Bench, f
         )
 
 
-def test_a_frame_shows_the_times_of_its_steps(bench: Bench) -> None:
-    processing = bench.program.commands._processing
+def test_a_frame_shows_the_times_of_its_steps(unit: Harness) -> None:
+    processing = unit.program.commands._processing
     steps = sorted({step for rows in TIMES_SHOWN.values() for _, step, _ in rows})
     for number, step in enumerate(steps):
         processing.latest_ms[step] = 100.0 + number
         processing.longest_ms[step] = 200.0 + number
     for frame, rows in TIMES_SHOWN.items():
-        values = bench.telemetry(frame)
+        values = unit.telemetry(frame)
         for field, step, is_longest in rows:
             assert field.startswith("Max") == is_longest
             assert values[field] == steps.index(step) + (200 if is_longest else 100)
 
 
-def test_every_step_is_one_that_the_processing_measures(bench: Bench, sky: Sky) -> None:
-    bench.picture = sky.picture
-    bench.command("CaptureAndProcess")
-    bench.command("setIDMode", IdMode=IdMode.TRACKING)
+def test_every_step_is_one_that_the_processing_measures(unit: Harness, sky: Sky) -> None:
+    unit.picture = sky.picture
+    unit.command("CaptureAndProcess")
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
     x, y, z = sky.attitude.inv().as_matrix()[:, 2]
-    bench.command("setTrackingMode", RightAscension=math.atan2(y, x), Declination=math.asin(z))
-    bench.command("CaptureAndProcess")
-    bench.command("SelectBestStars")
+    unit.command("setTrackingMode", RightAscension=math.atan2(y, x), Declination=math.asin(z))
+    unit.command("CaptureAndProcess")
+    unit.command("SelectBestStars")
     steps = {step for rows in TIMES_SHOWN.values() for _, step, _ in rows}
-    assert steps <= bench.program.commands._processing.latest_ms.keys()
+    assert steps <= unit.program.commands._processing.latest_ms.keys()

@@ -1,20 +1,18 @@
-"""Runs CubeSense's program without an emulator, in bench time.
+"""CubeSense's whole program on fake hardware.
 
-A request is performed as a whole; only a sleep can be left half-way. Cameras, FPGAs, memories and
-supplies are as simple as the program can tell them apart; what the FPGAs do follows from the
-levels of their pins alone, by the command table.
+Cameras, FPGAs, memories and supplies are as simple as the program can tell them apart; what the
+FPGAs do follows from the levels of their pins alone, by the command table.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS
-from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
@@ -27,27 +25,16 @@ from cubestack.firmware_model.interface.cubesense.pins import (
     SRAM_POWER,
     Monitor,
 )
-from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import (
-    AwaitPin,
-    Pay,
-    ReadPin,
-    ReadTimer,
-    Request,
-    Reset,
-    SetPin,
-    Sleep,
-    StrobeRead,
-)
+from cubestack.firmware_model.mcu.requests import AwaitPin, Routine, StrobeRead
 
+from ..host_side import HostSide, write_bytes
+from ..runner import Runner
 from .scenery import scan, window
 
 CYCLE_NS = 200
 FRAME_US = 33_367
 READ_OUT_US = 30_507
-BOOT_US = 5_000
-HANG_US = 200_000_000  # no job takes longer: a whole picture on the bench UART takes 27 s
 LATCH_UP_MA = 120.0
 LOST = 0xA5  # what a memory holds after its supply was off
 
@@ -118,7 +105,7 @@ class SccbCamera:
         return 0 if ninth and self.answers else self.levels["SDA"]
 
 
-class Bench:
+class Harness(Runner, HostSide):
     """A program on fake hardware.
 
     Attributes:
@@ -128,15 +115,16 @@ class Bench:
         latched: memories that draw ``LATCH_UP_MA`` until their supply is off.
         cameras: control bus of each camera.
         pins: output pins.
-        sent: bytes that the program sent to each port.
-        backlog: bytes that each port still has to send.
-        resets: causes of all resets.
-        on_request: called with every request before it is performed.
-        log: (time in us, request) of every request but those that only take time.
-        now_ns: bench time.
+        bench_sent, bench_backlog: as ``sent`` and ``backlog``, of the bench protocol's port.
     """
 
+    interface = INTERFACE
+    boot_us = 5_000
+    hang_us = 200_000_000  # no job takes longer: a whole picture on the bench UART takes 27 s
+
     def __init__(self, *, mcu_addressing: bool = False) -> None:
+        HostSide.__init__(self)
+        Runner.__init__(self, PIC18F45K20)
         self.mcu_addressing = mcu_addressing
         self.serial_number = "CS0042"
         dark = np.full((ROWS, COLUMNS), 34, np.uint8)
@@ -144,9 +132,6 @@ class Bench:
         self.wait_us = 17_500
         self.supply_ma = {Monitor.SUPPLY_3V3: 31.4, Monitor.SUPPLY_5V: 12.0}
         self.memory_ma = 5.0
-        self.on_request: Callable[[Request], None] = lambda _request: None
-        self.resets: list[int] = []
-        self.log: list[tuple[int, Request]] = []
         self.power_on()
 
     def power_on(self) -> None:
@@ -154,24 +139,42 @@ class Bench:
         self.memories = {sram: np.full((ROWS, COLUMNS), LOST, np.uint8) for sram in Sram}
         self.latched: set[Sram] = set()
         self.cameras = {camera: SccbCamera() for camera in Camera}
-        self.sent = {port: bytearray() for port in Port}
-        self.backlog = dict.fromkeys(Port, 0)
+        self.sent.clear()
+        self.bench_sent = bytearray()
+        self.now_ns = self.backlog = self.bench_backlog = 0
         self.pins: dict[str, int] = {}
-        self.now_ns = 0
-        self.meter = Meter(PIC18F45K20)
         self._boot()
         self.run()
+
+    def start(self) -> Routine[None]:
+        outputs = (*LINES, "CLK", "DATA_I", *CAMERA_SCL.values(), *CAMERA_SDA.values())
+        self.pins = {**dict.fromkeys(outputs, 0), **dict.fromkeys(ENABLE, 1)}
+        self._doing = actions(0, 0, 0, 1, 1)
+        self._ack_ns: dict[Sram, int] = {}
+        self._position = 0
+        for pin in (*CAMERA_POWER.values(), *SRAM_POWER.values()):
+            self.set_pin(pin, 0)
+        self.program = CubeSenseProgram(self, self.meter)
+        return self.program.main()
+
+    @property
+    def link(self) -> NodeLink:
+        return self.program.node
+
+    @property
+    def waiting(self) -> bool:
+        return self.program.idle
 
     # --- what the program uses ------------------------------------------------------------------
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
-        self.sent[port] += data
+        if port is Port.NODE:
+            super().uart_send(data)
+        else:
+            self.bench_sent += data
 
     def uart_backlog(self, port: Port = Port.NODE) -> int:
-        return self.backlog[port]
-
-    def wake(self) -> None:
-        self._woken = True
+        return self.backlog if port is Port.NODE else self.bench_backlog
 
     def adc_counts(self, monitor: Monitor) -> int:
         memory = {Monitor.SRAM1: Sram.SRAM1, Monitor.SRAM2: Sram.SRAM2}
@@ -181,113 +184,27 @@ class Bench:
         drawn = LATCH_UP_MA if sram in self.latched else self.memory_ma
         return round(drawn * self.pins[SRAM_POWER[sram]] / MA_PER_COUNT)
 
-    def uptime_us(self) -> int:
-        return self.now_us
-
     # --- what a test uses -----------------------------------------------------------------------
 
-    @property
-    def now_us(self) -> int:
-        """Bench time in us; the timer of the program."""
-        return self.now_ns // 1000
-
-    def run(self, until_us: int | None = None) -> None:
-        """Run until bench time ``until_us``; without it, until the program has nothing to do."""
-        hang_us = self.now_us + HANG_US
-        while until_us is None or self.now_us < until_us:
-            assert self.now_us < hang_us, f"still busy: {self._request}"
-            if self._request is None:
-                self._request = self._routine.send(self._answer)
-                self._pay()
-                self.on_request(self._request)
-            request = self._request
-            if isinstance(request, Reset):
-                self.resets.append(request.cause)
-                self._boot()
-                continue
-            if isinstance(request, Sleep):
-                if not self._slept(request, until_us):
-                    return
-            else:
-                self._answer = self._perform(request)
-            self._request = None
-
-    def perform(self, routine: Any) -> Any:
-        """Run a routine of the program by itself, to its end; what it returns."""
-        answer: object = None
-        while True:
-            try:
-                request = routine.send(answer)
-            except StopIteration as end:
-                self._pay()
-                return end.value
-            self._pay()
-            self.on_request(request)
-            answer = None
-            if isinstance(request, Sleep):
-                self.now_ns = max(self.now_ns, 1000 * (request.deadline_us or 0))
-            else:
-                answer = self._perform(request)
-
-    def uart(self, data: bytes, port: Port = Port.NODE) -> None:
-        """Bytes arrive at a port."""
-        link = self.program.node if port is Port.NODE else self.program.bench
+    def letters(self, data: bytes) -> None:
+        """Bytes arrive at the bench protocol's port."""
         for byte in data:
-            link.uart_byte(byte)
+            self.program.bench.uart_byte(byte)
 
-    def received(self) -> list[bytes]:
-        """Payloads of the frames that the node sent since the last call."""
-        decoder, frames = FrameDecoder(1024), []
-        for byte in self.sent[Port.NODE]:
-            event = decoder.feed(byte)
-            assert event in (None, FrameEvent.FRAME), f"the node sent {self.sent[Port.NODE]!r}"
-            if event is FrameEvent.FRAME:
-                frames.append(decoder.payload)
-        assert not decoder.unfinished
-        self.sent[Port.NODE].clear()
-        return frames
-
-    def send(self, name: str, **values: object) -> int:
-        """Send a telecommand and do not run it; its acknowledge's error byte."""
-        message = INTERFACE.telecommand(name)
-        values = {**message.reset_values(), **values}
-        self.uart(encode_frame(bytes([message.id]) + message.pack(**values)))
-        (answer,) = self.received()
-        (error,) = answer
-        return error
-
-    def command(self, name: str, **values: object) -> None:
-        """Send a telecommand, which must be accepted, and run it to its end."""
-        assert self.send(name, **values) == 0
-        self.run()
-
-    def telemetry(self, name: str) -> dict[str, Any]:
-        message = INTERFACE.telemetry(name)
-        self.uart(encode_frame(bytes([message.id])))
-        (answer,) = self.received()
-        return dict(message.unpack(answer))
-
-    def i2c_write(self, data: bytes, *, registers: bool = False) -> int:
-        """A write transfer; how many bytes were acknowledged before the first that was not."""
-        link = self.program.registers if registers else self.program.node
-        link.i2c_start(False)
-        count = 0
-        for byte in data:
-            if not link.i2c_write(byte):
-                break
-            count += 1
-        link.i2c_stop()
+    def write_register(self, *data: int) -> int:
+        """A write transfer to the pointer's address; how many bytes were acknowledged."""
+        count = write_bytes(self.program.registers, bytes(data))
+        self.program.registers.i2c_stop()
         return count
 
-    def i2c_read(self, count: int, pointer: int | None = None, *, registers: bool = False) -> bytes:
-        """A read transfer, with a write of ``pointer`` and a repeated start before if given."""
-        link = self.program.registers if registers else self.program.node
+    def read_register(self, count: int, pointer: int | None = None) -> bytes:
+        """A read transfer from the pointer's address; 0 for a byte that is not there yet."""
+        registers = self.program.registers
         if pointer is not None:
-            link.i2c_start(False)
-            assert link.i2c_write(pointer)
-        link.i2c_start(True)
-        data = bytes(link.i2c_read() or 0 for _ in range(count))
-        link.i2c_stop()
+            assert write_bytes(registers, bytes([pointer])) == 1
+        registers.i2c_start(True)
+        data = bytes(registers.i2c_read() or 0 for _ in range(count))
+        registers.i2c_stop()
         return data
 
     def cut(self) -> set[Sram]:
@@ -296,47 +213,10 @@ class Bench:
 
     # --- pins -----------------------------------------------------------------------------------
 
-    def _boot(self) -> None:
-        self.now_ns += 1000 * BOOT_US
-        outputs = (*LINES, "CLK", "DATA_I", *CAMERA_SCL.values(), *CAMERA_SDA.values())
-        self.pins = {**dict.fromkeys(outputs, 0), **dict.fromkeys(ENABLE, 1)}
-        self._doing = actions(0, 0, 0, 1, 1)
-        self._ack_ns: dict[Sram, int] = {}
-        self._position = 0
-        for pin in (*CAMERA_POWER.values(), *SRAM_POWER.values()):
-            self._set_pin(pin, 0)
-        self._woken = False
-        self._request: Request | None = None
-        self._answer: object = None
-        self.program = CubeSenseProgram(self, self.meter)
-        self._routine = self.program.main()
+    def get_pin(self, pin: str) -> int:
+        return {name: self.cameras[c].sda for c, name in CAMERA_SDA.items()}[pin]
 
-    def _pay(self) -> None:
-        self.now_ns += self.meter.take() * CYCLE_NS
-
-    def _perform(self, request: Request) -> object:
-        if not isinstance(request, Pay | ReadTimer):
-            self.log.append((self.now_us, request))
-        match request:
-            case ReadTimer():
-                return self.now_us
-            case SetPin(pin, level):
-                self.meter.charge(port_write=1)
-                self._set_pin(pin, level)
-            case ReadPin(pin):
-                self.meter.charge(port_read=1)
-                return {name: self.cameras[c].sda for c, name in CAMERA_SDA.items()}[pin]
-            case AwaitPin():
-                return self._await(request)
-            case StrobeRead():
-                self._strobe(request)
-            case Pay():
-                pass
-            case _:
-                raise AssertionError(f"the part has nothing for {request}")
-        return None
-
-    def _set_pin(self, pin: str, level: int) -> None:
+    def set_pin(self, pin: str, level: int) -> None:
         was, self.pins[pin] = self.pins.get(pin), level
         for camera in Camera:
             powered = self.pins.get(CAMERA_POWER[camera])
@@ -376,7 +256,7 @@ class Bench:
             assert Action.TAKE_ADDRESS in self._doing
             self._position = (self._position << 8 | self.pins["DATA_I"]) & 0xFFFFFF
 
-    def _await(self, request: AwaitPin) -> bool:
+    def await_pin(self, request: AwaitPin) -> bool:
         half = ACK[request.pin]
         deadline_ns = self.now_ns + 1000 * request.timeout_us
         ack_ns = self._ack_ns.get(half)
@@ -393,7 +273,7 @@ class Bench:
             self.memories[half] = picture.copy()
         return True
 
-    def _strobe(self, request: StrobeRead) -> None:
+    def strobe(self, request: StrobeRead) -> None:
         (half,) = [h for h in Sram if self._doing[h] in (Action.READ, *EDGE_ACTIONS, *ADDRESSING)]
         action, count = self._doing[half], len(request.target)
         owner = Sram(1 - half) if action is Action.PASS_EDGE else half
@@ -414,18 +294,3 @@ class Bench:
             start = row << 10 | column
         self._position = start
         self.now_ns += count * request.cycles * CYCLE_NS
-
-    def _slept(self, request: Sleep, until_us: int | None) -> bool:
-        """Sleep as far as it goes; False when something else has to happen first."""
-        woken = request.wakeable and self._woken
-        deadline_us = self.now_us if woken else request.deadline_us
-        assert deadline_us is not None
-        if until_us is None and not woken and self.program.idle:
-            return False
-        if until_us is not None and deadline_us > until_us:
-            self.now_ns = 1000 * until_us
-            return False
-        self.now_ns = max(self.now_ns, 1000 * deadline_us)
-        self._woken = self._woken and not woken
-        self._answer = woken
-        return True

@@ -20,39 +20,39 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
-from .node import Node
+from ..links_harness import Links
 
 IMAGE = REGISTERS["IMAGE"].address
 
 
 @pytest.fixture
-def node() -> Node:
-    node = Node(mcu_addressing=True)
+def node() -> Links:
+    node = Links(mcu_addressing=True)
     node.pictures[:] = np.random.default_rng(7).integers(0, 256, node.pictures.shape)
     return node
 
 
-def value(node: Node, name: str) -> float:
+def value(node: Links, name: str) -> float:
     register = REGISTERS[name]
     found = register.decode(node.read_register(register.length, register.address))
     assert not isinstance(found, bytes)
     return found
 
 
-def write(node: Node, name: str, number: int) -> None:
+def write(node: Links, name: str, number: int) -> None:
     assert node.write_register(REGISTERS[name].address, number) == 2
 
 
 # --- registers -----------------------------------------------------------------------------------
 
 
-def test_every_readable_register_starts_with_its_declared_value(node: Node) -> None:
+def test_every_readable_register_starts_with_its_declared_value(node: Links) -> None:
     for register in REGISTERS:
         if register.readable and not register.streams:
             assert value(node, register.name) == register.field.reset, register.name
 
 
-def test_a_write_only_register_reads_as_nothing(node: Node) -> None:
+def test_a_write_only_register_reads_as_nothing(node: Links) -> None:
     for register in REGISTERS:
         if not register.readable:
             assert node.read_register(2, register.address) == bytes([FILL, FILL])
@@ -61,7 +61,9 @@ def test_a_write_only_register_reads_as_nothing(node: Node) -> None:
 @pytest.mark.parametrize(
     "register", [r for r in REGISTERS if r.readable and r.writable], ids=lambda r: r.name
 )
-def test_a_setting_is_read_back_and_is_the_node_protocols_own(node: Node, register: object) -> None:
+def test_a_setting_is_read_back_and_is_the_node_protocols_own(
+    node: Links, register: object
+) -> None:
     name = register.name  # type: ignore[attr-defined]
     before = {r.name: value(node, r.name) for r in REGISTERS if r.readable and not r.streams}
     write(node, name, 1)
@@ -86,27 +88,27 @@ def test_a_setting_is_read_back_and_is_the_node_protocols_own(node: Node, regist
         assert shown[f"{field}{camera + 1}"] == 1
 
 
-def test_an_exposure_beyond_a_byte_reads_as_255(node: Node) -> None:
+def test_an_exposure_beyond_a_byte_reads_as_255(node: Links) -> None:
     node.command("CameraSettings2", Exposure=0x1F1F)
     assert value(node, "NADIR_EXPOSURE") == 255
 
 
 @pytest.mark.parametrize("target", Measurement)
 @pytest.mark.parametrize("name", ["MEASURE", "CAPTURE"])
-def test_an_action_measures(node: Node, name: str, target: Measurement) -> None:
+def test_an_action_measures(node: Links, name: str, target: Measurement) -> None:
     write(node, name, target)
     camera, detect = target.camera, name == "MEASURE"
     pending = DetectResult.PENDING if detect else DetectResult.NONE_SCHEDULED
     assert value(node, f"{camera.name}_CAPTURE") == CaptureResult.PENDING
     assert value(node, f"{camera.name}_DETECT") == pending
-    assert node.log == []
+    assert node.done == []
     node.run()
-    assert node.log == [("measure", camera, target.sram, detect)]
+    assert node.done == [("measure", camera, target.sram, detect)]
     assert value(node, f"{camera.name}_CAPTURE") == CaptureResult.STORED_OWN_SRAM
     assert node.woken
 
 
-def test_results_are_big_endian_and_signed(node: Node) -> None:
+def test_results_are_big_endian_and_signed(node: Links) -> None:
     for camera in Camera:
         result = node.state.results[camera]
         result.x, result.y, result.points = 0x0102 + camera, -2 - camera, 28
@@ -117,17 +119,17 @@ def test_results_are_big_endian_and_signed(node: Node) -> None:
 
 
 @pytest.mark.parametrize("selection", SramSelection)
-def test_over_current_flags_are_seen_and_cleared(node: Node, selection: SramSelection) -> None:
+def test_over_current_flags_are_seen_and_cleared(node: Links, selection: SramSelection) -> None:
     for bits in range(4):
         node.state.over_current = {sram: bool(bits >> sram & 1) for sram in Sram}
         assert value(node, "OVER_CURRENT") == bits
     write(node, "CLEAR_OVER_CURRENT", selection)
     node.run()
     cleared = Sram if selection is SramSelection.BOTH else [Sram(selection)]
-    assert node.log == [("clear", *cleared)]
+    assert node.done == [("clear", *cleared)]
 
 
-def test_a_value_that_is_not_allowed_is_ignored(node: Node) -> None:
+def test_a_value_that_is_not_allowed_is_ignored(node: Links) -> None:
     state = {camera: asdict(settings) for camera, settings in node.state.cameras.items()}
     for register in REGISTERS:
         for number in range(256):
@@ -142,22 +144,22 @@ def test_a_value_that_is_not_allowed_is_ignored(node: Node) -> None:
 
 
 def test_a_search_that_the_fpgas_are_not_built_for_is_ignored() -> None:
-    node = Node()
+    node = Links()
     write(node, "NADIR_SEARCH", NadirSearch.AROUND_SAMPLES)
     assert value(node, "NADIR_SEARCH") == NadirSearch.LINES
 
 
-def test_an_action_that_meets_a_full_queue_is_lost(node: Node) -> None:
+def test_an_action_that_meets_a_full_queue_is_lost(node: Links) -> None:
     for _ in range(5):
         write(node, "MEASURE", Measurement.SUN_SRAM1)
     write(node, "MEASURE", Measurement.NADIR_SRAM2)
     assert node.state.results[Camera.NADIR].capture is CaptureResult.START_UP
     assert node.telemetry("CommunicationStatus")["TcmdBufferOverrun"] == 1
     node.run()
-    assert len(node.log) == 4
+    assert len(node.done) == 4
 
 
-def test_an_action_is_no_telecommand(node: Node) -> None:
+def test_an_action_is_no_telecommand(node: Links) -> None:
     node.send("CaptureOnly")
     write(node, "CLEAR_OVER_CURRENT", SramSelection.BOTH)
     node.run(1)
@@ -169,7 +171,7 @@ def test_an_action_is_no_telecommand(node: Node) -> None:
 # --- transfers -----------------------------------------------------------------------------------
 
 
-def test_a_value_is_latched_when_its_address_is_written(node: Node) -> None:
+def test_a_value_is_latched_when_its_address_is_written(node: Links) -> None:
     result = node.state.results[Camera.SUN]
     result.x = 0x0102
     assert node.write_register(0x40) == 1
@@ -179,17 +181,17 @@ def test_a_value_is_latched_when_its_address_is_written(node: Node) -> None:
     assert node.read_register(2, 0x40) == b"\x03\x04"
 
 
-def test_the_pointer_stays_behind_a_write(node: Node) -> None:
+def test_the_pointer_stays_behind_a_write(node: Links) -> None:
     write(node, "SUN_GAIN", 7)
     assert node.read_register(2) == bytes([7, FILL])
 
 
-def test_a_second_data_byte_is_not_acknowledged(node: Node) -> None:
+def test_a_second_data_byte_is_not_acknowledged(node: Links) -> None:
     assert node.write_register(REGISTERS["SUN_GAIN"].address, 7, 8, 9) == 2
     assert value(node, "SUN_GAIN") == 7
 
 
-def test_a_read_before_any_pointer_gives_nothing(node: Node) -> None:
+def test_a_read_before_any_pointer_gives_nothing(node: Links) -> None:
     assert node.read_register(3) == bytes([FILL] * 3)
 
 
@@ -197,7 +199,7 @@ def test_a_read_before_any_pointer_gives_nothing(node: Node) -> None:
 
 
 @pytest.mark.parametrize("sram", Sram)
-def test_the_picture_comes_in_several_reads_and_is_read_once(node: Node, sram: Sram) -> None:
+def test_the_picture_comes_in_several_reads_and_is_read_once(node: Links, sram: Sram) -> None:
     write(node, "IMAGE_SRAM", sram)
     data = node.read_register(8192, IMAGE)
     while len(data) < IMAGE_BYTES:
@@ -209,14 +211,14 @@ def test_the_picture_comes_in_several_reads_and_is_read_once(node: Node, sram: S
     assert not node.queue
 
 
-def test_what_is_read_ahead_is_bounded(node: Node) -> None:
+def test_what_is_read_ahead_is_bounded(node: Links) -> None:
     node.read_register(1, IMAGE)
     for _ in range(100):
         node.run()
     assert 1 <= node.read <= READ_AHEAD_BYTES + 1
 
 
-def test_the_clock_is_stretched_until_the_first_bytes_are_there(node: Node) -> None:
+def test_the_clock_is_stretched_until_the_first_bytes_are_there(node: Links) -> None:
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
     before = node.meter.counts["i2c_interrupt"]
@@ -228,7 +230,7 @@ def test_the_clock_is_stretched_until_the_first_bytes_are_there(node: Node) -> N
 
 
 @pytest.mark.parametrize("address", [IMAGE, 0x40, 0xFE])
-def test_writing_the_pointer_ends_the_stream(node: Node, address: int) -> None:
+def test_writing_the_pointer_ends_the_stream(node: Links, address: int) -> None:
     node.read_register(100, IMAGE)
     other = node.read_register(2, address)
     assert other == (node.pictures[0, :2].tobytes() if address == IMAGE else other)
@@ -236,7 +238,7 @@ def test_writing_the_pointer_ends_the_stream(node: Node, address: int) -> None:
     assert node.read_register(100, IMAGE) == node.pictures[0, :100].tobytes()
 
 
-def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Node) -> None:
+def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Links) -> None:
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
     assert node.registers.i2c_read() is None
@@ -246,7 +248,7 @@ def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Nod
     assert node.read_register(70) == node.pictures[1, :70].tobytes()
 
 
-def test_a_measurement_in_between_does_not_show(node: Node) -> None:
+def test_a_measurement_in_between_does_not_show(node: Links) -> None:
     data = node.read_register(1000, IMAGE)
     node.command("CaptureOnly", Sram=Sram.SRAM2)
     data += node.read_register(1000)
@@ -254,21 +256,21 @@ def test_a_measurement_in_between_does_not_show(node: Node) -> None:
     assert len(node.opened) == 2
 
 
-def test_a_memory_without_supply_gives_nothing(node: Node) -> None:
+def test_a_memory_without_supply_gives_nothing(node: Links) -> None:
     node.off = {Sram.SRAM1}
     assert node.read_register(200, IMAGE) == bytes([FILL] * 200)
     node.off = set()
     assert node.read_register(200, IMAGE) == node.pictures[0, :200].tobytes()
 
 
-def test_a_memory_cut_off_meanwhile_ends_the_picture(node: Node) -> None:
+def test_a_memory_cut_off_meanwhile_ends_the_picture(node: Links) -> None:
     assert node.read_register(READ_AHEAD_BYTES, IMAGE)
     node.off = {Sram.SRAM1}
     data = node.read_register(500)
     assert data.endswith(bytes([FILL] * 400))
 
 
-def test_a_download_at_the_same_time_leaves_both_whole(node: Node) -> None:
+def test_a_download_at_the_same_time_leaves_both_whole(node: Links) -> None:
     node.command("StartImageDownload", Sram=Sram.SRAM2, Size=0)
     data = b""
     for number in range(2176, 2196):
@@ -278,6 +280,6 @@ def test_a_download_at_the_same_time_leaves_both_whole(node: Node) -> None:
     assert data == node.pictures[0, :1000].tobytes()
 
 
-def test_a_reset_is_asked_for_by_its_cause(node: Node) -> None:
+def test_a_reset_is_asked_for_by_its_cause(node: Links) -> None:
     assert node.send("Reset", Target=3) == 0
     assert node.run() == SOFTWARE_RESET

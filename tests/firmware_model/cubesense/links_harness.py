@@ -4,8 +4,7 @@ Pictures, supplies and measurements are as simple as these can tell them apart. 
 a test says so.
 """
 
-from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,6 @@ from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import Result, State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
-from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
@@ -32,39 +30,40 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     Sram,
 )
 from cubestack.firmware_model.interface.cubesense.pins import Monitor
-from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Request, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Pay, Routine
+
+from ..host_side import HostSide, write_bytes
+from ..runner import Runner
 
 BENCH_BYTE_US = 87
 
 
-class Node:
+class Links(Runner, HostSide):
     """Everything between the pins of the buses and the main loop.
 
     Attributes:
         pictures: what each memory holds, (2, 307200).
         off: memories without supply.
-        log: what the program did beside reading: measurements, restarts, cleared flags.
+        done: what the program did beside reading: measurements, restarts, cleared flags.
         opened: memories whose pictures were begun, in order.
         read, skipped: bytes read and passed over.
         outcome: capture result of the next measurements.
-        backlog: bytes that the node protocol's UART still has to send.
-        on_request: called before each request is performed.
-        now_us: bench time.
+        bench_sent: bytes that the bench protocol's port got.
     """
 
+    interface = INTERFACE
+
     def __init__(self, *, mcu_addressing: bool = False) -> None:
+        HostSide.__init__(self)
+        Runner.__init__(self, PIC18F45K20)
         self.pictures: NDArray[np.uint8] = np.zeros((2, IMAGE_BYTES), np.uint8)
         self.off: set[Sram] = set()
-        self.log: list[tuple[object, ...]] = []
+        self.done: list[tuple[object, ...]] = []
         self.opened: list[Sram] = []
         self.read = self.skipped = 0
         self.outcome = CaptureResult.STORED_OWN_SRAM
-        self.on_request: Callable[[Request], object] = lambda _request: None
-        self.now_us = 0
-        self.sent = {port: bytearray() for port in Port}
-        self.backlog = 0
+        self.bench_sent = bytearray()
         self._free_us = 0
         self.woken = 0
         self.amps = {monitor: 1.5 + index for index, monitor in enumerate(Monitor)}
@@ -73,7 +72,6 @@ class Node:
         self._open: Sram | None = None
         self._position = 0
 
-        self.meter = Meter(PIC18F45K20)
         self.state = State()
         self.queue = JobQueue()
         self.commands = Commands(
@@ -87,17 +85,23 @@ class Node:
         )
         reader, download = self.commands.reader, self.commands.download
         telemetry = Telemetry(self, self.meter, self.state, cast(Supply, self), download)
-        self.link = NodeLink(self, self.meter, self.state, self.queue, telemetry, download)
+        self._link = NodeLink(self, self.meter, self.state, self.queue, telemetry, download)
         self.registers = RegisterLink(self, self.meter, self.state, self.queue, reader)
         self.bench = BenchLink(
             self, self.meter, self.state, self.queue, reader, cast(Measurement, self)
         )
 
+    @property
+    def link(self) -> NodeLink:
+        return self._link
+
     # --- hardware -------------------------------------------------------------------------------
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
-        self.sent[port] += data
-        if port is Port.BENCH:
+        if port is Port.NODE:
+            super().uart_send(data)
+        else:
+            self.bench_sent += data
             self._free_us = max(self._free_us, self.now_us) + BENCH_BYTE_US * len(data)
 
     def uart_backlog(self, port: Port = Port.NODE) -> int:
@@ -111,20 +115,17 @@ class Node:
     def adc_counts(self, monitor: Monitor) -> int:
         raise AssertionError("asked for through the supply")
 
-    def uptime_us(self) -> int:
-        return self.now_us
-
     # --- supply, cameras, acquisition, measurement ------------------------------------------------
 
     def currents(self) -> dict[Monitor, float]:
         return self.amps
 
     def clear_over_current(self, *memories: Sram) -> Routine[None]:
-        self.log.append(("clear", *memories))
+        self.done.append(("clear", *memories))
         yield Pay()
 
     def restart(self) -> Routine[None]:
-        self.log.append(("restart",))
+        self.done.append(("restart",))
         yield Pay()
 
     @property
@@ -154,7 +155,7 @@ class Node:
 
     def measure(self, camera: Camera, sram: Sram, *, detect: bool = True) -> Routine[None]:
         self._open = None
-        self.log.append(("measure", camera, sram, detect))
+        self.done.append(("measure", camera, sram, detect))
         detected = DetectResult.SUCCESS if detect else DetectResult.NONE_SCHEDULED
         yield Pay()
         self.state.results[camera] = Result(self.outcome, detected, 1234, -567, sram=sram)
@@ -165,79 +166,10 @@ class Node:
         """Execute what waits, or so many jobs of it; the cause of a reset, if one was asked for."""
         while self.queue and jobs != 0:
             jobs = None if jobs is None else jobs - 1
-            routine, answer = self.commands.execute(self.queue.pop()), None
-            while True:
-                try:
-                    request = routine.send(answer)
-                except StopIteration as end:
-                    if end.value is not None:
-                        return int(end.value)
-                    break
-                self.on_request(request)
-                answer = self._perform(request)
+            cause = self.perform(self.commands.execute(self.queue.pop()))
+            if cause is not None:
+                return cause
         return None
-
-    def _perform(self, request: Request) -> Any:
-        match request:
-            case ReadTimer():
-                return self.now_us
-            case Sleep():
-                assert request.deadline_us is not None
-                self.now_us = max(self.now_us, request.deadline_us)
-        return None
-
-    # --- node protocol ----------------------------------------------------------------------------
-
-    def uart(self, data: bytes) -> bytes:
-        """Send raw bytes; the bytes that come back at once."""
-        for byte in data:
-            self.link.uart_byte(byte)
-        answer = bytes(self.sent[Port.NODE])
-        self.sent[Port.NODE].clear()
-        return answer
-
-    def frames(self, payload: bytes) -> list[bytes]:
-        """Send a frame; payloads of the frames that come back at once."""
-        decoder, found = FrameDecoder(1024), []
-        for byte in self.uart(encode_frame(payload)):
-            if decoder.feed(byte) is FrameEvent.FRAME:
-                found.append(decoder.payload)
-        assert not decoder.unfinished
-        return found
-
-    def send(self, name: str, **values: object) -> int:
-        """Send a telecommand, others than ``values`` as after a reset; its error byte."""
-        message = INTERFACE.telecommand(name)
-        (answer,) = self.frames(
-            bytes([message.id]) + message.pack(**{**message.reset_values(), **values})
-        )
-        (error,) = answer
-        return error
-
-    def command(self, name: str, **values: object) -> None:
-        """Send a telecommand, which must be accepted, and execute it."""
-        assert self.send(name, **values) == 0
-        self.run()
-
-    def telemetry(self, name: str) -> dict[str, Any]:
-        message = INTERFACE.telemetry(name)
-        (answer,) = self.frames(bytes([message.id]))
-        return dict(message.unpack(answer))
-
-    def i2c_write(self, data: bytes) -> int:
-        """A write transfer; how many bytes were acknowledged before the first that was not."""
-        count = write_bytes(self.link, data)
-        self.link.i2c_stop()
-        return count
-
-    def i2c_read(self, count: int, identifier: int | None = None) -> bytes:
-        """A read transfer, with a write of ``identifier`` and a repeated start before if given."""
-        if identifier is not None:
-            assert write_bytes(self.link, bytes([identifier])) == 1
-        self.link.i2c_start(True)
-        data = [self.link.i2c_read() for _ in range(count)]
-        self.link.i2c_stop()
-        return bytes(byte for byte in data if byte is not None)
 
     # --- register protocol ------------------------------------------------------------------------
 
@@ -270,15 +202,6 @@ class Node:
         for byte in data:
             self.bench.uart_byte(byte)
         self.run()
-        answer = bytes(self.sent[Port.BENCH])
-        self.sent[Port.BENCH].clear()
+        answer = bytes(self.bench_sent)
+        self.bench_sent.clear()
         return answer
-
-
-def write_bytes(link: NodeLink | RegisterLink, data: bytes) -> int:
-    """Start a write transfer; how many bytes were acknowledged before the first that was not."""
-    link.i2c_start(False)
-    for count, byte in enumerate(data):
-        if not link.i2c_write(byte):
-            return count
-    return len(data)

@@ -16,14 +16,14 @@ from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import CAPTURES, DOWNLOADS
 from cubestack.firmware_model.mcu.requests import Request
 
-from .node import BENCH_BYTE_US, Node
+from ..links_harness import BENCH_BYTE_US, Links
 
 IMAGE = REGISTERS["IMAGE"].address
 
 
 @pytest.fixture
-def node() -> Node:
-    node = Node()
+def node() -> Links:
+    node = Links()
     node.pictures[:] = np.random.default_rng(8).integers(0, 256, node.pictures.shape)
     return node
 
@@ -31,19 +31,19 @@ def node() -> Node:
 @pytest.mark.parametrize(
     ("letter", "camera"), [(b"a", Camera.NADIR), (b"q", Camera.SUN)], ids=["nadir", "sun"]
 )
-def test_a_picture_is_taken(node: Node, letter: bytes, camera: Camera) -> None:
+def test_a_picture_is_taken(node: Links, letter: bytes, camera: Camera) -> None:
     assert CAPTURES[camera].request == letter
     for byte in letter:
         node.bench.uart_byte(byte)
-    assert node.sent[Port.BENCH] == b""
+    assert node.bench_sent == b""
     assert node.woken
     assert node.letters(b"") == b"Y"
-    assert node.log == [("measure", camera, Sram(camera), False)]
+    assert node.done == [("measure", camera, Sram(camera), False)]
     assert node.telemetry(f"Result{camera + 1}")["Detect"] == DetectResult.NONE_SCHEDULED
 
 
 @pytest.mark.parametrize("outcome", [CaptureResult.CAMERA_TIMEOUT, CaptureResult.SRAM_OVER_CURRENT])
-def test_a_capture_that_fails_is_not_answered(node: Node, outcome: CaptureResult) -> None:
+def test_a_capture_that_fails_is_not_answered(node: Links, outcome: CaptureResult) -> None:
     node.outcome = outcome
     assert node.letters(b"aq") == b""
     node.outcome = CaptureResult.STORED_OWN_SRAM
@@ -54,7 +54,7 @@ def test_a_capture_that_fails_is_not_answered(node: Node, outcome: CaptureResult
     ("letter", "camera"), [(b"s", Camera.NADIR), (b"w", Camera.SUN)], ids=["nadir", "sun"]
 )
 def test_a_picture_is_sent_at_the_pace_of_the_line(
-    node: Node, letter: bytes, camera: Camera
+    node: Links, letter: bytes, camera: Camera
 ) -> None:
     assert DOWNLOADS[camera].request == letter
     largest = 0
@@ -70,56 +70,56 @@ def test_a_picture_is_sent_at_the_pace_of_the_line(
     assert node.now_us / 1e6 == pytest.approx(IMAGE_BYTES * BENCH_BYTE_US / 1e6, rel=0.02)
 
 
-def test_letters_are_answered_in_their_order(node: Node) -> None:
+def test_letters_are_answered_in_their_order(node: Links) -> None:
     answer = node.letters(b"qsaw")
     nadir, sun = node.pictures[Camera.NADIR].tobytes(), node.pictures[Camera.SUN].tobytes()
     assert answer == b"Y" + nadir + b"Y" + sun
 
 
-def test_so_many_letters_wait_and_more_are_lost(node: Node) -> None:
+def test_so_many_letters_wait_and_more_are_lost(node: Links) -> None:
     assert node.letters(b"a" * (LETTERS + 3)) == b"Y" * LETTERS
     assert node.letters(b"a") == b"Y"
 
 
-def test_other_bytes_are_ignored(node: Node) -> None:
+def test_other_bytes_are_ignored(node: Links) -> None:
     letters = {letter.request[0] for letter in (*CAPTURES.values(), *DOWNLOADS.values())}
     assert node.letters(bytes(byte for byte in range(256) if byte not in letters)) == b""
     node.bench.uart_silence()
-    assert node.log == []
+    assert node.done == []
     assert not node.queue
     assert not node.state.flags
 
 
-def test_letters_and_telecommands_have_their_own_places(node: Node) -> None:
+def test_letters_and_telecommands_have_their_own_places(node: Links) -> None:
     for _ in range(LETTERS):
         node.bench.uart_byte(ord("a"))
     assert [node.send("CaptureOnly") for _ in range(5)] == [0, 0, 0, 0, 4]
     node.run()
-    assert [entry[1] for entry in node.log] == [Camera.SUN] * 4 + [Camera.NADIR] * 4
+    assert [entry[1] for entry in node.done] == [Camera.SUN] * 4 + [Camera.NADIR] * 4
 
 
-def test_a_telecommand_does_not_wait_for_the_end_of_a_picture(node: Node) -> None:
+def test_a_telecommand_does_not_wait_for_the_end_of_a_picture(node: Links) -> None:
     node.bench.uart_byte(ord("s"))
     node.run(5)
     node.send("CaptureOnly", Sram=Sram.SRAM1)
     node.run(1)
-    assert node.log
+    assert node.done
     node.run()
-    assert bytes(node.sent[Port.BENCH]) == node.pictures[Camera.NADIR].tobytes()
+    assert bytes(node.bench_sent) == node.pictures[Camera.NADIR].tobytes()
     assert len(node.opened) == 2
 
 
-def test_the_register_stream_waits_for_the_end_of_a_picture(node: Node) -> None:
+def test_the_register_stream_waits_for_the_end_of_a_picture(node: Links) -> None:
     node.bench.uart_byte(ord("w"))
     node.run(5)
     data = node.read_register(100, IMAGE)
     assert data == node.pictures[0, :100].tobytes()
-    assert bytes(node.sent[Port.BENCH]) == node.pictures[Camera.SUN].tobytes()
+    assert bytes(node.bench_sent) == node.pictures[Camera.SUN].tobytes()
     assert len(node.opened) == 2
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile"])
-def test_a_memory_without_supply_ends_the_answer(node: Node, when: str) -> None:
+def test_a_memory_without_supply_ends_the_answer(node: Links, when: str) -> None:
     if when == "before":
         node.off = {Sram.SRAM2}
     else:

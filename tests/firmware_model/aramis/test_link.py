@@ -1,0 +1,79 @@
+from typing import Any
+
+from cubestack.firmware_model.aramis.link import AramisLink
+from cubestack.firmware_model.aramis.state import State
+from cubestack.firmware_model.interface.aramis import INTERFACE, AckError
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.mcu.requests import Routine, Sleep
+from cubestack.firmware_model.node.queue import QueuedCommand
+
+from .harness import Harness
+
+
+class Served(Harness):
+    """A link with canned telemetry.
+
+    Attributes:
+        told: urgent telecommands, by their names.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.state = State(self.flash)
+        self.told: list[str] = []
+        self._link = AramisLink(self, self.meter, self.state, self.values, self.tell)
+
+    @property
+    def link(self) -> AramisLink:
+        return self._link
+
+    def values(self, message: Message) -> dict[str, Any]:
+        return dict(message.reset_values())
+
+    def tell(self, command: QueuedCommand) -> None:
+        self.told.append(command.message.name)
+
+
+def sleep() -> Routine[bool]:
+    """A wake-up that came before is not lost."""
+    return (yield Sleep(None))
+
+
+def test_telecommands_are_acknowledged_queued_and_wake_the_program() -> None:
+    desk = Served()
+    desk.now_us = 77
+    gain = INTERFACE.telecommand("SetGain")
+    frame = encode_frame(bytes([gain.id]) + gain.pack(Gain=2.0))
+    assert desk.wire(frame) == bytes.fromhex("1f7f001fff")
+    command = desk.link.queue[0]
+    assert (command.message.name, command.values, command.came_us) == ("SetGain", {"Gain": 2.0}, 77)
+    assert desk.told == ["SetGain"]
+    assert desk.perform(sleep())
+    assert desk.state.telecommands == 1
+
+
+def test_wrong_parameters_raise_their_flags() -> None:
+    desk = Served()
+    assert desk.send("SetExposure", Rows=0) == AckError.BAD_PARAMETER
+    assert desk.state.flags == {"ParameterError"}
+    wrong = AckError.BAD_PARAMETER
+    assert desk.send("GetAttitudeNearPoint", RightAscension=0, Declination=2) == wrong
+    assert "DirectionError" in desk.state.flags
+    desk.state.flags.clear()
+    assert desk.send("GetAttitudeNearVector", X=0.5, Y=0.5, Z=0.5) == wrong
+    assert desk.state.flags == {"DirectionError"}
+    assert desk.send("GetAttitudeNearVector", X=0.6, Y=0.0, Z=0.8) == AckError.OK
+    assert desk.send("SetBodyRotation", Q0=1, Q1=1, Q2=0, Q3=0) == wrong
+    assert "RotationError" in desk.state.flags
+    assert desk.send("SetBodyRotation", Q0=0.6, Q1=0, Q2=0, Q3=0.8) == AckError.OK
+    message = INTERFACE.telecommand("GetAttitudeNearVector")
+    nan = bytes([message.id]) + bytes.fromhex("0000c07f") * 3
+    assert desk.frames(nan) == [bytes([wrong])]
+
+
+def test_the_buffer_holds_four() -> None:
+    desk = Served()
+    assert [desk.send("StopLoop") for _ in range(5)] == [AckError.OK] * 4 + [AckError.BUFFER_FULL]
+    assert desk.state.flags == {"TcmdBufferOverflow"}
+    assert len(desk.told) == 4

@@ -1,0 +1,191 @@
+"""Runs firmware programs without an emulator: performs their requests in virtual time.
+
+A request is performed as a whole; only a sleep can be left half-way, so that a test can do
+something at any time of it. What hangs on the pins is a subclass' to fake.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from cubestack.firmware_model.mcu.costs import CostTable, Meter
+from cubestack.firmware_model.mcu.requests import (
+    AwaitPin,
+    BusAccess,
+    CameraTransfer,
+    Pay,
+    ReadPin,
+    ReadTimer,
+    Request,
+    Reset,
+    Routine,
+    SetPin,
+    Sleep,
+    StrobeRead,
+)
+
+T = TypeVar("T")
+
+
+class Runner:
+    """Virtual time, and the requests that every program makes.
+
+    Attributes:
+        meter: what the program is charged.
+        now_ns: virtual time.
+        resets: causes of all resets.
+        log: (time in us, request) of every request but those that only take time.
+        on_request: called with every request before it is performed.
+        on_sleep: called when a routine that runs by itself waits to be woken, before time passes.
+    """
+
+    boot_us = 0
+    hang_us = 1_000_000_000
+
+    def __init__(self, table: CostTable) -> None:
+        self.meter = Meter(table)
+        self.now_ns = 0
+        self.resets: list[int] = []
+        self.log: list[tuple[int, Request]] = []
+        self.on_request: Callable[[Request], object] = lambda _request: None
+        self.on_sleep: Callable[[], object] = lambda: None
+        self._woken = False
+
+    # --- what the program uses --------------------------------------------------------------------
+
+    def wake(self) -> None:
+        self._woken = True
+
+    def uptime_us(self) -> int:
+        return self.now_us
+
+    # --- what a test uses -------------------------------------------------------------------------
+
+    @property
+    def now_us(self) -> int:
+        """Virtual time in us; the timer of the program."""
+        return self.now_ns // 1000
+
+    @now_us.setter
+    def now_us(self, now_us: int) -> None:
+        self.now_ns = 1000 * now_us
+
+    def run(self, until_us: int | None = None) -> None:
+        """Run until ``until_us``; without it, until the program waits for the host."""
+        hang_us = self.now_us + self.hang_us
+        while until_us is None or self.now_us < until_us:
+            assert self.now_us < hang_us, f"still busy: {self._request}"
+            if self._request is None:
+                self._request = self._routine.send(self._answer)
+                self._pay()
+                self.on_request(self._request)
+            if isinstance(self._request, Reset):
+                self.resets.append(self._request.cause)
+                self._boot()
+                continue
+            if isinstance(self._request, Sleep):
+                if not self._slept(self._request, until_us):
+                    return
+            else:
+                self._answer = self._perform(self._request)
+            self._request = None
+
+    def perform(self, routine: Routine[T]) -> T:
+        """Run a routine by itself, to its end; what it returns."""
+        answer: Any = None
+        while True:
+            try:
+                request = routine.send(answer)
+            except StopIteration as end:
+                self._pay()
+                result: T = end.value
+                return result
+            self._pay()
+            self.on_request(request)
+            if isinstance(request, Sleep):
+                if request.wakeable:
+                    self.on_sleep()
+                answer = request.wakeable and self._woken
+                self._woken = self._woken and not answer
+                if not answer:
+                    assert request.deadline_us is not None
+                    self.now_ns = max(self.now_ns, 1000 * request.deadline_us)
+            else:
+                answer = self._perform(request)
+
+    # --- what hangs on the pins -------------------------------------------------------------------
+
+    def start(self) -> Routine[None]:
+        """A new life of the program."""
+        raise AssertionError("there is no whole program here")
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a sleep with a deadline is one that only the host ends."""
+        return False
+
+    def set_pin(self, pin: str, level: int) -> None:
+        raise AssertionError(f"nothing hangs on {pin}")
+
+    def get_pin(self, pin: str) -> int:
+        raise AssertionError(f"nothing hangs on {pin}")
+
+    def await_pin(self, request: AwaitPin) -> bool:
+        raise AssertionError(f"nothing hangs on {request.pin}")
+
+    def strobe(self, request: StrobeRead) -> None:
+        raise AssertionError(f"there is nothing for {request}")
+
+    def access(self, request: BusAccess) -> int:
+        raise AssertionError(f"there is nothing for {request}")
+
+    def transfer(self, request: CameraTransfer) -> bytes | None:
+        raise AssertionError(f"there is nothing for {request}")
+
+    # --- time -------------------------------------------------------------------------------------
+
+    def _boot(self) -> None:
+        self.now_ns += 1000 * self.boot_us
+        self._woken = False
+        self._request: Request | None = None
+        self._answer: object = None
+        self._routine = self.start()
+
+    def _pay(self) -> None:
+        self.now_ns += self.meter.take() * 1_000_000_000 // self.meter.table.clock_hz
+
+    def _perform(self, request: Request) -> object:
+        if not isinstance(request, Pay | ReadTimer):
+            self.log.append((self.now_us, request))
+        match request:
+            case ReadTimer():
+                return self.now_us
+            case SetPin(pin, level):
+                self.meter.charge(port_write=1)
+                self.set_pin(pin, level)
+            case ReadPin(pin):
+                self.meter.charge(port_read=1)
+                return self.get_pin(pin)
+            case AwaitPin():
+                return self.await_pin(request)
+            case StrobeRead():
+                self.strobe(request)
+            case BusAccess():
+                return self.access(request)
+            case CameraTransfer():
+                return self.transfer(request)
+        return None
+
+    def _slept(self, request: Sleep, until_us: int | None) -> bool:
+        """Sleep as far as it goes; False when something else has to happen first."""
+        woken = request.wakeable and self._woken
+        deadline_us = self.now_us if woken else request.deadline_us
+        if until_us is None and (deadline_us is None or (not woken and self.waiting)):
+            return False
+        if until_us is not None and (deadline_us is None or deadline_us > until_us):
+            self.now_us = until_us
+            return False
+        assert deadline_us is not None
+        self.now_ns = max(self.now_ns, 1000 * deadline_us)
+        self._woken = self._woken and not woken
+        self._answer = woken
+        return True
