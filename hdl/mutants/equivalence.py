@@ -14,15 +14,13 @@ kept ones hold. Where the pins' equality is not among them a counterexample is l
 
 import json
 import re
-import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, product
-from pathlib import Path
 from typing import NamedTuple
 
 from cubestack.firmware_model.interface.pins import Pin
-from cubestack.hdl.flow.tools import run_yosys
+from cubestack.hdl.flow.tools import yosys_files
 from cubestack.hdl.mutants.netlist import Mutant, Netlist
 
 __all__ = ["Equivalence", "Verdict"]
@@ -90,13 +88,9 @@ class Equivalence:
         ToolMissingError without a Yosys.
         """
         self._netlist = design
-        with _folder() as name:
-            folder = Path(name)
-            (folder / "netlist.il").write_text(design.text, encoding="utf-8")
-            run_yosys(_GOLD, folder)
-            self._gold = (folder / "gold.il").read_text(encoding="utf-8")
-            flat = json.loads((folder / "flat.json").read_text(encoding="utf-8"))
-        module = flat["modules"]["dut"]
+        files = {"netlist.il": design.text}
+        _, self._gold, flat = yosys_files(_GOLD, files, "gold.il", "flat.json")
+        module = json.loads(flat)["modules"]["dut"]
         ports = {name: (p["direction"], p["bits"]) for name, p in module["ports"].items()}
         self._inputs = {n: len(bits) for n, (way, bits) in ports.items() if way == "input"}
         outputs = {n: bits for n, (way, bits) in ports.items() if way == "output"}
@@ -232,12 +226,12 @@ class Equivalence:
         calls: Sequence[str],
     ) -> str:
         script = _JOIN.format(mutation=mutant.command() if mutant else "")
-        with _folder() as name:
-            folder = Path(name)
-            (folder / "netlist.il").write_text(self._netlist.text, encoding="utf-8")
-            (folder / "gold.il").write_text(self._gold, encoding="utf-8")
-            (folder / "harness.v").write_text(self._harness(groups, known), encoding="utf-8")
-            return run_yosys(script + "\n".join(calls), folder)
+        files = {
+            "netlist.il": self._netlist.text,
+            "gold.il": self._gold,
+            "harness.v": self._harness(groups, known),
+        }
+        return yosys_files(script + "\n".join(calls), files)[0]
 
     def _harness(self, groups: Sequence[Sequence[str]], known: Sequence[str]) -> str:
         """Verilog of both side by side; group n of guesses is ``guess<n>``, and ``all<n>``."""
@@ -271,7 +265,3 @@ def _block_of(mutant: Mutant) -> str:
     if path and path[-1].partition("$")[0] == "counter":
         path.pop()
     return "".join(f"{part}." for part in path)
-
-
-def _folder() -> "tempfile.TemporaryDirectory[str]":
-    return tempfile.TemporaryDirectory()

@@ -9,16 +9,14 @@ argument ``+mutant=N`` chooses one, and no plus-argument, or 0, the design itsel
 import hashlib
 import random
 import re
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 from amaranth.back import rtlil
 from amaranth.lib.wiring import Component
 
-from cubestack.hdl.flow.tools import run_yosys
+from cubestack.hdl.flow.tools import yosys_files
 
 __all__ = ["Mutant", "Netlist", "mutants", "netlist", "selectable"]
 
@@ -115,11 +113,8 @@ def netlist(component: Component, kept: Sequence[str] = ()) -> Netlist:
     text = str(rtlil.convert(component, name="dut", emit_src=True))
     text = _SOURCE.sub(lambda found: f'{found[1]}{_basenames(found[2])}"', text)
     keep = "".join(f"setattr -mod -set keep_hierarchy 1 dut.{name}\n" for name in kept)
-    with _folder() as name:
-        folder = Path(name)
-        (folder / "design.il").write_text(text, encoding="utf-8")
-        run_yosys(_SIMPLIFY.format(keep=keep), folder)
-        simplified = (folder / "netlist.il").read_text(encoding="utf-8")
+    script = _SIMPLIFY.format(keep=keep)
+    _, simplified = yosys_files(script, {"design.il": text}, "netlist.il")
     return Netlist(re.sub(r"^# Generated.*\n", "", simplified), tuple(kept))
 
 
@@ -135,12 +130,9 @@ def mutants(
         every = [m for m in mutants(design) if any(s.startswith(f"{source}:") for s in m.source)]
         chosen = len(every) if count is None else min(count, len(every))
         return random.Random(seed).sample(every, chosen)
-    with _folder() as name:
-        folder = Path(name)
-        (folder / "netlist.il").write_text(design.text, encoding="utf-8")
-        run_yosys(_LIST.format(count=_ALL if count is None else count, seed=seed), folder)
-        lines = (folder / "mutants.txt").read_text(encoding="utf-8").splitlines()
-    return [_parsed(line) for line in lines]
+    script = _LIST.format(count=_ALL if count is None else count, seed=seed)
+    _, listed = yosys_files(script, {"netlist.il": design.text}, "mutants.txt")
+    return [_parsed(line) for line in listed.splitlines()]
 
 
 def selectable(design: Netlist, chosen: Sequence[Mutant]) -> str:
@@ -151,11 +143,8 @@ def selectable(design: Netlist, chosen: Sequence[Mutant]) -> str:
         f"{mutant.command()} -ctrl {_CONTROL} {_CONTROL_BITS} {number}"
         for number, mutant in enumerate(chosen, 1)
     )
-    with _folder() as name:
-        folder = Path(name)
-        (folder / "netlist.il").write_text(design.text, encoding="utf-8")
-        run_yosys(_SELECTABLE.format(mutations=mutations, control=_CONTROL), folder)
-        text = (folder / "mutants.v").read_text(encoding="utf-8")
+    script = _SELECTABLE.format(mutations=mutations, control=_CONTROL)
+    _, text = yosys_files(script, {"netlist.il": design.text}, "mutants.v")
     bus = f"[{_CONTROL_BITS - 1}:0] {_CONTROL};\n"
     argument = f'initial if (!$value$plusargs("mutant=%d", {_CONTROL})) {_CONTROL} = 0;\n'
     # In the top it is no port any more.
@@ -187,7 +176,3 @@ def _parsed(line: str) -> Mutant:
 def _basenames(sources: str) -> str:
     """The same places on every machine: files without their folders."""
     return "|".join(source.rpartition("/")[2] for source in sources.split("|"))
-
-
-def _folder() -> "tempfile.TemporaryDirectory[str]":
-    return tempfile.TemporaryDirectory()

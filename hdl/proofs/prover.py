@@ -10,12 +10,10 @@ a counterexample from its start, which takes a small picture.
 """
 
 import re
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -23,7 +21,7 @@ from amaranth.hdl import Instance, Module, Signal, Value
 from amaranth.lib.wiring import Component, In
 
 from cubestack.hdl.flow.generate import rtlil_text
-from cubestack.hdl.flow.tools import run_yosys
+from cubestack.hdl.flow.tools import yosys_files
 
 __all__ = ["Fault", "Proof", "ProofResult", "Register", "UnknownWireError", "past", "prove"]
 
@@ -141,12 +139,8 @@ def prove(proof: Proof, planted: bool = False) -> ProofResult:
         steps=FAULT_STEPS if planted else STEPS,
         limit=LIMIT,
     )
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "flat.il").write_text(flat, encoding="utf-8")
-        (folder / "harness.il").write_text(text, encoding="utf-8")
-        run_yosys(script, folder)
-        report = (folder / "sat.txt").read_text(encoding="utf-8")
+    files = {"flat.il": flat, "harness.il": text}
+    _, report = yosys_files(script, files, "sat.txt")
     return ProofResult(
         "Induction step proven: SUCCESS!" in report,
         "model found for base case: FAIL!" in report,
@@ -164,11 +158,7 @@ def past(m: Module, value: Value) -> Signal:
 
 @cache
 def _flattened(rtlil: str) -> str:
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "design.il").write_text(rtlil, encoding="utf-8")
-        run_yosys(_FLATTEN, folder)
-        return (folder / "flat.il").read_text(encoding="utf-8")
+    return yosys_files(_FLATTEN, {"design.il": rtlil}, "flat.il")[1]
 
 
 def _registers(flat: str) -> dict[str, int | None]:
