@@ -7,4 +7,6 @@ tree=build/typecheck/cubestack
 mkdir -p "$tree"
 for package in hdl firmware_model emulator host; do ln -sfn "../../../$package" "$tree/$package"; done
 for file in host/api/*; do [ -f "$file" ] && ln -sfn "../../../$file" "$tree/${file##*/}"; done
-MYPYPATH=build/typecheck .venv/bin/python -m mypy --exclude 'cubestack/host/api/' -p cubestack
+ln -sfn ../../examples/cubesense_fpga_i2c build/typecheck/cubesense_fpga_i2c
+MYPYPATH=build/typecheck .venv/bin/python -m mypy \
+    --exclude '(cubestack/host/api|cubesense_fpga_i2c/tests)/' -p cubestack -p cubesense_fpga_i2c

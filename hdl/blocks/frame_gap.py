@@ -1,7 +1,7 @@
 """Tells frames apart where the camera's VSYN is not wired: by the long pause between them.
 
 CubeSense thesis, table 3.4: of the camera's two control signals PCLK and HREF, none marks a frame.
-How a frame's start is found from them is not published and is ours.
+How a frame's start is found from them is not published: it is assumed.
 """
 
 from amaranth.hdl import Module, Signal
@@ -13,13 +13,13 @@ __all__ = ["FrameGap"]
 class FrameGap(Component):
     """Makes a VSync: low until the first frame starts, and low in each later gap.
 
-    A frame starts with the first line after more than ``clocks`` clocks with HREF low. Clocks
+    A frame starts with the first row after more than ``clocks`` clocks with HREF low. Clocks
     count from the domain's reset on.
 
     Ports:
         href: high while pixels are sent; synchronous to the domain's clock.
-        vsync: low from reset on until the first frame's first line, later from the clock that
-            makes a pause a gap to the line that ends it. Follows ``href`` without a clock.
+        vsync: low from reset on until the first frame's first row, later from the clock that
+            makes a pause a gap to the row that ends it. Follows ``href`` without a clock.
     """
 
     def __init__(self, clocks: int, *, domain: str = "pix") -> None:

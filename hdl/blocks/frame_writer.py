@@ -1,7 +1,7 @@
 """Camera to SRAM: stores one whole frame, then raises ACK.
 
 CubeStar thesis, section 5.2.2 and appendix C. One pixel is taken at each rising edge of the pixel
-clock inside a line, and written during the low half of that clock period: the address, the data
+clock inside a row, and written during the low half of that clock period: the address, the data
 and ``store`` change after a rising edge only, so they are stable for the whole write pulse.
 """
 
@@ -19,17 +19,17 @@ class FrameWriter(Component):
     All camera inputs are synchronous to the domain's clock, which is the camera's pixel clock.
     Being in reset is being idle: nothing is stored and ``ack`` is low.
 
-    - Storing starts at a line's start only: a low HSync must have been seen first.
+    - Storing starts at a row's start only: a low HSync must have been seen first.
     - A low VSync goes back to the first row, so a frame that was joined in the middle is dropped.
-    - Pixels beyond the last column, and lines beyond the last row, are not stored. A line that is
-      too short leaves the rest of its row as it was; a frame whose last row is too short is not
+    - Pixels beyond the last column, and rows beyond the last one, are not stored. A row that is
+      too short leaves the rest of its pixels as they were; a frame whose last row is too short is not
       acknowledged, and the next one is stored in its place.
     - ``ack`` rises when the write pulse of the last pixel is over. It stays, and nothing more is
       stored, until the next reset; VSync does not clear it.
 
     Ports:
         pixel: pixel data.
-        hsync: low between lines.
+        hsync: low between rows.
         vsync: low between frames.
         address: SRAM address of the pixel in ``data``.
         data: pixel to be written.
@@ -54,13 +54,13 @@ class FrameWriter(Component):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Build the line and frame tracking around the position counter."""
+        """Build the row and frame tracking around the position counter."""
         m = Module()
         m.submodules.counter = counter = self._counter
         sync = m.d[self._domain]
 
-        between_lines_seen = Signal()  # since reset or VSync: a line's start can be recognised
-        line_open = Signal()  # at least one pixel of this line was taken
+        between_lines_seen = Signal()  # since reset or VSync: a row's start can be recognised
+        line_open = Signal()  # at least one pixel of this row was taken
         line_full = Signal()  # the row is complete; surplus pixels are ignored
         frame_full = Signal()  # the last row is over, complete or not
 

@@ -1,7 +1,7 @@
 """Matrix addressing: a column counter and a row counter side by side.
 
-CubeSense thesis, section 6.5: the SRAM address is row : column, so a line always starts at its
-own column 0 whatever happened in the line before. CubeStar's frame of 1024 x 512 is a power of two
+CubeSense thesis, section 6.5: the SRAM address is row : column, so a row always starts at its
+own column 0 whatever happened in the row before. CubeStar's frame of 1024 x 512 is a power of two
 both ways, where the same address is also the linear one of the CubeStar thesis, section 5.2.2.
 """
 

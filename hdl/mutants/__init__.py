@@ -1,1 +1,1 @@
-"""Mutants of the designs: one wrong gate each, which the test benches have to notice."""
+"""Mutants of the designs: one wrong gate each, which the testbenches have to notice."""
