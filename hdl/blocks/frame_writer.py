@@ -22,7 +22,7 @@ class FrameWriter(Component):
     - Storing starts at a row's start only: a low HSync must have been seen first.
     - A low VSync goes back to the first row, so a frame that was joined in the middle is dropped.
     - Pixels beyond the last column, and rows beyond the last one, are not stored. A row that is
-      too short leaves the rest of its pixels as they were; a frame whose last row is too short is not
+      too short leaves its other pixels as they were; a frame whose last row is too short is not
       acknowledged, and the next one is stored in its place.
     - ``ack`` rises when the write pulse of the last pixel is over. It stays, and nothing more is
       stored, until the next reset; VSync does not clear it.
