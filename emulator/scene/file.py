@@ -62,7 +62,9 @@ def values_for(owner: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key in names}
 
 
-def read_table(table: Mapping[str, Any], readers: Readers) -> dict[str, Any]:
+def read_table(
+    table: Mapping[str, Any], readers: Mapping[str, Callable[[Any], Any]]
+) -> dict[str, Any]:
     """Checked values of ``table``; SceneError for keys and values that ``readers`` do not take."""
     values = {}
     for key, value in table.items():

@@ -1,0 +1,116 @@
+"""The board of a plain node: one microcontroller with a ``NodeProgram``, and an FPGA if need be."""
+
+from abc import abstractmethod
+from typing import Any, ClassVar, Generic, TypeVar
+
+from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.faults.sites import Sites
+from cubestack.emulator.rtl.factory import EngineKind, make_engine
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.sim.power import PowerTable
+from cubestack.emulator.sim.processor import Processor
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.mcu.costs import CostTable, Meter
+from cubestack.firmware_model.node.program import POWER_ON, NodeProgram
+
+__all__ = ["NodeBoard"]
+
+ProgramT = TypeVar("ProgramT", bound=NodeProgram)
+SceneT = TypeVar("SceneT")
+
+
+class NodeBoard(Board, Generic[ProgramT, SceneT]):
+    """One emulated node; a sensor says what is particular to it.
+
+    Attributes:
+        interface: its messages.
+        supplies: what draws current: a part "processor" with the states "sleep" and "run" is among
+            it.
+        costs: of the processor's operations.
+        scene_type: class of the scenes that it sees.
+        boot_us: time from reset to the first instruction of ``main``.
+    """
+
+    interface: ClassVar[Interface]
+    supplies: ClassVar[PowerTable]
+    costs: ClassVar[CostTable]
+    scene_type: ClassVar[type[Any]]
+    boot_us: ClassVar[int] = 1_000
+
+    def __init__(
+        self,
+        scene: SceneT,
+        *,
+        seed: int = 0,
+        engine: EngineKind = "auto",
+        baud: int | None = None,
+        kernel: Kernel | None = None,
+        i2c_bus: I2cBus | None = None,
+    ) -> None:
+        """Power up.
+
+        Args:
+            scene: what it sees.
+            seed: of everything random but the scene: memories at power-up among it.
+            engine: see ``make_engine``; ValueError for any but "auto" without an FPGA.
+            baud: of the satellite's UART; None for the interface's.
+            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
+        """
+        super().__init__(self.supplies, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        self.scene = scene
+        wiring = self._wiring()
+        if wiring is not None:
+            self.engine = make_engine(wiring, engine)
+            for memory in self.engine.memories.values():
+                self._scramble(memory)
+        elif engine != "auto":
+            raise ValueError(f"{self.interface.name} has no FPGA: leave engine {engine!r} out")
+        self._node_link(
+            lambda: self.program.link, baud or self.interface.baud, self.interface.i2c_address
+        )
+        meter = Meter(self.costs)
+
+        def boot(_cause: int) -> ProgramT:
+            self._program = self._boot(meter)
+            return self._program
+
+        self.processor = Processor(
+            self.kernel,
+            meter,
+            self.engine,
+            None,
+            boot,
+            power_on_cause=POWER_ON,
+            boot_us=self.boot_us,
+            on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
+        )
+
+    @abstractmethod
+    def _boot(self, meter: Meter) -> ProgramT:
+        """The program after a reset, which charges ``meter``."""
+
+    def _wiring(self) -> Wiring | None:
+        """What is soldered to its FPGA; None without one."""
+        return None
+
+    @property
+    def program(self) -> ProgramT:
+        """The firmware program that runs now."""
+        return self._program
+
+    @property
+    def scene(self) -> SceneT:
+        """What it sees; see ``Board``."""
+        return self._scene
+
+    @scene.setter
+    def scene(self, scene: object) -> None:
+        if not isinstance(scene, self.scene_type):
+            known = self.scene_type.__name__
+            raise TypeError(f"{self.interface.name} sees a {known}, not {scene!r}")
+        self._scene: SceneT = scene
+
+    def _sites(self) -> Sites:
+        return self._common_sites()

@@ -1,0 +1,49 @@
+"""Messages that a plain node has beside its own: who it is, what went wrong, whether it is done.
+
+As the CubeSpace family's nodes have them; ``firmware_model.node.program`` serves them.
+"""
+
+from collections.abc import Mapping
+
+from cubestack.firmware_model.interface.codec.field import enum8, flags_at, u8, u16
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+
+__all__ = ["NODE_FLAGS", "NODE_TELECOMMANDS", "node_telemetry"]
+
+#: Error flags of its link to the host, with their causes.
+NODE_FLAGS = {
+    "UartError": "byte outside of a frame, or a frame that never ended",
+    "I2cReadWithoutId": "read with no telemetry ID written before",
+    "TcmdBufferOverflow": "telecommand while the command buffer was full",
+    "TcmdRefused": "telecommand with an unknown ID, a wrong length or a parameter out of range",
+}
+
+NODE_TELECOMMANDS = (
+    Message(1, "Reset", "restart the program"),
+    Message(2, "ClearErrorFlags", "lower all error flags"),
+)
+
+
+def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Message, ...]:
+    """Telemetry 128 to 131 of a node of that type, whose ``own_flags`` follow those of its link."""
+    flags = {**NODE_FLAGS, **own_flags}
+    return (
+        Message(128, "Identification", "who answers").of(
+            u8("NodeType", f"always {node_type}", reset=node_type),
+            u8("InterfaceVersion", "of these tables"),
+            u8("FirmwareVersionMajor", "of the program"),
+            u8("FirmwareVersionMinor", "of the program"),
+            u16("RuntimeMilliseconds", "fraction of RuntimeSeconds", "ms"),
+            u16("RuntimeSeconds", "since power-up, wraps", "s"),
+        ),
+        Message(130, "ErrorFlags", "what went wrong since ClearErrorFlags").of(
+            *flags_at((bit, name, flags[name], name) for bit, name in enumerate(flags))
+        ),
+        Message(131, "TcmdProcessed", "whether every accepted telecommand is done").of(
+            u8("Processed", "1: all are done"),
+            u8("Waiting", "telecommands that wait"),
+            u8("Latest", "ID of the latest telecommand, accepted or not"),
+            enum8("Error", "its error code", choices=AckError),
+        ),
+    )

@@ -1,0 +1,22 @@
+"""Things that are named by a text, ``"package.module:name"``, and loaded when they are used."""
+
+from collections.abc import Callable
+from functools import partial
+from pkgutil import resolve_name
+from typing import Any
+
+__all__ = ["call", "get"]
+
+
+def get(what: str) -> Callable[[], Any]:
+    """A callable that gives it."""
+    return partial(resolve_name, what)
+
+
+def call(what: str) -> Callable[..., Any]:
+    """A callable that calls it."""
+
+    def called(*given: Any, **options: Any) -> Any:
+        return resolve_name(what)(*given, **options)
+
+    return called
