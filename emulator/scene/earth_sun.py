@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 __all__ = ["EarthSunScene", "Mounting", "Reflection", "SensorTruth", "Target"]
@@ -85,9 +85,7 @@ class Reflection:
 
     def __post_init__(self) -> None:
         """Refuse a disc that can not be."""
-        for name in ("radius_px", "level"):
-            if not getattr(self, name) > 0:
-                raise SceneError(f"{name} must be above 0, not {getattr(self, name)}")
+        refuse_zero(self, "radius_px", "level")
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,11 +141,8 @@ class EarthSunScene:
         rate = np.asarray(self.rate_deg_s, np.float64)
         if rate.shape != (3,) or not np.all(np.isfinite(rate)):
             raise SceneError(f"rate_deg_s must be 3 numbers in deg/s, not {self.rate_deg_s!r}")
-        if not 0 < self.altitude_km < np.inf:
-            raise SceneError(f"altitude_km must be above 0, not {self.altitude_km}")
-        for name in ("unevenness", "glow_km", "seed"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise SceneError(f"{name} must not be negative, not {getattr(self, name)}")
+        refuse_zero(self, "altitude_km")
+        refuse_negative(self, "unevenness", "glow_km", "seed")
 
     @classmethod
     def facing(

@@ -4,6 +4,7 @@ A reader takes what TOML gave for one key and returns the checked value; SceneEr
 must be. :func:`read_table` puts the key in front.
 """
 
+import math
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
@@ -18,6 +19,8 @@ __all__ = [
     "number",
     "read_scene_file",
     "read_table",
+    "refuse_negative",
+    "refuse_zero",
     "several",
     "subtable",
     "text",
@@ -31,6 +34,20 @@ V = TypeVar("V")
 
 class SceneError(ValueError):
     """A scene that can not be: a wrong value, key, file or picture. The text is one line."""
+
+
+def refuse_negative(thing: Any, *names: str) -> None:
+    """Raise SceneError when one of these attributes is below 0 or not finite."""
+    for name in names:
+        if not 0 <= getattr(thing, name) < math.inf:
+            raise SceneError(f"{name} must not be negative, not {getattr(thing, name)}")
+
+
+def refuse_zero(thing: Any, *names: str) -> None:
+    """Raise SceneError when one of these attributes is not above 0, or not finite."""
+    for name in names:
+        if not 0 < getattr(thing, name) < math.inf:
+            raise SceneError(f"{name} must be above 0, not {getattr(thing, name)}")
 
 
 def read_scene_file(

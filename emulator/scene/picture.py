@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, UnidentifiedImageError
 
 from cubestack.emulator.scene.attitude import unit_quaternion
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, refuse_zero
 
 __all__ = ["FORMATS", "PictureScene", "check_quaternion", "load_picture"]
 
@@ -37,8 +37,8 @@ class PictureScene:
         """Load the picture; SceneError when there is none, or a value is wrong."""
         if self.quaternion is not None:
             check_quaternion(self.quaternion)
-        if self.exposure_ms is not None and not self.exposure_ms > 0:
-            raise SceneError(f"exposure_ms must be above 0, not {self.exposure_ms}")
+        if self.exposure_ms is not None:
+            refuse_zero(self, "exposure_ms")
         if min(self.crop) < 0:
             raise SceneError(f"crop must not be negative, not {self.crop[0]},{self.crop[1]}")
         object.__setattr__(self, "pixels", load_picture(Path(self.file)))

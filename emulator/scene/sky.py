@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, refuse_negative
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
 from cubestack.emulator.scene.picture import PictureScene, check_quaternion
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -79,9 +79,7 @@ class SkyScene:
         starts = [pose.start_s for pose in self._all_poses]
         if sorted(starts) != starts:
             raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
-        for name in ("false_stars", "seed"):
-            if getattr(self, name) < 0:
-                raise SceneError(f"{name} must not be negative, not {getattr(self, name)}")
+        refuse_negative(self, "false_stars", "seed")
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:
             raise SceneError(

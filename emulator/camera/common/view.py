@@ -1,13 +1,13 @@
 """What a camera sees and what it is like: scenes know no sensor, conditions know no scene."""
 
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from cubestack.emulator.camera.common.optics import Optics
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, refuse_negative
 from cubestack.emulator.scene.sky import Scene
 
-__all__ = ["SkyCondition", "SkyView", "View", "refuse_negative"]
+__all__ = ["SkyCondition", "SkyView", "View"]
 
 S = TypeVar("S")
 C = TypeVar("C")
@@ -22,13 +22,6 @@ class View(Generic[S, C]):
 
     scene: S
     condition: C
-
-
-def refuse_negative(thing: Any, *names: str) -> None:
-    """Raise SceneError when one of these attributes is below 0 or infinite."""
-    for name in names:
-        if not 0 <= getattr(thing, name) < float("inf"):
-            raise SceneError(f"{name} must not be negative, not {getattr(thing, name)}")
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from cubestack.emulator.camera.common.view import View, refuse_negative
+from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import refuse_negative, refuse_zero
 
 __all__ = ["EarthSunView", "FisheyeCondition"]
 
@@ -30,8 +30,7 @@ class FisheyeCondition:
 
     def __post_init__(self) -> None:
         """Refuse what can not be."""
-        if not 0 < self.bloom_px < float("inf"):
-            raise SceneError(f"bloom_px must be above 0, not {self.bloom_px}")
+        refuse_zero(self, "bloom_px")
         refuse_negative(self, "hot_pixels", "hot_pairs", "seed")
 
 

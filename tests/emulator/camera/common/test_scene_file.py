@@ -13,11 +13,7 @@ from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import PictureScene, SceneError, SkyScene
 
-
-def save(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+from ..files import check_refused, save
 
 
 def load(path: Path) -> SkyView:
@@ -146,13 +142,7 @@ POSE = "ra_deg = 1\ndec_deg = 2\n"
     ],
 )
 def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
-    path = save(tmp_path, text)
-    with pytest.raises(SceneError) as caught:
-        load(path)
-    message = str(caught.value)
-    assert complaint in message
-    assert str(path) in message
-    assert "\n" not in message
+    check_refused(load, save(tmp_path, text), complaint)
 
 
 def test_missing_scene_file(tmp_path: Path) -> None:

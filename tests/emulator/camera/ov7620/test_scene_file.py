@@ -8,15 +8,10 @@ from cubestack.emulator.camera.ov7620 import scene_file
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import Reflection, Target
-from cubestack.emulator.scene.file import SceneError
+
+from ..files import check_refused, save
 
 SUN, NADIR = Target.SUN, Target.NADIR
-
-
-def save(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def test_scene_from_a_file(tmp_path: Path) -> None:
@@ -115,10 +110,4 @@ KIND = 'kind = "earth-sun"\n'
     ],
 )
 def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
-    path = save(tmp_path, text)
-    with pytest.raises(SceneError) as caught:
-        load_earth_sun_scene(path)
-    message = str(caught.value)
-    assert complaint in message
-    assert str(path) in message
-    assert "\n" not in message
+    check_refused(load_earth_sun_scene, save(tmp_path, text), complaint)

@@ -1,0 +1,25 @@
+"""Scene files that tests write."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.scene.file import SceneError
+
+
+def save(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def check_refused(load: Callable[[Path], Any], path: Path, complaint: str) -> None:
+    """One line names the file and what is wrong with it."""
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert complaint in message
+    assert str(path) in message
+    assert "\n" not in message
