@@ -23,7 +23,6 @@ __all__ = [
     "LIKELY_FIELD_DEG",
     "PUBLISHED_FIELD_DEG",
     "double_gauss",
-    "focal_length_mm",
 ]
 
 PUBLISHED_FIELD_DEG = 21.53463888888889
@@ -37,18 +36,13 @@ EFFECTIVE_WIDTH_A = 1500.0
 SPOT_SIGMA_PX = 1.5
 
 
-def focal_length_mm(field_deg: float) -> float:
-    """Focal length with which the picture's height spans ``field_deg``."""
-    return ROWS * PIXEL_PITCH_MM / 2 / math.tan(math.radians(field_deg / 2))
-
-
 def double_gauss(
     field_deg: float = PUBLISHED_FIELD_DEG,
     *,
     spot_sigma_px: float = SPOT_SIGMA_PX,
     shade: bool = True,
 ) -> Optics:
-    """The lens with a round field of ``field_deg``.
+    """The lens with a round field of ``field_deg``, which the picture's height spans.
 
     Args:
         field_deg: diameter of the field, 5 to 40.
@@ -60,7 +54,7 @@ def double_gauss(
     """
     if not 5 <= field_deg <= 40:
         raise ValueError(f"the field must be 5 to 40 deg, not {field_deg:g}")
-    focal_mm = focal_length_mm(field_deg)
+    focal_mm = ROWS * PIXEL_PITCH_MM / 2 / math.tan(math.radians(field_deg / 2))
     focal_px = focal_mm / PIXEL_PITCH_MM
     return Optics(
         focal_length_mm=focal_mm,

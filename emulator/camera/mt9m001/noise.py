@@ -9,8 +9,6 @@ noise. What is published neither here nor there is marked as assumed.
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cubestack.emulator.camera.common.imager import doubled
 
 __all__ = [
@@ -22,7 +20,6 @@ __all__ = [
     "READ_NOISE_ELECTRONS",
     "NoiseTerms",
     "dark_electrons_per_s",
-    "quantisation_sigma",
 ]
 
 FULL_WELL_ELECTRONS = 10 ** (45 / 10)
@@ -69,8 +66,3 @@ class NoiseTerms:
 def dark_electrons_per_s(temperature_c: float) -> float:
     """Mean dark current of a pixel."""
     return doubled(DARK_ELECTRONS_PER_S_AT_25_C, temperature_c, 25.0)
-
-
-def quantisation_sigma(gain: float, bits: int = 10) -> float:
-    """Standard deviation of the quantisation in electrons, equations 3.5 and 3.6."""
-    return float(FULL_WELL_ELECTRONS / gain / 2**bits / np.sqrt(12))

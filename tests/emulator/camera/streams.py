@@ -10,7 +10,6 @@ def segments(camera: Any, start_ps: int, count: int) -> list[StreamSegment]:
     found = []
     for _ in range(count):
         segment = camera.segment_at(start_ps)
-        assert segment is not None
         found.append(segment)
         start_ps = segment.start_ps + int(segment.clocks * camera.period)
     return found

@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 
 ORION = SkyScene.pointing(84.0, -1.0)
 LENS = double_gauss()
-SHUTTER = RollingShutter(10**12, 31_750_000, 3000, 3000)  # type: ignore[arg-type]
+SHUTTER = RollingShutter(10**12, 31_750_000, 3000, 3000)
 
 
 def test_light_has_the_sensor_s_size_and_falls_where_the_stars_are() -> None:

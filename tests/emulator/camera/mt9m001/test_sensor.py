@@ -40,7 +40,6 @@ def put(camera: Mt9m001, name: str, *words: int, now_ps: int = 0) -> None:
 def get(camera: Mt9m001, name: str) -> int:
     assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]), 0)
     answer = camera.i2c_read(ADDRESS, 2, 0)
-    assert answer is not None
     return int.from_bytes(answer, "big")
 
 
@@ -49,7 +48,6 @@ def stream(camera: Mt9m001, start_ps: int, until_ps: int) -> list[tuple[int, int
     segments, now = [], start_ps
     while now < until_ps:
         segment = camera.segment_at(now)
-        assert segment is not None
         segments.append((segment.start_ps, segment.clocks, segment.vsync, segment.rows))
         now = segment.start_ps + int(segment.clocks * camera.period)
     return segments
@@ -60,7 +58,6 @@ def frame(camera: Mt9m001, after_ps: int) -> np.ndarray:
     pieces, now, low = [], after_ps, False
     while len(pieces) < 2:
         segment = camera.segment_at(now)
-        assert segment is not None
         low |= not segment.vsync
         if low and segment.pixels is not None:
             pieces.append(segment.pixels())
@@ -100,7 +97,6 @@ def test_a_long_exposure_makes_the_frame_longer(shutter: int, rows: int) -> None
     starts = [s[0] for s in stream(camera, 0, PS_PER_S) if s[1] == 242]
     assert np.diff(starts) == pytest.approx(rows * ROW_S * PS_PER_S)
     exposure = camera.frame_from(starts[-1])
-    assert exposure is not None
     assert exposure.exposure_s == pytest.approx(shutter * ROW_S)
     assert exposure.readout_ps == pytest.approx(starts[-1] + 242 / PIXEL_CLOCK_HZ * PS_PER_S, abs=1)
 
@@ -132,9 +128,9 @@ def test_changes_wait_while_they_are_held() -> None:
     put(camera, "OUTPUT_CONTROL", 0b11)
     put(camera, "SHUTTER_WIDTH", 2000)
     put(camera, "GLOBAL_GAIN", 0x20)
-    assert camera.frame_from(0).exposure_lines == 1049  # type: ignore[union-attr]
+    assert camera.frame_from(0).exposure_lines == 1049
     put(camera, "OUTPUT_CONTROL", 0b10)
-    assert camera.frame_from(0).exposure_lines == 2000  # type: ignore[union-attr]
+    assert camera.frame_from(0).exposure_lines == 2000
 
 
 def test_registers_answer_as_declared() -> None:
@@ -192,7 +188,7 @@ def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure() -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     stop, start = 40 * PS_PER_MS, 90 * PS_PER_MS
-    assert camera.segment_at(stop).vsync == 1  # type: ignore[union-attr]
+    assert camera.segment_at(stop).vsync == 1
     put(camera, "OUTPUT_CONTROL", 0, now_ps=stop)
     assert changes
     assert all(s[2:] == (0, 0) for s in stream(camera, stop, start))
@@ -274,7 +270,7 @@ def test_a_turning_camera_smears_along_its_motion() -> None:
         around = picture[row - 12 : row + 13, column - 12 : column + 13].astype(float) - 2
         y, x = np.mgrid[:25, :25]
         total = around.sum()
-        return tuple(  # type: ignore[return-value]
+        return tuple(
             float((around * axis**2).sum() / total - ((around * axis).sum() / total) ** 2)
             for axis in (x, y)
         )

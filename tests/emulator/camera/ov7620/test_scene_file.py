@@ -47,7 +47,6 @@ def test_scene_from_a_file(tmp_path: Path) -> None:
     truth = scene.truth(NADIR, 0)
     assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((10, -20))
     np.testing.assert_allclose(scene.sun, [0, 0.6, -0.8])
-    assert scene.moon is not None
     np.testing.assert_allclose(scene.moon, [1, 0, 0])
     np.testing.assert_allclose(scene.nadir_camera.matrix[2], [1, 0, 0])
     assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
@@ -57,7 +56,6 @@ def test_scene_from_a_file(tmp_path: Path) -> None:
 
 
 def test_example_in_the_documentation_is_a_scene(tmp_path: Path) -> None:
-    assert scene_file.__doc__ is not None
     example = scene_file.__doc__.split("::\n", 1)[1].rsplit("\n\n", 1)[0]
     scene = load_earth_sun_scene(save(tmp_path, textwrap.dedent(example))).scene
     assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
