@@ -4,8 +4,8 @@ other tools, proofs of what they promise, waveforms of tests that failed.
 examples:
   cubestack hdl area
   cubestack hdl area --ice40 --json
-  cubestack hdl verilog cubestar --out cubestar.v
-  cubestack hdl verilog cubesense-sun | yosys -f verilog -p 'synth_ice40' -
+  cubestack hdl verilog TOP --out top.v
+  cubestack hdl verilog TOP | yosys -f verilog -p 'synth_ice40' -
   cubestack hdl prove sun-scan
   cubestack hdl wave whole_frame
 """
@@ -32,7 +32,7 @@ of a top they share logic.
 
 examples:
   cubestack hdl area
-  cubestack hdl area cubestar "Sun search"
+  cubestack hdl area "Sun search" "nadir scan"
   cubestack hdl area --ice40    a public yardstick beside it: iCE40 cells
   cubestack hdl area --ice40 --fmax --json    what each area.json in hdl/ tracks"""
 
@@ -42,8 +42,8 @@ stub of constraints as comments. Icarus Verilog, Yosys and Verilator take it
 without a warning.
 
 examples:
-  cubestack hdl verilog cubestar --out cubestar.v
-  cubestack hdl verilog cubesense-pair > pair.v  both FPGAs, to simulate"""
+  cubestack hdl verilog TOP --out top.v     any other word for TOP lists all of them
+  cubestack hdl verilog TOP | yosys -f verilog -p 'synth_ice40' -"""
 
 PROVE = """Prove, by induction, what the designs promise: for every length of time,
 every picture and every order of the clocks' edges. Each proof is then tried

@@ -33,7 +33,14 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     Sram,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, actions
-from cubestack.firmware_model.interface.cubesense.pins import ENABLE
+from cubestack.firmware_model.interface.cubesense.pins import (
+    COMMON_PINS,
+    CONTROLS,
+    EDGE,
+    ENABLE,
+    RNW,
+    SHIFT,
+)
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.firmware_model.mcu.costs import Meter
@@ -159,7 +166,7 @@ class CubeSenseBoard(Board):
 
     def _sites(self) -> Sites:
         return self._common_sites(
-            controls=("RNW", "EDGE", "SHIFT", *ENABLE),
+            controls=(RNW, EDGE, SHIFT, *ENABLE),
             cameras={
                 half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")
                 for camera, half in HALVES.items()
@@ -194,8 +201,8 @@ class CubeSenseBoard(Board):
     def _release_pins(self) -> None:
         """The processor is reset: its pins float to where resistors pull them."""
         self._advance_engine()
-        for pin in (*ENABLE, "RNW", "CLK", "EDGE", "SHIFT"):
-            self.engine.set_pin(pin, int(pin in ENABLE))
+        for pin in (*ENABLE, *COMMON_PINS):
+            self.engine.set_pin(pin, pin.level)
         self._command()
         self._lines.release()
         self.power.set_state("processor", "reset")
@@ -204,12 +211,12 @@ class CubeSenseBoard(Board):
         started.callbacks.append(lambda _event: self.power.set_state("processor", "on"))
 
     def _pin_changed(self, pin: str) -> None:
-        if pin in (*ENABLE, "RNW", "EDGE", "SHIFT"):
+        if pin in CONTROLS:
             self._command()
 
     def _command(self) -> None:
         """Follow what the control lines command: currents, and which frame is stored."""
-        levels = (self.engine.get_pin(pin) for pin in ("SHIFT", "EDGE", "RNW", *ENABLE))
+        levels = (self.engine.get_pin(pin) for pin in CONTROLS)
         commanded = actions(*levels)
         before, self._commanded = self._commanded, dict(zip(Camera, commanded, strict=True))
         for camera, action in self._commanded.items():
