@@ -4,8 +4,6 @@ AraMiS thesis, section 2.2. A setting telecommand stores its parameters; the oth
 take time. Only the supply is cut off in the interrupt itself: a latch-up does not wait.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from cubestack.firmware_model.aramis.camera import Camera
@@ -13,7 +11,6 @@ from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.catalogue.upload import CatalogueUpload
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.measurement import Measuring
-from cubestack.firmware_model.aramis.settings import SETTING_COMMANDS
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import (
     BLOCK_BYTES,
@@ -25,21 +22,19 @@ from cubestack.firmware_model.interface.aramis import (
 )
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
+from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
 __all__ = ["Commands"]
 
 STREAM_BACKLOG_BYTES = 4 * BLOCK_BYTES
-STREAM_PAUSE_US = 20_000
 
 
-class Commands:
+class Commands(CommandExecutor):
     """Executes telecommands.
 
     Attributes:
-        handled: names of the telecommands that have an effect.
-        running: whether one is being executed, the reset that it asked for included.
         upload: the catalogue that is being loaded.
     """
 
@@ -53,16 +48,15 @@ class Commands:
         measuring: Measuring,
     ) -> None:
         """Act on the given parts of the program."""
+        super().__init__(hardware, state.settings)
         self._hardware = hardware
         self._meter = meter
         self._state = state
         self._camera = camera
         self._catalogue = catalogue
         self._measuring = measuring
-        self.running = False
         self.upload = CatalogueUpload(hardware, meter, catalogue)
-        self._reset_cause: ResetCause | None = None
-        self._actions: dict[str, Callable[[QueuedCommand], None]] = {
+        self._actions |= {
             "SetSystemTime": self._set_time,
             "SetExposure": lambda _: measuring.restart(),
             "SetGain": lambda _: measuring.restart(),
@@ -75,7 +69,7 @@ class Commands:
             "ClearErrorFlags": lambda _: state.flags.clear(),
             "Reset": self._reset,
         }
-        self._routines: dict[str, Callable[[QueuedCommand], Routine[object]]] = {
+        self._routines |= {
             "Activate": self._activate,
             "Deactivate": self._deactivate,
             "GetAttitude": lambda _: measuring.measure(None),
@@ -90,26 +84,11 @@ class Commands:
             "WriteCameraRegister": self._write_register,
             "SelectCameraRegister": self._select_register,
         }
-        self.handled = frozenset({*SETTING_COMMANDS, *self._actions, *self._routines})
 
     def urgent(self, command: QueuedCommand) -> None:
         """Interrupt: what of an accepted telecommand can not wait for the main loop."""
         if command.message.name == "LatchUpAction" and command.values["Step"] == LatchUpStep.OFF:
             self._camera.cut()
-
-    def execute(self, command: QueuedCommand) -> Routine[ResetCause | None]:
-        """Execute ``command``; returns a cause when the program has to end in a reset."""
-        self.running = True
-        name = command.message.name
-        if name in SETTING_COMMANDS:
-            self._state.settings.put(name, command.values)
-        if name in self._actions:
-            self._actions[name](command)
-        if name in self._routines:
-            yield from self._routines[name](command)
-        yield Pay()
-        self.running = self._reset_cause is not None
-        return self._reset_cause
 
     # --- node -------------------------------------------------------------------------------------
 
@@ -239,9 +218,7 @@ class Commands:
 
     def _stream_image(self, _command: QueuedCommand) -> Routine[None]:
         for start in range(0, IMAGE_BYTES, BLOCK_BYTES):
-            while self._hardware.uart_backlog() > STREAM_BACKLOG_BYTES:
-                now_us: int = yield ReadTimer()
-                yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
+            yield from self._await_room(STREAM_BACKLOG_BYTES)
             self._hardware.uart_send(encode_frame(self._block(start)))
 
     def _write_register(self, command: QueuedCommand) -> Routine[None]:

@@ -6,9 +6,6 @@ Program code is not modelled, so flash must leave room for it. The Earth and the
 looked for at the same time, so their buffers share their places.
 """
 
-from dataclasses import dataclass
-from enum import Enum
-
 import numpy as np
 
 from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
@@ -23,6 +20,7 @@ from cubestack.firmware_model.interface.cubesense.telecommands import (
     DISTORTION_TERMS,
     TELECOMMANDS,
 )
+from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 __all__ = ["CAPACITY", "Buffer", "Memory", "budget", "report", "used"]
@@ -36,32 +34,8 @@ TASK_BYTES = 32
 """What the links and the main loop remember between two bytes or two steps: assumed."""
 
 
-class Memory(Enum):
-    """A memory of the part."""
-
-    RAM = "RAM"
-    FLASH = "flash"
-
-
 #: Size of each memory in bytes.
 CAPACITY = {Memory.RAM: 1536, Memory.FLASH: 32 * 1024}
-
-
-@dataclass(frozen=True)
-class Buffer:
-    """One buffer.
-
-    Attributes:
-        name: what it holds.
-        memory: where it lies.
-        size: in bytes.
-        inside: name of the buffer whose place it shares; empty when it has its own.
-    """
-
-    name: str
-    memory: Memory
-    size: int
-    inside: str = ""
 
 
 _WINDOW, _SUMS = "Sun window", "sums of the window's columns and of a row"
@@ -112,16 +86,6 @@ def _state_bytes() -> int:
     settings = INTERFACE.telemetry("Configuration").length
     boresights = sum(INTERFACE.telecommand(f"Boresight{camera + 1}").length for camera in Camera)
     return sum(INTERFACE.telemetry(name).length for name in shown) + settings + boresights
-
-
-def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
-    """Bytes in use of each memory."""
-    return {
-        memory: sum(
-            buffer.size for buffer in buffers if buffer.memory is memory and not buffer.inside
-        )
-        for memory in Memory
-    }
 
 
 def report() -> str:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.phases import Phases
-from cubestack.firmware_model.cubestar.pictures.copied import CopiedPictures, Pictures
+from cubestack.firmware_model.cubestar.pictures.contract import Pictures
+from cubestack.firmware_model.cubestar.pictures.copied import CopiedPictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus

@@ -4,14 +4,11 @@ A setting telecommand stores its parameters. Others act at once, or take time; a
 in which telecommands that still wait are lost.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.processing import Processing
-from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -24,7 +21,8 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     TestPattern,
 )
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
 __all__ = ["WATCHDOG_US", "Commands"]
@@ -33,15 +31,12 @@ WATCHDOG_US = 2_000_000
 """Period of the watchdog; ours, the sources give none."""
 
 STREAM_BACKLOG_BYTES = 512
-STREAM_PAUSE_US = 20_000
 
 
-class Commands:
+class Commands(CommandExecutor):
     """Executes telecommands.
 
     Attributes:
-        handled: names of the telecommands that have an effect.
-        running: whether one is being executed, the reset that it asked for included.
         memory_test: result of the last TestSRAM.
         next_block: upload block behind the latest one.
         blocks_received: upload blocks since UploadImage.
@@ -58,19 +53,18 @@ class Commands:
         supply: SupplyMonitor,
     ) -> None:
         """Act on the given parts of the program."""
+        super().__init__(hardware, state.settings)
         self._hardware = hardware
         self._meter = meter
         self._state = state
         self._capture = capture
         self._processing = processing
         self._supply = supply
-        self.running = False
         self.memory_test = MemoryTest.NOT_RUN
         self.next_block = 0
         self.blocks_received = 0
         self.second_half = False
-        self._reset_cause: ResetCause | None = None
-        self._actions: dict[str, Callable[[QueuedCommand], None]] = {
+        self._actions |= {
             "Reset": self._reset,
             "MCUReset": self._reset_processor,
             "ClearWDGResetCounter": self._clear_watchdog_count,
@@ -82,7 +76,7 @@ class Commands:
             "ClearConfig": lambda _: state.erase_config(),
             "StopLoop": self._stop_loop,
         }
-        self._routines: dict[str, Callable[[QueuedCommand], Routine[object]]] = {
+        self._routines |= {
             "TogglePowerSW": self._toggle_supply,
             "WriteTo_IS_Register": self._write_paged_register,
             "ReadFrom_IS_Register": self._read_paged_register,
@@ -103,21 +97,6 @@ class Commands:
             "ProcessImage": lambda _: processing.process(),
             "Trigger": self._trigger,
         }
-        self.handled = frozenset({*SETTING_COMMANDS, *self._actions, *self._routines})
-
-    def execute(self, command: QueuedCommand) -> Routine[ResetCause | None]:
-        """Execute ``command``; returns a cause when the program has to end in a reset."""
-        self.running = True
-        name = command.message.name
-        if name in SETTING_COMMANDS:
-            self._state.settings.put(name, command.values)
-        if name in self._actions:
-            self._actions[name](command)
-        if name in self._routines:
-            yield from self._routines[name](command)
-        yield Pay()
-        self.running = self._reset_cause is not None
-        return self._reset_cause
 
     # --- node ---------------------------------------------------------------------------------
 
@@ -204,9 +183,7 @@ class Commands:
     def _stream_image(self, _command: QueuedCommand) -> Routine[None]:
         step = UPLOAD_BLOCK_BYTES
         for start in range(0, IMAGE_BYTES, step):
-            while self._hardware.uart_backlog() > STREAM_BACKLOG_BYTES:
-                now_us: int = yield ReadTimer()
-                yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
+            yield from self._await_room(STREAM_BACKLOG_BYTES)
             block = yield from self._capture.pictures.read(start, step)
             self._hardware.uart_send(encode_frame(block))
             self._meter.charge(loop=step)

@@ -7,9 +7,6 @@ from the tables, the settings' limits and the catalogue, wherever these decide. 
 modelled, so flash and RAM must leave room for it.
 """
 
-from dataclasses import dataclass
-from enum import Enum
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +22,7 @@ from cubestack.firmware_model.cubestar.state import (
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
 from cubestack.firmware_model.node.link import longest_command
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
@@ -55,15 +53,6 @@ DIRECTIONS = 500
 """In which the reduced catalogue is tried, about 9 deg apart."""
 
 
-class Memory(Enum):
-    """A memory of the processor board."""
-
-    RAM = "RAM"
-    FLASH = "flash"
-    EXTERNAL_RAM = "external SRAM"
-    RETENTION = "retention registers"
-
-
 #: Size of each memory in bytes.
 CAPACITY = {
     Memory.RAM: 128 * KB,
@@ -71,15 +60,6 @@ CAPACITY = {
     Memory.EXTERNAL_RAM: EXTERNAL_RAM_BYTES,
     Memory.RETENTION: RETENTION_BYTES,
 }
-
-
-@dataclass(frozen=True)
-class Buffer:
-    """One buffer: its name, where it lies, its size in bytes."""
-
-    name: str
-    memory: Memory
-    size: int
 
 
 def _limit(command: str, field: str) -> int:
@@ -131,14 +111,6 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         ),
         Buffer("settings, flags and counters", Memory.RETENTION, State.RETENTION_SIZE),
     )
-
-
-def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
-    """Bytes in use of each memory."""
-    return {
-        memory: sum(buffer.size for buffer in buffers if buffer.memory is memory)
-        for memory in Memory
-    }
 
 
 def _largest_reduction(catalogue: StarCatalogue) -> int:

@@ -13,7 +13,7 @@ from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.phases import Phases
-from cubestack.firmware_model.cubestar.pictures.copied import ITERATION_US
+from cubestack.firmware_model.cubestar.pictures.contract import ITERATION_US
 from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
@@ -101,7 +101,7 @@ class CubeStarProgram:
                 yield from self._reset(cause)
         return waiting
 
-    def _reset(self, cause: ResetCause) -> Routine[None]:
+    def _reset(self, cause: int) -> Routine[None]:
         yield Pay()  # so that nothing can happen between the next line and the reset
         self.state.retained.reset_us = yield ReadTimer()
         self.state.retain()

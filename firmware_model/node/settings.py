@@ -12,11 +12,16 @@ __all__ = ["Settings"]
 
 
 class Settings:
-    """Current parameters of every setting telecommand."""
+    """Current parameters of every setting telecommand.
+
+    Attributes:
+        commands: names of these telecommands.
+    """
 
     def __init__(self, interface: Interface, commands: Iterable[str]) -> None:
         """Start with the reset values that ``interface`` declares for ``commands``."""
-        self._messages = {name: interface.telecommand(name) for name in commands}
+        self.commands = tuple(commands)
+        self._messages = {name: interface.telecommand(name) for name in self.commands}
         self._values: dict[str, dict[str, Any]] = {}
         self.clear()
 
@@ -38,18 +43,18 @@ class Settings:
 
     def size(self, *commands: str) -> int:
         """Bytes of the parameters of ``commands``, in their order; of all when none is named."""
-        return sum(self._messages[name].length for name in commands or self._messages)
+        return sum(self._messages[name].length for name in commands or self.commands)
 
     def pack(self, *commands: str) -> bytes:
         """Parameters of ``commands``, ``size`` bytes."""
-        names = commands or self._messages
+        names = commands or self.commands
         return b"".join(self._messages[name].pack(**self._values[name]) for name in names)
 
     def unpack(self, data: bytes, *commands: str) -> None:
         """Restore what ``pack`` gave; other lengths raise ValueError."""
         if len(data) != self.size(*commands):
             raise ValueError(f"stored settings have {len(data)} bytes, not {self.size(*commands)}")
-        for name in commands or self._messages:
+        for name in commands or self.commands:
             message = self._messages[name]
             self._values[name] = message.unpack(data[: message.length])
             data = data[message.length :]

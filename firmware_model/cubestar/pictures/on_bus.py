@@ -5,7 +5,7 @@ addresses are those of ``docs/gateware-cubestar-next.md``; ours, as none of it w
 pixels are zeroed and written back over the bus.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,12 @@ from cubestack.firmware_model.cubestar.detection import (
     search_stars,
 )
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.cubestar.pictures.copied import (
+from cubestack.firmware_model.cubestar.pictures.contract import (
     ITERATION_US,
-    CopiedPictures,
     Pictures,
     test_pattern,
 )
+from cubestack.firmware_model.cubestar.pictures.copied import CopiedPictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -44,7 +44,7 @@ __all__ = ["pictures_of"]
 FAST_ITERATION_US = 500_000
 
 
-class _BusPictures(ABC):
+class _BusPictures(Pictures):
     """What these layouts share.
 
     A place is where a picture can be; ``Retained.image_place`` has that of the newest one.
@@ -56,27 +56,8 @@ class _BusPictures(ABC):
     memories: tuple[tuple[int, int, int], ...]
     """Chip select, first address and size of each memory."""
 
-    def __init__(
-        self, hardware: CubeStarHardware, state: State, meter: Meter, supply: SupplyMonitor
-    ) -> None:
-        """Reach the memories by ``hardware``'s bus."""
-        self._hardware = hardware
-        self._state = state
-        self._meter = meter
-        self._supply = supply
-        self._open = False
-
-    @abstractmethod
-    def start(self) -> Routine[None]:
-        """Set the pins up after a reset."""
-
-    @abstractmethod
-    def begin(self) -> Routine[None]:
-        """Let the FPGA store the next whole frame."""
-
-    @abstractmethod
-    def end(self, stored: bool) -> Routine[None]:
-        """Let it stop."""
+    _open = False
+    """Whether the bus leads to the newest picture."""
 
     @abstractmethod
     def _address_of(self, place: int) -> tuple[int, int]:
@@ -290,7 +271,7 @@ def _pin(board: int, name: str) -> str:
     return BOARD_PREFIXES[board] + name
 
 
-_KINDS: dict[Layout, type[CopiedPictures | _BusPictures]] = {
+_KINDS: dict[Layout, type[Pictures]] = {
     Layout.COPIED: CopiedPictures,
     Layout.SHARED: SharedPictures,
     Layout.TWO_MEMORIES: TwoMemoryPictures,

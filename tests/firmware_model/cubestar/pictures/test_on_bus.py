@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, detect_stars
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
-from cubestack.firmware_model.cubestar.pictures.copied import ITERATION_US, Pictures
+from cubestack.firmware_model.cubestar.pictures.contract import ITERATION_US, Pictures
 from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor

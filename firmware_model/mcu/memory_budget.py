@@ -1,0 +1,42 @@
+"""Which buffers a program keeps in which memory, and how much of it they take."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+__all__ = ["Buffer", "Memory", "used"]
+
+
+class Memory(Enum):
+    """A memory of a processor board."""
+
+    RAM = "RAM"
+    FLASH = "flash"
+    EXTERNAL_RAM = "external SRAM"
+    RETENTION = "retention registers"
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """One buffer.
+
+    Attributes:
+        name: what it holds.
+        memory: where it lies.
+        size: in bytes.
+        inside: name of the buffer whose place it shares; empty when it has its own.
+    """
+
+    name: str
+    memory: Memory
+    size: int
+    inside: str = ""
+
+
+def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
+    """Bytes in use of each memory that holds a buffer."""
+    there = {buffer.memory for buffer in buffers}
+    return {
+        memory: sum(b.size for b in buffers if b.memory is memory and not b.inside)
+        for memory in Memory
+        if memory in there
+    }

@@ -1,0 +1,55 @@
+"""Executes telecommands, one after the other, in the main loop."""
+
+from collections.abc import Callable
+from typing import Any
+
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.node.hardware import NodeHardware
+from cubestack.firmware_model.node.queue import QueuedCommand
+from cubestack.firmware_model.node.settings import Settings
+
+__all__ = ["CommandExecutor"]
+
+STREAM_PAUSE_US = 20_000
+
+
+class CommandExecutor:
+    """What telecommands do: settings are stored, actions done at once, routines take time.
+
+    Attributes:
+        running: whether one is being executed, the reset that it asked for included.
+    """
+
+    def __init__(self, hardware: NodeHardware, settings: Settings) -> None:
+        """Store into ``settings``; a node adds its actions and routines by telecommand."""
+        self._uart = hardware
+        self._settings = settings
+        self._actions: dict[str, Callable[[QueuedCommand], None]] = {}
+        self._routines: dict[str, Callable[[QueuedCommand], Routine[Any]]] = {}
+        self._reset_cause: int | None = None
+        self.running = False
+
+    @property
+    def handled(self) -> frozenset[str]:
+        """Names of the telecommands that have an effect."""
+        return frozenset({*self._settings.commands, *self._actions, *self._routines})
+
+    def execute(self, command: QueuedCommand) -> Routine[int | None]:
+        """Execute ``command``; returns a cause when the program has to end in a reset."""
+        self.running = True
+        name = command.message.name
+        if name in self._settings.commands:
+            self._settings.put(name, command.values)
+        if name in self._actions:
+            self._actions[name](command)
+        if name in self._routines:
+            yield from self._routines[name](command)
+        yield Pay()
+        self.running = self._reset_cause is not None
+        return self._reset_cause
+
+    def _await_room(self, backlog_bytes: int) -> Routine[None]:
+        """Sleep until the UART has no more than ``backlog_bytes`` to send."""
+        while self._uart.uart_backlog() > backlog_bytes:
+            now_us: int = yield ReadTimer()
+            yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
