@@ -16,7 +16,15 @@ import simpy
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["CurrentTarget", "I2cBus", "I2cError", "I2cFaultHook", "I2cMessage", "I2cTarget"]
+__all__ = [
+    "CurrentTarget",
+    "I2cBus",
+    "I2cError",
+    "I2cFaultHook",
+    "I2cMessage",
+    "I2cTap",
+    "I2cTarget",
+]
 
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
@@ -92,6 +100,18 @@ class I2cFaultHook(Protocol):
         """A byte was sent by the host, or by the target, and is not acknowledged yet."""
 
 
+class I2cTap(Protocol):
+    """Listens to whole transfers and changes nothing."""
+
+    def transfer_began(self, messages: list[I2cMessage]) -> None:
+        """A host wants this transfer from now on, behind those already under way."""
+
+    def transfer_ended(
+        self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
+    ) -> None:
+        """It has ended now, read data in the messages; with ``error``, not all of it was done."""
+
+
 class CurrentTarget:
     """Hands every call on to the program that runs now, which a reset replaces."""
 
@@ -123,6 +143,7 @@ class I2cBus:
         kernel: virtual time.
         bit_ps: time of one bit.
         fault_hook: what is on the wires, if anything.
+        taps: who else listens.
     """
 
     def __init__(self, kernel: Kernel, hz: int = 100_000) -> None:
@@ -135,6 +156,7 @@ class I2cBus:
         self._taken = False
         self._turns: deque[simpy.Event] = deque()
         self.fault_hook: I2cFaultHook | None = None
+        self.taps: list[I2cTap] = []
         self.bit_ps = PS_PER_S // hz
 
     def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
@@ -168,6 +190,19 @@ class I2cBus:
 
         Read data lands in the messages. Raises I2cError, after the stop condition.
         """
+        began_ps, failure = self.kernel.now, None
+        for tap in self.taps:
+            tap.transfer_began(messages)
+        try:
+            yield from self._in_turn(messages)
+        except BaseException as error:
+            failure = error
+            raise
+        finally:
+            for tap in self.taps:
+                tap.transfer_ended(messages, began_ps, failure)
+
+    def _in_turn(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         if self._taken:
             yield from self._take_turn()
         self._taken = True

@@ -5,14 +5,11 @@ its way is not on record, so that it can be done again. The format is that of
 ``firmware_model.formats.recording``; ``replay`` plays it back.
 """
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from types import TracebackType
-from typing import IO, Any, Self
-
-import simpy
+from typing import IO, Self
 
 from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
-from cubestack.emulator.bus.i2c_tap import BusTap
 from cubestack.emulator.bus.uart import Uart
 from cubestack.firmware_model.formats.recording import (
     BusMessage,
@@ -25,7 +22,7 @@ from cubestack.firmware_model.formats.recording import (
 )
 from cubestack.firmware_model.formats.setup import Setup
 
-__all__ = ["RecordedBus", "Recorder"]
+__all__ = ["Recorder"]
 
 BLOCK_BYTES = 256
 """Longest run of bytes in one event."""
@@ -44,11 +41,13 @@ class Recorder:
         """Record ``uarts`` by the names of their ports; ``stream`` stays its owner's."""
         bauds = {port: uart.form.baud for port, uart in uarts.items()}
         self._writer = RecordingWriter(stream, device, bauds, setup)
-        self._taps = [_Tap(self._writer, port, uart) for port, uart in uarts.items()]
+        self._taps: list[_LineTap | _BusTap] = [
+            _LineTap(self._writer, port, uart) for port, uart in uarts.items()
+        ]
 
-    def bus(self, bus: I2cBus, port: str = "i2c") -> "RecordedBus":
-        """``bus``, with its transfers on record; to be used in its place."""
-        return RecordedBus(bus, port, self._writer)
+    def listen(self, bus: I2cBus, port: str = "i2c") -> None:
+        """Record the transfers of ``bus`` as well."""
+        self._taps.append(_BusTap(self._writer, port, bus))
 
     def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
         """The device was told so, from outside of its ports; see ``Control``."""
@@ -73,7 +72,7 @@ class Recorder:
         self.close()
 
 
-class _Tap:
+class _LineTap:
     """Joins bytes that follow each other without a gap."""
 
     def __init__(self, writer: RecordingWriter, port: str, uart: Uart) -> None:
@@ -121,24 +120,24 @@ class _Tap:
             self._data.clear()
 
 
-class RecordedBus(BusTap):
-    """An I2C bus with its transfers on record."""
+class _BusTap:
+    """An I2C bus on record."""
 
-    def __init__(self, bus: I2cBus, port: str, writer: RecordingWriter) -> None:
-        """Stand in for ``bus``."""
-        super().__init__(bus)
-        self._port = port
+    def __init__(self, writer: RecordingWriter, port: str, bus: I2cBus) -> None:
         self._writer = writer
+        self._port = port
+        self._bus = bus
+        bus.taps.append(self)
 
-    def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
-        """See I2cBus."""
-        start_ps, errno = self.kernel.now, 0
-        try:
-            yield from self._bus.transfer(messages)
-        except I2cError as error:
-            errno = error.errno or 0
-            raise
-        finally:
-            found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
-            event = BusTransfer(start_ps, self._port, self.kernel.now, found, errno)
-            self._writer.write(event)
+    def transfer_began(self, messages: list[I2cMessage]) -> None:
+        pass
+
+    def transfer_ended(
+        self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
+    ) -> None:
+        errno = error.errno or 0 if isinstance(error, I2cError) else 0
+        found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
+        self._writer.write(BusTransfer(began_ps, self._port, self._bus.kernel.now, found, errno))
+
+    def close(self) -> None:
+        self._bus.taps.remove(self)

@@ -11,20 +11,18 @@ Times are rounded down to 1 ns.
 """
 
 import heapq
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from itertools import count
 from typing import IO, Any
 
-import simpy
 from vcd import VCDWriter
 
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
-from cubestack.emulator.bus.i2c_tap import BusTap
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["Probes", "TracedBus", "VcdTrace"]
+__all__ = ["Probes", "VcdTrace"]
 
 PS_PER_NS = 1000
 
@@ -59,17 +57,17 @@ class VcdTrace:
         for name, value in probes().items():
             self._declare(f"firmware.{name}", None if isinstance(value, str) else 32)
         self._pins = self._declare_pins()
-        self._taps = [(uart, _LineTap(self, port, uart)) for port, uart in uarts.items()]
-        for uart, tap in self._taps:
-            uart.taps.append(tap)
+        self._taps: list[_LineTap | _BusTap] = [
+            _LineTap(self, port, uart) for port, uart in uarts.items()
+        ]
         self._look()
         # SimPy has no hook for observers but the method itself.
         self._step = kernel.step
         vars(kernel)["step"] = self._observed_step
 
-    def bus(self, bus: I2cBus, port: str = "i2c") -> "TracedBus":
-        """``bus``, with its transfers in the trace; to be used in its place."""
-        return TracedBus(self, bus, port)
+    def listen(self, bus: I2cBus, port: str = "i2c") -> None:
+        """Trace the transfers of ``bus`` as well."""
+        self._taps.append(_BusTap(self, bus, port))
 
     def put(self, time_ps: int, name: str, value: int | str) -> None:
         """A declared variable has a value from ``time_ps`` on."""
@@ -79,16 +77,11 @@ class VcdTrace:
         """A variable, dots between its scopes; ``bits`` None is a text."""
         self._declare(name, bits, init)
 
-    @property
-    def now_ps(self) -> int:
-        """Virtual time."""
-        return self._kernel.now
-
     def close(self) -> None:
         """Write what is pending and detach."""
         vars(self._kernel).pop("step", None)
-        for uart, tap in self._taps:
-            uart.taps.remove(tap)
+        for tap in self._taps:
+            tap.close()
         self._flush(None)
         self._writer.close(max(self._written_ns, self._kernel.now // PS_PER_NS))
 
@@ -150,6 +143,10 @@ class _LineTap:
             trace.declare(f"{port}.{direction}_byte", 8)
         trace.declare(f"{port}.framing_errors", 32)
         self._uart = uart
+        uart.taps.append(self)
+
+    def close(self) -> None:
+        self._uart.taps.remove(self)
 
     def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         for index, byte in enumerate(data):
@@ -170,32 +167,34 @@ class _LineTap:
                 last = level
 
 
-class TracedBus(BusTap):
-    """An I2C bus with its transfers in a trace."""
+class _BusTap:
+    """An I2C bus in the trace."""
 
     def __init__(self, trace: VcdTrace, bus: I2cBus, port: str) -> None:
-        """Stand in for ``bus``."""
         self._trace = trace
-        super().__init__(bus)
+        self._bus = bus
         self._port = port
         trace.declare(f"{port}.busy", 1)
         trace.declare(f"{port}.address", 8)
         trace.declare(f"{port}.transfer", None, "")
+        bus.taps.append(self)
 
-    def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
-        """See I2cBus."""
+    def transfer_began(self, messages: list[I2cMessage]) -> None:
         self._put("busy", 1)
         self._put("address", messages[0].address & 0xFF if messages else 0)
-        outcome = "refused"
-        try:
-            yield from self._bus.transfer(messages)
-            outcome = ",".join(
-                f"{'R' if m.reading else 'W'}{m.address:02x}:{bytes(m.data).hex()}"
-                for m in messages
-            )
-        finally:
-            self._put("busy", 0)
-            self._put("transfer", outcome)
+
+    def transfer_ended(
+        self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
+    ) -> None:
+        del began_ps
+        self._put("busy", 0)
+        found = (
+            f"{'R' if m.reading else 'W'}{m.address:02x}:{bytes(m.data).hex()}" for m in messages
+        )
+        self._put("transfer", "refused" if error else ",".join(found))
+
+    def close(self) -> None:
+        self._bus.taps.remove(self)
 
     def _put(self, name: str, value: int | str) -> None:
-        self._trace.put(self._trace.now_ps, f"{self._port}.{name}", value)
+        self._trace.put(self._bus.kernel.now, f"{self._port}.{name}", value)

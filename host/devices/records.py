@@ -19,13 +19,13 @@ __all__ = ["create_file", "start_recorder", "start_trace"]
 def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None = None) -> Recorder:
     """Record every byte of all ports; before any port is opened.
 
-    The board's I2C bus is replaced by one that is listened to. ``setup`` goes into the header.
+    ``setup`` goes into the header.
     """
     from cubestack.emulator.recording.recorder import Recorder
 
     board = emulated.board
     recorder = Recorder(stream, emulated.device.name, board.uarts, setup)
-    board.i2c_bus = recorder.bus(board.i2c_bus)
+    recorder.listen(board.i2c_bus)
     return recorder
 
 
@@ -37,7 +37,7 @@ def start_trace(emulated: AnyEmulated, stream: IO[str]) -> VcdTrace:
     trace = VcdTrace(
         stream, emulated.device.name, board.kernel, board.uarts, board.engine, board.probes
     )
-    board.i2c_bus = trace.bus(board.i2c_bus)
+    trace.listen(board.i2c_bus)
     return trace
 
 

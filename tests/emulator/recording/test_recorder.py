@@ -56,12 +56,12 @@ class Device:
 def record(path: Path, writes: list[tuple[int, bytes]], transfers: int = 2) -> Recording:
     device, stream = Device(), io.StringIO()
     with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
-        bus = recorder.bus(device.bus)
+        recorder.listen(device.bus)
 
         def talk():
             for _ in range(transfers):
                 messages = [I2cMessage(0x1B, bytearray(b"\x80")), I2cMessage(0x1B, read=3)]
-                yield device.kernel.process(bus.transfer(messages))
+                yield device.kernel.process(device.bus.transfer(messages))
                 yield device.kernel.timeout(PS_PER_MS)
 
         device.kernel.process(talk())
@@ -124,10 +124,10 @@ def test_delay_is_named(tmp_path):
 def test_failed_transfer_is_on_record(tmp_path):
     device, stream = Device(), io.StringIO()
     with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
-        bus = recorder.bus(device.bus)
+        recorder.listen(device.bus)
         with pytest.raises(I2cError):
             device.kernel.run(
-                device.kernel.process(bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))]))
+                device.kernel.process(device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))]))
             )
     (tmp_path / "a.rec").write_text(stream.getvalue())
     recording = load_recording(tmp_path / "a.rec")

@@ -93,13 +93,13 @@ def test_probes_and_transfers():
     bus = I2cBus(kernel)
     bus.attach(0x1A, Target())
     trace = VcdTrace(stream, "board", kernel, {}, None, lambda: state)
-    traced = trace.bus(bus)
+    trace.listen(bus)
 
     def run():
         yield kernel.timeout(1_000_000)
         state["task"] = "BUSY"
         state["n"] = 5
-        yield from traced.transfer([I2cMessage(0x1A, bytearray(b"\1")), I2cMessage(0x1A, read=1)])
+        yield from bus.transfer([I2cMessage(0x1A, bytearray(b"\1")), I2cMessage(0x1A, read=1)])
 
     kernel.process(run())
     kernel.run()
@@ -115,6 +115,11 @@ def test_probes_and_transfers():
 def test_trace_leaves_nothing_behind():
     kernel = Kernel()
     uart = Uart(kernel, BAUD, lambda _byte: None, lambda: None, silence_bytes=10)
-    VcdTrace(io.StringIO(), "board", kernel, {"uart": uart}).close()
-    assert uart.taps == []
+    bus = I2cBus(kernel)
+    trace = VcdTrace(io.StringIO(), "board", kernel, {"uart": uart})
+    trace.listen(bus)
+    assert uart.taps
+    assert bus.taps
+    trace.close()
+    assert uart.taps == bus.taps == []
     assert "step" not in vars(kernel)

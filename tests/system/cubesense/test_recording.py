@@ -33,7 +33,7 @@ def recorded(opened, scene, tmp_path) -> Recording:
         Recorder(stream, "cubesense", lines(session.board)) as recorder,
     ):
         board = session.board
-        board.i2c_bus = recorder.bus(board.i2c_bus)
+        recorder.listen(board.i2c_bus)
         session.cubesense.capture_and_detect(Camera.SUN)
         session.cubesense.client.telemetry("Configuration")
         session.bench.take(Camera.NADIR)
