@@ -120,19 +120,19 @@ class CurrentTarget:
         self._link = link
 
     def i2c_start(self, read: bool) -> None:
-        """See I2cTarget."""
+        """A (repeated) start."""
         self._link().i2c_start(read)
 
     def i2c_write(self, byte: int) -> bool:
-        """See I2cTarget."""
+        """A byte came."""
         return self._link().i2c_write(byte)
 
     def i2c_read(self) -> int | None:
-        """See I2cTarget."""
+        """The next byte to send."""
         return self._link().i2c_read()
 
     def i2c_stop(self) -> None:
-        """See I2cTarget."""
+        """The transfer ended."""
         self._link().i2c_stop()
 
 

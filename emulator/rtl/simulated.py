@@ -66,7 +66,7 @@ class SimulatedEngine(SteppingEngine):
         simulator = Simulator(wiring.component)
         simulator.add_testbench(lend_context)
         simulator.advance()
-        # All time is ours, the simulator only has to settle: its context does that in every set().
+        # Time is this class's; the simulator only has to settle: its context does that in every set().
         self._context = contexts[0]
         self._settle(0)
 

@@ -1,6 +1,6 @@
 """Copies of a design in which some pins have fixed levels, for long bursts at these levels.
 
-With CubeSense's control lines fixed, nearly all of the two FPGAs is in reset. Yosys then leaves a
+With a design's control lines fixed, much of it may be in reset, as of two linked FPGAs. Yosys then leaves a
 few registers of some eighty, and resolves the link's clock to a pin.
 
 Every register that can still change stays, whether an output shows it or not, because its state
