@@ -66,7 +66,7 @@ class SimulatedEngine(SteppingEngine):
         simulator = Simulator(wiring.component)
         simulator.add_testbench(lend_context)
         simulator.advance()
-        # Time is this class's; the simulator only has to settle: its context does that in every set().
+        # Time is kept here; the simulator only has to settle: its context does so in every set().
         self._context = contexts[0]
         self._settle(0)
 

@@ -1,7 +1,7 @@
 """Copies of a design in which some pins have fixed levels, for long bursts at these levels.
 
-With a design's control lines fixed, much of it may be in reset, as of two linked FPGAs. Yosys then leaves a
-few registers of some eighty, and resolves the link's clock to a pin.
+With its control lines fixed, nearly all of a pair of FPGAs may be in reset. Yosys then leaves a few
+registers of some eighty, and resolves the link's clock to a pin.
 
 Every register that can still change stays, whether an output shows it or not, because its state
 goes back to the whole design after the burst. A register without reset whose clock is fixed holds
