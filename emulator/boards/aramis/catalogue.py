@@ -7,8 +7,8 @@ stars, and every triangle whose sides are all shorter than the field is listed.
 The thesis counts 1312 stars and 265 292 triangles in the Bright Star Catalogue at epoch 2000; those
 from Hipparcos are 1324 and 267 128. Magnitudes are enough to explain that: each field's sixth star
 hangs on them, and magnitudes shifted at random by 0.05 give 1316 to 1330 stars and 262 560 to
-273 131 triangles in five trials. Double stars closer than 30 arcsec taken as one would give 1325 and
-268 137. The stars' numbers are Hipparcos' too: the package that carries the catalogue has no
+273 131 triangles in five trials. Double stars closer than 30 arcsec taken as one would give 1325
+and 268 137. The stars' numbers are Hipparcos' too: the package that carries the catalogue has no
 cross-identification with the Harvard Revised numbers that the thesis reports.
 """
 
