@@ -75,6 +75,10 @@ class Pin(str):
             pin.level_in = f"{name}_I" if direction == "inout" else None
         return pin
 
+    def __reduce__(self) -> tuple[type["Pin"], tuple[str, Direction, str], dict[str, object]]:
+        """How copies are made: the least declaration, then all attributes."""
+        return Pin, (str(self), self.direction, self.meaning), self.__dict__
+
     def but(self, name: str = "", *, meaning: str = "", width: int = 0) -> "Pin":
         """The same pin with another name, meaning or width."""
         return Pin(
