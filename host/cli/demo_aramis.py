@@ -12,7 +12,7 @@ from cubestack.host.cli.terminal import console, progress_bar
 from cubestack.host.clients.aramis.client import Aramis, Attitude
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.experiments.cubestar import compare
-from cubestack.host.pictures.frames import annotate, save_picture
+from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.transport.streams import open_transport
 
 __all__ = ["show"]

@@ -15,8 +15,8 @@ from cubestack.host.cli.terminal import console, progress_bar
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.pictures.earth_sun import annotate_nadir, annotate_sun
-from cubestack.host.pictures.frames import save_picture
+from cubestack.host.pictures.cubesense import annotate_nadir, annotate_sun
+from cubestack.host.pictures.images import save_picture
 from cubestack.host.transport.streams import open_transport
 
 __all__ = ["show"]

@@ -17,7 +17,7 @@ from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.experiments.cubestar import compare
-from cubestack.host.pictures.frames import annotate, save_picture
+from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.transport.streams import open_transport
 
 __all__ = ["RENDERED", "show"]

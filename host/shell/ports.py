@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import TargetError
-from cubestack.host.pictures.frames import save_picture
+from cubestack.host.pictures.images import save_picture
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count
 from cubestack.host.transport.streams import Transport
 

@@ -1,4 +1,4 @@
-"""Pictures for people: a frame as PNG, and a frame with its stars marked."""
+"""Pictures for people: grey values as PNG, and a picture with its stars marked."""
 
 from collections.abc import Sequence
 from pathlib import Path
