@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from cubestack.host.devices.emulated import AnyEmulated, EmulatedDevice
     from cubestack.host.devices.registry import device_names
     from cubestack.host.errors import HostError
+    from cubestack.host.transport.smbus import CubeSMBus
 
     # What a type checker sees: which name gives which client. See ``host.devices`` for the rest.
     @overload
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Aramis",
     "BoardOption",
+    "CubeSMBus",
     "CubeSense",
     "CubeStar",
     "Device",
@@ -97,6 +99,7 @@ __version__: Final = version("cubestack")
 _HOMES: Final = {
     "Aramis": "host.clients.aramis.client",
     "BoardOption": "host.devices.device",
+    "CubeSMBus": "host.transport.smbus",
     "CubeSense": "host.clients.cubesense.client",
     "CubeStar": "host.clients.cubestar.client",
     "Device": "host.devices.device",
