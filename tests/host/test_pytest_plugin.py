@@ -1,5 +1,6 @@
 """The plugin in a pytest of its own, as a user's project would have it."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.host.devices.registry import device_names
 
 PLUGIN = "cubestack.host.pytest_plugin"
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -60,19 +62,32 @@ def test_seeds_come_from_the_command_line(run: Run) -> None:
     assert run(text, "--cubestack-seed=8").returncode == 0
 
 
-@pytest.mark.parametrize(
-    ("marker", "message"),
-    [
-        ("(3)", "marker cubestack takes scene, seed, faults by name, nothing else"),
-        ("(sead=3)", "marker cubestack takes scene, seed, faults by name, nothing else"),
-        ("(faults='seed = -1')", "seed must be a whole number from 0, not -1"),
-        ("(faults='none.toml')", "none.toml: No such file or directory"),
-    ],
-)
-def test_what_a_marker_gets_wrong(run: Run, marker: str, message: str) -> None:
-    done = run(f"@pytest.mark.cubestack{marker}\ndef test_it(cubestar): pass\n")
+WRONG_MARKERS = {
+    "(3)": "marker cubestack takes scene, seed, faults by name, nothing else",
+    "(sead=3)": "marker cubestack takes scene, seed, faults by name, nothing else",
+    "(faults='seed = -1')": "seed must be a whole number from 0, not -1",
+    "(faults='none.toml')": "none.toml: No such file or directory",
+}
+
+
+def test_what_a_marker_gets_wrong(run: Run) -> None:
+    done = run(
+        "".join(
+            f"@pytest.mark.cubestack{marker}\ndef test_{number}(aramis): pass\n"
+            for number, marker in enumerate(WRONG_MARKERS)
+        )
+    )
     assert done.returncode == 1
-    assert message in done.stdout
+    told = re.findall(r"^E  +(.*)", done.stdout, re.MULTILINE)
+    assert len(told) == len(WRONG_MARKERS)
+    for line, message in zip(told, WRONG_MARKERS.values(), strict=True):
+        assert message in line
+
+
+def test_every_registered_device_has_a_fixture(run: Run) -> None:
+    done = run("", "--fixtures", "-v")
+    for name in device_names():
+        assert f"\n{name} -- " in done.stdout
 
 
 def test_the_plugin_costs_nothing_before_it_is_used(run: Run) -> None:
