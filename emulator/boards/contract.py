@@ -79,6 +79,7 @@ class Board(ABC):
         lines: serial lines, the satellite's first.
         engine: FPGAs and their SRAMs; None on a board without.
         processor: microcontroller with the running program.
+        program: firmware program that runs now; a reset makes a new one.
     """
 
     random_stream: ClassVar[tuple[int, ...]] = ()
@@ -86,6 +87,7 @@ class Board(ABC):
 
     engine: RtlEngine | None = None
     processor: Processor
+    program: Program
 
     def __init__(
         self, power: PowerTable, *, seed: int, kernel: Kernel | None, i2c_bus: I2cBus | None
@@ -111,11 +113,6 @@ class Board(ABC):
         self.power = PowerModel(self.kernel, power)
         self.lines: tuple[SerialLine, ...] = ()
         self._rng = np.random.default_rng([seed, *self.random_stream])
-
-    @property
-    @abstractmethod
-    def program(self) -> Program:
-        """The firmware program that runs now."""
 
     @property
     @abstractmethod

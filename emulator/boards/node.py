@@ -38,6 +38,7 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
     costs: ClassVar[CostTable]
     scene_type: ClassVar[type[Any]]
     boot_us: ClassVar[int] = 1_000
+    program: ProgramT
 
     def __init__(
         self,
@@ -73,8 +74,8 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         meter = Meter(self.costs)
 
         def boot(_cause: int) -> ProgramT:
-            self._program = self._boot(meter)
-            return self._program
+            self.program = self._boot(meter)
+            return self.program
 
         self.processor = Processor(
             self.kernel,
@@ -94,11 +95,6 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
     def _wiring(self) -> Wiring | None:
         """What is soldered to its FPGA; None without one."""
         return None
-
-    @property
-    def program(self) -> ProgramT:
-        """The firmware program that runs now."""
-        return self._program
 
     @property
     def scene(self) -> SceneT:

@@ -61,6 +61,7 @@ class AramisBoard(Board):
     """
 
     random_stream = (0xA7A,)
+    program: AramisProgram
 
     def __init__(
         self,
@@ -109,7 +110,8 @@ class AramisBoard(Board):
             self._hardware.reset_cause = cause
             self._frames.clear()
             self._frame = 0
-            return AramisProgram(self._hardware, meter)
+            self.program = AramisProgram(self._hardware, meter)
+            return self.program
 
         self.processor = Processor(
             self.kernel,
@@ -123,13 +125,6 @@ class AramisBoard(Board):
         )
         self.power.on_switch = self._supply_switched
         self._show_camera()
-
-    @property
-    def program(self) -> AramisProgram:
-        """The firmware program that runs now."""
-        program = self.processor.program
-        assert isinstance(program, AramisProgram)
-        return program
 
     @property
     def scene(self) -> Scene:

@@ -74,6 +74,7 @@ class CubeSenseBoard(Board):
     """
 
     engine: RtlEngine
+    program: CubeSenseProgram
 
     def __init__(
         self,
@@ -123,7 +124,8 @@ class CubeSenseBoard(Board):
         def boot(_cause: int) -> CubeSenseProgram:
             self.hardware.reset()
             self._release_pins()
-            return CubeSenseProgram(self.hardware, meter)
+            self.program = CubeSenseProgram(self.hardware, meter)
+            return self.program
 
         self.processor = Processor(
             self.kernel,
@@ -137,13 +139,6 @@ class CubeSenseBoard(Board):
             on_pin=lambda pin, _level: self._pin_changed(pin),
         )
         self.i2c_bus.attach(register_address, CurrentTarget(lambda: self.program.registers))
-
-    @property
-    def program(self) -> CubeSenseProgram:
-        """The firmware program that runs now."""
-        program = self.processor.program
-        assert isinstance(program, CubeSenseProgram)
-        return program
 
     @property
     def scene(self) -> EarthSunScene:

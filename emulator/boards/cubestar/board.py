@@ -57,6 +57,7 @@ class CubeStarBoard(Board):
     """
 
     engine: RtlEngine
+    program: CubeStarProgram
 
     def __init__(
         self,
@@ -98,7 +99,8 @@ class CubeStarBoard(Board):
 
         def boot(cause: int) -> CubeStarProgram:
             self._hardware.reset_cause = cause
-            return CubeStarProgram(self._hardware, meter, catalogue, layout)
+            self.program = CubeStarProgram(self._hardware, meter, catalogue, layout)
+            return self.program
 
         self.processor = Processor(
             self.kernel,
@@ -118,13 +120,6 @@ class CubeStarBoard(Board):
         self._accesses = False
         self._storing_since_ps = 0
         self.stored: deque[RollingShutter | None] = deque([None], maxlen=4)
-
-    @property
-    def program(self) -> CubeStarProgram:
-        """The firmware program that runs now."""
-        program = self.processor.program
-        assert isinstance(program, CubeStarProgram)
-        return program
 
     @property
     def flash(self) -> FlashStore:
