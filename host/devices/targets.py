@@ -15,11 +15,11 @@ emulated:DEVICE             a device that is powered up in this process; time pa
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.message import Interface
@@ -41,7 +41,7 @@ from cubestack.host.transport.streams import Transport, open_transport
 if TYPE_CHECKING:
     from smbus2 import SMBus
 
-__all__ = ["FORMS", "Controls", "Target", "connect", "device_of", "open_target", "with_i2c"]
+__all__ = ["FORMS", "Target", "connect", "device_of", "open_target", "with_i2c"]
 
 I2C, RECORDED, EMULATED = "i2c:", "recorded:", "emulated:"
 
@@ -50,40 +50,6 @@ FORMS = (
     "recorded:FILE"
 )
 """What a target may be, for the help."""
-
-
-class Controls(Protocol):
-    """What can be done to an emulated device from outside of its ports."""
-
-    faults: tuple[str, ...]
-    """What ``fault`` takes, as a user types it."""
-
-    fault_parameters: Mapping[str, tuple[str, ...]]
-    """What may follow each kind of fault and its target, as NAME=VALUE."""
-
-    channels: tuple[str, ...]
-    """Load switches."""
-
-    def fault(self, words: list[str]) -> None:
-        """Let something break; ValueError for what is not in ``faults``."""
-
-    def fault_log(self) -> list[str]:
-        """A line for each thing that faults have done, with its virtual time."""
-
-    def scene(self, path: Path) -> None:
-        """Show another scene; ValueError for a file that is none."""
-
-    def currents(self) -> dict[str, float]:
-        """Supply currents in mA: all, and each channel's."""
-
-    def switch(self, channel: str, on: bool) -> None:
-        """Switch a channel; ValueError for an unknown one."""
-
-    def time_s(self) -> float:
-        """Virtual time."""
-
-    def advance(self, seconds: float) -> None:
-        """Let virtual time pass."""
 
 
 @dataclass
@@ -107,7 +73,7 @@ class Target:
     line: Transport | None = None
     registers: RegisterClient | None = None
     service_port: Transport | None = None
-    controls: Controls | None = None
+    controls: EmulatedControls | None = None
     device: AnyDevice | None = None
     on_close: list[Callable[[], None]] = field(default_factory=list)
 

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from cubestack.host.devices.targets import Controls, Target
+from cubestack.host.devices.controls import EmulatedControls
+from cubestack.host.devices.targets import Target
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
 
 __all__ = ["LOG", "ON_OFF", "ControlCommands"]
@@ -72,6 +73,6 @@ class ControlCommands:
         return Result([("time", f"{now_s:.6f} s")], {"time_s": now_s})
 
     @property
-    def _controls(self) -> Controls:
+    def _controls(self) -> EmulatedControls:
         assert self._target.controls is not None  # else the shell has refused
         return self._target.controls
