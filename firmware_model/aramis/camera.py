@@ -32,7 +32,7 @@ SETTLE_US = 2_000
 ROW_CLOCKS = COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS
 BLANK_ROWS = REGISTERS["VERTICAL_BLANKING"].reset + 1
 MARGIN_US = 20_000
-"""Added to three frames before a picture is given up; ours."""
+"""Added to three frames before a picture is given up; assumed."""
 
 _ENABLE = REGISTERS["OUTPUT_CONTROL"].field("CHIP_ENABLE").mask
 

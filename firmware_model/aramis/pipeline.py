@@ -31,9 +31,9 @@ class Detection:
         sigmas: a bright pixel is above the mean by so many standard deviations, 0 to 20.
         spikes: how noise is removed.
         needed: bright pixels that a window of 25 must have, 1 to 25.
-        min_pixels, max_pixels: size of a star (ours; the thesis has no limits).
-        max_stars: the brightest are kept, 3 to 255 (ours).
-        subtract: whether the mean level is taken off before weighing (ours).
+        min_pixels, max_pixels: size of a star (assumed; the thesis has no limits).
+        max_stars: the brightest are kept, 3 to 255 (assumed).
+        subtract: whether the mean level is taken off before weighing (an extension).
     """
 
     sigmas: float = 2.0
@@ -79,7 +79,7 @@ VERIFIED = replace(
     detection=Detection(spikes=SpikeRemoval.CENTRE, subtract=True),
     profile=Profile(sigma_rad=5.6e-5, verify=True),
 )
-"""Ours: further stars must confirm the attitude; noise of 0.15 px is expected."""
+"""An extension: further stars must confirm the attitude; noise of 0.15 px is expected."""
 
 
 def detect(

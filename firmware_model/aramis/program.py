@@ -1,7 +1,7 @@
 """AraMiS' main program: telecommands, the loop, and the catalogue's periodic reload.
 
-AraMiS thesis, sections 2.1 (periodic reloading), 2.2 (use cases) and 7.3. The loop is ours, 1 Hz
-unless told otherwise; below a second the next frame comes while the last one is worked on. The
+AraMiS thesis, sections 2.1 (periodic reloading), 2.2 (use cases) and 7.3. The loop is an extension,
+1 Hz unless told otherwise; below a second the next frame comes while the last one is worked on. The
 catalogue is reloaded in slices while there is nothing else to do.
 """
 
@@ -20,7 +20,7 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine
 __all__ = ["LATE_US", "AramisProgram"]
 
 LATE_US = 10_000
-"""An iteration that starts later than this after its time is a timing error; ours."""
+"""An iteration that starts later than this after its time is a timing error; assumed."""
 
 OVERLAP_BELOW_MS = 1000
 SLICE_US = 5_000

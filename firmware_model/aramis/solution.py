@@ -34,7 +34,8 @@ class Profile:
         triple_stars: triples are made of so many of the brightest stars, with verification.
         candidates: with verification, so many candidates of a triple are tried at most, and pivots
             only serve to leave no more.
-        hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (ours).
+        hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (an
+            extension).
         smear_px: with verification, where stars are drawn out farther, that is why there is no
             attitude.
         skew_px: with verification, stars that also moved farther from row to row are refused.

@@ -3,7 +3,7 @@
 CubeStar thesis, section 4.4 (equations 4.4.8 to 4.4.10) and section 5.3.5 (Gaussian elimination,
 equation 5.3.1), in single precision and in the order of operations of the C program.
 
-The thesis reads its quaternion as one that turns the axes. Ours is the conjugate, which turns the
+The thesis reads its quaternion as one that turns the axes. This is the conjugate, which turns the
 vectors: v_camera = q v_inertial q*.
 
 The Rodrigues vector grows without bound near rotations of 180 deg. The method of sequential

@@ -49,7 +49,7 @@ ACK_POLL_CYCLES = 9
 """Port read (2) and loop step (7) of the cost table."""
 
 ACK_TIMEOUT_US = 70_000
-"""Longer than ACK can take, two frames of 33.37 ms less the gap between them: ours."""
+"""Longer than ACK can take, two frames of 33.37 ms less the gap between them: assumed."""
 
 CHUNK = FULL_SIZE.scan_step
 """Bytes that a picture is read in at most: those of the scan's buffer."""

@@ -4,9 +4,9 @@ CubeSense thesis, sections 3.2.1.1 and 6.4.1, appendix C.1: the program drives t
 and only ever writes: start, eight bits, a ninth in which the camera may answer, stop. Each line is
 pulled up; level 1 releases it. Charged cycles keep the clock below the bus' 400 kHz.
 
-The published program sets the nadir camera's exposure once. Ours sets all registers again when a
-setting changed, or the camera lost its supply, before the next picture is taken. It can not see the
-latter, so a camera that sends no picture counts as such.
+The published program sets the nadir camera's exposure once. This one sets all registers again when
+a setting changed, or the camera lost its supply, before the next picture is taken. It can not see
+the latter, so a camera that sends no picture counts as such.
 """
 
 from cubestack.firmware_model.cubesense.state import CameraSettings, State

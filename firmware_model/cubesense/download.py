@@ -5,8 +5,8 @@ What lies ahead is passed over; for what lies behind, and after somebody else ne
 begins anew. A download in the order of its frames reads the picture once.
 
 CubeSpace family with two cameras, interface generation 2: telecommands 64 and 65 ask for a frame,
-telemetry 65 says when it is ready, 64 has it. Ours: while a frame is being prepared, telemetry 64
-has what its buffer holds; a frame that a later request has overtaken is not prepared.
+telemetry 65 says when it is ready, 64 has it. Assumed: while a frame is being prepared, telemetry
+64 has what its buffer holds; a frame that a later request has overtaken is not prepared.
 """
 
 from collections.abc import Mapping

@@ -22,7 +22,7 @@ from cubestack.firmware_model.mcu.requests import ReadTimer, Reset, Routine
 __all__ = ["DRAIN_US", "CubeSenseProgram"]
 
 DRAIN_US = 100_000
-"""A reset waits so long at most for the UART; its longest answer takes half of it. Ours."""
+"""A reset waits so long at most for the UART; its longest answer takes half of it. Assumed."""
 
 DRAIN_STEP_US = 1_000
 

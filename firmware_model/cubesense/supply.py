@@ -16,14 +16,14 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, SetPi
 __all__ = ["OFF_TIME_US", "OVER_CURRENT_MA", "SAMPLE_US", "SETTLE_US", "Supply"]
 
 OVER_CURRENT_MA = 60.0
-"""Ours, no limit is published: four times what a working memory draws here (15 mA, and table 7.1
+"""Assumed, no limit is published: four times what a working memory draws here (15 mA, and table 7.1
 has some 5 mA at 5 V), and far below what a latch-up does."""
 
 SAMPLE_US = 5_000
 """Longest time between two looks at the monitors while the program waits."""
 
 OFF_TIME_US = 100_000
-"""How long a supply stays off at least in a power cycle: ours, the sources give no time."""
+"""How long a supply stays off at least in a power cycle: assumed, the sources give no time."""
 
 SETTLE_US = 1_000
 """From a supply's switch to its first use: assumed."""

@@ -27,7 +27,7 @@ from cubestack.firmware_model.node.identification import identification
 __all__ = ["NODE_TYPE", "SERIAL_BYTES", "Telemetry"]
 
 NODE_TYPE = 4
-"""Ours; the public material names no number."""
+"""Assumed; the public material names no number."""
 
 SERIAL_BYTES = INTERFACE.telemetry("SerialNumber").length
 

@@ -1,7 +1,7 @@
 """What a downloaded frame holds: pixels of the picture, or nothing.
 
 CubeSpace family with two cameras, interface generation 2, downloads squares of five sizes; how a
-640 x 480 picture becomes one is ours. The picture lies in the middle of a square of 1024 x 1024
+640 x 480 picture becomes one is assumed. The picture lies in the middle of a square of 1024 x 1024
 pixels, 192 columns from its left and 272 rows from its top, and the rest is zero. A smaller square
 takes every 2nd, 4th, 8th or 16th pixel of every such row of the large one, from its first pixel on.
 The margins are multiples of 16, so every square takes the picture's first pixel, and so on from

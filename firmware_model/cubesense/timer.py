@@ -1,7 +1,7 @@
 """The program's clock: the part's timer behind its prescaler of 256.
 
 CubeSense thesis, section 7.4: time = ticks x 256 / 5 MHz, so a tick is 51.2 us and 16 bits hold
-3.4 s. Every published duration has these steps, and so have ours.
+3.4 s. Every published duration has these steps, and so have these.
 """
 
 from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ

@@ -2,8 +2,8 @@
 
 CubeStar thesis, sections 4.3.2 (Algorithm 1), 4.3.4 (reduced catalogue) and 5.3.2 (constant arrays
 in flash: 405 stars in 5.54 kB, 11 484 pairs in 89.7 kB). Two pairs are closer than the camera can
-split; the thesis leaves them in, and so do we. Ours: a companion within `COMPANION_RAD` of a
-brighter star is left out, because the two would tie in every vote. With Hipparcos and V below 3.8
+split; the thesis leaves them in, and so do we. An extension: a companion within `COMPANION_RAD` of
+a brighter star is left out, because the two would tie in every vote. With Hipparcos and V below 3.8
 that is alpha Centauri B alone, without which the published 405 stars remain. Magnitudes and
 Hipparcos numbers are not in flash (the published size leaves no room for them): they are kept here
 for the ground's reports.

@@ -28,7 +28,7 @@ from cubestack.firmware_model.node.queue import QueuedCommand
 __all__ = ["WATCHDOG_US", "Commands"]
 
 WATCHDOG_US = 2_000_000
-"""Period of the watchdog; ours, the sources give none."""
+"""Period of the watchdog; assumed, the sources give none."""
 
 STREAM_BACKLOG_BYTES = 512
 

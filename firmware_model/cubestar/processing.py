@@ -1,7 +1,7 @@
 """From picture to attitude: detection, matching and QUEST, with the time of each step.
 
 CubeStar thesis, sections 5.3.3 to 5.3.5. What the mode flag selects is published; how it changes
-is not, so it is ours: an attitude leads to tracking, a failure leads one step back (tracking,
+is not, so it is assumed: an attitude leads to tracking, a failure leads one step back (tracking,
 assisted, lost in space). Without an attitude and a hint (telecommand setTrackingMode) the node is
 lost in space, whatever the flag says.
 """

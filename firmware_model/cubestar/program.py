@@ -3,7 +3,7 @@
 CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new picture, the processor
 works on the previous one; then the picture is transferred, and a software reset ends the iteration.
 With one shared memory (section 7.2) the processor works on a picture as soon as it is stored.
-Ours: the reset waits until shortly before the next iteration, so that results can be read until
+Assumed: the reset waits until shortly before the next iteration, so that results can be read until
 then, and leaves out a turn when the host is in the middle of a message.
 """
 
@@ -30,7 +30,7 @@ RESET_LEAD_US = 10_000
 """From the reset to the next iteration: more than the few milliseconds that the reset takes."""
 
 LATE_US = 10_000
-"""An iteration that starts later than this after its time is a timing error; ours."""
+"""An iteration that starts later than this after its time is a timing error; assumed."""
 
 
 class CubeStarProgram:

@@ -2,7 +2,8 @@
 
 CubeStar thesis, sections 5.3.4 to 5.3.6: the software reset that ends every iteration clears the
 RAM; only the newest image and the newest good attitude survive, the attitude and the mode flag in
-flash. Settings, flags and counters are ours to keep; they live in the retention registers.
+flash. Settings, flags and counters are kept as well (an extension); they live in the retention
+registers.
 
 A page of this part's flash stands 20 000 erasures. The published firmware writes the attitude each
 second, which erases a page of 4 kB that often if each write takes a whole page: 5.6 hours. The

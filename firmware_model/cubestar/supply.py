@@ -13,7 +13,7 @@ __all__ = ["CHANNELS", "OFF_TIME_US", "UNDER_CURRENT_MA", "SupplyMonitor"]
 CHANNELS = ("memory", "imager")
 
 OFF_TIME_US = 100_000
-"""How long a channel stays off after a latch-up: ours, the sources give no time."""
+"""How long a channel stays off after a latch-up: assumed, the sources give no time."""
 
 UNDER_CURRENT_MA = 0.5
 """Less than any working part behind a switch draws: assumed, a quarter of an SRAM in standby."""

@@ -3,7 +3,7 @@
 CubeStar thesis, section 5.2.1 and appendix C. The vendor's peripheral library for this part
 (em_ebi.h) names the phases and their limits: address set-up and hold, strobe set-up and strobe
 hold of at most 3 cycles of the core clock, a strobe of at most 63. The thesis prints no timing
-registers, so their values are ours.
+registers, so their values are assumed.
 """
 
 from dataclasses import dataclass

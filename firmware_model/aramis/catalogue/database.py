@@ -2,7 +2,7 @@
 
 AraMiS thesis, sections 5.5 (triangle database), 5.6 (k-vectors), 5.9 (faces) and 2.3.3 (all of it
 is copied to RAM, where the program works on it). The thesis sizes its database as a text file of
-doubles, 21.2 MB (section 2.3.2); ours is binary, little-endian, without gaps:
+doubles, 21.2 MB (section 2.3.2); this one is binary, little-endian, without gaps:
 
 - a header, `HEADER`: magic, version, counts, epoch, field and the bounds of both k-vectors;
 - the arrays of `LAYOUT` in order, whose lengths follow from the counts;

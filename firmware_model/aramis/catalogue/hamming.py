@@ -1,7 +1,7 @@
 """Error-correcting code of the catalogue in flash: one bit in 72 corrected, two detected.
 
 AraMiS thesis, sections 2.1 (an error-correcting code, which one is to be defined) and 2.3.2 (room
-for a Hamming code's overhead). Ours: an extended Hamming code whose 72 columns all have an odd
+for a Hamming code's overhead). Assumed: an extended Hamming code whose 72 columns all have an odd
 number of ones (Hsiao, "A Class of Optimal Minimum Odd-weight-column SEC-DED Codes", 1970): 64 bits
 of data, 8 check bits. A syndrome with an odd number of ones is a single error if a column matches;
 with an even number it is two errors.

@@ -21,7 +21,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 __all__ = ["VALUES_PER_BIN", "KVector", "Range"]
 
 VALUES_PER_BIN = 4
-"""Mean occupation of a bin: more saves memory, and costs comparisons (ours)."""
+"""Mean occupation of a bin: more saves memory, and costs comparisons (assumed)."""
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 

@@ -3,7 +3,7 @@
 AraMiS thesis, section 3.6 (equation 3.10) and section 7.3. Pixels that touch, by a side or a
 corner, are one star; its grey levels are the weights. Weighing the plain grey level, as the thesis
 does, draws the centroid to the middle of the region as soon as there is background; `floor`
-subtracts a level first (ours).
+subtracts a level first (an extension).
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 __all__ = ["MOST_RUNS", "Regions", "find_regions", "locate_stars"]
 
 MOST_RUNS = 20_000
-"""Runs of pixels that the list in RAM holds (ours); a picture of stars has some hundred."""
+"""Runs of pixels that the list in RAM holds (assumed); a picture of stars has some hundred."""
 
 
 @dataclass(frozen=True, eq=False)

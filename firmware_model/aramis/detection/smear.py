@@ -1,4 +1,4 @@
-"""How far the stars were drawn out while the picture was taken. Ours: the thesis has none.
+"""How far the stars were drawn out while the picture was taken. An extension: the thesis has none.
 
 A star that moves during the exposure leaves a streak. Its second moments along and across differ by
 the square of the streak's length over twelve, as those of a line do, whatever the star's own width.

@@ -4,7 +4,7 @@ AraMiS thesis, section 5.8 (tables 5.1 to 5.3). Two criteria put a score into a 
 measured against catalogue stars: the order of brightness, and the order of the sides. Each scores
 its coefficient of variation (standard deviation over mean of the three measured values), so the
 criterion whose values differ more decides where both disagree. A side stands for the star opposite
-to it. The thesis' appendix scores brightness star by star in another way; ours follows the text.
+to it. The thesis' appendix scores brightness star by star in another way; this follows the text.
 """
 
 from dataclasses import dataclass

@@ -2,13 +2,13 @@
 
 AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
 the main triangle, the next three the pivots, and a unique triangle is believed. A rough direction
-leaves the triangles around it; ours is that it also must be close to the boresight found, and that
-the sides must agree with the identities, of which the second choice will do.
+leaves the triangles around it; an extension is that it also must be close to the boresight found,
+and that the sides must agree with the identities, of which the second choice will do.
 
-With verification (ours), an attitude must be confirmed by further stars. Then every candidate is
-tried, with both ways of telling its stars apart; pivots, which a false star would spoil, only serve
-to leave few enough; and further triples of stars follow when none is confirmed. The confirmed
-attitude is solved again with all stars that confirm it.
+With verification (an extension), an attitude must be confirmed by further stars. Then every
+candidate is tried, with both ways of telling its stars apart; pivots, which a false star would
+spoil, only serve to leave few enough; and further triples of stars follow when none is confirmed.
+The confirmed attitude is solved again with all stars that confirm it.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,6 @@
-"""Stars put back to where they were when the middle row was exposed. Ours: the thesis has none.
+"""Stars put back to where they were when the middle row was exposed.
+
+An extension: the thesis has none.
 
 The rows of a frame are exposed one after the other. When the camera turns, each star is measured
 at its own row's time, and as stars are not spread evenly over the rows, the attitude of all of them

@@ -137,7 +137,7 @@ def _share_pair(
 ) -> NDArray[np.bool_]:
     """Which triangles (n,) of star triples (n, 3) share two stars with one of others (m, 3).
 
-    The pairs of the others are sorted as 32-bit words, and each pair of ours is searched there.
+    The pairs of the others are sorted as 32-bit words, and each pair of this one is searched there.
     """
     wanted, listed = _pairs(triangles), _pairs(others)
     count = listed.size

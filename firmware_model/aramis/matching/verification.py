@@ -1,4 +1,4 @@
-"""Checking an attitude against the stars that had no part in it. Ours: the thesis has none.
+"""Checking an attitude against the stars that had no part in it. An extension: the thesis has none.
 
 The thesis believes every unique triangle, and many of its results are wrong (section 8.2). Here the
 three sides must first agree one by one, because area and moment leave one measure of a triangle

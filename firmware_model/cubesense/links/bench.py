@@ -1,10 +1,10 @@
 """The one-letter bench protocol's side of the bench computer; the port's interrupts and answers.
 
 CubeSense thesis, appendix E. Letters are answered one after the other, a picture in pieces, between
-which the program does other jobs. Ours: four letters wait at most, and one that meets more is lost;
-other bytes are ignored; a capture that fails, and a picture that can not be read, are not answered.
-The I2C register's stream waits for the end of a picture here: taking turns, each would begin its
-own anew for every piece.
+which the program does other jobs. Assumed: four letters wait at most, and one that meets more is
+lost; other bytes are ignored; a capture that fails, and a picture that can not be read, are not
+answered. The I2C register's stream waits for the end of a picture here: taking turns, each would
+begin its own anew for every piece.
 """
 
 from collections import deque

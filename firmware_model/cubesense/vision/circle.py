@@ -1,9 +1,9 @@
 """Circles through edges, in the part's single precision.
 
 CubeSense thesis, sections 4.4.1.2 (three points, equations 4.4.4 to 4.4.10; equation 4.4.7 prints
-x_2 - x_2 for x_3 - x_2), 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by
-the inverse's first rows). Ours are the radius, which needs the third row too, and leaving one point
-out of the sums again.
+x_2 - x_2 for x_3 - x_2), 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by the
+inverse's first rows). Extensions are the radius, which needs the third row too, and leaving one
+point out of the sums again.
 """
 
 from dataclasses import dataclass

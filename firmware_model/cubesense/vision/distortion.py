@@ -9,10 +9,10 @@ pixel is 0.34 deg. Equation 6.3.7, and the listing with it, adds the interpolate
 radius' whole pixels only, where equations 6.3.2 and 6.3.6 add it to the radius: on average the lost
 half pixel makes up for the rounding.
 
-Ours: a table of 16-bit entries in 1/100 px, added to the whole radius. It was the compiler's pages
-of 256 bytes that forbade one in RAM; flash has room.
+Assumed: a table of 16-bit entries in 1/100 px, added to the whole radius. It was the compiler's
+pages of 256 bytes that forbade one in RAM; flash has room.
 
-Also ours: `Projection.STEREOGRAPHIC`, see there.
+An extension: `Projection.STEREOGRAPHIC`, see there.
 """
 
 from collections.abc import Sequence
@@ -67,7 +67,7 @@ class Projection(Enum):
     """
 
     EQUIDISTANT = "r = f theta, published"
-    STEREOGRAPHIC = "r = f tan(theta / 2), ours"
+    STEREOGRAPHIC = "r = f tan(theta / 2), an extension"
 
 
 @dataclass(frozen=True, eq=False)

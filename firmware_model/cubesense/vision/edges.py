@@ -8,9 +8,9 @@ What we settle: the pixel before a line is dark, and the previous sample is a bo
 so that it has 64 positions and exactly 6 steps (in the listing the first buffered pixel is a bound,
 and an edge there is found one pixel late). Boresight: table 5.1.
 
-Ours, with ``sub_pixel``: the edge lies between the two pixels that the search ends with, where a
-straight line through their values meets the threshold. The published edge is the centre of the
-bright one, up to a pixel inside, which also lets parts of the lens' rim pass for edges.
+An extension, with ``sub_pixel``: the edge lies between the two pixels that the search ends with,
+where a straight line through their values meets the threshold. The published edge is the centre of
+the bright one, up to a pixel inside, which also lets parts of the lens' rim pass for edges.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 MAX_EDGES = 2 * EDGES_PER_FRAME
-"""Edges that the part keeps: ours. The widest Earth has 28, the rest is for false ones."""
+"""Edges that the part keeps: assumed. The widest Earth has 28, the rest is for false ones."""
 
 Asked = TypeVar("Asked")
 Answer = TypeVar("Answer")

@@ -34,7 +34,7 @@ LEAST_SLOPE = np.float32(0.1)
 LARGEST_RATIO = np.float32(3)
 LARGEST_OFFSET_PX = np.float32(16)
 NEWTON_LIMIT = 8
-"""Stricter than the tables' makers are, because radii in between are not tried: ours."""
+"""Stricter than the tables' makers are, because radii in between are not tried: assumed."""
 
 _TRIED = [np.float32(radius) for radius in (*range(0, RIM_PX, STEP_PX), RIM_PX)]
 
@@ -43,7 +43,8 @@ def invertible(coefficients: Sequence[float], meter: Meter) -> bool:
     """Whether `byte_table` and `fine_table` can be made of ``coefficients``, at any projection.
 
     Some for which they could are refused: a slope below 0.1 somewhere, slopes that differ by more
-    than a factor of 3 (ours by 2.2), an offset beyond 16 px, or a rim beyond 320 px (ours at 275).
+    than a factor of 3 (this one by 2.2), an offset beyond 16 px, or a rim beyond 320 px (this one
+    at 275).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         terms = [np.float32(value) for value in coefficients]

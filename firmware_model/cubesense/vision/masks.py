@@ -1,6 +1,6 @@
 """Areas of a picture that detection ignores, such as a boom in the field of view.
 
-Telecommands Mask1 and Mask2 of the node protocol; what the areas do is ours.
+Telecommands Mask1 and Mask2 of the node protocol; what the areas do is assumed.
 """
 
 from collections.abc import Sequence

@@ -3,7 +3,7 @@
 CubeSense thesis, sections 4.4.1.3, 5.5, 6.5.3 and appendix C.5: undistort each edge, fit a circle,
 hand out its centre as int of 1/100 px. Angles are the centre's coordinates at 2.9 px a degree.
 
-The result codes are public, what leads to them is not; ours:
+The result codes are public, what leads to them is not; assumed:
 
 - too many edges: more than the part keeps.
 - too few edges: fewer than `NadirConfig.min_edges`, here 6, twice the unknowns.
@@ -11,7 +11,7 @@ The result codes are public, what leads to them is not; ours:
   away along an axis, which the interface does not have, or edges off the circle.
   Up to a quarter of the edges may be dropped first, the worst one at a time: hot pixels, the Moon.
 
-Also ours is the fit in the stereographic projection (see `Projection`). A circle there has the
+An extension is the fit in the stereographic projection (see `Projection`). A circle there has the
 centre (x, y) and gives the origin the power p; the cone that it is the image of has its axis along
 (2 f x, 2 f y, f^2 - p).
 """
@@ -44,8 +44,9 @@ DROPPED_SHARE = 4
 MAX_RMS_PX = {Projection.EQUIDISTANT: 8.0, Projection.STEREOGRAPHIC: 0.5}
 """Largest root mean square distance of the edges from the circle, in px of the projection.
 
-In the published projection the limb itself leaves the circle by this much towards the rim. In ours,
-edges of a sunlit limb stay below 0.35 px, and a looser limit lets fits to the terminator pass.
+In the published projection the limb itself leaves the circle by this much towards the rim. In the
+stereographic one, edges of a sunlit limb stay below 0.35 px, and a looser limit lets fits to the
+terminator pass.
 """
 
 LARGEST_PX = np.float32(LARGEST_ANGLE_DEG * PIXELS_PER_DEGREE)

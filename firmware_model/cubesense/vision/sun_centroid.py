@@ -4,15 +4,15 @@ CubeSense thesis, sections 4.4.2, 6.6.2, 6.6.3, appendix C.6 and table 5.1: mean
 of all pixels that reach the threshold, weighted by value, plus the window's origin, less the
 boresight; then undistorted.
 
-Ours, with ``whole_chords``: a Sun that overflows the window is cut, mostly at the bottom, and its
-mean moves. A row that reaches the window's left or right border is then left out of the mean of x,
-a column that reaches the upper or lower one out of the mean of y. When nothing would remain, all
-count.
+An extension, with ``whole_chords``: a Sun that overflows the window is cut, mostly at the bottom,
+and its mean moves. A row that reaches the window's left or right border is then left out of the
+mean of x, a column that reaches the upper or lower one out of the mean of y. When nothing would
+remain, all count.
 
 The Sun is not found when the FPGA saw no run of bright pixels, when fewer pixels reach the
 threshold than `SunConfig.min_pixels`, or when their centre lies outside of the field of view, where
-the lens shows nothing and an int of 1/100 px may overflow; the criteria are ours. Four pixels are
-one more than the FPGA's run, so that one row of stuck pixels is no Sun.
+the lens shows nothing and an int of 1/100 px may overflow; the criteria are assumed. Four pixels
+are one more than the FPGA's run, so that one row of stuck pixels is no Sun.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ COORDINATE_BYTES = 4
 """x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
 
 _LARGEST_ANGLE = LARGEST_ANGLE_DEG * 100
-"""In 1/100 deg; only a lens that is not ours images anything beyond."""
+"""In 1/100 deg; only another lens images anything beyond."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 CubeStar thesis, section 4.5. No voting: the stars near the last boresight are turned into camera
 axes with the last attitude, and a centroid within 0.3 deg of one takes its identity, so the camera
-may turn up to 0.3 deg in an iteration and two stars are enough. Ours: the nearest star is taken
+may turn up to 0.3 deg in an iteration and two stars are enough. Assumed: the nearest star is taken
 when several are in reach, and the verification round drops what contradicts the other stars, as
 when a star fainter than the catalogue stands near the predicted place of another.
 """

@@ -47,13 +47,14 @@ __all__ = [
 #: Search tolerance of section 4.3.5, about one pixel.
 DEFAULT_MARGIN_RAD = 0.001
 
-#: Coincidences per picture above which a result is refused; ours, see the test of false stars.
+#: Coincidences per picture above which a result is refused; an extension, see the test of false
+#: stars.
 LARGEST_CHANCE = 0.05
 
 #: Stars that a solution needs without other knowledge (section 4.3.5).
 FEWEST_STARS = 3
 
-#: Tenths of the most votes that an identity needs to stand, one for each round; ours.
+#: Tenths of the most votes that an identity needs to stand, one for each round; assumed.
 _STANDING_TENTHS = (4, 4, 5, 6, 7, 8)
 
 

@@ -1,7 +1,7 @@
 """Pictures in memories behind the FPGA, which the program reaches over its external bus.
 
 CubeStar thesis, options 2 and 3 of section 3.3, and section 7.2. Nothing is copied. Pins and
-addresses are those of ``docs/gateware-cubestar-next.md``; ours, as none of it was built. Visited
+addresses are those of ``docs/gateware-cubestar-next.md``; assumed, as none of it was built. Visited
 pixels are zeroed and written back over the bus.
 """
 
