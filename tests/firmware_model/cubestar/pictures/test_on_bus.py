@@ -1,7 +1,6 @@
 """Pictures behind the FPGA: what the program does over its bus, on memories that are arrays."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,26 +18,27 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.external_bus import EBI
 from cubestack.firmware_model.mcu.flash_store import FlashStore
-from cubestack.firmware_model.mcu.requests import BusAccess, Routine, SetPin
+from cubestack.firmware_model.mcu.requests import BusAccess, Request
 
+from ...runner import Runner
 from ..sky import Sky
 
 ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]
 SIZE = 2 * IMAGE_BYTES
 
 
-class Board:
+class Board(Runner):
     """Memories by chip select, as arrays, and the pins; it says which accesses find an answer."""
 
     def __init__(self, layout: Layout) -> None:
+        super().__init__(CORTEX_M3)
         self.layout = layout
         self.retention = bytearray(RETENTION_BYTES)
         self.flash = FlashStore()
         self.external_ram = np.zeros(0, np.uint8)
         self.memories = {select: np.zeros(SIZE, np.uint8) for select in (0, 1)}
         self.pins: dict[str, int] = {}
-        self.log: list[tuple[str, int]] = []
-        self.meter = Meter(CORTEX_M3)
+        self.levels: list[tuple[str, int]] = []
         self.state = State(self)  # type: ignore[arg-type]  # what it does not use is missing
         self.supply = SupplyMonitor(self, self.state)  # type: ignore[arg-type]
         self.pictures: Pictures = pictures_of(
@@ -50,29 +50,20 @@ class Board:
         )
         self.accesses = 0
         self.stuck: int | None = None
-        self.run(self.pictures.start())
+        self.perform(self.pictures.start())
 
-    def run(self, routine: Routine[Any]) -> Any:
-        """Perform what it requests; its result."""
-        answer = None
-        while True:
-            try:
-                request = routine.send(answer)
-            except StopIteration as done:
-                return done.value
-            answer = None
-            if isinstance(request, SetPin):
-                self.pins[request.pin] = request.level
-                self.log.append((request.pin, request.level))
-            else:
-                assert isinstance(request, BusAccess)
-                answer = self._access(request)
+    def _pay(self) -> None:
+        """Cycles stay on the meter, for tests to look at."""
+
+    def set_pin(self, pin: str, level: int) -> None:
+        self.pins[pin] = level
+        self.levels.append((pin, level))
 
     def bus_read(self, select: int, address: int, count: int) -> bytes:
         assert self._open(select, address)
         return self.memories[select][address : address + count].tobytes()
 
-    def _access(self, request: BusAccess) -> int:
+    def access(self, request: BusAccess) -> int:
         assert request.cycles == 2 + EBI.cycles
         for address in request.addresses[:1]:
             assert self._open(request.select, int(address))
@@ -102,7 +93,7 @@ class Board:
 
     def stored(self, picture: NDArray[np.uint8]) -> None:
         """The FPGA stores a picture where the pins say."""
-        self.run(self.pictures.begin())
+        self.perform(self.pictures.begin())
         select, place = 0, self.pins.get("BANK", 0)
         if self.layout is Layout.TWO_MEMORIES:
             place = self.pins["INTO"]
@@ -111,7 +102,7 @@ class Board:
             assert self.pictures.acknowledge == f"BOARD{select + 1}_ACK"
             place = self.pins[f"BOARD{select + 1}_BANK"]
         self.memories[select][place * IMAGE_BYTES :][:IMAGE_BYTES] = picture.reshape(-1)
-        self.run(self.pictures.end(True))
+        self.perform(self.pictures.end(True))
 
 
 @pytest.fixture(params=ON_BUS, ids=lambda layout: layout.value)
@@ -120,7 +111,7 @@ def board(request: pytest.FixtureRequest) -> Board:
 
 
 def read_all(board: Board) -> NDArray[np.uint8]:
-    return np.frombuffer(board.run(board.pictures.read(0, IMAGE_BYTES)), np.uint8)
+    return np.frombuffer(board.perform(board.pictures.read(0, IMAGE_BYTES)), np.uint8)
 
 
 def test_the_newest_picture_is_read_wherever_it_was_stored(board: Board) -> None:
@@ -137,15 +128,15 @@ def test_a_picture_that_was_not_stored_leaves_the_last_one(board: Board) -> None
     """Where there is a second memory; a shared one holds half of a picture then."""
     picture = np.arange(IMAGE_BYTES).astype(np.uint8)
     board.stored(picture)
-    board.run(board.pictures.begin())
-    board.run(board.pictures.end(False))
+    board.perform(board.pictures.begin())
+    board.perform(board.pictures.end(False))
     assert np.array_equal(read_all(board), picture)
 
 
 def test_while_the_next_picture_is_stored_the_last_one_is_there_or_none(board: Board) -> None:
     picture = np.arange(IMAGE_BYTES).astype(np.uint8)
     board.stored(picture)
-    board.run(board.pictures.begin())
+    board.perform(board.pictures.begin())
     if board.pictures.while_storing:
         assert np.array_equal(read_all(board), picture)
         assert board.pictures.read_now(7, 9) == picture[7:16].tobytes()
@@ -166,7 +157,7 @@ def test_the_search_is_that_in_an_array_and_leaves_the_picture(board: Board, sky
     expected = detect_stars(sky.picture, DetectionConfig(), own)
     board.meter.take()
     before, accesses = dict(board.meter.counts), board.accesses
-    found = board.run(board.pictures.search(DetectionConfig()))
+    found = board.perform(board.pictures.search(DetectionConfig()))
     assert np.array_equal(found.centroids, expected.centroids)
     assert np.array_equal(found.intensities, expected.intensities)
     assert (found.dark_value, found.end) == (expected.dark_value, expected.end)
@@ -181,30 +172,27 @@ def test_the_search_is_that_in_an_array_and_leaves_the_picture(board: Board, sky
 
 def test_pixels_are_zero_on_the_bus_during_the_search(board: Board, sky: Sky) -> None:
     board.stored(sky.picture)
-    routine, lowest = board.pictures.search(DetectionConfig()), []
-    answer = None
-    while True:
-        try:
-            request = routine.send(answer)
-        except StopIteration:
-            break
-        assert isinstance(request, BusAccess)
-        answer = board._access(request)
-        if request.write and len(request.data) == 1:
+    lowest: list[int] = []
+
+    def look(request: Request) -> None:
+        if isinstance(request, BusAccess) and request.write and len(request.data) == 1:
             lowest.append(int(request.data[0]))
+
+    board.on_request = look
+    board.perform(board.pictures.search(DetectionConfig()))
     assert lowest
     assert not any(lowest)
 
 
 def test_memory_test_finds_one_bit_in_any_memory(board: Board) -> None:
-    assert board.run(board.pictures.test_memory()) is True
+    assert board.perform(board.pictures.test_memory()) is True
     for stuck in (0, 777_777, SIZE - 1):
         board.stuck = stuck
-        assert board.run(board.pictures.test_memory()) is False
+        assert board.perform(board.pictures.test_memory()) is False
 
 
 def test_every_place_is_tested(board: Board) -> None:
-    board.run(board.pictures.test_memory())
+    board.perform(board.pictures.test_memory())
     boards = 2 if board.layout is Layout.TWO_BOARDS else 1
     assert board.accesses == 4 * boards * SIZE
 
@@ -224,9 +212,9 @@ def test_every_place_is_tested(board: Board) -> None:
 def test_control_pins_change_in_the_gateware_s_order(layout: Layout, log: str) -> None:
     """RNW never changes under ENABLE where that would hand over the address in a write pulse."""
     board = Board(layout)
-    board.log.clear()
+    board.levels.clear()
     board.stored(np.zeros(IMAGE_BYTES, np.uint8))
-    assert " ".join(f"{pin}{level}" for pin, level in board.log) == log
+    assert " ".join(f"{pin}{level}" for pin, level in board.levels) == log
 
 
 def test_rate_is_twice_as_high_with_two_memories() -> None:
