@@ -93,6 +93,10 @@ class Proof:
     fault: Fault
 
 
+#: Fills a harness: its module, the ports' signals and the exposed wires' by their names.
+_Assertions = Callable[[Module, dict[str, Value], dict[str, Signal]], None]
+
+
 class Register(NamedTuple):
     """A register of the design; ``reset`` is None when no reset reaches it."""
 
@@ -119,7 +123,7 @@ def prove(proof: Proof, planted: bool = False) -> ProofResult:
     design, size = proof.make(planted)
     flat = _flattened(rtlil_text(design, "design"))
     widths = {name: int(width or 1) for width, name in _WIRE.findall(flat)}
-    names = {re.sub(r"\$\d+(?=\.)", "", name): name for name in widths}
+    names = {_plain(name): name for name in widths}
 
     def found(wire: str) -> str:
         if wire not in names:
@@ -128,8 +132,14 @@ def prove(proof: Proof, planted: bool = False) -> ProofResult:
 
     wires = {alias: found(wire) for alias, wire in proof.wires.items()}
     resets = {found(name): value for name, value in _registers(flat).items()}
-    exposed = sorted({*wires.values(), *resets})
-    harness = _Harness(design, size, proof, wires, {name: widths[name] for name in exposed}, resets)
+    exposed = {name: widths[name] for name in sorted({*wires.values(), *resets})}
+
+    def assertions(m: Module, signals: dict[str, Value], inside: dict[str, Signal]) -> None:
+        registers = [Register(_plain(w), inside[w], reset) for w, reset in resets.items()]
+        named = signals | {alias: inside[wire] for alias, wire in wires.items()}
+        proof.harness(m, SimpleNamespace(**named, size=size, registers=registers))
+
+    harness = _Harness(design, exposed, assertions)
     text = rtlil_text(harness, "harness").replace("cell \\$ff ", "cell $ff ")
     if planted:
         name = found(proof.fault.wire)
@@ -169,8 +179,13 @@ def _registers(flat: str) -> dict[str, int | None]:
             continue
         (name,) = re.findall(r"connect \\Q \\(\S+)\n", body)
         reset = re.findall(r"parameter \\ARST_VALUE \d+'([01]+)\n", body)
-        found[re.sub(r"\$\d+(?=\.)", "", name)] = int(reset[0], 2) if reset else None
+        found[_plain(name)] = int(reset[0], 2) if reset else None
     return found
+
+
+def _plain(wire: str) -> str:
+    """A wire's name without the numbers that make submodules' names unique."""
+    return re.sub(r"\$\d+(?=\.)", "", wire)
 
 
 def _stuck(flat: str, wire: str, width: int, level: int) -> str:
@@ -188,43 +203,25 @@ def _stuck(flat: str, wire: str, width: int, level: int) -> str:
 
 
 class _Harness(Component):
-    """The design's inputs as ports, its outputs and exposed wires as signals."""
+    """The design's inputs as ports, its outputs and the ``exposed`` wires as signals."""
 
-    def __init__(
-        self,
-        design: Component,
-        size: object,
-        proof: Proof,
-        wires: dict[str, str],
-        widths: dict[str, int],
-        resets: dict[str, int | None],
-    ) -> None:
-        self._design = design
-        self._size = size
-        self._proof = proof
-        self._wires = wires
-        self._widths = widths
-        self._resets = resets
+    def __init__(self, design: Component, exposed: dict[str, int], assertions: _Assertions) -> None:
+        self._design, self._exposed, self._assertions = design, exposed, assertions
         members = design.signature.members
         super().__init__({name: m for name, m in members.items() if m.flow is In})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
         ports: dict[str, Value] = {}
-        signals = {}
+        signals: dict[str, Value] = {}
         for name, member in self._design.signature.members.items():
             if member.flow is In:
                 signals[name] = ports[f"i_{name}"] = getattr(self, name)
             else:
                 signals[name] = ports[f"o_{name}"] = Signal(member.shape, name=f"design_{name}")
         inside = {}
-        for number, (wire, width) in enumerate(self._widths.items()):
+        for number, (wire, width) in enumerate(self._exposed.items()):
             inside[wire] = ports[f"o_{wire}"] = Signal(width, name=f"wire_{number}")
-        signals |= {alias: inside[wire] for alias, wire in self._wires.items()}
         m.submodules.design = Instance("design", **ports)
-        registers = [
-            Register(re.sub(r"\$\d+(?=\.)", "", wire), inside[wire], reset)
-            for wire, reset in self._resets.items()
-        ]
-        self._proof.harness(m, SimpleNamespace(**signals, size=self._size, registers=registers))
+        self._assertions(m, signals, inside)
         return m
