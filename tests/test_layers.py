@@ -40,7 +40,7 @@ ORDER = {
         "cubestar cubesense aramis",
     ),
     "host": (
-        "errors",
+        "errors options terminal",
         "transport export",
         "clients",
         "recording pictures",

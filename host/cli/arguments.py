@@ -1,11 +1,18 @@
-"""Values of options: checked, with errors that say what would be right."""
+"""The command line's arguments: values that are checked, and options made from declarations."""
+
+from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn, TypeVar
 
-__all__ = ["Parser", "angle", "corner", "number", "positive", "whole"]
+from cubestack.host import options
+from cubestack.host.options import Kind, Options, flag
+
+__all__ = ["Parser", "add_options", "chosen", "whole"]
+
+T = TypeVar("T")
+OptionsT = TypeVar("OptionsT", bound=Options)
 
 
 class Parser(argparse.ArgumentParser):
@@ -16,59 +23,52 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
-def whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Type of a whole number in ``least``..``most``."""
-    wanted = f"of at least {least}" if most is None else f"in {least}..{most}"
+def typed(kind: Kind[T]) -> Callable[[str], T]:
+    """The type of an argument of this kind; its error says what would be right."""
 
-    def read(text: str) -> int:
+    def read(text: str) -> T:
         try:
-            value = int(text)
-        except ValueError:
-            value = least - 1
-        if value < least or (most is not None and value > most):
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number {wanted}")
-        return value
+            return kind(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
 
     return read
 
 
-def angle(text: str) -> float:
-    """Type of an angle in degrees that is not negative."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 <= value <= 180:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an angle in 0..180 degrees")
-    return value
+def whole(least: int, most: int | None = None) -> Callable[[str], int]:
+    """Type of a whole number in ``least``..``most``."""
+    return typed(options.whole(least, most))
 
 
-def number(text: str) -> float:
-    """Type of a number, of either sign."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
-    return value
+def add_options(parser: argparse.ArgumentParser, *declared: type[Options]) -> None:
+    """Declare the options of these classes; one that several have is as the first has it."""
+    groups: dict[str, argparse._MutuallyExclusiveGroup] = {}
+    names: set[str] = set()
+    for name, field in ((n, f) for each in declared for n, f in each.declared().items()):
+        if name in names:
+            continue
+        names.add(name)
+        option = field.metadata["option"]
+        place: argparse._ActionsContainer = parser
+        if option.group is not None:
+            if option.group not in groups:
+                groups[option.group] = parser.add_mutually_exclusive_group()
+            place = groups[option.group]
+        how: dict[str, Any] = {"default": field.default, "help": option.help}
+        if option.kind is None and not option.choices:
+            place.add_argument(flag(name), action="store_true", **how)
+            continue
+        if option.kind is not None:
+            how["type"] = typed(option.kind)
+        if option.choices:
+            how["choices"] = option.choices
+        if option.metavar is not None:
+            how["metavar"] = option.metavar
+        if option.many:
+            how |= {"action": "append", "default": []}
+        place.add_argument(flag(name), **how)
 
 
-def positive(text: str) -> float:
-    """Type of a number above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
-    return value
-
-
-def corner(text: str) -> tuple[int, int]:
-    """Type of a pixel's column and row."""
-    try:
-        left, top = (int(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y, as in 0,256") from None
-    return left, top
+def chosen(args: argparse.Namespace, declared: type[OptionsT]) -> OptionsT:
+    """The options of ``declared`` as they were given; ValueError where they do not go together."""
+    return declared(**{name: getattr(args, name) for name in declared.declared()})

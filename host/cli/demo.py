@@ -2,31 +2,30 @@
 pictures.
 
 An emulator process serves a device on pseudo-terminals; a client in this
-process talks to it through pyserial and nothing else. First the star tracker:
-a rendered sky, then a photograph, one of --photographs if that folder has any,
-else a picture that this project rendered itself. Then the sun and nadir sensor:
-the Sun, and the Earth from 750 km. Last the star tracker without FPGA: a sky.
+process talks to it through pyserial and nothing else. A star tracker looks at
+a rendered sky, and may look at a photograph, one of --photographs if that
+folder has any; a sun and nadir sensor at the Sun, and at the Earth from 750 km.
 """
+
+from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from cubestack.host.cli import demo_aramis, demo_cubesense, demo_cubestar
 from cubestack.host.cli.arguments import whole
+from cubestack.host.devices.registry import devices
 
 __all__ = ["add_arguments", "run"]
-
-DEVICES = {
-    "cubestar": demo_cubestar.show,
-    "cubesense": demo_cubesense.show,
-    "aramis": demo_aramis.show,
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
+    names = [one.name for one in devices() if one.demo is not None]
     parser.add_argument(
-        "device", nargs="?", choices=DEVICES, help="show this one only; default: all of them"
+        "device",
+        nargs="?",
+        choices=names,
+        help="show this one only; default: all of them",
     )
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the pictures")
     parser.add_argument(
@@ -43,6 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show the devices; returns 1 when one of them did not find what it looked for."""
     args.out.mkdir(parents=True, exist_ok=True)
-    shown = [args.device] if args.device else list(DEVICES)
-    found = [DEVICES[device](args) for device in shown]
+    found = [
+        one.demo()(one, args.out, args.seed, args.photographs)
+        for one in devices()
+        if one.demo is not None and args.device in (None, one.name)
+    ]
     return 0 if all(found) else 1

@@ -29,10 +29,10 @@ from cubestack.host.cli.board_options import (
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.cli.records import add_record_arguments, record
-from cubestack.host.cli.terminal import progress, say
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.recording.setups import emulated_setup
+from cubestack.host.terminal import progress, say
 
 __all__ = ["add_arguments", "run"]
 

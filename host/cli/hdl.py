@@ -141,7 +141,7 @@ def _chosen(table: Mapping[str, Entry], names: list[str], kind: str) -> dict[str
 def _area(args: argparse.Namespace) -> int:
     from cubestack.hdl.flow.area_report import area_json, area_table, areas
     from cubestack.hdl.flow.top import counted
-    from cubestack.host.cli.terminal import progress
+    from cubestack.host.terminal import progress
 
     table = _chosen(counted(args.tops()), args.names, "design of one FPGA")
     rows = list(

@@ -4,13 +4,17 @@ Exit codes: 0 done, 1 the run failed, 2 the call was wrong. An error is one line
 what would be right.
 """
 
+from __future__ import annotations
+
 import argparse
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
+from typing import Protocol
 
 from cubestack.host.cli.arguments import Parser
+from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
 
 __all__ = ["main"]
@@ -23,13 +27,10 @@ COMMANDS = {
     "emulate": "serve an emulated device on serial ports until Ctrl-C",
     "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude or directions out: each result beside the truth",
-    "layouts": "compare CubeStar's memory layouts: rate, age, power, pins",
     "registers": "list a device's telecommands and telemetry",
     "shell": "read, write and watch registers by name",
     "conformance": "check a device's protocol against the tables",
     "replay": "play a recording to an emulated device, compare what it says",
-    "catalogue": "compile the onboard star catalogue and say what is in it",
-    "memory": "list the firmware's buffers against the processor's memories",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",
     "bench": "measure the cost of the hot paths on this machine",
 }
@@ -46,15 +47,37 @@ def make_parser() -> Parser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = import_module(f"cubestack.host.cli.{name}")
-        command = commands.add_parser(
-            name,
-            help=summary,
-            description=_with_names(module.__doc__ or ""),
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        module.add_arguments(command)
-        command.set_defaults(run=module.run)
+        _add(commands, name, summary, _with_names(module.__doc__ or ""), module)
+    for name, report in reports().items():
+        _add(commands, name, report.summary, report.description, report)
     return parser
+
+
+class _Command(Protocol):
+    """What a subcommand is: a module of ``host.cli``, or what devices declare."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare its options."""
+
+    def run(self, args: argparse.Namespace) -> int | None:
+        """Do it; returns the exit code."""
+
+
+def _add(
+    commands: argparse._SubParsersAction[Parser],
+    name: str,
+    summary: str,
+    description: str,
+    command: _Command,
+) -> None:
+    parser = commands.add_parser(
+        name,
+        help=summary,
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_arguments(parser)
+    parser.set_defaults(run=command.run)
 
 
 def _with_names(text: str) -> str:

@@ -1,35 +1,113 @@
-"""Measure end to end: scene, camera, FPGA, firmware, serial line, host; with
+"""Measure end to end: scene, camera, electronics, firmware, serial line, host; with
 the truth beside each result.
 
-Every frame is captured and processed by the emulated device; the host sees only
+Every picture is captured and processed by the emulated device; the host sees only
 what comes back over the serial line. The truth is known to this command alone.
 
 examples:
-  cubestack measure cubestar --frames 20 --mag-limit 3.8
-  cubestack measure aramis --frames 20
-  cubestack measure cubesense --frames 20
+  cubestack measure {first} --frames 20
+  cubestack measure {second} --frames 20
   cubestack measure DEVICE --help
 """
 
+from __future__ import annotations
+
 import argparse
+import json
+import time
+from collections.abc import Iterable, Iterator
+from typing import Any
 
-from cubestack.host.cli import measure_aramis, measure_cubesense, measure_cubestar
-from cubestack.host.cli.devices import add_devices
+from rich.table import Table
 
-__all__ = ["add_arguments", "run"]
+from cubestack.host.cli.arguments import add_options, chosen
+from cubestack.host.cli.board_options import add_engine_arguments, add_option, tell_notices
+from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.experiment import AnyExperiment, Result
+from cubestack.host.devices.registry import devices
+from cubestack.host.experiments.measure import board_options, experiment_of
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.terminal import console, progress, say
 
-DEVICES = {
-    "cubestar": (measure_cubestar, "attitudes of the star tracker"),
-    "aramis": (measure_aramis, "attitudes of the star tracker without FPGA"),
-    "cubesense": (measure_cubesense, "directions of the Sun and of the Earth's centre"),
-}
+__all__ = ["add_arguments", "add_board", "run", "run_experiment"]
+
+SHOWN = 40
+"""Rows of a table."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices, each with options of its own."""
-    add_devices(parser, DEVICES)
+    commands = parser.add_subparsers(dest="device", required=True, metavar="device")
+    for device in devices():
+        if device.experiment is None:
+            continue
+        experiment = experiment_of(device)
+        command = commands.add_parser(
+            device.name,
+            help=device.summary,
+            description=experiment.description,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.add_argument(
+            "--json", action="store_true", help="one JSON object a result, nothing else"
+        )
+        add_options(command, experiment.options)
+        add_board(command, device, experiment)
+        command.set_defaults(measured=device)
+
+
+def add_board(
+    parser: argparse.ArgumentParser,
+    device: AnyDevice,
+    experiment: AnyExperiment,
+) -> None:
+    """Declare how the device's FPGA is run, and what of its board the user chooses."""
+    if device.has_fpga and experiment.powers_up:
+        add_engine_arguments(parser)
+    for option in board_options(device, experiment).values():
+        add_option(parser, option)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure; returns 0 when every frame was measured, whether anything was found or not."""
-    return int(args.run_device(args))
+    """Measure; returns 0 when every result was read, whether anything was found or not."""
+    device: AnyDevice = args.measured
+    return run_experiment(args, device, experiment_of(device))
+
+
+def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyExperiment) -> int:
+    """Run it as ``args`` say, and show its results; returns 1 when it was no success."""
+    options = chosen(args, experiment.options)
+    given = {name: getattr(args, name, None) for name in board_options(device, experiment)}
+    board = {name: value for name, value in given.items() if value is not None}
+    if not args.json:
+        tell_notices(device, board, say)
+
+    def bar(items: Iterable[Any], total: int, label: str) -> Iterator[Any]:
+        return progress(items, total, label, quiet=args.json or not label)
+
+    opened = Opener(device, getattr(args, "engine", "auto"), board, bar)
+    started = time.monotonic()
+    results = []
+    for result in bar(experiment.run(opened, options), experiment.count(options), experiment.label):
+        results.append(result)
+        if args.json:
+            print(json.dumps(result.as_dict()), flush=True)
+    if not args.json:
+        _report(experiment, results, time.monotonic() - started)
+    return 0 if experiment.succeeded(results) else 1
+
+
+def _report(experiment: AnyExperiment, results: list[Result], wall_s: float) -> None:
+    """Show a table of the first results, and what all are together."""
+    if experiment.columns:
+        table = Table(title=experiment.title)
+        for column in experiment.columns[:-1]:
+            table.add_column(column, justify="right")
+        table.add_column(experiment.columns[-1], overflow="fold")
+        for number, result in enumerate(results[:SHOWN]):
+            table.add_row(*experiment.row(number, result))
+        console.print(table)
+        if len(results) > SHOWN:
+            console.print(f"... and {len(results) - SHOWN} more; --json lists them all")
+    for line in experiment.summarise(results).lines(wall_s):
+        console.print(line, soft_wrap=True)

@@ -26,12 +26,12 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.board_options import add_engine_arguments
 from cubestack.host.cli.fault_plan import add_faults_argument
 from cubestack.host.cli.records import add_record_arguments, record
-from cubestack.host.cli.terminal import say
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.device import Engine
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device
 from cubestack.host.recording.setups import setup_for, written
+from cubestack.host.terminal import say
 
 __all__ = ["add_arguments", "run"]
 

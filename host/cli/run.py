@@ -26,9 +26,9 @@ from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.board_options import add_engine_arguments
 from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
-from cubestack.host.cli.terminal import say
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
     from cubestack.emulator.i2cdev.running import HostBus

@@ -25,9 +25,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
-from cubestack.host.cli.terminal import say
 from cubestack.host.errors import HostError
 from cubestack.host.shell.language import Result, Shell
+from cubestack.host.terminal import say
 
 __all__ = ["add_arguments", "run"]
 

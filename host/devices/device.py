@@ -19,16 +19,18 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
-    from cubestack.host.experiments.contract import Experiment
+    from cubestack.host.devices.experiment import AnyExperiment
 
 __all__ = [
     "AnyDevice",
+    "Benchmark",
     "BoardOption",
     "BoardT_co",
     "ClientT_co",
     "ConformanceNotes",
     "Device",
     "Engine",
+    "Report",
     "Shown",
 ]
 
@@ -90,6 +92,42 @@ class ConformanceNotes:
     optional: frozenset[str] = frozenset()
 
 
+#: Shows a device: (device, folder of the pictures, seed, folder with photographs or None); whether
+#: all was found.
+Demo = Callable[[Any, Path, int, "Path | None"], bool]
+
+
+@dataclass(frozen=True)
+class Report:
+    """A command about a device: `cubestack NAME`.
+
+    Several devices may have one of the same name: `cubestack NAME DEVICE`.
+
+    Attributes:
+        name: of the command.
+        summary: one phrase for lists.
+        load: gives what it does.
+    """
+
+    name: str
+    summary: str
+    load: Callable[[], AnyExperiment]
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """One measurement of what it costs to emulate a device.
+
+    Attributes:
+        figures: names of what it gives, as in the JSON output, with what each means.
+        run: measures the device that it is given: figures by name; one that could not be measured
+            is left out.
+    """
+
+    figures: Mapping[str, str]
+    run: Callable[[Any], Mapping[str, float]]
+
+
 @dataclass(frozen=True)
 class Device(Generic[BoardT_co, ClientT_co]):
     """A sensor.
@@ -109,8 +147,9 @@ class Device(Generic[BoardT_co, ClientT_co]):
         options: of its board alone.
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.
-        demo: shows it end to end, with pictures: (arguments of the command) -> found; None for
-            nothing.
+        reports: further commands about it.
+        benchmarks: what can be measured of the cost of emulating it, in the order of the table.
+        demo: shows it end to end, with pictures; None for nothing.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
         profiles: names of the firmware's profiles, the default one first.
@@ -130,8 +169,10 @@ class Device(Generic[BoardT_co, ClientT_co]):
     default_scene_title: str
     options: tuple[BoardOption, ...] = ()
     has_fpga: bool = True
-    experiment: Callable[[], Experiment[Any, Any]] | None = None
-    demo: Callable[[Any], bool] | None = None
+    experiment: Callable[[], AnyExperiment] | None = None
+    reports: tuple[Report, ...] = ()
+    benchmarks: Callable[[], tuple[Benchmark, ...]] = tuple
+    demo: Callable[[], Demo] | None = None
     tops: Callable[[], TopTable] = dict
     proofs: Callable[[], Mapping[str, Proof]] = dict
     profiles: tuple[str, ...] = ("extended",)

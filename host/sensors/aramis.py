@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.host.clients.contract import Client
 from cubestack.host.conformance.effects import check_camera_register, check_stream
-from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Shown
+from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report, Shown
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
@@ -60,6 +62,11 @@ def _prepare(shown: Shown) -> None:
     onboard_database(progress=shown)
 
 
+def _lazily(what: str) -> Callable[[], Any]:
+    """Gives something of this sensor's experiments, which are loaded then."""
+    return partial(resolve_name, f"cubestack.host.experiments.aramis.{what}")
+
+
 DEVICE: Device[AramisBoard, Aramis] = Device(
     name="aramis",
     title="AraMiS",
@@ -70,6 +77,16 @@ DEVICE: Device[AramisBoard, Aramis] = Device(
     load_scene=_load_scene,
     default_scene=_default_scene,
     default_scene_title="Orion",
+    experiment=_lazily("measure:EXPERIMENT"),
+    reports=(
+        Report(
+            "catalogue",
+            "compile the onboard star catalogue and say what is in it",
+            _lazily("catalogue:EXPERIMENT"),
+        ),
+    ),
+    benchmarks=_lazily("benchmarks:BENCHMARKS"),
+    demo=_lazily("demo:show"),
     has_fpga=False,
     prepare=_prepare,
     conformance=ConformanceNotes(

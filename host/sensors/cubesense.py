@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.contract import Client
-from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
+from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
@@ -67,6 +69,11 @@ def _proofs() -> Mapping[str, Proof]:
     return PROOFS
 
 
+def _lazily(what: str) -> Callable[[], Any]:
+    """Gives something of this sensor's experiments, which are loaded then."""
+    return partial(resolve_name, f"cubestack.host.experiments.cubesense.{what}")
+
+
 DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
     name="cubesense",
     title="CubeSense",
@@ -77,6 +84,16 @@ DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
     load_scene=_load_scene,
     default_scene=_default_scene,
     default_scene_title="Earth and Sun",
+    experiment=_lazily("measure:EXPERIMENT"),
+    reports=(
+        Report(
+            "memory",
+            "list the firmware's buffers against the processor's memories",
+            _lazily("memory:EXPERIMENT"),
+        ),
+    ),
+    benchmarks=_lazily("benchmarks:BENCHMARKS"),
+    demo=_lazily("demo:show"),
     options=(
         BoardOption(
             "mcu_addressing",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
@@ -17,7 +18,7 @@ from cubestack.host.conformance.effects import (
     check_upload,
     check_watchdog,
 )
-from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device
+from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -96,6 +97,11 @@ def _proofs() -> Mapping[str, Proof]:
     return PROOFS
 
 
+def _lazily(what: str) -> Callable[[], Any]:
+    """Gives something of this sensor's experiments, which are loaded then."""
+    return partial(resolve_name, f"cubestack.host.experiments.cubestar.{what}")
+
+
 DEVICE: Device[CubeStarBoard, CubeStar] = Device(
     name="cubestar",
     title="CubeStar",
@@ -106,6 +112,21 @@ DEVICE: Device[CubeStarBoard, CubeStar] = Device(
     load_scene=_load_scene,
     default_scene=_default_scene,
     default_scene_title="Orion",
+    experiment=_lazily("measure:EXPERIMENT"),
+    reports=(
+        Report(
+            "layouts",
+            "compare CubeStar's memory layouts: rate, age, power, pins",
+            _lazily("layouts:EXPERIMENT"),
+        ),
+        Report(
+            "catalogue",
+            "compile the onboard star catalogue and say what is in it",
+            _lazily("catalogue:EXPERIMENT"),
+        ),
+    ),
+    benchmarks=_lazily("benchmarks:BENCHMARKS"),
+    demo=_lazily("demo:show"),
     options=(
         BoardOption(
             "layout",

@@ -17,7 +17,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from cubestack.emulator.rtl.cxxrtl.build import CompilerError
-from cubestack.host.cli.terminal import console, progress_bar, say
+from cubestack.host.terminal import console, progress_bar, say
 from tests.benchmarks.engines import speeds
 from tests.benchmarks.engines.icarus import CocotbError
 from tests.benchmarks.engines.speeds import ENGINES, Speed

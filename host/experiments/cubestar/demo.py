@@ -1,29 +1,32 @@
 """CubeStar: a rendered sky and a photograph captured, solved and downloaded."""
 
-import argparse
+from __future__ import annotations
+
 import json
-import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.cli.serving import served
-from cubestack.host.cli.terminal import console, progress_bar
 from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.experiments.cubestar import compare
+from cubestack.host.devices.device import Device
+from cubestack.host.experiments.attitude import errors
+from cubestack.host.experiments.demo import Demo, download, tell_times
 from cubestack.host.pictures.images import annotate, save_picture
-from cubestack.host.transport.streams import open_transport
+from cubestack.host.terminal import console
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
 __all__ = ["RENDERED", "show"]
 
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius
 RENDERED = Path(__file__).parent / "rendered-sky.png"
+PUBLISHED_PHASES = ("discard", "capture", "transfer", "detect", "match", "attitude")
 PUBLISHED_TIMES = (
     "discard 68 ms, capture 388 ms, transfer 404 ms; "
     "detect and match 320 ms together for 20 stars; attitude below 10 ms"
@@ -52,9 +55,11 @@ class _Subject:
     camera: Path | None = None
 
 
-def show(args: argparse.Namespace) -> bool:
+def show(
+    device: Device[CubeStarBoard, CubeStar], out: Path, seed: int, photographs: Path | None
+) -> bool:
     """Show both subjects; returns whether both were solved."""
-    solved = [_show(subject, args.out) for subject in (_sky(args.seed), _photograph(args))]
+    solved = [_show(device, subject, out) for subject in (_sky(seed), _photograph(photographs))]
     return all(solved)
 
 
@@ -70,11 +75,10 @@ def _sky(seed: int) -> _Subject:
     )
 
 
-def _photograph(args: argparse.Namespace) -> _Subject:
+def _photograph(folder: Path | None) -> _Subject:
     """The first photograph of the folder, else the picture that this project ships."""
-    folder = args.photographs
     camera = None if folder is None else folder / "truth.json"
-    if camera is None or not camera.is_file():
+    if folder is None or camera is None or not camera.is_file():
         return _shipped()
     images = json.loads(camera.read_text(encoding="utf-8"))["images"]
     name = next(name for name in sorted(images) if (folder / name).is_file())
@@ -98,16 +102,10 @@ def _shipped() -> _Subject:
     )
 
 
-def _show(subject: _Subject, out: Path) -> bool:
+def _show(device: Device[CubeStarBoard, CubeStar], subject: _Subject, out: Path) -> bool:
     """Capture, solve and download one subject; returns whether it was solved."""
-    started = time.monotonic()
-    console.rule(subject.title)
-    scene = out / f"{subject.name}.toml"
-    scene.write_text(subject.scene, encoding="utf-8")
-    with served("cubestar", scene, out / "ttyCUBESTAR") as port:
-        cubestar = CubeStar(
-            NodeClient(open_transport(str(port), INTERFACE.baud), INTERFACE, timeout_s=5.0)
-        )
+    demo = Demo(out, subject.name, subject.title)
+    with demo.client(device, subject.scene) as (cubestar, _):
         if subject.camera is not None:
             fit = calibrate(load_camera(subject.camera).cropped(*CROP))
             cubestar.configure(fit.settings)
@@ -117,23 +115,17 @@ def _show(subject: _Subject, out: Path) -> bool:
         cubestar.capture_and_process()
         attitude = cubestar.attitude()
         _report_attitude(attitude.valid, attitude.quaternion, attitude.matched, subject.truth)
-        _report_phases(cubestar.phase_times())
+        phases = cubestar.phase_times()
+        tell_times({name: phases[name] for name in PUBLISHED_PHASES})
+        console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)
         stars = cubestar.stars()
-        with progress_bar() as bar:
-            task = bar.add_task("downloading the picture over the serial line", total=None)
-            picture = cubestar.stream_image(
-                lambda done, total: bar.update(task, completed=done, total=total)
-            )
+        picture = download("the picture over the serial line", cubestar.stream_image)
         uptime = cubestar.client.telemetry("Identification")
-        cubestar.client.close()
-    save_picture(picture, out / f"{subject.name}-raw.png")
-    annotate(picture, stars, out / f"{subject.name}-stars.png")
+    pictures = f"{subject.name}-raw.png", f"{subject.name}-stars.png"
+    save_picture(picture, out / pictures[0])
+    annotate(picture, stars, out / pictures[1])
     virtual_s = int(uptime["RuntimeSeconds"]) + int(uptime["RuntimeMilliseconds"]) / 1000
-    console.print(
-        f"{virtual_s:.1f} s of virtual time in {time.monotonic() - started:.1f} s of wall time; "
-        f"pictures: {out / subject.name}-raw.png, {out / subject.name}-stars.png",
-        soft_wrap=True,
-    )
+    demo.finish(*pictures, virtual_s=virtual_s)
     return attitude.valid
 
 
@@ -155,16 +147,7 @@ def _report_attitude(
             f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]",
             soft_wrap=True,
         )
-    across, about = compare(quaternion, truth)
-    assert across is not None
-    assert about is not None
+    across, about = errors(quaternion, truth)
     console.print(
         f"error: {3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight"
     )
-
-
-def _report_phases(phases: dict[str, float]) -> None:
-    shown = ("discard", "capture", "transfer", "detect", "match", "attitude")
-    times = ", ".join(f"{name} {phases[name]:.1f} ms" for name in shown)
-    console.print(f"virtual time: {times}", soft_wrap=True)
-    console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)

@@ -17,28 +17,24 @@ examples:
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.session import add_engine_arguments, open_session
-from cubestack.host.cli.terminal import console, progress
-from cubestack.host.devices.boards import cubestar_scene
-from cubestack.host.experiments.cubestar import RIGHT_CROSS_DEG, RIGHT_ROLL_DEG
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.experiments.attitude import errors, is_right
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import SCENE, Options, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-    from cubestack.emulator.camera.common.view import SkyView
-    from cubestack.emulator.scene.sky import Scene
-    from cubestack.host.cli.session import Engine
 
-__all__ = ["LayoutResult", "add_arguments", "measure_layout", "report", "run"]
+__all__ = ["EXPERIMENT", "LayoutOptions", "LayoutResult", "LayoutSummary"]
+
+_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 SETTLING = 2
 """Attitudes before the measurement."""
@@ -56,7 +52,7 @@ PUBLISHED = {
 
 
 @dataclass(frozen=True)
-class LayoutResult:
+class LayoutResult(Result):
     """What was measured of a layout; the attributes are those of the JSON output.
 
     Without attitudes there is no rate, age and energy: None.
@@ -87,50 +83,81 @@ class LayoutResult:
     published: str
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
-    parser.add_argument(
-        "--scene", type=Path, metavar="FILE", help="TOML scene; default: Orion, V < 3.8"
-    )
-    parser.add_argument(
-        "--seconds", type=whole(2, 3600), default=10, help="of virtual time each (default 10)"
-    )
-    parser.add_argument(
-        "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
-    )
-    parser.add_argument("--json", action="store_true", help="one JSON object a layout")
-    add_engine_arguments(parser)
+@dataclass(frozen=True, kw_only=True)
+class LayoutOptions(Options):
+    """Options of `cubestack layouts`."""
+
+    scene: Any = option(None, "TOML scene; default: Orion, V < 3.8", SCENE, metavar="FILE")
+    seconds: int = option(10, "of virtual time each (default 10)", whole(2, 3600))
+    seed: int = option(0, "seed of everything random (default 0)", whole(0))
 
 
-def run(args: argparse.Namespace) -> int:
-    """Measure all; returns 1 when one gave no attitude."""
-    scene = cubestar_scene(args.scene)
-    results = []
-    for layout in progress(list(Layout), len(Layout), "running", quiet=args.json):
-        result = measure_layout(
-            layout, scene, seconds=args.seconds, seed=args.seed, engine=args.engine
+@dataclass(frozen=True)
+class LayoutSummary(Summary):
+    """What is published of the layouts, and which can not be built."""
+
+    results: Sequence[LayoutResult]
+
+    def lines(self, wall_s: float) -> Iterator[str]:
+        """One for each."""
+        for result in self.results:
+            yield f"published for {result.layout}: {result.published}"
+        for result in self.results:
+            if not result.fits:
+                yield f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins"
+
+
+class _Layouts(Experiment["_Opener", LayoutOptions, LayoutResult]):
+    options = LayoutOptions
+    description = __doc__
+    title = "CubeStar's memory layouts in their loops"
+    columns = ("layout", "Hz", "age ms", "mW", "mJ", "copy ms", "pins", "tiles")
+    label = "running"
+    decides = ("layout",)
+
+    def count(self, options: LayoutOptions) -> int:
+        return len(Layout)
+
+    def run(self, opened: _Opener, options: LayoutOptions) -> Iterator[LayoutResult]:
+        for layout in Layout:
+            yield _measure(layout, opened, options)
+
+    def row(self, number: int, result: LayoutResult) -> tuple[str, ...]:
+        each = f"{result.fpgas} x " if result.fpgas > 1 else ""
+        return (
+            result.layout,
+            _shown(result.rate_hz, 2),
+            f"{_shown(result.age_ms)} to {_shown(result.oldest_ms)}",
+            _shown(result.power_mw),
+            _shown(result.energy_mj),
+            f"{result.phase_ms['transfer']:.0f}",
+            f"{each}{result.pins}{'' if result.fits else ' (!)'}",
+            f"{each}{result.tiles}",
         )
-        results.append(result)
-        if args.json:
-            print(json.dumps(asdict(result)), flush=True)
-    if not args.json:
-        report(results)
-    return int(not all(result.attitudes for result in results))
+
+    def summarise(self, results: Sequence[LayoutResult]) -> LayoutSummary:
+        return LayoutSummary(results)
+
+    def succeeded(self, results: Sequence[LayoutResult]) -> bool:
+        """Each gave an attitude."""
+        return all(result.attitudes for result in results)
 
 
-def measure_layout(
-    layout: Layout, scene: Scene | SkyView, *, seconds: int, seed: int = 0, engine: Engine = "auto"
-) -> LayoutResult:
+def _shown(value: float | None, digits: int = 0) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _measure(layout: Layout, opened: _Opener, options: LayoutOptions) -> LayoutResult:
     """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
     from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
 
-    with open_session(scene, seed=seed, engine=engine, layout=layout) as session:
-        session.cubestar.client.command("Trigger")
-        found = list(_attitudes(session.board, seconds))
-        session.cubestar.client.command("StopLoop")
-        phases = session.cubestar.phase_times()
-        violations = sum(session.board.engine.violation_counts.values())
-        volts = session.board.power.table.volts
+    with opened(options.scene, seed=options.seed, layout=layout.value) as emulated:
+        emulated.client.client.command("Trigger")
+        found = list(_attitudes(emulated.board, options.seconds))
+        emulated.client.client.command("StopLoop")
+        phases = emulated.client.phase_times()
+        violations = sum(emulated.board.engine.violation_counts.values())
+        volts = emulated.board.power.table.volts
     fpga = fpga_of(layout)
     # Without an attitude there is nothing to divide by.
     begun, measured = found[0], found[1:]
@@ -176,7 +203,6 @@ def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
 
     When the first one does not come, its place is told without it.
     """
-    from cubestack.emulator.scene.attitude import attitude_error_deg
     from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
 
     kernel, seen, end_ps = board.kernel, 0, board.kernel.now + (SETTLING + 3) * PS_PER_S
@@ -197,8 +223,7 @@ def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
         assert stored is not None
         right = None
         if truth is not None:
-            across, about = attitude_error_deg(Attitude.unpack(page).quaternion, truth)
-            right = across < RIGHT_CROSS_DEG and abs(about) < RIGHT_ROLL_DEG
+            right = is_right(*errors(Attitude.unpack(page).quaternion, truth))
         if not begun:
             begun, end_ps = True, kernel.now + seconds * PS_PER_S + PS_PER_MS
         yield _Found(
@@ -209,32 +234,4 @@ def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
         )
 
 
-def report(results: list[LayoutResult]) -> None:
-    """Show ``results`` as a table."""
-    from rich.table import Table
-
-    table = Table(title="CubeStar's memory layouts in their loops")
-    for column in ("layout", "Hz", "age ms", "mW", "mJ", "copy ms", "pins", "tiles"):
-        table.add_column(column, justify="right")
-    for result in results:
-        each = f"{result.fpgas} x " if result.fpgas > 1 else ""
-        table.add_row(
-            result.layout,
-            _shown(result.rate_hz, 2),
-            f"{_shown(result.age_ms)} to {_shown(result.oldest_ms)}",
-            _shown(result.power_mw),
-            _shown(result.energy_mj),
-            f"{result.phase_ms['transfer']:.0f}",
-            f"{each}{result.pins}{'' if result.fits else ' (!)'}",
-            f"{each}{result.tiles}",
-        )
-    console.print(table)
-    for result in results:
-        console.print(f"published for {result.layout}: {result.published}", highlight=False)
-    for result in results:
-        if not result.fits:
-            console.print(f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins")
-
-
-def _shown(value: float | None, digits: int = 0) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+EXPERIMENT = _Layouts()

@@ -1,23 +1,26 @@
 """CubeSense: the Sun and the Earth measured and their pictures downloaded."""
 
-import argparse
-import time
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
-from cubestack.host.cli.serving import served
-from cubestack.host.cli.terminal import console, progress_bar
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
-from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.device import Device
+from cubestack.host.experiments.demo import Demo, download, tell_times
 from cubestack.host.pictures.cubesense import annotate_nadir, annotate_sun
 from cubestack.host.pictures.images import save_picture
+from cubestack.host.terminal import console
 from cubestack.host.transport.streams import open_transport
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
 __all__ = ["show"]
 
@@ -27,32 +30,25 @@ PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}
 """CubeSense thesis, section 7.4: from imaging to centroid, mean of 100."""
 
 
-def show(args: argparse.Namespace) -> bool:
+def show(
+    device: Device[CubeSenseBoard, CubeSense], out: Path, seed: int, _photographs: Path | None
+) -> bool:
     """Measure with both sensors; returns whether both found what they looked for."""
-    started = time.monotonic()
-    console.rule("sun and nadir sensor: the Sun, and the Earth from 750 km")
-    scene = args.out / "earth-sun.toml"
-    scene.write_text(
+    demo = Demo(out, "earth-sun", "sun and nadir sensor: the Sun, and the Earth from 750 km")
+    scene = (
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
-        f"seed = {args.seed}\n",
-        encoding="utf-8",
+        f"seed = {seed}\n"
     )
-    with served("cubesense", scene, args.out / "ttyCUBESENSE") as port:
-        cubesense = CubeSense(NodeClient(open_transport(str(port), INTERFACE.baud), INTERFACE))
+    with demo.client(device, scene) as (cubesense, port):
         line = open_transport(f"{port}.bench", SERVICE_PORT.baud)
         bench = ServicePortClient(line)
         found = [
-            _measure(cubesense, bench, camera, truth, args.out)
+            _measure(cubesense, bench, camera, truth, out)
             for camera, truth in ((Camera.SUN, SUN_DEG), (Camera.NADIR, NADIR_DEG))
         ]
         uptime_s = cubesense.uptime_s()
         line.close()
-        cubesense.client.close()
-    console.print(
-        f"{uptime_s:.1f} s of virtual time in {time.monotonic() - started:.1f} s of wall time; "
-        f"pictures: {args.out}/sun.png, {args.out}/nadir.png",
-        soft_wrap=True,
-    )
+    demo.finish("sun.png", "nadir.png", virtual_s=uptime_s)
     return all(found)
 
 
@@ -67,11 +63,9 @@ def _measure(
     measured = cubesense.capture_and_detect(camera)
     name = camera.name.lower()
     _report(measured, truth, cubesense.phase_times(camera))
-    with progress_bar() as bar:
-        task = bar.add_task(f"downloading the {name} picture over the bench port", total=None)
-        picture = bench.download(
-            camera, lambda done, total: bar.update(task, completed=done, total=total)
-        )
+    picture = download(
+        f"the {name} picture over the bench port", lambda shown: bench.download(camera, shown)
+    )
     save_picture(picture, out / f"{name}-raw.png")
     _annotate(cubesense, measured, picture, out / f"{name}.png")
     return measured.detected
@@ -89,8 +83,7 @@ def _report(measured: Measurement, truth: tuple[float, float], phases_ms: dict[s
         f"truth {truth[0]:+.2f}°, {truth[1]:+.2f}°; error {error_deg:.3f}°",
         soft_wrap=True,
     )
-    times = ", ".join(f"{phase} {ms:.1f} ms" for phase, ms in phases_ms.items())
-    console.print(f"  virtual time: {times}", soft_wrap=True)
+    tell_times(phases_ms, "  ")
     console.print(f"  published:    {PUBLISHED_MS[measured.camera]} ms from imaging to centroid")
 
 

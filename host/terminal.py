@@ -1,8 +1,8 @@
 """What the terminal shows: results on standard output, progress on standard error."""
 
-import json
 from collections.abc import Iterable, Iterator
-from typing import Any, Protocol, TypeVar
+from contextlib import contextmanager
+from typing import TypeVar
 
 from rich.console import Console
 from rich.progress import (
@@ -14,22 +14,12 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-__all__ = ["collect", "console", "progress", "progress_bar", "say"]
+__all__ = ["console", "progress", "progress_bar", "say"]
 
 console = Console()
 _errors = Console(stderr=True)
 
 T = TypeVar("T")
-
-
-class Result(Protocol):
-    """What a command measured."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-
-
-R = TypeVar("R", bound=Result)
 
 
 def say(text: str) -> None:
@@ -52,22 +42,32 @@ def progress_bar() -> Progress:
 
 
 def progress(items: Iterable[T], total: int, label: str, *, quiet: bool = False) -> Iterator[T]:
-    """Pass ``items`` through with a progress bar; ``quiet`` leaves it out."""
+    """Pass ``items`` through with a progress bar, which may be inside another's loop.
+
+    ``quiet`` leaves it out.
+    """
     if quiet:
         yield from items
         return
-    with progress_bar() as bar:
+    with _shown_bar() as bar:
         task = bar.add_task(label, total=total)
         for item in items:
             yield item
             bar.advance(task)
 
 
-def collect(results: Iterable[R], total: int, *, as_json: bool) -> list[R]:
-    """All ``results``, ``total`` of them: behind a progress bar, or printed as JSON, one a line."""
-    collected = []
-    for result in progress(results, total, "measuring", quiet=as_json):
-        collected.append(result)
-        if as_json:
-            print(json.dumps(result.as_dict()), flush=True)
-    return collected
+#: The display that is on the terminal; a second one can not be.
+_open: list[Progress] = []
+
+
+@contextmanager
+def _shown_bar() -> Iterator[Progress]:
+    if _open:
+        yield _open[0]
+        return
+    with progress_bar() as bar:
+        _open.append(bar)
+        try:
+            yield bar
+        finally:
+            _open.clear()

@@ -1,0 +1,68 @@
+"""Commands about particular devices, which the devices themselves declare."""
+
+from __future__ import annotations
+
+import argparse
+
+from cubestack.host.cli.arguments import add_options
+from cubestack.host.cli.measure import add_board, run_experiment
+from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.experiment import AnyExperiment
+from cubestack.host.devices.registry import devices
+from cubestack.host.options import flag
+
+__all__ = ["Reports", "reports"]
+
+Found = tuple[AnyDevice, AnyExperiment]
+
+
+class Reports:
+    """One command: what the devices that have it say of themselves.
+
+    Attributes:
+        summary: one phrase for the help.
+        found: the experiment of each device that has it, by the device's name.
+    """
+
+    def __init__(self, summary: str) -> None:
+        """Of no device yet."""
+        self.summary = summary
+        self.found: dict[str, Found] = {}
+
+    @property
+    def description(self) -> str:
+        """Those of all devices."""
+        return "\n".join(experiment.description for _, experiment in self.found.values())
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the device, and the options of all that can be it."""
+        first = next(iter(self.found))
+        parser.add_argument(
+            "device", nargs="?", choices=self.found, default=first, help=f"default {first}"
+        )
+        parser.add_argument("--json", action="store_true", help="one JSON object a result")
+        add_options(parser, *(experiment.options for _, experiment in self.found.values()))
+        for device, experiment in self.found.values():
+            add_board(parser, device, experiment)
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Run it for the device; ValueError for an option that is another's."""
+        device, experiment = self.found[args.device]
+        own = experiment.options.declared()
+        for other, theirs in self.found.values():
+            for name, field in theirs.options.declared().items():
+                if name not in own and getattr(args, name) != field.default:
+                    raise ValueError(
+                        f"{flag(name)} has no effect for {device.name}; it is {other.name}'s"
+                    )
+        return run_experiment(args, device, experiment)
+
+
+def reports() -> dict[str, Reports]:
+    """The commands that the registered devices declare, by name."""
+    found: dict[str, Reports] = {}
+    for device in devices():
+        for report in device.reports:
+            command = found.setdefault(report.name, Reports(report.summary))
+            command.found[device.name] = (device, report.load())
+    return found

@@ -1,0 +1,80 @@
+"""What an experiment is: a device measured end to end, each result beside the truth."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from cubestack.host.options import Options
+
+__all__ = ["AnyExperiment", "Experiment", "Result", "Summary"]
+
+
+class Result:
+    """One result; a frozen dataclass whose attributes are those of the JSON output."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return dict(vars(self))
+
+
+class Summary(ABC):
+    """What results are together; a frozen dataclass."""
+
+    @abstractmethod
+    def lines(self, wall_s: float) -> Iterator[str]:
+        """For a reader; the results took so long."""
+
+
+OpenerT = TypeVar("OpenerT")
+OptionsT = TypeVar("OptionsT", bound=Options)
+ResultT = TypeVar("ResultT", bound=Result)
+
+
+class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
+    """How a command measures one device, or what it looks up about it.
+
+    Attributes:
+        options: what can be chosen.
+        description: for the help, with examples.
+        title, columns: of the table of results; the last column is text. No columns: no table.
+        label: says what is going on, beside the progress bar; empty for none.
+        powers_up: whether it needs the device, and not only its tables.
+        decides: options of the board that the experiment sets itself.
+    """
+
+    options: type[OptionsT]
+    description: str
+    title: str = ""
+    columns: tuple[str, ...] = ()
+    label: str = "measuring"
+    powers_up: bool = True
+    decides: tuple[str, ...] = ()
+
+    def count(self, options: OptionsT) -> int:
+        """How many results there will be."""
+        return 1
+
+    @abstractmethod
+    def run(self, opened: OpenerT, options: OptionsT) -> Iterator[ResultT]:
+        """Measure with the device that ``opened`` powers up, an ``experiments.opener.Opener``.
+
+        Raises ValueError for a scene, a picture or a plan of faults that can not be used.
+        """
+
+    def row(self, number: int, result: ResultT) -> tuple[str, ...]:
+        """A result in the table: one cell for each of ``columns``; ``number`` counts from 0."""
+        raise NotImplementedError
+
+    @abstractmethod
+    def summarise(self, results: Sequence[ResultT]) -> Summary:
+        """What the results are together."""
+
+    def succeeded(self, results: Sequence[ResultT]) -> bool:
+        """Whether the run was a success; to find nothing is one, unless an experiment says else."""
+        return True
+
+
+#: An experiment with whatever device.
+AnyExperiment: TypeAlias = Experiment[Any, Any, Any]

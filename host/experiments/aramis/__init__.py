@@ -1,0 +1,1 @@
+"""Experiments with the star tracker of AraMiS."""

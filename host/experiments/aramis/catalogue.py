@@ -1,0 +1,116 @@
+"""Compile AraMiS' onboard star catalogue from Hipparcos and say what is in it.
+
+examples:
+  cubestack catalogue aramis                           stars and triangles
+  cubestack catalogue aramis --epoch 2000 --fov 18 --output image.bin
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cubestack.host.devices.device import Shown
+from cubestack.host.devices.experiment import Result
+from cubestack.host.experiments.facts import Lookup
+from cubestack.host.options import NUMBER, PATH, Options, option, whole
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
+
+__all__ = ["EXPERIMENT", "CatalogueFacts", "CatalogueOptions"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CatalogueOptions(Options):
+    """What the catalogue is compiled for; None as it is flown."""
+
+    mag_limit: float | None = option(
+        None, "faintest star, included; default 6", NUMBER, metavar="V"
+    )
+    epoch: float = option(2026.0, "default 2026", NUMBER, metavar="YEAR")
+    fov: float | None = option(None, "diameter of the field, default 21.53", NUMBER, metavar="DEG")
+    stars_per_field: int | None = option(
+        None, "brightest kept, default 6", whole(3, 50), metavar="N"
+    )
+    step: float | None = option(None, "of the scan, default 1", NUMBER, metavar="DEG")
+    longest_side: float | None = option(
+        None, "of a triangle, default: the field", NUMBER, metavar="DEG"
+    )
+    output: Path | None = option(None, "write the flash image", PATH, metavar="FILE")
+
+    def parameters(self) -> CatalogueParameters:
+        """As the compiler of the catalogue takes them; ValueError for what it can not do."""
+        from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
+
+        given: dict[str, Any] = {
+            "fov_deg": self.fov,
+            "stars_per_field": self.stars_per_field,
+            "mag_limit": self.mag_limit,
+            "step_deg": self.step,
+            "longest_side_deg": self.longest_side,
+            "epoch": self.epoch,
+        }
+        return CatalogueParameters(
+            **{name: value for name, value in given.items() if value is not None}
+        )
+
+
+@dataclass(frozen=True)
+class CatalogueFacts(Result):
+    """What is in it, beside the published numbers; sizes in bytes, wall time in seconds."""
+
+    fov_deg: float
+    stars_per_field: int
+    mag_limit: float
+    step_deg: float
+    longest_side_deg: float
+    epoch: float
+    stars: int
+    published_stars: int
+    triangles: int
+    published_triangles: int
+    star_numbers: str
+    bytes: int
+    bytes_of_parts: dict[str, int]
+    seconds: float
+    sha256: str
+
+
+class _Catalogue(Lookup[CatalogueOptions, CatalogueFacts]):
+    options = CatalogueOptions
+    description = __doc__
+
+    def look_up(self, options: CatalogueOptions, shown: Shown) -> CatalogueFacts:
+        from cubestack.emulator.boards.aramis.catalogue import PUBLISHED, cached_database
+
+        parameters = options.parameters()
+        start = time.monotonic()
+        database = cached_database(parameters, shown)
+        seconds = time.monotonic() - start
+        image = database.pack()
+        if options.output is not None:
+            options.output.write_bytes(image)
+        return CatalogueFacts(
+            fov_deg=parameters.fov_deg,
+            stars_per_field=parameters.stars_per_field,
+            mag_limit=parameters.mag_limit,
+            step_deg=parameters.step_deg,
+            longest_side_deg=parameters.side_deg,
+            epoch=parameters.epoch,
+            stars=len(database.numbers),
+            published_stars=PUBLISHED["stars"],
+            triangles=len(database),
+            published_triangles=PUBLISHED["triangles"],
+            star_numbers="Hipparcos",
+            bytes=len(image),
+            bytes_of_parts=database.sizes,
+            seconds=round(seconds, 2),
+            sha256=hashlib.sha256(image).hexdigest(),
+        )
+
+
+EXPERIMENT = _Catalogue()

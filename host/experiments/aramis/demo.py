@@ -1,0 +1,64 @@
+"""AraMiS: a sky captured, solved lost in space and near a rough direction, and downloaded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.host.clients.aramis.client import Aramis, Attitude
+from cubestack.host.devices.device import Device
+from cubestack.host.experiments.attitude import errors
+from cubestack.host.experiments.demo import Demo, download, tell_times
+from cubestack.host.pictures.images import annotate, save_picture
+from cubestack.host.terminal import console
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+
+__all__ = ["show"]
+
+POINTING_DEG = (84.0, -1.0, 20.0)  # Orion
+ROUGHLY_OFF_DEG = 2.0
+
+
+def show(
+    device: Device[AramisBoard, Aramis], out: Path, seed: int, _photographs: Path | None
+) -> bool:
+    """Measure twice and download; returns whether both measurements were conclusive."""
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
+
+    demo = Demo(out, "aramis-sky", "star tracker without FPGA: Orion, 21.5 deg, 2026")
+    ra, dec, roll = POINTING_DEG
+    truth = quaternion_from_pointing(ra, dec, roll)
+    scene = f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\nseed = {seed}\n'
+    with demo.client(device, scene) as (aramis, _):
+        console.print(f"activated; catalogue: {aramis.activate().name.lower()}")
+        lost = aramis.measure()
+        _report("lost in space", lost, truth)
+        boresight = matrix_from_quaternion(truth)[2]
+        rough = boresight + np.radians(ROUGHLY_OFF_DEG) * matrix_from_quaternion(truth)[0]
+        aided = aramis.measure(rough / np.linalg.norm(rough))
+        _report(f"with a direction {ROUGHLY_OFF_DEG:g}° off", aided, truth)
+        tell_times(aramis.phase_times(), "  ")
+        stars = aramis.stars()
+        picture = download("the picture over the serial line", aramis.image)
+    save_picture(picture, out / "aramis-raw.png")
+    annotate(picture, stars, out / "aramis-stars.png")
+    demo.finish("aramis-raw.png", "aramis-stars.png")
+    return lost.valid and aided.valid
+
+
+def _report(title: str, attitude: Attitude, truth: NDArray[np.float64]) -> None:
+    outcome = f"{attitude.outcome.name.lower()}: {attitude.reason.name.lower()}"
+    if not attitude.valid or attitude.quaternion is None:
+        console.print(f"{title}: {outcome}")
+        return
+    across, about = errors(attitude.quaternion, truth)
+    console.print(
+        f"{title}: {outcome}, {attitude.matched} of {attitude.detected} stars; error: "
+        f"{3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight",
+        soft_wrap=True,
+    )

@@ -1,0 +1,309 @@
+"""Measure attitudes with AraMiS' star tracker end to end: scene, camera, firmware,
+serial line, host.
+
+The star tracker captures and processes every picture; the host sees only what
+comes back over the serial line. The truth is known to this command alone and is
+printed beside the result. The sky shows all stars that the camera can see. The
+first measurement with a lens compiles its catalogue, which takes seconds.
+
+examples:
+  cubestack measure aramis --frames 20                       lost in space
+  cubestack measure aramis --frames 200 --json > frames.jsonl
+  cubestack measure aramis --mode assisted --hint-error 3    rough boresight
+  cubestack measure aramis --published --frames 100          as the thesis runs it
+  cubestack measure aramis --field 18 --roll-rate 10 --exposure 20
+  cubestack measure aramis --bit-flips 1e-6                  upsets in flash
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.aramis import OnOff, SpikeMethod
+from cubestack.firmware_model.interface.cameras.mt9m001 import (
+    COLUMNS,
+    FRAME_END_CLOCKS,
+    FRAME_START_CLOCKS,
+    PIXEL_CLOCK_HZ,
+)
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.experiments.attitude import (
+    AttitudeExperiment,
+    AttitudeResult,
+    SkyOptions,
+    compare,
+    count_wrong,
+    random_view,
+    rough_boresight,
+)
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import (
+    ANGLE,
+    CORNER,
+    NUMBER,
+    POSITIVE,
+    Kind,
+    between,
+    option,
+)
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.aramis.board import AramisBoard
+    from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+
+__all__ = ["EXPERIMENT", "NOISE_TERMS", "AramisOptions", "AramisResult"]
+
+_Opener: TypeAlias = "Opener[AramisBoard, Aramis]"
+
+FIELD_DEG = 21.53463888888889
+"""Of the published simulations; the lens that was expected to be built has 18."""
+
+NOISE_TERMS = ("shot", "dark", "background", "quantisation", "readout")
+ROW_S = (COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS) / PIXEL_CLOCK_HZ
+PHASE_S = 0.2
+"""Measurements start at a random time within so long after each other."""
+
+
+def _magnitudes(given: Any) -> tuple[float, float]:
+    brightest, faintest = given.split(",") if isinstance(given, str) else given
+    return NUMBER(brightest), NUMBER(faintest)
+
+
+MAGNITUDES = Kind(
+    "V,V, the brightest first, as in 4.5,6", _magnitudes, lambda pair: pair[0] <= pair[1]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AramisOptions(SkyOptions):
+    """Options of `cubestack measure aramis`."""
+
+    mode: str = option(
+        "lis",
+        "lost in space (default), or near a rough direction",
+        choices=("lis", "assisted"),
+    )
+    published: bool = option(
+        False, "believe a unique triangle, as the thesis does, without verification"
+    )
+    field: float = option(
+        FIELD_DEG,
+        "field of view of lens and catalogue (default 21.5346, the published one)",
+        between(5, 40, "a field of view in 5..40 degrees"),
+        metavar="DEG",
+    )
+    exposure: float | None = option(None, "exposure (default 200)", POSITIVE, metavar="MS")
+    gain: float | None = option(
+        None, "gain, 1 to 15 (default 15)", between(1, 15, "a gain in 1..15"), metavar="X"
+    )
+    rate: float = option(0.0, "body rate across the boresight", ANGLE, metavar="DEG_S")
+    roll_rate: float = option(0.0, "body rate about it", ANGLE, metavar="DEG_S")
+    false_mags: tuple[float, float] = option(
+        (4.5, 6.0),
+        "brightest and faintest magnitude of the false stars (default 4.5,6)",
+        MAGNITUDES,
+        metavar="V,V",
+    )
+    without: tuple[str, ...] = option(
+        (), "leave out a term of the noise; may be given again", choices=NOISE_TERMS, many=True
+    )
+    bit_flips: float = option(
+        0.0,
+        "turn over each bit of the catalogue's flash with this probability before each frame",
+        between(0, 1, "a probability in 0..1"),
+        metavar="RATE",
+    )
+    crop: tuple[int, int] = option(
+        (0, 0), "with --image: left upper corner of the 1280 x 1024 part", CORNER, metavar="X,Y"
+    )
+
+    def check(self) -> None:
+        """Options of a picture need one, those of the random sky need that."""
+        if self.image is None and self.given("crop"):
+            raise ValueError("--crop belongs to --image")
+        sky = ("mag_limit", "false_stars", "no_noise", "rate", "roll_rate")
+        if not self.is_random and self.given(*sky):
+            raise ValueError(
+                "--mag-limit, --false-stars, --no-noise and rates belong to the random sky; "
+                "a scene file has keys for them"
+            )
+
+
+#: Keys of the JSON output, in their order.
+_KEYS = (
+    *("solved", "right", "outcome", "reason", "centroids", "matched", "wrong"),
+    *("candidates", "pivots", "triples", "mode", "error_cross_deg", "error_roll_deg"),
+    *("truth", "quaternion", "image_time_s", "flips", "corrected", "lost"),
+    *("phase_ms", "wall_ms", "status"),
+)
+
+
+@dataclass(frozen=True)
+class AramisResult(AttitudeResult):
+    """Attributes are those of the JSON output.
+
+    Attributes:
+        outcome, reason: how the identification ended.
+        candidates, pivots, triples: of the identification.
+        image_time_s: mid-exposure by the star tracker's clock, since power-up.
+        flips, corrected, lost: bits turned over in flash, and what loading made of the words.
+    """
+
+    outcome: str
+    reason: str
+    candidates: int
+    pivots: int
+    triples: int
+    image_time_s: float
+    flips: int
+    corrected: int
+    lost: int
+
+    @property
+    def ending(self) -> str:
+        """How it ended, and why."""
+        return f"{self.outcome}: {self.reason} {self.status}".rstrip()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {key: getattr(self, key) for key in _KEYS}
+
+
+class _Experiment(AttitudeExperiment["_Opener", AramisOptions, AramisResult]):
+    options = AramisOptions
+    description = __doc__
+
+    def run(self, opened: _Opener, options: AramisOptions) -> Iterator[AramisResult]:
+        from cubestack.emulator.boards.aramis.catalogue import onboard_database
+        from cubestack.emulator.camera.common.view import SkyCondition
+        from cubestack.emulator.camera.mt9m001.lens import double_gauss
+        from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
+
+        rng = np.random.default_rng(options.seed)
+        condition = SkyCondition(double_gauss(options.field))
+        with opened(
+            _view(options, condition, rng),
+            seed=options.seed,
+            faults=options.faults,
+            catalogue=onboard_database(options.field, opened.shown),
+            noise=NoiseTerms(**dict.fromkeys(options.without, False)),
+        ) as emulated:
+            aramis = emulated.client
+            _configure(aramis, options)
+            aramis.activate()
+            pristine = emulated.board.catalogue_flash.copy()
+            for number in range(options.frames):
+                if number and options.is_random:
+                    emulated.scene = _view(options, condition, rng)
+                flips = 0
+                if options.bit_flips:
+                    aramis.deactivate()
+                    emulated.board.catalogue_flash[:] = pristine
+                    flips = emulated.board.irradiate("flash", options.bit_flips)
+                    aramis.activate()
+                aramis.client.pause(float(rng.uniform(0, PHASE_S)))
+                yield _measure(emulated, options, rng, flips)
+
+
+def _view(options: AramisOptions, condition: SkyCondition, rng: np.random.Generator) -> SkyView:
+    from cubestack.emulator.camera.common.scene_file import load_scene
+    from cubestack.emulator.camera.common.view import SkyView, View
+    from cubestack.emulator.scene.sky import PictureScene
+
+    if isinstance(options.scene, Path):
+        return load_scene(options.scene, condition)
+    if isinstance(options.scene, View):
+        return options.scene
+    if options.scene is not None:
+        return SkyView(options.scene, condition)
+    if options.image is not None:
+        return SkyView(PictureScene(options.image, crop=options.crop), condition)
+    along = rng.random() * 2 * np.pi
+    rate = (options.rate * np.cos(along), options.rate * np.sin(along), options.roll_rate)
+    return random_view(options, condition, rng, rate_deg_s=rate, false_star_mag=options.false_mags)
+
+
+def _configure(aramis: Aramis, options: AramisOptions) -> None:
+    """Send what differs from the settings after power-up."""
+    client = aramis.client
+    interface = client.interface
+    client.command("SetField", FieldOfView=options.field, Round=OnOff.ON)
+    if options.exposure is not None:
+        client.command("SetExposure", Rows=max(1, round(options.exposure / 1000 / ROW_S)))
+    if options.gain is not None:
+        client.command("SetGain", Gain=options.gain)
+    client.wait_processed(1.0)
+    if options.published:
+        detection = interface.telecommand("SetDetection").reset_values()
+        detection |= {"Spikes": SpikeMethod.WINDOW, "Subtract": OnOff.OFF}
+        client.command("SetDetection", **detection)
+        matching = interface.telecommand("SetIdentification").reset_values()
+        client.command("SetIdentification", **(matching | {"Verify": OnOff.OFF, "Noise": 0.26}))
+        client.wait_processed(1.0)
+
+
+def _measure(
+    emulated: EmulatedDevice[AramisBoard, Aramis],
+    options: AramisOptions,
+    rng: np.random.Generator,
+    flips: int,
+) -> AramisResult:
+    started = time.perf_counter()
+    aramis, client, board = emulated.client, emulated.client.client, emulated.board
+    client.command("ClearErrorFlags")
+    hint = None
+    if options.mode == "assisted":
+        known = emulated.scene.truth(board.kernel.now)
+        if known is None:
+            raise ValueError("--mode assisted needs a scene whose attitude is known")
+        hint = rough_boresight(known, options.hint_error, rng)
+    found = aramis.measure(hint)
+    truth = board.truth(found.frame)
+    summary = client.telemetry("IdentificationSummary")
+    catalogue = client.telemetry("CatalogueStatus")
+    flags = client.telemetry("ErrorFlags")
+    return AramisResult(
+        **compare(found.quaternion if found.valid else None, truth),
+        outcome=found.outcome.name.lower(),
+        reason=found.reason.name.lower(),
+        centroids=found.detected,
+        matched=found.matched if found.valid else 0,
+        wrong=_count_wrong(emulated, truth) if found.valid else 0,
+        candidates=int(summary["Candidates"]),
+        pivots=int(summary["Pivots"]),
+        triples=int(summary["Triples"]),
+        mode=options.mode,
+        image_time_s=found.image_uptime_s,
+        flips=flips,
+        corrected=int(catalogue["Corrected"]),
+        lost=int(catalogue["Lost"]),
+        phase_ms=aramis.phase_times(),
+        wall_ms=1000 * (time.perf_counter() - started),
+        status=" ".join(name for name, up in flags.items() if up),
+    )
+
+
+def _count_wrong(
+    emulated: EmulatedDevice[AramisBoard, Aramis], truth: NDArray[np.float64] | None
+) -> int | None:
+    """Identified stars that the truth puts elsewhere; None without a truth."""
+    from cubestack.emulator.scene.sky import SkyScene
+
+    camera = emulated.board.camera
+    if truth is None or not isinstance(camera.scene, SkyScene):
+        return None
+    named = [star for star in emulated.client.stars() if star.hipparcos is not None]
+    places = np.array([[star.x_px, star.y_px] for star in named]).reshape(-1, 2)
+    hipparcos = [star.hipparcos or 0 for star in named]
+    return count_wrong(hipparcos, camera.condition.optics.unproject(places), truth)
+
+
+EXPERIMENT = _Experiment()

@@ -1,0 +1,292 @@
+"""What measuring star trackers has in common: random skies, hints, and attitudes beside the truth.
+
+Axes and errors: D = A_measured A_truth^T, with A the rotation from inertial to camera; the error
+across is the angle between the boresights, the error about them atan2(D01 - D10, D00 + D11).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.experiments.opener import MeasureOptions
+from cubestack.host.options import (
+    ANGLE,
+    CORNER,
+    NUMBER,
+    PATH,
+    SCENE,
+    option,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+
+__all__ = [
+    "AttitudeExperiment",
+    "AttitudeResult",
+    "AttitudeSummary",
+    "SkyOptions",
+    "arcsec",
+    "compare",
+    "count_wrong",
+    "errors",
+    "is_right",
+    "percentile_95",
+    "random_view",
+    "rough_boresight",
+]
+
+RIGHT_CROSS_DEG = 0.1
+RIGHT_ROLL_DEG = 0.3
+SAME_STAR_DEG = 0.2
+"""An identified star further than this from where the truth puts it has a wrong identity."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkyOptions(MeasureOptions):
+    """Options of every star tracker; without scene and image each frame has a random sky."""
+
+    scene: Any = option(
+        None, "TOML scene; default: random sky", SCENE, metavar="FILE", group="light"
+    )
+    image: Path | None = option(
+        None, "picture file as the light", PATH, metavar="FILE", group="light"
+    )
+    mode: str = "lis"
+    hint_error: float = option(0.0, "largest error of the hint", ANGLE, metavar="DEG")
+    mag_limit: float | None = option(
+        None,
+        "cut the sky at this magnitude; default: all that the camera can see",
+        NUMBER,
+        metavar="V",
+    )
+    false_stars: int = option(
+        0, "stars that are in no catalogue, at random places", whole(0), metavar="N"
+    )
+    no_noise: bool = option(False, "a sensor without any noise")
+    crop: tuple[int, int] = option(
+        (0, 0), "with --image: left upper corner of the part that is seen", CORNER, metavar="X,Y"
+    )
+
+    @property
+    def is_random(self) -> bool:
+        """Whether each frame has a random sky."""
+        return self.scene is None and self.image is None
+
+
+def random_view(
+    options: SkyOptions, condition: SkyCondition, rng: np.random.Generator, **more: Any
+) -> SkyView:
+    """A sky as the options say, at a random pose, and the camera; ``more`` as the scene has it."""
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.scene.attitude import random_quaternion
+    from cubestack.emulator.scene.sky import SkyScene
+
+    scene = SkyScene(
+        quaternion=random_quaternion(rng),
+        mag_limit=options.mag_limit,
+        false_stars=options.false_stars,
+        seed=int(rng.integers(1 << 31)),
+        **more,
+    )
+    return SkyView(scene, replace(condition, noise=not options.no_noise, seed=scene.seed))
+
+
+def rough_boresight(
+    truth: NDArray[np.float64], error_deg: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """A boresight (3,) at most ``error_deg`` from the true attitude's, uniform over that cap."""
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion
+
+    matrix = matrix_from_quaternion(truth)
+    away = np.radians(error_deg) * np.sqrt(rng.random())
+    side = rng.random() * 2 * np.pi
+    across = np.cos(side) * matrix[0] + np.sin(side) * matrix[1]
+    return np.asarray(np.cos(away) * matrix[2] + np.sin(away) * across, np.float64)
+
+
+def errors(measured: NDArray[np.floating[Any]], truth: NDArray[np.float64]) -> tuple[float, float]:
+    """Errors across and about the boresight, degrees; of quaternions (4,), scalar last."""
+    from cubestack.emulator.scene.attitude import attitude_error_deg
+
+    return attitude_error_deg(measured, truth)
+
+
+def is_right(cross_deg: float, roll_deg: float) -> bool:
+    """Whether errors are those of a right attitude."""
+    return cross_deg < RIGHT_CROSS_DEG and abs(roll_deg) < RIGHT_ROLL_DEG
+
+
+def compare(
+    measured: NDArray[np.float64] | None, truth: NDArray[np.float64] | None
+) -> dict[str, Any]:
+    """The fields of an ``AttitudeResult`` that come from both; None where there is none."""
+    cross = roll = right = None
+    if measured is not None and truth is not None:
+        cross, roll = errors(measured, truth)
+        right = is_right(cross, roll)
+    elif truth is not None:
+        right = False
+    return {
+        "solved": measured is not None,
+        "right": right,
+        "error_cross_deg": cross,
+        "error_roll_deg": roll,
+        "truth": _listed(truth),
+        "quaternion": _listed(measured),
+    }
+
+
+def _listed(quaternion: NDArray[np.float64] | None) -> list[float] | None:
+    return None if quaternion is None else [float(part) for part in quaternion]
+
+
+def count_wrong(hipparcos: Sequence[int], directions: ArrayLike, truth: NDArray[np.float64]) -> int:
+    """Identified stars that the truth puts elsewhere.
+
+    Args:
+        hipparcos: their Hipparcos numbers.
+        directions: where they were seen, shape (n, 3), any length, in camera axes.
+        truth: quaternion (4,).
+    """
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion
+    from cubestack.emulator.scene.hipparcos import load_sky
+
+    if not hipparcos:
+        return 0
+    sky = load_sky()
+    expected = sky.vectors[np.searchsorted(sky.hip, hipparcos)] @ matrix_from_quaternion(truth).T
+    measured = np.asarray(directions, np.float64)
+    cosines = np.sum(expected * measured, axis=1) / np.linalg.norm(measured, axis=1)
+    return int(np.sum(np.degrees(np.arccos(np.clip(cosines, -1, 1))) > SAME_STAR_DEG))
+
+
+@dataclass(frozen=True)
+class AttitudeResult(Result):
+    """Attributes are those of the JSON output; angles in degrees, None where there is no truth.
+
+    Attributes:
+        solved: the measurement gave an attitude.
+        right: it did, and the attitude is right; None without truth.
+        centroids, matched: stars found, and stars that the attitude rests on.
+        wrong: identified stars with a wrong identity.
+        mode: "lis", "assisted" or "tracking": how it was found, or looked for.
+        error_cross_deg, error_roll_deg: across and about the boresight.
+        truth, quaternion: inertial to camera, scalar last; None without attitude.
+        phase_ms: virtual time of each step; wall_ms is wall time.
+        status: how it ended, and names of the error flags.
+    """
+
+    solved: bool
+    right: bool | None
+    centroids: int
+    matched: int
+    wrong: int | None
+    mode: str
+    error_cross_deg: float | None
+    error_roll_deg: float | None
+    truth: list[float] | None
+    quaternion: list[float] | None
+    phase_ms: dict[str, float]
+    wall_ms: float
+    status: str
+
+    @property
+    def ending(self) -> str:
+        """How it ended, and why."""
+        return self.status
+
+
+@dataclass(frozen=True)
+class AttitudeSummary(Summary):
+    """Rates in percent of all frames.
+
+    Over the right ones: 95th percentiles of the errors in degrees, and the mean of the whole
+    measurement's virtual time in ms where the device tells it; None where there is none.
+    """
+
+    frames: int
+    solved_percent: float
+    right_percent: float
+    cross_p95_deg: float | None
+    roll_p95_deg: float | None
+    total_ms: float | None
+
+    def lines(self, wall_s: float) -> Iterator[str]:
+        """Rates, then errors."""
+        yield (
+            f"of {self.frames}: {self.solved_percent:.1f} % solved, "
+            f"{self.right_percent:.1f} % right, {wall_s:.1f} s wall time"
+        )
+        if self.cross_p95_deg is not None:
+            time = "" if self.total_ms is None else f"; mean time {self.total_ms:.0f} ms"
+            yield (
+                f"95th percentile of the right ones: {arcsec(self.cross_p95_deg)} arcsec "
+                f"across, {arcsec(self.roll_p95_deg)} about the boresight{time}"
+            )
+
+
+OpenerT = TypeVar("OpenerT")
+SkyOptionsT = TypeVar("SkyOptionsT", bound=SkyOptions)
+AttitudeResultT = TypeVar("AttitudeResultT", bound=AttitudeResult)
+
+
+class AttitudeExperiment(
+    Experiment[OpenerT, SkyOptionsT, AttitudeResultT],
+    Generic[OpenerT, SkyOptionsT, AttitudeResultT],
+):
+    """Attitudes of a star tracker, each beside the truth."""
+
+    title = "attitude over the serial line, beside the truth; errors in arcsec"
+    columns = ("frame", "right", "stars", "matched", "wrong", "cross", "roll", "status and flags")
+
+    def count(self, options: SkyOptionsT) -> int:
+        """One result a frame."""
+        return options.frames
+
+    def row(self, number: int, result: AttitudeResultT) -> tuple[str, ...]:
+        """Verdict, numbers of stars, errors, and how it ended."""
+        yes_no = {True: "yes", False: "no", None: "-"}
+        return (
+            str(number),
+            yes_no[result.right] if result.solved else "no fix",
+            str(result.centroids),
+            str(result.matched),
+            "-" if result.wrong is None else str(result.wrong),
+            arcsec(result.error_cross_deg),
+            arcsec(result.error_roll_deg),
+            result.ending,
+        )
+
+    def summarise(self, results: Sequence[AttitudeResultT]) -> AttitudeSummary:
+        """Rates over all frames, errors and times over the right ones."""
+        right = [result for result in results if result.right]
+        count = max(1, len(results))
+        times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
+        return AttitudeSummary(
+            frames=len(results),
+            solved_percent=100 * sum(result.solved for result in results) / count,
+            right_percent=100 * len(right) / count,
+            cross_p95_deg=percentile_95(result.error_cross_deg for result in right),
+            roll_p95_deg=percentile_95(result.error_roll_deg for result in right),
+            total_ms=float(np.mean(times)) if times else None,
+        )
+
+
+def percentile_95(values: Iterator[float | None]) -> float | None:
+    """95th percentile of the magnitudes of those that are known."""
+    known = [abs(value) for value in values if value is not None]
+    return float(np.percentile(known, 95)) if known else None
+
+
+def arcsec(degrees: float | None) -> str:
+    """An angle for readers."""
+    return "-" if degrees is None else f"{3600 * degrees:.1f}"

@@ -1,0 +1,306 @@
+"""Measure directions with CubeSense's sun and nadir sensors end to end.
+
+Each frame gives one result of each sensor, at a random phase of its camera.
+Without --scene every result has a random pose of its own: the sun sensor's with
+the Sun anywhere within --sun-angle, the nadir sensor's with the Earth's centre
+anywhere within --tilt, lit from behind the satellite.
+
+examples:
+  cubestack measure cubesense --frames 20
+  cubestack measure cubesense --sensor nadir --frames 500 --json > nadir.jsonl
+  cubestack measure cubesense --scene earth.toml --json
+  cubestack measure cubesense --memory other     through the link of the FPGAs
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
+from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
+from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.experiments.opener import MeasureOptions, Opener
+from cubestack.host.options import (
+    ANGLE,
+    POSITIVE,
+    SCENE,
+    flag,
+    option,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
+    from cubestack.emulator.scene.earth_sun import SensorTruth
+
+__all__ = ["EXPERIMENT", "CubeSenseOptions", "SensorResult", "SensorSummary"]
+
+_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
+
+#: Names of --search.
+SEARCHES = {
+    "lines": NadirSearch.LINES,
+    "samples": NadirSearch.AROUND_SAMPLES,
+    "stepping": NadirSearch.AROUND_SAMPLES_STEPPING,
+}
+
+FRAME_S = 525 * 858 / 13.5e6
+"""A camera's frame time: captures start at a random phase of it."""
+
+#: Options of the random pose.
+POSE = ("tilt", "sun_angle", "altitude", "bloom", "no_noise")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CubeSenseOptions(MeasureOptions):
+    """Options of `cubestack measure cubesense`."""
+
+    scene: Any = option(None, "TOML scene; default: random poses", SCENE, metavar="FILE")
+    frames: int = option(1, "results of each sensor (default 1)", whole(1))
+    sensor: str = option("both", "default: both", choices=("both", "sun", "nadir"))
+    memory: str = option(
+        "own",
+        "SRAM that takes the pictures: the camera's own (default), or the other half's",
+        choices=("own", "other"),
+    )
+    search: str = option(
+        "lines",
+        "how edges are looked for: along lines (published); around samples, by halves or "
+        "stepping from pixel to pixel, with FPGAs that let the processor choose addresses",
+        choices=tuple(SEARCHES),
+    )
+    tilt: float | None = option(
+        None, "random pose: largest tilt to nadir (30)", ANGLE, metavar="DEG"
+    )
+    sun_angle: float | None = option(
+        None, "random pose: largest angle to the Sun (90)", ANGLE, metavar="DEG"
+    )
+    altitude: float | None = option(None, "random pose: altitude (750)", POSITIVE, metavar="KM")
+    bloom: float | None = option(
+        None, "random pose: radius of the Sun's image (7)", POSITIVE, metavar="PX"
+    )
+    no_noise: bool = option(False, "random pose: ideal cameras")
+
+    def check(self) -> None:
+        """Options of the random pose need one; a search reads the camera's own memory."""
+        if self.scene is not None and self.given(*POSE):
+            names = ", ".join(map(flag, POSE))
+            raise ValueError(f"{names} belong to the random poses; a scene file has keys for them")
+        if self.search != "lines" and self.memory == "other":
+            raise ValueError(
+                f"--search {self.search} reads a camera's own SRAM: leave --memory other out"
+            )
+
+    @property
+    def sensors(self) -> list[Camera]:
+        """Those that measure."""
+        return list(Camera) if self.sensor == "both" else [Camera[self.sensor.upper()]]
+
+
+@dataclass(frozen=True)
+class SensorResult(Result):
+    """Attributes are those of the JSON output; angles in degrees, None where nothing was found.
+
+    Attributes:
+        sensor: "sun" or "nadir".
+        detected: whether the angles are a measurement.
+        alpha_deg, beta_deg: measured angles along the picture's rows and columns.
+        truth_alpha_deg, truth_beta_deg: what they should be.
+        error_deg: angle between the measured and the true direction.
+        edges: edges that the nadir sensor's fit used; None for the sun sensor.
+        sun_pixels: pixels of the sun sensor's mean; None for the nadir sensor.
+        pixels_read: pixels that the processor read from the FPGA.
+        capture, detect: result codes by name.
+        phase_ms: virtual times: wait, store, search, centroid, total.
+        wall_ms: wall time of the measurement.
+    """
+
+    sensor: str
+    detected: bool
+    alpha_deg: float | None
+    beta_deg: float | None
+    truth_alpha_deg: float | None
+    truth_beta_deg: float | None
+    error_deg: float | None
+    edges: int | None
+    sun_pixels: int | None
+    pixels_read: int
+    capture: str
+    detect: str
+    phase_ms: dict[str, float]
+    wall_ms: float
+
+
+@dataclass(frozen=True)
+class SensorSummary:
+    """One sensor's results; over the detected ones errors in degrees, and the mean time in ms."""
+
+    results: int
+    detected: int
+    error_mean_deg: float | None
+    error_p95_deg: float | None
+    total_ms: float | None
+
+    def line(self, sensor: str) -> str:
+        """For a reader."""
+        text = f"{sensor}: {self.detected} of {self.results} detected"
+        if self.error_p95_deg is None:
+            return text
+        return (
+            f"{text}; error: mean {self.error_mean_deg:.3f}, "
+            f"95th percentile {self.error_p95_deg:.3f} deg; time {self.total_ms:.1f} ms"
+        )
+
+
+@dataclass(frozen=True)
+class DirectionSummary(Summary):
+    """Summaries of the sensors that measured, by name."""
+
+    sensors: dict[str, SensorSummary]
+
+    def lines(self, wall_s: float) -> Iterator[str]:
+        """One for each sensor."""
+        for name, summary in self.sensors.items():
+            yield summary.line(name)
+        yield f"{wall_s:.1f} s wall time"
+
+
+class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
+    options = CubeSenseOptions
+    description = __doc__
+    title = "directions over the serial line, beside the truth; degrees"
+    columns = ("sensor", "alpha", "truth", "beta", "truth", "error", "points", "ms", "result")
+    decides = ("mcu_addressing",)
+
+    def count(self, options: CubeSenseOptions) -> int:
+        return options.frames * len(options.sensors)
+
+    def run(self, opened: _Opener, options: CubeSenseOptions) -> Iterator[SensorResult]:
+        rng = np.random.default_rng(options.seed)
+        search = SEARCHES[options.search]
+        sampling = search is not NadirSearch.LINES
+        given = None if options.scene is None else opened.device.scene(options.scene)
+        with opened(
+            given or _random_view(options, options.sensors[0], rng),
+            seed=options.seed,
+            faults=options.faults,
+            mcu_addressing=sampling,
+        ) as emulated:
+            if sampling:
+                emulated.client.client.command("SetNadirSearch", Search=search)
+            for _ in range(options.frames):
+                for sensor in options.sensors:
+                    emulated.scene = given or _random_view(options, sensor, rng)
+                    emulated.client.client.pause(float(rng.uniform(0, FRAME_S)))
+                    sram = Sram(sensor if options.memory == "own" else 1 - sensor)
+                    yield _measure(emulated, sensor, sram)
+
+    def row(self, number: int, result: SensorResult) -> tuple[str, ...]:
+        return (
+            result.sensor,
+            _degrees(result.alpha_deg),
+            _degrees(result.truth_alpha_deg),
+            _degrees(result.beta_deg),
+            _degrees(result.truth_beta_deg),
+            _degrees(result.error_deg, 3),
+            str(result.sun_pixels if result.edges is None else result.edges),
+            f"{result.phase_ms['total']:.1f}",
+            result.detect if result.capture.startswith("stored") else result.capture,
+        )
+
+    def summarise(self, results: Sequence[SensorResult]) -> DirectionSummary:
+        by_sensor = {
+            name: [result for result in results if result.sensor == name]
+            for name in ("sun", "nadir")
+        }
+        return DirectionSummary({name: _summarise(own) for name, own in by_sensor.items() if own})
+
+
+def _degrees(value: float | None, digits: int = 2) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _summarise(results: Sequence[SensorResult]) -> SensorSummary:
+    errors = [result.error_deg for result in results if result.error_deg is not None]
+    times = [result.phase_ms["total"] for result in results if result.detected]
+    return SensorSummary(
+        results=len(results),
+        detected=sum(result.detected for result in results),
+        error_mean_deg=float(np.mean(errors)) if errors else None,
+        error_p95_deg=float(np.percentile(errors, 95)) if errors else None,
+        total_ms=float(np.mean(times)) if times else None,
+    )
+
+
+def _random_view(
+    options: CubeSenseOptions, sensor: Camera, rng: np.random.Generator
+) -> EarthSunView:
+    """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
+    from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+
+    reach = _or(options.sun_angle, 90.0) if sensor is Camera.SUN else _or(options.tilt, 30.0)
+    radius, towards = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random()
+    angles = (float(radius * np.cos(towards)), float(radius * np.sin(towards)))
+    seed, altitude_km = int(rng.integers(1 << 31)), _or(options.altitude, 750.0)
+    if sensor is Camera.SUN:
+        scene = EarthSunScene.facing(sun_deg=angles, altitude_km=altitude_km, seed=seed)
+        scene = replace(scene, nadir=-np.asarray(scene.sun))
+    else:
+        scene = EarthSunScene.facing(nadir_deg=angles, altitude_km=altitude_km, seed=seed)
+        scene = replace(scene, sun=-np.asarray(scene.nadir))
+    bloom_px = _or(options.bloom, 7.0)
+    condition = FisheyeCondition(bloom_px=bloom_px, noise=not options.no_noise, seed=seed)
+    return EarthSunView(scene, condition)
+
+
+def _or(given: float | None, default: float) -> float:
+    return default if given is None else given
+
+
+def _measure(
+    emulated: EmulatedDevice[CubeSenseBoard, CubeSense], sensor: Camera, sram: Sram
+) -> SensorResult:
+    cubesense = emulated.client
+    started = time.perf_counter()
+    measured = cubesense.capture_and_detect(sensor, sram)
+    wall_ms = 1000 * (time.perf_counter() - started)
+    truth = emulated.board.truth(sensor) if measured.capture.stored else None
+    visible = truth if truth is not None and truth.visible else None
+    details = cubesense.details(sensor)
+    points = int(details["Points"])
+    return SensorResult(
+        sensor=sensor.name.lower(),
+        detected=measured.detected,
+        alpha_deg=measured.alpha_deg if measured.detected else None,
+        beta_deg=measured.beta_deg if measured.detected else None,
+        truth_alpha_deg=None if visible is None else visible.alpha_deg,
+        truth_beta_deg=None if visible is None else visible.beta_deg,
+        error_deg=None if visible is None else _error_deg(measured, visible),
+        edges=points if sensor is Camera.NADIR else None,
+        sun_pixels=points if sensor is Camera.SUN else None,
+        pixels_read=int(details["PixelsRead"]),
+        capture=measured.capture.name.lower(),
+        detect=measured.detect.name.lower(),
+        phase_ms=cubesense.phase_times(sensor),
+        wall_ms=wall_ms,
+    )
+
+
+def _error_deg(measured: Measurement, truth: SensorTruth) -> float | None:
+    if not measured.detected:
+        return None
+    vector = direction(measured.alpha_deg, measured.beta_deg)
+    # Precise for small angles, which an arc cosine is not.
+    sine = float(np.linalg.norm(np.cross(vector, truth.vector)))
+    return float(np.degrees(np.arctan2(sine, float(vector @ truth.vector))))
+
+
+EXPERIMENT = _Experiment()

@@ -1,0 +1,233 @@
+"""Measure attitudes of CubeStar end to end: scene, camera, FPGA, firmware, host.
+
+Every frame is captured and processed by the emulated device; the host sees only
+what comes back over the serial line. The truth is known to this command alone
+and is printed beside the result.
+
+The camera sees more stars than the onboard list has. With all of them in view
+the published detection threshold lets many pictures fail; --mag-limit 3.8 cuts
+the sky at the list's own limit.
+
+examples:
+  cubestack measure cubestar --frames 20 --mag-limit 3.8      lost in space
+  cubestack measure cubestar --frames 200 --mag-limit 3.8 --json > frames.jsonl
+  cubestack measure cubestar --mode assisted --hint-error 5   rough boresight
+  cubestack measure cubestar --image sky.jpg --crop 0,256 --camera camera.json
+  cubestack measure cubestar --mag-limit 3.8 --layout 2       one SRAM for FPGA and processor
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
+from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.cubestar.operator import find_threshold
+from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.errors import CameraFileError
+from cubestack.host.experiments.attitude import (
+    AttitudeExperiment,
+    AttitudeResult,
+    SkyOptions,
+    compare,
+    count_wrong,
+    random_view,
+    rough_boresight,
+)
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import ANGLE, CORNER, PATH, option
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.scene.sky import Scene
+
+__all__ = ["EXPERIMENT", "CubeStarOptions"]
+
+_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
+
+#: Names of --mode for the firmware's modes.
+MODE_NAMES = {
+    MatchMode.LOST_IN_SPACE: "lis",
+    MatchMode.ASSISTED: "assisted",
+    MatchMode.TRACKING: "tracking",
+}
+
+UNIT_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class CubeStarOptions(SkyOptions):
+    """Options of `cubestack measure cubestar`."""
+
+    mode: str = option(
+        "lis",
+        "lost in space (default), assisted match, or tracking",
+        choices=tuple(MODE_NAMES.values()),
+    )
+    hint_error: float = option(
+        0.0,
+        "largest error of the hint (assisted) or of the last attitude (tracking)",
+        ANGLE,
+        metavar="DEG",
+    )
+    crop: tuple[int, int] = option(
+        (0, 0), "with --image: left upper corner of the 1024 x 512 part", CORNER, metavar="X,Y"
+    )
+    camera: Path | None = option(
+        None,
+        "with --image: JSON with the camera's f_px, cx_px, cy_px, k1, k2, p1, p2",
+        PATH,
+        metavar="FILE",
+    )
+
+    def check(self) -> None:
+        """Options of a picture need one, those of the random sky need that."""
+        if self.image is None and self.given("camera", "crop"):
+            raise ValueError("--crop and --camera belong to --image")
+        if not self.is_random and self.given("mag_limit", "false_stars", "no_noise"):
+            raise ValueError(
+                "--mag-limit, --false-stars and --no-noise belong to the random sky; a scene file "
+                "has the keys mag_limit, false_stars and noise"
+            )
+
+
+class _Experiment(AttitudeExperiment["_Opener", CubeStarOptions, AttitudeResult]):
+    options = CubeStarOptions
+    description = __doc__
+
+    def run(self, opened: _Opener, options: CubeStarOptions) -> Iterator[AttitudeResult]:
+        from cubestack.emulator.camera.mlx75412.lens import CONDITION
+        from cubestack.emulator.scene.sky import PictureScene
+
+        rng = np.random.default_rng(options.seed)
+        camera, picture_truth = None, None
+        if options.camera is not None:
+            camera = load_camera(options.camera).cropped(*options.crop)
+        scene = options.scene
+        if options.image is not None:
+            scene = PictureScene(options.image, crop=options.crop)
+            picture_truth = _picture_truth(options.image, options.camera)
+        elif options.is_random:
+            scene = random_view(options, CONDITION, rng)
+        with opened(scene, seed=options.seed, faults=options.faults) as emulated:
+            if camera is not None:
+                emulated.client.configure(calibrate(camera).settings)
+            if options.image is not None:
+                find_threshold(emulated.client)
+            for number in range(options.frames):
+                if number and options.is_random:
+                    emulated.scene = random_view(options, CONDITION, rng)
+                yield _measure(emulated, options, picture_truth, rng)
+
+
+def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | None:
+    """Attitude of a picture, from the "images" object of its camera file if that has it."""
+    if camera is None:
+        return None
+    content = json.loads(camera.read_text(encoding="utf-8"))
+    try:
+        quaternion = content["images"][image.name]["quaternion_xyzw_inertial_to_camera"]
+    except (KeyError, TypeError):  # a camera file need not know the picture
+        return None
+    truth = np.array(quaternion, np.float64)
+    if truth.shape != (4,) or not abs(np.linalg.norm(truth) - 1) < UNIT_TOLERANCE:
+        raise CameraFileError(f"{camera}: {image.name}'s quaternion must be four of unit length")
+    return truth
+
+
+def _measure(
+    emulated: EmulatedDevice[CubeStarBoard, CubeStar],
+    options: CubeStarOptions,
+    picture_truth: NDArray[np.float64] | None,
+    rng: np.random.Generator,
+) -> AttitudeResult:
+    started = time.perf_counter()
+    cubestar, client = emulated.client, emulated.client.client
+    client.command("ClearErrorFlags")
+    known, scene = picture_truth, emulated.scene
+    if known is None:
+        known = scene.truth(emulated.board.kernel.now)
+    if options.mode == "lis":
+        client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
+    else:
+        if known is None:
+            raise ValueError(f"--mode {options.mode} needs a scene whose attitude is known")
+        client.command("setIDMode", IdMode=IdMode.TRACKING)
+        tracking = options.mode == "tracking"
+        _give_hint(cubestar, rough_boresight(known, 0.0 if tracking else options.hint_error, rng))
+        if tracking:
+            _prime_tracking(emulated, scene, options.hint_error, rng)
+    status = cubestar.capture_and_process()
+    attitude = cubestar.attitude()
+    solved = attitude.valid
+    if picture_truth is None:
+        known = emulated.board.truth()
+    centroids = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
+    wrong = _count_wrong(cubestar, known) if solved else 0
+    phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
+    # The flags say why a task ended as its status tells.
+    flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]
+    return AttitudeResult(
+        **compare(attitude.quaternion if solved else None, known),
+        centroids=centroids,
+        matched=attitude.matched if solved else 0,
+        wrong=wrong,
+        mode=MODE_NAMES[attitude.mode] if solved else options.mode,
+        phase_ms=phases,
+        wall_ms=1000 * (time.perf_counter() - started),
+        status=" ".join([status.name.lower(), *flags]),
+    )
+
+
+def _give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
+    x, y, z = boresight
+    cubestar.client.command(
+        "setTrackingMode",
+        RightAscension=float(np.arctan2(y, x)),
+        Declination=float(np.arctan2(z, np.hypot(x, y))),
+    )
+
+
+def _prime_tracking(
+    emulated: EmulatedDevice[CubeStarBoard, CubeStar],
+    scene: Scene,
+    offset_deg: float,
+    rng: np.random.Generator,
+) -> None:
+    """Let the device find an attitude at most ``offset_deg`` from the one it will track from."""
+    from cubestack.emulator.scene.sky import SkyScene
+
+    if not isinstance(scene, SkyScene):
+        raise ValueError("--mode tracking needs a sky scene: a picture has no frame before it")
+    axis = rng.standard_normal(3)
+    rate = offset_deg * rng.random() * axis / np.linalg.norm(axis)
+    emulated.scene = scene.turned(rate)
+    emulated.client.capture_and_process()
+    emulated.scene = scene
+    emulated.client.client.command("ClearErrorFlags")
+
+
+def _count_wrong(cubestar: CubeStar, truth: NDArray[np.float64] | None) -> int | None:
+    """Identified stars that the truth puts elsewhere; None without a truth."""
+    if truth is None:
+        return None
+    client = cubestar.client
+    stars = {s.number: s.hipparcos for s in cubestar.stars() if s.hipparcos is not None}
+    count = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
+    vectors: dict[int, list[Any]] = {}
+    for _ in range(count):
+        record = client.telemetry("BodyUnitVectors")
+        vectors[int(record["StarNumber"])] = [record[f"Vb{axis}"] for axis in "XYZ"]
+    return count_wrong(list(stars.values()), [vectors[number] for number in stars], truth)
+
+
+EXPERIMENT = _Experiment()

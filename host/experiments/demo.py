@@ -1,0 +1,97 @@
+"""What demonstrations share: a device served by another process, a client, and what is told."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.host.clients.contract import Progress
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.device import BoardT_co, ClientT_co, Device
+from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.terminal import console, progress_bar, say
+from cubestack.host.transport.streams import open_transport
+
+__all__ = ["Demo", "download", "tell_times"]
+
+BOOT_TIMEOUT_S = 120.0  # the first start compiles the FPGA
+ANSWER_TIMEOUT_S = 5.0
+
+
+class Demo:
+    """One subject of a demonstration: its title, the device that looks at it, and its pictures.
+
+    Attributes:
+        out: folder of everything that is written.
+        name: stem of the scene file.
+    """
+
+    def __init__(self, out: Path, name: str, title: str) -> None:
+        """Show the title."""
+        self.out = out
+        self.name = name
+        self._started = time.monotonic()
+        console.rule(title)
+
+    @contextmanager
+    def client(
+        self, device: Device[BoardT_co, ClientT_co], scene: str
+    ) -> Iterator[tuple[ClientT_co, Path]]:
+        """A client of a ``device`` that sees ``scene``, a TOML text; and its port's path."""
+        path = self.out / f"{self.name}.toml"
+        path.write_text(scene, encoding="utf-8")
+        with _served(device.name, path, self.out / f"tty{device.name.upper()}") as port:
+            line = open_transport(str(port), device.interface.baud)
+            node = NodeClient(line, device.interface, timeout_s=ANSWER_TIMEOUT_S)
+            yield device.client(node), port
+            node.close()
+
+    def finish(self, *pictures: str, virtual_s: float | None = None) -> None:
+        """Tell how long it took, and names of the pictures that were written."""
+        wall = f"{time.monotonic() - self._started:.1f} s of wall time"
+        times = wall if virtual_s is None else f"{virtual_s:.1f} s of virtual time in {wall}"
+        names = ", ".join(str(self.out / picture) for picture in pictures)
+        console.print(f"{times}; pictures: {names}", soft_wrap=True)
+
+
+@contextmanager
+def _served(device: str, scene: Path, port: Path) -> Iterator[Path]:
+    """An emulator process that serves ``device``, which sees ``scene``, on ``port``."""
+    command = [sys.executable, "-m", "cubestack", "emulate", device]
+    command += ["--scene", str(scene), "--pty", str(port), "--pace", "fast"]
+    say("starting the emulator; its first start on a machine compiles what it needs")
+    emulator = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert emulator.stderr is not None
+        line = emulator.stderr.readline().strip()
+        if not port.exists():
+            raise PortOpenError(line or "the emulator did not start")
+        say(line)
+        yield port
+    except PortClosedError:
+        emulator.kill()
+        say(f"the emulator ended: {emulator.communicate()[1].strip().splitlines()[-1]}")
+        raise
+    finally:
+        emulator.terminate()
+        emulator.communicate(timeout=BOOT_TIMEOUT_S)
+
+
+def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """The picture that ``fetch`` gets, with a progress bar."""
+    with progress_bar() as bar:
+        task = bar.add_task(f"downloading {what}", total=None)
+        return fetch(lambda done, total: bar.update(task, completed=done, total=total))
+
+
+def tell_times(phases_ms: dict[str, float], indent: str = "") -> None:
+    """Tell the virtual times of a measurement's steps."""
+    times = ", ".join(f"{name} {ms:.1f} ms" for name, ms in phases_ms.items())
+    console.print(f"{indent}virtual time: {times}", soft_wrap=True)

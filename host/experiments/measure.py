@@ -1,0 +1,70 @@
+"""Measure a registered device, from a program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
+from cubestack.host.devices.emulated import check_options
+from cubestack.host.devices.experiment import AnyExperiment, Result
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.experiments.opener import Opener
+
+__all__ = ["experiment_of", "measure"]
+
+
+def measure(
+    name: str,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    engine: Engine = "auto",
+    **options: Any,
+) -> Iterator[Result]:
+    """Measure a device end to end; yields each result, beside the truth, as soon as it is there.
+
+    Args:
+        name: of the device, such as ``"cubestar"``.
+        progress: called with the number of results so far, and of all.
+        engine: how its FPGA is run.
+        options: as `cubestack measure NAME --help` has them, with underscores: ``frames=20``,
+            ``mag_limit=3.8``, ``no_noise=True``; options of its board among them.
+
+    Raises:
+        TargetError: nobody registered that name.
+        ValueError: an option, or a value of one, that can not be; the text says what is right.
+    """
+    device = registered(name)
+    experiment = experiment_of(device)
+    own = {one: value for one, value in options.items() if one in experiment.options.declared()}
+    board = {one: value for one, value in options.items() if one not in own}
+    known = board_options(device, experiment)
+    for one in board:
+        if one not in known:
+            every = ", ".join([*experiment.options.declared(), *known])
+            raise ValueError(f"measure has no option {one!r} for {device.name}; known: {every}")
+    check_options(device, board)
+    checked = experiment.options(**own)
+    results = experiment.run(Opener(device, engine, board), checked)
+    return results if progress is None else _counted(results, experiment.count(checked), progress)
+
+
+def experiment_of(device: AnyDevice) -> AnyExperiment:
+    """What ``measure`` does with a device; ValueError when that is nothing."""
+    if device.experiment is None:
+        raise ValueError(f"there is nothing to measure with {device.name}")
+    return device.experiment()
+
+
+def board_options(device: AnyDevice, experiment: AnyExperiment) -> Mapping[str, BoardOption]:
+    """Options of the device's board that the experiment leaves to the user."""
+    options = device.options if experiment.powers_up else ()
+    return {one.name: one for one in options if one.name not in experiment.decides}
+
+
+def _counted(
+    results: Iterator[Result], total: int, progress: Callable[[int, int], None]
+) -> Iterator[Result]:
+    for done, result in enumerate(results, start=1):
+        progress(done, total)
+        yield result

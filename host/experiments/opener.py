@@ -1,0 +1,77 @@
+"""Powers devices up for experiments, and the options of all that are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic
+
+from cubestack.host.devices.device import BoardT_co, ClientT_co, Device, Engine, Shown
+from cubestack.host.devices.emulated import EmulatedDevice, power_up
+from cubestack.host.options import PLAN, SCENE, Options, option, whole
+
+if TYPE_CHECKING:
+    from cubestack.emulator.faults.plan import Plan
+
+__all__ = ["MeasureOptions", "Opener"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureOptions(Options):
+    """Options of everything that ``measure`` measures."""
+
+    scene: Any = option(None, "TOML scene; default: a random one", SCENE, metavar="FILE")
+    frames: int = option(1, "number of frames (default 1)", whole(1))
+    seed: int = option(0, "seed of everything random (default 0)", whole(0))
+    faults: Path | Plan | None = option(
+        None, "TOML plan of faults, with their seed (see docs/faults.md)", PLAN, metavar="FILE"
+    )
+
+
+def _silent(items: Iterable[Any], _total: int, _label: str) -> Iterator[Any]:
+    yield from items
+
+
+@dataclass(frozen=True)
+class Opener(Generic[BoardT_co, ClientT_co]):
+    """Powers a device up for an experiment, with the board that the user chose.
+
+    Attributes:
+        device: to power up.
+        engine: how its FPGA is run.
+        board: options of its board.
+        shown: passes items through and shows how many are done, of what takes seconds the first
+            time: (items, total, label) -> the items.
+    """
+
+    device: Device[BoardT_co, ClientT_co]
+    engine: Engine = "auto"
+    board: Mapping[str, Any] = field(default_factory=dict)
+    shown: Shown = _silent
+
+    def __call__(
+        self, scene: Any, *, seed: int, faults: Path | Plan | None = None, **board: Any
+    ) -> EmulatedDevice[BoardT_co, ClientT_co]:
+        """The device, looking at ``scene``, with a plan of faults, or that in a file, injected.
+
+        ``board`` are keywords of its board that the experiment decides. Raises ValueError for a
+        scene or a plan that makes no sense.
+        """
+        plan = _load(faults) if isinstance(faults, Path) else faults
+        emulated = power_up(
+            self.device, scene, seed=seed, engine=self.engine, **{**self.board, **board}
+        )
+        if plan is not None:
+            try:
+                emulated.faults.load(plan)
+            except ValueError:
+                emulated.close()
+                raise
+        return emulated
+
+
+def _load(path: Path) -> Plan:
+    from cubestack.emulator.faults.plan import load_plan
+
+    return load_plan(path)
