@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from cubestack.host.devices.emulated import AnyEmulated, EmulatedDevice
     from cubestack.host.devices.registry import device_names
     from cubestack.host.errors import HostError
+    from cubestack.host.experiments.measure import measure
     from cubestack.host.transport.smbus import CubeSMBus
 
     # What a type checker sees: which name gives which client. See ``host.devices`` for the rest.
@@ -89,6 +90,7 @@ __all__ = [
     "connect",
     "device_names",
     "load_plan",
+    "measure",
     "open_device",
     "parse_plan",
 ]
@@ -112,6 +114,7 @@ _HOMES: Final = {
     "connect": "host.devices.targets",
     "device_names": "host.devices.registry",
     "load_plan": "emulator.faults.plan",
+    "measure": "host.experiments.measure",
     "open_device": "host.devices.emulated",
     "parse_plan": "emulator.faults.plan",
 }

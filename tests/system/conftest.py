@@ -4,13 +4,20 @@ Everything runs on the compiled FPGA, which is built once and cached; without a 
 tests are skipped, as full-size pictures take minutes in the reference simulator.
 """
 
+import io
 import json
 import os
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import (
+    AbstractContextManager,
+    contextmanager,
+    redirect_stderr,
+    redirect_stdout,
+)
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +26,7 @@ import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.host.cli.main import main
-from cubestack.host.cli.session import Session, open_session
+from cubestack.host.devices.emulated import AnyEmulated, open_device
 
 ROOT = Path(__file__).parents[2]
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
@@ -49,24 +56,30 @@ def photographs() -> Path:
     return folder
 
 
-@pytest.fixture
-def measure(capsys: pytest.CaptureFixture[str]) -> Callable[..., Frames]:
-    """`cubestack measure cubestar --json` with more arguments; the frames that it prints."""
+@pytest.fixture(scope="session")
+def measure_device() -> Callable[..., Frames]:
+    """`cubestack measure DEVICE --json` with more arguments; the results that it prints."""
 
-    def run(*arguments: object) -> Frames:
-        capsys.readouterr()
-        code = main(["measure", "cubestar", "--json", *map(str, arguments)])
-        output = capsys.readouterr()
-        assert (code, output.err) == (0, "")
-        return [json.loads(line) for line in output.out.splitlines()]
+    def run(device: str, *arguments: object) -> Frames:
+        out, err = io.StringIO(), io.StringIO()
+        with redirect_stdout(out), redirect_stderr(err):
+            code = main(["measure", device, "--json", *map(str, arguments)])
+        assert (code, err.getvalue()) == (0, "")
+        return [json.loads(line) for line in out.getvalue().splitlines()]
 
     return run
 
 
+@pytest.fixture(scope="session")
+def measure(measure_device: Callable[..., Frames]) -> Callable[..., Frames]:
+    """The same of this folder's device."""
+    return partial(measure_device, "cubestar")
+
+
 @pytest.fixture
-def session() -> Callable[..., AbstractContextManager[Session]]:
-    """Opens a board that looks at a scene, with a client on its serial line."""
-    return open_session
+def session() -> Callable[..., AnyEmulated]:
+    """Opens the device of this folder, looking at a scene."""
+    return partial(open_device, "cubestar")
 
 
 @pytest.fixture

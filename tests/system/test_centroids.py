@@ -31,7 +31,7 @@ def drawn_stars(centres: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def measured(session: Any) -> NDArray[np.float64]:
-    return np.array([(star.x_px, star.y_px) for star in session.cubestar.stars()])
+    return np.array([(star.x_px, star.y_px) for star in session.client.stars()])
 
 
 def test_drawn_stars(session: Any, rng: np.random.Generator) -> None:
@@ -39,8 +39,8 @@ def test_drawn_stars(session: Any, rng: np.random.Generator) -> None:
     centres = np.stack([cells % 10 * 100 + 50, cells // 10 * 100 + 50], axis=1)
     centres = centres + rng.uniform(-20, 20, centres.shape)
     with session(SkyScene.pointing(0, 0)) as opened:
-        opened.cubestar.upload_image(drawn_stars(centres))
-        opened.cubestar.process_image()
+        opened.client.upload_image(drawn_stars(centres))
+        opened.client.process_image()
         found = measured(opened)
     assert len(found) == STARS
     nearest = np.linalg.norm(found[:, None] - centres, axis=2).argmin(axis=1)
@@ -52,8 +52,8 @@ def test_drawn_stars(session: Any, rng: np.random.Generator) -> None:
 def test_stars_of_the_sky_without_noise(session: Any) -> None:
     scene = SkyScene(quaternion_from_pointing(*POINTING_DEG), mag_limit=3.8)
     with session(SkyView(scene, replace(CONDITION, noise=False))) as opened:
-        opened.cubestar.capture_and_process()
-        stars = opened.cubestar.stars()
+        opened.client.capture_and_process()
+        stars = opened.client.stars()
         matrix = matrix_from_quaternion(opened.board.truth())
     assert len(stars) == STARS
     sky = load_sky()

@@ -23,7 +23,7 @@ def run(session: Callable[..., Any], seed: int) -> Wire:
             deliver(data, first_ps, byte_ps)
 
         opened.board.uart.line = listen
-        cubestar, client = opened.cubestar, opened.cubestar.client
+        cubestar, client = opened.client, opened.client.client
         cubestar.capture_and_process()
         cubestar.stars()
         client.telemetry("ImageBlock")

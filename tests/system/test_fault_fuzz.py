@@ -23,10 +23,9 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
-from cubestack.host.cli.aramis_session import open_aramis
-from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.emulated import open_device
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
@@ -236,16 +235,16 @@ class Fuzzer:
 
 
 def cubestar() -> Any:
-    return open_session(SkyScene.pointing(84, -1), seed=4)
+    return open_device("cubestar", SkyScene.pointing(84, -1), seed=4)
 
 
 def cubesense() -> Any:
-    return open_cubesense(EarthSunScene.facing(nadir_deg=(5, 5)), seed=4)
+    return open_device("cubesense", EarthSunScene.facing(nadir_deg=(5, 5)), seed=4)
 
 
 def aramis() -> Any:
     orion = SkyScene.pointing(84, -1)
-    return open_aramis(orion, seed=4)
+    return open_device("aramis", orion, seed=4)
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -31,11 +31,11 @@ def enable_to_ack_ms(cubestar: Any, delay_ms: int) -> float:
 )
 def test_frame_rate_register(session: Any, register: int, published_fps: float) -> None:
     with session(SkyScene.pointing(0, 0)) as opened:
-        opened.cubestar.client.command("SetFrameRate", FrameRate=register)
+        opened.client.client.command("SetFrameRate", FrameRate=register)
         period_ms = 1000 / published_fps
-        first = enable_to_ack_ms(opened.cubestar, 70)
+        first = enable_to_ack_ms(opened.client, 70)
         # Enabled just after that frame began: it is dropped, and the next one is stored.
-        second = enable_to_ack_ms(opened.cubestar, round(period_ms) + 5)
+        second = enable_to_ack_ms(opened.client, round(period_ms) + 5)
     assert second - first == pytest.approx(period_ms, rel=2e-3)
     assert first == pytest.approx(period_ms + READ_OUT_MS, abs=2)  # line-rounded, and set-up
 
@@ -51,9 +51,9 @@ def striped(tmp_path: Path) -> PictureScene:
 def stored_rows(session: Any, scene: PictureScene, delay_ms: int) -> Any:
     """One column of the picture that a capture with this discard delay stores, from telemetry."""
     with session(scene) as opened:
-        opened.cubestar.client.command("SetDiscardDelay", Delay=delay_ms)
-        opened.cubestar.capture()
-        return opened.cubestar.stream_image()[:, 500].astype(float)
+        opened.client.client.command("SetDiscardDelay", Delay=delay_ms)
+        opened.client.capture()
+        return opened.client.stream_image()[:, 500].astype(float)
 
 
 @pytest.mark.parametrize("delay_ms", [10, 66])

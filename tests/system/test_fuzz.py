@@ -11,10 +11,8 @@ from smbus2 import i2c_msg
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.i2c import I2cClient
-from cubestack.host.clients.node import NodeClient
-from cubestack.host.experiments.cubestar import compare
+from cubestack.host.experiments.attitude import errors
 
 UART_BYTES = 100_000
 I2C_MESSAGES = 10_000
@@ -30,15 +28,13 @@ def check_identification(client: Any) -> None:
 
 def check_attitude(opened: Any) -> None:
     """From whatever state, a reset to power-up values leads to a right attitude."""
-    client = opened.cubestar.client
+    client = opened.client.client
     client.wait_processed(60)
     for name in ("StopLoop", "ClearConfig", "Reset"):
         client.command(name)
         client.wait_processed(10)  # a reset forgets what waits behind it
-    assert opened.cubestar.capture_and_process().name == "CALCULATED"
-    cross, roll = compare(opened.cubestar.attitude().quaternion, opened.board.truth())
-    assert cross is not None
-    assert roll is not None
+    assert opened.client.capture_and_process().name == "CALCULATED"
+    cross, roll = errors(opened.client.attitude().quaternion, opened.board.truth())
     assert cross < 0.01
     assert abs(roll) < 0.05
 
@@ -60,8 +56,7 @@ def test_random_bytes_on_the_uart(opened: Any, rng: np.random.Generator) -> None
     line.write(rng.bytes(UART_BYTES))
     while opened.board.uart.host_backlog:
         line.read(4096, 0.01)
-    opened.cubestar = CubeStar(NodeClient(opened.board.serial(), INTERFACE))
-    check_identification(opened.cubestar.client)
+    check_identification(opened.client.client)
     check_attitude(opened)
 
 
@@ -73,8 +68,7 @@ def test_random_frames_on_the_uart(opened: Any, rng: np.random.Generator) -> Non
         line.write(encode_frame(bytes([known.id]) + rng.bytes(length)))
         line.read(4096, 0.05)
     let_it_answer(line)
-    opened.cubestar = CubeStar(NodeClient(opened.board.serial(), INTERFACE))
-    check_identification(opened.cubestar.client)
+    check_identification(opened.client.client)
     check_attitude(opened)
 
 
@@ -91,6 +85,5 @@ def test_random_messages_on_i2c(opened: Any, rng: np.random.Generator) -> None:
             bus.i2c_rdwr(*messages)
     check_identification(I2cClient(bus, INTERFACE, wait=bus.wait))
     let_it_answer(opened.board.serial())  # a picture may be on its way down
-    opened.cubestar = CubeStar(NodeClient(opened.board.serial(), INTERFACE))
-    check_identification(opened.cubestar.client)
+    check_identification(opened.client.client)
     check_attitude(opened)

@@ -22,20 +22,21 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     TestPattern,
 )
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.cli import layouts
 from cubestack.host.cli.main import main
-from cubestack.host.cli.session import Session, tell_layout
+from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.cubestar.layouts import EXPERIMENT, LayoutResult
 
 ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]
 ORION = SkyScene(quaternion_from_pointing(84.0, -1.0, 0.0), mag_limit=3.8)
 FULL = ImageBlockSize.BYTES_128.length
 
-Open = Callable[..., AbstractContextManager[Session]]
+Open = Callable[..., AbstractContextManager[AnyEmulated]]
 
 
-def blocks(node: Session, numbers: range) -> bytes:
+def blocks(node: AnyEmulated, numbers: range) -> bytes:
     """Blocks of the picture, read in interrupts."""
-    client, found = node.cubestar.client, b""
+    client, found = node.client.client, b""
     for number in numbers:
         client.command("ImageBlockSet", BlockNumber=number, BlockSize=ImageBlockSize.BYTES_128)
         client.wait_processed(1.0)
@@ -43,25 +44,25 @@ def blocks(node: Session, numbers: range) -> bytes:
     return found
 
 
-def flags(node: Session) -> set[str]:
-    return {name for name, up in node.cubestar.client.telemetry("ErrorFlags").items() if up}
+def flags(node: AnyEmulated) -> set[str]:
+    return {name for name, up in node.client.client.telemetry("ErrorFlags").items() if up}
 
 
-def seen(node: Session) -> dict[str, Any]:
+def seen(node: AnyEmulated) -> dict[str, Any]:
     """All that a host gets of one capture, but for times and currents."""
-    status = node.cubestar.capture_and_process()
-    client = node.cubestar.client
+    status = node.client.capture_and_process()
+    client = node.client.client
     found = {
         name: client.telemetry(name)
         for name in ("DetectionSummary", "MatchSummary", "DetectionThresholdValues")
     }
-    attitude = node.cubestar.attitude()
+    attitude = node.client.attitude()
     return {
         **found,
         "status": status,
         "quaternion": attitude.quaternion.tolist(),
         "matched": attitude.matched,
-        "stars": node.cubestar.stars(),
+        "stars": node.client.stars(),
         "flags": flags(node),
     }
 
@@ -73,16 +74,14 @@ def layout(request: pytest.FixtureRequest) -> Layout:
 
 
 @pytest.fixture
-def node(session: Open, layout: Layout) -> Iterator[Session]:
-    with session(ORION, layout=layout) as opened:
+def node(session: Open, layout: Layout) -> Iterator[AnyEmulated]:
+    with session(ORION, layout=layout.value) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
 def published() -> dict[str, Any]:
-    from cubestack.host.cli.session import open_session
-
-    with open_session(ORION) as opened:
+    with open_device("cubestar", ORION) as opened:
         found = seen(opened)
         picture: np.ndarray = opened.board.program._capture.image.copy()
         star = int(picture.argmax()) // FULL
@@ -94,14 +93,14 @@ def block_of(picture: np.ndarray, number: int) -> bytes:
     return picture.tobytes()[number * FULL :][:FULL]
 
 
-def newest(node: Session, layout: Layout) -> np.ndarray:
+def newest(node: AnyEmulated, layout: Layout) -> np.ndarray:
     """The picture of the first capture, where the layout has it."""
     name = "SRAM" if layout is Layout.SHARED else "SRAM2"
     return node.board.engine.memories[name][: 512 * 1024]
 
 
 def test_the_same_scene_gives_the_same_bytes_and_attitude(
-    node: Session, layout: Layout, published: dict[str, Any]
+    node: AnyEmulated, layout: Layout, published: dict[str, Any]
 ) -> None:
     """Detected over the bus, zeroed and written back there, and downloaded in two ways."""
     found = seen(node)
@@ -111,56 +110,56 @@ def test_the_same_scene_gives_the_same_bytes_and_attitude(
     assert np.array_equal(newest(node, layout), picture.reshape(-1))
     for number in (0, star - 8, star, star + 8, 4095):  # a row has eight
         assert blocks(node, range(number, number + 1)) == block_of(picture, number)
-    streamed = zip(range(40), node.cubestar.client.stream("StreamDownImage", 4096), strict=False)
+    streamed = zip(range(40), node.client.client.stream("StreamDownImage", 4096), strict=False)
     assert all(block == block_of(picture, number) for number, block in streamed)
     assert not node.board.engine.violation_counts
 
 
-def test_nothing_is_copied(node: Session) -> None:
-    node.cubestar.capture()
-    phases = node.cubestar.phase_times()
+def test_nothing_is_copied(node: AnyEmulated) -> None:
+    node.client.capture()
+    phases = node.client.phase_times()
     assert phases["transfer"] == 0
     assert phases["capture"] == pytest.approx(384, abs=1)
 
 
-def test_uploaded_and_drawn_pictures_are_in_memory(node: Session) -> None:
+def test_uploaded_and_drawn_pictures_are_in_memory(node: AnyEmulated) -> None:
     rng = np.random.default_rng(4)
     picture = np.zeros((512, 1024), np.uint8)
     picture[100:102] = rng.integers(0, 256, (2, 1024))
-    node.cubestar.upload_image(picture)
+    node.client.upload_image(picture)
     assert blocks(node, range(800, 816)) == picture[100:102].tobytes()
-    node.cubestar.client.command("CaptureTestPatern", TestPaternType=TestPattern.DIAGONAL_RAMP)
-    node.cubestar.client.wait_processed(5.0)
+    node.client.client.command("CaptureTestPatern", TestPaternType=TestPattern.DIAGONAL_RAMP)
+    node.client.client.wait_processed(5.0)
     expected = (np.add.outer(np.arange(512), np.arange(1024)) % 256).astype(np.uint8)
     assert blocks(node, range(4090, 4096)) == expected.tobytes()[-6 * FULL :]
 
 
 @pytest.mark.parametrize("layout", [Layout.SHARED])
-def test_memory_test_passes_and_takes_the_bus_s_time(node: Session) -> None:
+def test_memory_test_passes_and_takes_the_bus_s_time(node: AnyEmulated) -> None:
     began_ps = node.board.kernel.now
-    node.cubestar.client.command("TestSRAM")
-    node.cubestar.client.wait_processed(10.0)
+    node.client.client.command("TestSRAM")
+    node.client.client.wait_processed(10.0)
     took_s = (node.board.kernel.now - began_ps) / 1e12
-    result = node.cubestar.client.telemetry("SRAMTestResults")["TestResult"]
+    result = node.client.client.telemetry("SRAMTestResults")["TestResult"]
     assert result == MemoryTest.PASSED
     assert took_s == pytest.approx(4 * (1 << 20) * (8 + 5) / 48e6, abs=0.05)
     assert not node.board.engine.violation_counts
 
 
 @pytest.mark.parametrize("layout", [Layout.SHARED])
-def test_a_bit_that_does_not_hold_is_found(node: Session) -> None:
+def test_a_bit_that_does_not_hold_is_found(node: AnyEmulated) -> None:
     node.board.faults.inject("memory-stuck", address=4711, bit=3, level=0)
-    node.cubestar.client.command("TestSRAM")
-    node.cubestar.client.wait_processed(10.0)
-    result = node.cubestar.client.telemetry("SRAMTestResults")["TestResult"]
+    node.client.client.command("TestSRAM")
+    node.client.client.wait_processed(10.0)
+    result = node.client.client.telemetry("SRAMTestResults")["TestResult"]
     assert result == MemoryTest.FAILED
 
 
 def test_while_a_picture_is_stored_the_last_one_is_there_or_a_flag_is_up(
-    node: Session, layout: Layout, published: dict[str, Any]
+    node: AnyEmulated, layout: Layout, published: dict[str, Any]
 ) -> None:
-    node.cubestar.capture()
-    star, client = published["star"], node.cubestar.client
+    node.client.capture()
+    star, client = published["star"], node.client.client
     client.command("ImageBlockSet", BlockNumber=star, BlockSize=ImageBlockSize.BYTES_128)
     client.wait_processed(1.0)
     client.command("CaptureImage")
@@ -179,38 +178,38 @@ def test_while_a_picture_is_stored_the_last_one_is_there_or_a_flag_is_up(
     assert not node.board.engine.violation_counts
 
 
-def test_a_lost_acknowledge_fails_the_capture_and_the_next_one_is_good(node: Session) -> None:
+def test_a_lost_acknowledge_fails_the_capture_and_the_next_one_is_good(node: AnyEmulated) -> None:
     for acknowledge in node.board.engine.wiring.acknowledges:
         node.board.faults.inject("ack-lost", target=acknowledge)
-    assert node.cubestar.capture_and_process() is TaskStatus.CAPTURE_FAILED
+    assert node.client.capture_and_process() is TaskStatus.CAPTURE_FAILED
     assert "ImageCaptureError" in flags(node)
     node.board.faults.clear()
-    node.cubestar.client.command("ClearErrorFlags")
-    assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
+    node.client.client.command("ClearErrorFlags")
+    assert node.client.capture_and_process() is TaskStatus.CALCULATED
 
 
 def test_a_latch_up_of_the_memory_loses_the_picture_only(
-    node: Session, layout: Layout, published: dict[str, Any]
+    node: AnyEmulated, layout: Layout, published: dict[str, Any]
 ) -> None:
     star = published["star"]
-    node.cubestar.capture()
+    node.client.capture()
     assert blocks(node, range(star, star + 1)) == block_of(published["picture"], star)
     node.board.power.latch_up("memory")
-    node.cubestar.client.pause(0.5)
+    node.client.client.pause(0.5)
     assert flags(node) == {"OverCurrent"}
     assert node.board.power.is_on("memory")
     assert blocks(node, range(star, star + 1)) != block_of(published["picture"], star)
-    assert node.cubestar.process_image() is TaskStatus.DETECTION_FAILED
-    assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
+    assert node.client.process_image() is TaskStatus.DETECTION_FAILED
+    assert node.client.capture_and_process() is TaskStatus.CALCULATED
 
 
 def test_a_latch_up_of_the_boards_in_a_search_costs_the_picture(
-    node: Session, layout: Layout
+    node: AnyEmulated, layout: Layout
 ) -> None:
     """Nothing is found from there on, and what was found stays zero."""
-    node.cubestar.capture()
+    node.client.capture()
     picture = newest(node, layout).copy()
-    client, power = node.cubestar.client, node.board.power
+    client, power = node.client.client, node.board.power
     client.command("DetectStars")
     client.pause(0.005)
     power.latch_up("imager")
@@ -223,36 +222,36 @@ def test_a_latch_up_of_the_boards_in_a_search_costs_the_picture(
     changed = left != picture
     assert 0 < np.count_nonzero(changed) < 20 * 60
     assert not left[changed].any()
-    assert node.cubestar.process_image() is TaskStatus.DETECTION_FAILED
-    assert node.cubestar.capture_and_process() is TaskStatus.CALCULATED
+    assert node.client.process_image() is TaskStatus.DETECTION_FAILED
+    assert node.client.capture_and_process() is TaskStatus.CALCULATED
     assert not node.board.engine.violation_counts
 
 
 def test_a_switched_off_board_has_no_picture_to_give(
-    node: Session, published: dict[str, Any]
+    node: AnyEmulated, published: dict[str, Any]
 ) -> None:
     star = published["star"]
-    node.cubestar.capture()
-    node.cubestar.client.command("TogglePowerSW")
-    node.cubestar.client.wait_processed(1.0)
+    node.client.capture()
+    node.client.client.command("TogglePowerSW")
+    node.client.client.wait_processed(1.0)
     assert blocks(node, range(star, star + 1)) == bytes(FULL)
     assert "StatusError" in flags(node)
 
 
 def test_banks_are_kept_apart_where_there_are_any(
-    node: Session, layout: Layout, published: dict[str, Any]
+    node: AnyEmulated, layout: Layout, published: dict[str, Any]
 ) -> None:
     star = published["star"]
     before = newest(node, layout).copy()
-    node.cubestar.client.command("SelectImageBank", Bank=1)
-    node.cubestar.capture()
+    node.client.client.command("SelectImageBank", Bank=1)
+    node.client.capture()
     found = blocks(node, range(star, star + 1))
     assert max(found) > 100
     if layout is not Layout.TWO_MEMORIES:
         assert np.array_equal(newest(node, layout), before)
         whole = node.board.engine.memories["SRAM" if layout is Layout.SHARED else "SRAM2"]
         assert block_of(whole[1 << 19 :], star) == found
-    assert node.cubestar.client.telemetry("LoopStatus")["Bank"] == 1
+    assert node.client.client.telemetry("LoopStatus")["Bank"] == 1
 
 
 def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -> None:
@@ -260,7 +259,7 @@ def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -
     capsys.readouterr()
     assert main(["layouts", "--seconds", "2", "--json"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    results = [layouts.LayoutResult(**json.loads(line)) for line in lines]
+    results = [LayoutResult(**json.loads(line)) for line in lines]
     assert [result.layout for result in results] == [layout.value for layout in Layout]
     for result in results:
         fast = result.layout in ("3", "two-boards")
@@ -274,15 +273,17 @@ def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -
         assert result.energy_mj is not None
         assert result.rate_hz is not None
         assert result.power_mw == pytest.approx(result.energy_mj * result.rate_hz, rel=1e-3)
-    layouts.report(results)
-    shown = capsys.readouterr().out
-    assert all(result.published in shown for result in results)
-    assert shown.count("can not be built") == 1
+    for result in results:
+        assert all(part for part in EXPERIMENT.row(0, result))
+    told = list(EXPERIMENT.summarise(results).lines(wall_s=1.0))
+    assert [line.split(": ")[1] for line in told[: len(results)]] == [r.published for r in results]
+    (line,) = told[len(results) :]
+    assert "layout 3 can not be built" in line
 
 
 def test_two_memories_are_filled_in_turn(session: Open) -> None:
     """And the one that is not stored in is worked on, beside the pixels."""
-    with session(ORION, layout=Layout.TWO_MEMORIES) as node:
+    with session(ORION, layout=Layout.TWO_MEMORIES.value) as node:
         into = []
         set_pin = node.board.engine.set_pin
 
@@ -292,8 +293,8 @@ def test_two_memories_are_filled_in_turn(session: Open) -> None:
             set_pin(name, level)
 
         node.board.engine.set_pin = watched  # type: ignore[method-assign]
-        node.cubestar.client.command("Trigger")
-        node.cubestar.client.pause(2.2)
+        node.client.client.command("Trigger")
+        node.client.client.pause(2.2)
         assert len(into) >= 4
         assert all(later != earlier for earlier, later in pairwise(into))
 
@@ -307,10 +308,8 @@ def test_only_option_3_needs_too_many_pins() -> None:
 def test_the_commands_say_what_can_not_be_built(
     capsys: pytest.CaptureFixture[str], emulate: Callable[..., Any]
 ) -> None:
-    told: list[str] = []
-    for layout in Layout:
-        tell_layout(layout, told.append)
-    (line,) = told
+    (option,) = device("cubestar").options
+    (line,) = filter(None, map(option.notice, option.choices))
     assert "layout 3 can not be built with an AGLN030: its FPGA takes 95 pins of 77" in line
     capsys.readouterr()
     arguments = ["measure", "cubestar", "--layout", "3", "--mag-limit", "3.8"]
@@ -325,7 +324,10 @@ def test_the_commands_say_what_can_not_be_built(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("measure", "cubestar", "--layout", "4"), "'4' is none of the layouts 1, 2, 3"),
+        (
+            ("measure", "cubestar", "--layout", "4"),
+            "invalid choice: '4' (choose from '1', '2', '3', 'two-boards')",
+        ),
         (("emulate", "cubesense", "--tcp", "0", "--layout", "2"), "option of cubestar, not of"),
     ],
 )
@@ -355,7 +357,7 @@ def test_a_recording_says_which_layout_it_is_of(
         assert "'9' is none of the layouts 1, 2, 3, two-boards" in capsys.readouterr().err
 
 
-def test_a_trace_shows_the_bus(node: Session) -> None:
+def test_a_trace_shows_the_bus(node: AnyEmulated) -> None:
     stream = io.StringIO()
     board = node.board
     trace = VcdTrace(
@@ -366,7 +368,7 @@ def test_a_trace_shows_the_bus(node: Session) -> None:
         board.engine,
         board.probes,
     )
-    node.cubestar.capture()
+    node.client.capture()
     blocks(node, range(3))
     trace.close()
     lines = stream.getvalue().splitlines()

@@ -37,7 +37,7 @@ class Turn(NamedTuple):
 
 def run_loop(opened: Any, scene: SkyScene, iterations: int) -> list[Turn]:
     """Poll once a second, as a satellite's computer would."""
-    cubestar, kernel = opened.cubestar, opened.board.kernel
+    cubestar, kernel = opened.client, opened.board.kernel
     turns = []
     for _ in range(iterations):
         attitude, phases = cubestar.attitude(), cubestar.phase_times()
@@ -57,8 +57,8 @@ def looping(session: Callable[..., Any]) -> Any:
         context = session(scene, seed=1)
         opened = context.__enter__()
         contexts.append(context)
-        client = opened.cubestar.client
-        opened.cubestar.capture_and_process()
+        client = opened.client.client
+        opened.client.capture_and_process()
         client.command("setIDMode", IdMode=IdMode.TRACKING)
         client.command("Trigger")
         client.pause(2.9)  # the second iteration ends, the first picture of the loop is solved
@@ -119,8 +119,8 @@ def matched_share(opened: Any, rate_deg_s: float, rng: np.random.Generator) -> f
         )
         condition = replace(CONDITION, seed=int(rng.integers(1000)))
         opened.board.camera.scene = SkyView(scene, condition)
-        opened.cubestar.capture_and_process()
-        detected += len(stars := opened.cubestar.stars())
+        opened.client.capture_and_process()
+        detected += len(stars := opened.client.stars())
         matched += sum(star.hipparcos is not None for star in stars)
     return matched / detected
 
@@ -138,7 +138,7 @@ def test_tracking_is_lost_at_two_degrees_a_second(looping: Any) -> None:
     turns = run_loop(opened, scene, ITERATIONS)
     tracked = [t for t in turns if t.attitude.valid and t.attitude.mode is MatchMode.TRACKING]
     assert not tracked
-    assert opened.cubestar.client.telemetry("ErrorFlags")["RateExceeded"]
+    assert opened.client.client.telemetry("ErrorFlags")["RateExceeded"]
 
 
 @pytest.mark.parametrize("channel", ["imager", "memory"])
@@ -146,7 +146,7 @@ def test_tracking_is_lost_at_two_degrees_a_second(looping: Any) -> None:
 def test_a_latch_up_is_cut_off_and_healed(looping: Any, channel: str, after_s: float) -> None:
     scene = SkyScene.pointing(84, -1)
     opened = looping(scene)
-    client, board = opened.cubestar.client, opened.board
+    client, board = opened.client.client, opened.board
     client.command("ClearErrorFlags")
     client.pause(after_s)
     board.power.latch_up(channel)
@@ -164,13 +164,13 @@ def test_a_latch_up_is_cut_off_and_healed(looping: Any, channel: str, after_s: f
 
 def test_a_latch_up_while_idle(session: Any) -> None:
     with session(SkyScene.pointing(84, -1)) as opened:
-        client = opened.cubestar.client
-        assert opened.cubestar.capture_and_process().name == "CALCULATED"
+        client = opened.client.client
+        assert opened.client.capture_and_process().name == "CALCULATED"
         opened.board.power.latch_up("imager")
         client.pause(1.0)
         assert client.telemetry("ErrorFlags")["OverCurrent"]
-        assert opened.cubestar.capture_and_process().name == "CALCULATED"
-        attitude = opened.cubestar.attitude()
+        assert opened.client.capture_and_process().name == "CALCULATED"
+        attitude = opened.client.attitude()
         cross, _ = attitude_error_deg(attitude.quaternion, opened.board.truth())
         assert attitude.valid
         assert cross < 0.01

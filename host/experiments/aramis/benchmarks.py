@@ -26,7 +26,6 @@ def _device(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
     from cubestack.emulator.camera.common.register_file import RegisterFile
     from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
     from cubestack.emulator.camera.mt9m001.lens import CONDITION
-    from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
     from cubestack.emulator.camera.mt9m001.registers import read_settings
     from cubestack.firmware_model.aramis.detection.background import Background
     from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
@@ -41,7 +40,7 @@ def _device(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
         client.pause(2.0)
         ratio = simulated_ratio(emulated, lambda: client.pause(float(LOOP_S)))
         client.command("StopLoop")
-        imager = Mt9m001Imager(0, NoiseTerms(), None)
+        imager = Mt9m001Imager()
         settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(HIGHEST_GAIN,) * 4)
         shutter, scene = emulated.board.ppi.stored, emulated.scene
         assert shutter is not None

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.host.cli.demo_cubestar import RENDERED
 from cubestack.host.cli.main import COMMANDS, main
+from cubestack.host.cli.reports import reports
+from cubestack.host.experiments.cubestar.demo import RENDERED
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
 
@@ -49,7 +50,7 @@ def check_one_line(outcome: Outcome, *words: str) -> None:
         assert word in message
 
 
-@pytest.mark.parametrize("command", [None, *COMMANDS])
+@pytest.mark.parametrize("command", [None, *COMMANDS, *reports()])
 def test_help(run: Run, command: str | None) -> None:
     outcome = run(*([command] if command else []), "--help")
     assert outcome.code == DONE

@@ -13,10 +13,10 @@ from PIL import Image
 from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.aramis import INTERFACE, CatalogueState
-from cubestack.host.cli.aramis_session import open_aramis
 from cubestack.host.cli.main import main
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.devices.emulated import open_device
 from tests.system.conftest import COMMAND, Served
 
 POINTING_DEG = (84.0, -1.0, 20.0)
@@ -62,7 +62,7 @@ def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
 
 
 def test_the_same_over_i2c() -> None:
-    with open_aramis(SkyScene(TRUTH)) as session:
+    with open_device("aramis", SkyScene(TRUTH)) as session:
         bus = session.board.i2c()
         bus.wait(0.1)
         client = I2cClient(bus, INTERFACE, 0x1D, wait=bus.wait)

@@ -1,9 +1,7 @@
 """What the tests of a whole CubeSense share."""
 
-import io
-import json
 from collections.abc import Callable
-from contextlib import AbstractContextManager, redirect_stdout
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,8 +10,7 @@ import pytest
 from cubestack.emulator.boards.cubesense.board import HALVES
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, IMAGE_BYTES, ROWS, Camera
-from cubestack.host.cli.main import main
-from cubestack.host.cli.session import CubeSenseSession, open_cubesense
+from cubestack.host.devices.emulated import AnyEmulated, open_device
 
 Frames = list[dict[str, Any]]
 
@@ -28,43 +25,22 @@ def scene() -> EarthSunScene:
 
 
 @pytest.fixture
-def opened() -> Callable[..., AbstractContextManager[CubeSenseSession]]:
-    """Opens a board that looks at a scene, with clients on its serial lines."""
-    return open_cubesense
+def opened() -> Callable[..., AnyEmulated]:
+    """Opens a device that looks at a scene."""
+    return partial(open_device, "cubesense")
 
 
-@pytest.fixture
-def measure(capsys: pytest.CaptureFixture[str]) -> Callable[..., Frames]:
+@pytest.fixture(scope="session")
+def measure(measure_device: Callable[..., Frames]) -> Callable[..., Frames]:
     """`cubestack measure cubesense --json` with more arguments; the results that it prints."""
-
-    def run(*arguments: object) -> Frames:
-        capsys.readouterr()
-        code = main(["measure", "cubesense", "--json", *map(str, arguments)])
-        output = capsys.readouterr()
-        assert (code, output.err) == (0, "")
-        return [json.loads(line) for line in output.out.splitlines()]
-
-    return run
-
-
-@pytest.fixture(scope="module")
-def module_measure() -> Callable[..., Frames]:
-    """The same for a fixture that several tests of a module share."""
-
-    def run(*arguments: object) -> Frames:
-        output = io.StringIO()
-        with redirect_stdout(output):
-            assert main(["measure", "cubesense", "--json", *map(str, arguments)]) == 0
-        return [json.loads(line) for line in output.getvalue().splitlines()]
-
-    return run
+    return partial(measure_device, "cubesense")
 
 
 @pytest.fixture
-def sent() -> Callable[[CubeSenseSession, Camera], np.ndarray]:
+def sent() -> Callable[[AnyEmulated, Camera], np.ndarray]:
     """The picture (480, 640) that a camera sent while one was stored last, rendered anew."""
 
-    def look(session: CubeSenseSession, camera: Camera) -> np.ndarray:
+    def look(session: AnyEmulated, camera: Camera) -> np.ndarray:
         shutter = session.board.stored_frame(camera)
         assert shutter is not None
         segment = session.board.cameras[camera].segment_at(shutter.readout_ps + 1)
@@ -76,10 +52,10 @@ def sent() -> Callable[[CubeSenseSession, Camera], np.ndarray]:
 
 
 @pytest.fixture
-def memory() -> Callable[[CubeSenseSession, Camera], np.ndarray]:
+def memory() -> Callable[[AnyEmulated, Camera], np.ndarray]:
     """The picture (480, 640) in the memory of a camera's half, looked at from outside."""
 
-    def read(session: CubeSenseSession, half: Camera) -> np.ndarray:
+    def read(session: AnyEmulated, half: Camera) -> np.ndarray:
         rows = session.board.engine.memories[HALVES[half]].reshape(-1, 1024)[:ROWS, :COLUMNS]
         assert rows.size == IMAGE_BYTES
         return rows

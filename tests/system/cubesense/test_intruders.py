@@ -27,8 +27,8 @@ def seen_by(scene: EarthSunScene, camera: Camera, alpha: float, beta: float) -> 
 
 def measure(opened: Callable[..., Any], scene: Any, camera: Camera) -> Measurement:
     with opened(scene) as session:
-        session.cubesense.client.pause(0.3)
-        found: Measurement = session.cubesense.capture_and_detect(camera)
+        session.client.client.pause(0.3)
+        found: Measurement = session.client.capture_and_detect(camera)
     return found
 
 
@@ -61,10 +61,10 @@ def test_a_light_beside_the_earth_is_dropped_from_its_limb(
     (sample,) = LENSES[Target.NADIR].unproject([(511, 79)])
     light = Reflection(Target.NADIR, *angles_from_vector(sample), radius_px=9.0, level=200.0)
     with opened(replace(scene, reflections=(light,))) as session:
-        session.cubesense.client.pause(0.3)
-        found = session.cubesense.capture_and_detect(Camera.NADIR)
-        edges = session.cubesense.edges()
-        used = int(session.cubesense.details(Camera.NADIR)["Points"])
+        session.client.client.pause(0.3)
+        found = session.client.capture_and_detect(Camera.NADIR)
+        edges = session.client.edges()
+        used = int(session.client.details(Camera.NADIR)["Points"])
     check(found, NADIR_DEG)
     assert used == len(edges) - 2
 

@@ -12,8 +12,8 @@ from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
-from cubestack.host.cli.session import CubeSenseSession
 from cubestack.host.clients.cubesense.client import Measurement
+from cubestack.host.devices.emulated import AnyEmulated
 
 from .conftest import NADIR_DEG, SUN_DEG
 
@@ -29,9 +29,9 @@ def turning(seed: int = 1) -> EarthSunScene:
     )
 
 
-def loop(session: CubeSenseSession, turns: int = TURNS) -> I2cScheduler:
+def loop(session: AnyEmulated, turns: int = TURNS) -> I2cScheduler:
     """Read both results every second; the memories change places from turn to turn."""
-    cubesense, kernel = session.cubesense, session.board.kernel
+    cubesense, kernel = session.client, session.board.kernel
     cubesense.client.pause(0.3)
     found: I2cScheduler = []
     for turn in range(turns + 1):
@@ -76,8 +76,8 @@ def wire(opened: Callable[..., Any], seed: int) -> tuple[Wire, list[bytes], int]
 
         session.board.uart.line = listen
         loop(session, 3)
-        for message in session.cubesense.client.interface.telemetries:
-            session.cubesense.client.request(bytes([message.id]))
+        for message in session.client.client.interface.telemetries:
+            session.client.client.request(bytes([message.id]))
         memories = [memory.tobytes() for memory in session.board.engine.memories.values()]
         return sent, memories, session.board.kernel.now
 

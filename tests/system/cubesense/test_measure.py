@@ -22,13 +22,13 @@ def offsets(frames: Frames, axis: str) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def nadir(module_measure: Callable[..., Frames]) -> Frames:
-    return module_measure("--sensor", "nadir", "--frames", 60, "--seed", 3)
+def nadir(measure: Callable[..., Frames]) -> Frames:
+    return measure("--sensor", "nadir", "--frames", 60, "--seed", 3)
 
 
 @pytest.fixture(scope="module")
-def sun(module_measure: Callable[..., Frames]) -> Frames:
-    return module_measure("--sensor", "sun", "--frames", 60, "--seed", 3)
+def sun(measure: Callable[..., Frames]) -> Frames:
+    return measure("--sensor", "sun", "--frames", 60, "--seed", 3)
 
 
 def test_a_frame_gives_one_result_of_each_sensor(measure: Callable[..., Frames]) -> None:

@@ -15,6 +15,7 @@ from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
@@ -89,10 +90,11 @@ def test_pictures_over_the_bench_are_what_the_camera_sent(
     opened: Callable[..., Any], scene: EarthSunScene, sent: Callable[..., Any]
 ) -> None:
     with opened(scene) as session:
-        session.cubesense.client.pause(0.3)
+        session.client.client.pause(0.3)
+        bench = BenchClient(session.board.serial("bench_uart"))
         for camera in Camera:
-            session.bench.take(camera)
-            np.testing.assert_array_equal(session.bench.download(camera), sent(session, camera))
+            bench.take(camera)
+            np.testing.assert_array_equal(bench.download(camera), sent(session, camera))
 
 
 def test_both_i2c_protocols_measure(opened: Callable[..., Any], scene: EarthSunScene) -> None:
@@ -133,7 +135,7 @@ def test_reading_a_result_schedules_the_next_one(
     opened: Callable[..., Any], scene: EarthSunScene
 ) -> None:
     with opened(scene) as session:
-        cubesense = session.cubesense
+        cubesense = session.client
         cubesense.client.pause(0.3)
         cubesense.result_then_schedule(Camera.NADIR)
         for turned in (0.0, 5.0, 10.0):

@@ -34,9 +34,9 @@ def recorded(opened, scene, tmp_path) -> Recording:
     ):
         board = session.board
         recorder.listen(board.i2c_bus)
-        session.cubesense.capture_and_detect(Camera.SUN)
-        session.cubesense.client.telemetry("Configuration")
-        session.bench.take(Camera.NADIR)
+        session.client.capture_and_detect(Camera.SUN)
+        session.client.client.telemetry("Configuration")
+        ServicePortClient(board.serial("bench_uart")).take(Camera.NADIR)
         bus = board.i2c()
         I2cClient(bus, INTERFACE, wait=bus.wait).telemetry("Power")
         RegisterClient(bus, INTERFACE.registers, wait=bus.wait).read("SUN_THRESHOLD")
@@ -82,7 +82,7 @@ def test_trace_shows_the_measurement(opened, scene):
         trace = VcdTrace(
             stream, "cubesense", board.kernel, lines(board), board.engine, board.probes
         )
-        session.cubesense.capture_and_detect(Camera.SUN)
+        session.client.capture_and_detect(Camera.SUN)
         trace.close()
     text = stream.getvalue()
     assert "sPENDING " in text
@@ -97,7 +97,7 @@ def test_recording_does_not_change_the_run(recorded, opened, scene, tmp_path):
         stream = io.StringIO()
         trace = VcdTrace(stream, "x", session.board.kernel, lines(session.board))
         with path.open("w") as file, Recorder(file, "cubesense", lines(session.board)):
-            session.cubesense.capture_and_detect(Camera.SUN)
+            session.client.capture_and_detect(Camera.SUN)
         trace.close()
     again = load_recording(path)
     assert (

@@ -20,9 +20,9 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     Sram,
     SramSelection,
 )
-from cubestack.host.cli.session import CubeSenseSession
 from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.clients.cubesense.download import download_image, picture_of
+from cubestack.host.devices.emulated import AnyEmulated
 
 from .conftest import NADIR_DEG, SUN_DEG
 
@@ -39,66 +39,66 @@ def check(measured: Measurement, capture: CaptureResult) -> None:
 @pytest.fixture
 def session(opened: Callable[..., Any], scene: EarthSunScene) -> Any:
     with opened(scene, seed=2) as made:
-        made.cubesense.client.pause(0.3)
+        made.client.client.pause(0.3)
         yield made
 
 
-def latch_up(session: CubeSenseSession, memory: Sram) -> None:
+def latch_up(session: AnyEmulated, memory: Sram) -> None:
     """For good."""
     session.board.faults.inject("latch-up", target=memory.name, lasting=True)
 
 
 @pytest.mark.parametrize("failed", Sram)
 def test_with_one_memory_failed_both_cameras_measure_in_the_other(
-    session: CubeSenseSession, failed: Sram
+    session: AnyEmulated, failed: Sram
 ) -> None:
     latch_up(session, failed)
-    session.cubesense.client.pause(0.1)
-    assert session.cubesense.power().over_current[failed]
+    session.client.client.pause(0.1)
+    assert session.client.power().over_current[failed]
     good = Sram(1 - failed)
     for camera in Camera:
         own = Sram(camera) is good
         check(
-            session.cubesense.capture_and_detect(camera, good),
+            session.client.capture_and_detect(camera, good),
             CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM,
         )
-        lost = session.cubesense.capture_and_detect(camera, failed)
+        lost = session.client.capture_and_detect(camera, failed)
         assert lost.capture is CaptureResult.SRAM_OVER_CURRENT
         assert lost.detect is DetectResult.NONE_SCHEDULED
 
 
 @pytest.mark.parametrize("dead", Camera)
 def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
-    session: CubeSenseSession, dead: Camera
+    session: AnyEmulated, dead: Camera
 ) -> None:
     """The dead camera gives no clock, yet its half's memory is written and read."""
     alive = Camera(1 - dead)
     session.board.faults.inject("camera-dead", target=HALVES[dead])
     latch_up(session, Sram(alive))
-    session.cubesense.client.pause(0.1)
-    check(session.cubesense.capture_and_detect(alive, Sram(dead)), CaptureResult.STORED_OTHER_SRAM)
-    gone = session.cubesense.capture_and_detect(dead, Sram(dead))
+    session.client.client.pause(0.1)
+    check(session.client.capture_and_detect(alive, Sram(dead)), CaptureResult.STORED_OTHER_SRAM)
+    gone = session.client.capture_and_detect(dead, Sram(dead))
     assert gone.capture is CaptureResult.CAMERA_TIMEOUT
     assert gone.detect is DetectResult.NONE_SCHEDULED
 
 
 @pytest.mark.parametrize("camera", Camera)
 def test_picture_in_the_other_memory_is_what_the_camera_sent(
-    session: CubeSenseSession,
+    session: AnyEmulated,
     memory: Callable[..., Any],
     sent: Callable[..., Any],
     camera: Camera,
 ) -> None:
     other = Sram(1 - camera)
-    session.cubesense.capture(camera, other)
+    session.client.capture(camera, other)
     stored = memory(session, Camera(other))
     np.testing.assert_array_equal(stored, sent(session, camera))
-    seen = picture_of(download_image(session.cubesense.client, other, ImageSize.SIDE_128))
+    seen = picture_of(download_image(session.client.client, other, ImageSize.SIDE_128))
     np.testing.assert_array_equal(seen, stored[::8, ::8])
 
 
-def test_latch_up_is_cut_off_and_cleared_by_command(session: CubeSenseSession) -> None:
-    cubesense = session.cubesense
+def test_latch_up_is_cut_off_and_cleared_by_command(session: AnyEmulated) -> None:
+    cubesense = session.client
     session.board.power.latch_up("SRAM1")
     cubesense.client.pause(0.05)
     power = cubesense.power()
@@ -112,10 +112,10 @@ def test_latch_up_is_cut_off_and_cleared_by_command(session: CubeSenseSession) -
     check(cubesense.capture_and_detect(Camera.SUN), CaptureResult.STORED_OWN_SRAM)
 
 
-def test_memory_that_stays_latched_is_cut_off_again(session: CubeSenseSession) -> None:
+def test_memory_that_stays_latched_is_cut_off_again(session: AnyEmulated) -> None:
     latch_up(session, Sram.SRAM2)
     for _ in range(3):
-        session.cubesense.client.pause(0.1)
-        assert session.cubesense.power().over_current == (False, True)
+        session.client.client.pause(0.1)
+        assert session.client.power().over_current == (False, True)
         assert session.board.power.current_ma("SRAM2") == 0
-        session.cubesense.clear_over_current(SramSelection.BOTH)
+        session.client.clear_over_current(SramSelection.BOTH)

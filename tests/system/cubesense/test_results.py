@@ -25,21 +25,21 @@ def detect(
     opened: Callable[..., Any], scene: EarthSunScene | EarthSunView, camera: Camera
 ) -> DetectResult:
     with opened(scene) as session:
-        session.cubesense.client.pause(0.3)
-        return session.cubesense.capture_and_detect(camera).detect
+        session.client.client.pause(0.3)
+        return session.client.capture_and_detect(camera).detect
 
 
 def test_before_the_first_measurement(opened: Callable[..., Any]) -> None:
     with opened(NOON) as session:
-        session.cubesense.client.pause(0.3)
+        session.client.client.pause(0.3)
         for camera in Camera:
-            found = session.cubesense.result(camera)
+            found = session.client.result(camera)
             assert (found.capture, found.detect) == START_UP
 
 
 def test_pending_from_the_acknowledge_on(opened: Callable[..., Any]) -> None:
     with opened(NOON) as session:
-        cubesense = session.cubesense
+        cubesense = session.client
         cubesense.client.pause(0.3)
         cubesense.client.command("CaptureAndDetect", Camera=Camera.SUN, Sram=Sram.SRAM1)
         found = cubesense.result(Camera.SUN)
@@ -49,9 +49,9 @@ def test_pending_from_the_acknowledge_on(opened: Callable[..., Any]) -> None:
 
 def test_captured_only(opened: Callable[..., Any]) -> None:
     with opened(NOON) as session:
-        session.cubesense.client.pause(0.3)
-        assert session.cubesense.capture(Camera.NADIR) is CaptureResult.STORED_OWN_SRAM
-        assert session.cubesense.result(Camera.NADIR).detect is DetectResult.NONE_SCHEDULED
+        session.client.client.pause(0.3)
+        assert session.client.capture(Camera.NADIR) is CaptureResult.STORED_OWN_SRAM
+        assert session.client.result(Camera.NADIR).detect is DetectResult.NONE_SCHEDULED
 
 
 def test_no_earth_in_view_is_too_few_edges(opened: Callable[..., Any]) -> None:
@@ -100,19 +100,19 @@ def test_hot_pixels_are_no_sun(opened: Callable[..., Any]) -> None:
 
 def test_dead_camera_times_out_and_the_node_goes_on(opened: Callable[..., Any]) -> None:
     with opened(NOON) as session:
-        session.cubesense.client.pause(0.3)
+        session.client.client.pause(0.3)
         session.board.faults.inject("camera-dead", target="sun")
-        found = session.cubesense.capture_and_detect(Camera.SUN)
+        found = session.client.capture_and_detect(Camera.SUN)
         assert found.capture is CaptureResult.CAMERA_TIMEOUT
         assert found.detect is DetectResult.NONE_SCHEDULED
-        assert session.cubesense.capture_and_detect(Camera.NADIR).detected
+        assert session.client.capture_and_detect(Camera.NADIR).detected
 
 
 @pytest.mark.parametrize("after_ms", [5, 45, 100])
 def test_latch_up_during_a_measurement(opened: Callable[..., Any], after_ms: float) -> None:
     """While the picture is awaited or stored, and while lines are searched."""
     with opened(NOON) as session:
-        cubesense = session.cubesense
+        cubesense = session.client
         cubesense.client.pause(0.3)
         cubesense.client.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)
         cubesense.client.pause(after_ms / 1000)

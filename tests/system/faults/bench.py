@@ -17,11 +17,12 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.host.cli.session import open_cubesense, open_session
 from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.emulated import open_device
 
 SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
 ORION_DEG = (84.0, -1.0)
@@ -183,17 +184,17 @@ class Bench:
 @contextmanager
 def cubestar(scene: SkyScene | None = None) -> Iterator[Bench]:
     """A CubeStar that looks at Orion."""
-    with open_session(scene or SkyScene.pointing(*ORION_DEG), seed=4) as session:
-        yield Bench("cubestar", session.board, CubeStar, session.cubestar.client)  # type: ignore[arg-type]
+    with open_device("cubestar", scene or SkyScene.pointing(*ORION_DEG), seed=4) as session:
+        yield Bench("cubestar", session.board, CubeStar, session.client.client)
 
 
 @contextmanager
 def cubesense(scene: EarthSunScene | None = None) -> Iterator[Bench]:
     """A CubeSense that sees Sun and Earth."""
     seen = scene or EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
-    with open_cubesense(seen, seed=4) as session:
-        bench = Bench("cubesense", session.board, CubeSense, session.cubesense.client)  # type: ignore[arg-type]
-        bench.bench_client = session.bench
+    with open_device("cubesense", seen, seed=4) as session:
+        bench = Bench("cubesense", session.board, CubeSense, session.client.client)
+        bench.bench_client = BenchClient(session.board.serial("bench_uart"))
         yield bench
 
 

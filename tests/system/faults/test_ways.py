@@ -12,7 +12,7 @@ from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.cli.main import main
-from cubestack.host.cli.session import open_session
+from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.targets import open_target
 from cubestack.host.shell.language import Shell
 
@@ -216,7 +216,7 @@ def test_refusals_name_what_would_be_right(star: Bench) -> None:
 
 
 def test_the_simulator_s_registers_can_not_be_hit() -> None:
-    with open_session(SkyScene.pointing(84, -1), engine="python") as session:
+    with open_device("cubestar", SkyScene.pointing(84, -1), engine="python") as session:
         kinds = session.board.faults.kinds()
         assert set(FAULTS) - set(kinds) == {"register-flip", "register-upsets"}
         with pytest.raises(ValueError, match="only the compiled engine"):

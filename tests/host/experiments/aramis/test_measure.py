@@ -1,0 +1,132 @@
+"""Measuring with AraMiS from a program, with a small catalogue."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cubestack.emulator.boards.aramis import catalogue
+from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
+from cubestack.emulator.camera.mt9m001.registers import read_settings
+from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+from cubestack.host.cli.main import main
+from cubestack.host.experiments.aramis.measure import NOISE_TERMS, AramisResult
+from cubestack.host.experiments.measure import measure as measure_device
+
+
+@pytest.fixture(scope="module")
+def small() -> Database:
+    return build_database(CatalogueParameters(step_deg=10, stars_per_field=5))
+
+
+@pytest.fixture(autouse=True)
+def _small_catalogue(monkeypatch: pytest.MonkeyPatch, small: Database) -> None:
+    monkeypatch.setattr(catalogue, "onboard_database", lambda *_field, **_progress: small)
+
+
+def measure(**options: Any) -> list[AramisResult]:
+    return list(measure_device("aramis", **options))  # type: ignore[arg-type]
+
+
+def test_a_random_sky_lost_in_space() -> None:
+    frames = measure(frames=3)
+    for frame in frames:
+        assert (frame.right, frame.wrong, frame.flips, frame.status) == (True, 0, 0, "")
+        assert (frame.outcome, frame.reason, frame.mode) == ("conclusive", "confirmed", "lis")
+        assert frame.error_cross_deg is not None
+        assert frame.error_cross_deg < 0.01
+        assert len(frame.truth or ()) == len(frame.quaternion or ()) == 4
+        assert frame.matched >= 3
+        assert frame.phase_ms["total"] > 300
+    assert frames[0].truth != frames[1].truth
+
+
+def test_runs_repeat_but_for_the_wall_time() -> None:
+    first, again, other = (
+        replace(measure(frames=1, seed=seed)[0], wall_ms=0.0) for seed in (4, 4, 5)
+    )
+    assert first == again
+    assert first.truth != other.truth
+
+
+def test_modes_noise_rates_and_published_settings() -> None:
+    (aided,) = measure(mode="assisted", hint_error=4)
+    assert (aided.right, aided.mode) == (True, "assisted")
+    (ideal,), (quiet,) = measure(no_noise=True), measure(without=NOISE_TERMS)
+    assert ideal.error_cross_deg == quiet.error_cross_deg
+    (published,) = measure(published=True, exposure=100, gain=8)
+    assert published.reason not in ("confirmed", "unconfirmed")
+    (turning,) = measure(roll_rate=10, exposure=100)
+    assert turning.right
+
+
+def test_bits_turned_over_in_flash_are_counted() -> None:
+    for frame in measure(bit_flips=3e-6, frames=2):
+        assert 0 < frame.corrected <= frame.flips
+        assert (frame.right, frame.lost) == (True, 0)
+        assert frame.status in ("", "CatalogueCorrected")
+    (damaged,) = measure(bit_flips=1e-2)
+    assert (damaged.solved, damaged.right, damaged.quaternion) == (False, False, None)
+    assert damaged.reason in ("catalogue_damaged", "no_catalogue")
+
+
+def test_a_scene_file_and_a_scene(tmp_path: Path) -> None:
+    path = tmp_path / "sky.toml"
+    path.write_text('kind = "sky"\nra_deg = 84.0\ndec_deg = -1.0\n', encoding="utf-8")
+    made = SkyScene.pointing(84.0, -1.0)
+    frames = [*measure(scene=path, frames=2), *measure(scene=made)]
+    assert [frame.truth for frame in frames] == [frames[0].truth] * 3
+    assert all(frame.right for frame in frames)
+
+
+def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
+    pointing = quaternion_from_pointing(84.0, -1.0, 20.0)
+    scene = SkyScene(pointing)
+    settings = read_settings(RegisterFile(REGISTERS))
+    settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
+    shutter = RollingShutter(10**12, Fraction(31_750_000), 6299, 6299)
+    sky = Mt9m001Imager().picture(scene, CONDITION, shutter, settings)
+    wide = np.pad(sky, ((0, 20), (7, 0)))
+    Image.fromarray(wide).save(tmp_path / "sky.png")
+    (frame,) = measure(image=tmp_path / "sky.png", crop=(7, 0))
+    assert (frame.solved, frame.right, frame.truth) == (True, None, None)
+    assert attitude_error_deg(np.array(frame.quaternion), pointing)[0] < 0.01
+
+
+def test_a_table_for_readers(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", "aramis", "--frames", "2"]) == 0
+    shown = capsys.readouterr().out
+    assert "100.0 % right" in shown
+    assert "mean time" in shown
+    assert "confirmed" in shown
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"crop": (1, 2)}, "--crop belongs to --image"),
+        ({"scene": "x.toml", "rate": 1}, "belong to the random sky"),
+        ({"scene": "x.toml", "image": "x.png"}, "--scene and --image exclude each other"),
+        ({"image": "x.png", "mode": "assisted"}, "x.png"),
+        ({"mode": "tracking"}, "'tracking' is none of lis, assisted"),
+        ({"field": 4}, "field: 4 is not a field of view in 5..40 degrees"),
+        ({"gain": 16}, "a gain in 1..15"),
+        ({"bit_flips": 2}, "a probability in 0..1"),
+        ({"false_mags": (6, 4.5)}, "the brightest first"),
+        ({"without": ("shot", "salt")}, "'salt' is none of shot, dark"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        measure(**options)

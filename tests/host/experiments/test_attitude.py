@@ -1,0 +1,47 @@
+"""Attitudes beside the truth: verdict, errors, hints and wrong stars."""
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.host.experiments.attitude import compare, count_wrong, is_right, rough_boresight
+
+TRUTH = quaternion_from_pointing(84.0, -1.0, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("cross", "roll", "right"),
+    [(0.09, 0.29, True), (0.09, -0.29, True), (0.11, 0.0, False), (0.0, -0.31, False)],
+)
+def test_an_attitude_is_right_within_a_tenth_across_and_three_about(
+    cross: float, roll: float, right: bool
+) -> None:
+    assert is_right(cross, roll) is right
+
+
+def test_what_is_not_known_is_none() -> None:
+    both, lost = compare(TRUTH, TRUTH), compare(None, TRUTH)
+    assert (both["solved"], both["right"], both["quaternion"]) == (True, True, TRUTH.tolist())
+    assert (lost["solved"], lost["right"], lost["quaternion"]) == (False, False, None)
+    blind = compare(TRUTH, None)
+    assert (blind["solved"], blind["right"], blind["error_cross_deg"]) == (True, None, None)
+
+
+def test_hints_fill_their_cap_evenly() -> None:
+    rng = np.random.default_rng(3)
+    boresight = matrix_from_quaternion(TRUTH)[2]
+    hints = np.array([rough_boresight(TRUTH, 5.0, rng) for _ in range(2000)])
+    away = np.degrees(np.arccos(hints @ boresight))
+    assert away.max() <= 5.0
+    assert np.mean(away < 5.0 / np.sqrt(2)) == pytest.approx(0.5, abs=0.04)
+    assert np.linalg.norm(hints.mean(axis=0)) > 0.998
+
+
+def test_stars_that_the_truth_puts_elsewhere_are_counted() -> None:
+    sky = load_sky()
+    numbers = [int(number) for number in sky.hip[[10, 20, 30]]]
+    seen = 3.0 * sky.vectors[[10, 20, 30]] @ matrix_from_quaternion(TRUTH).T
+    assert count_wrong(numbers, seen, TRUTH) == 0
+    assert count_wrong(numbers, seen[[0, 2, 1]], TRUTH) == 2
+    assert count_wrong([], np.empty((0, 3)), TRUTH) == 0

@@ -1,0 +1,157 @@
+"""Measuring from a program: options as keywords, results as they come, and what is refused."""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from cubestack.host.cli.arguments import add_options, chosen
+from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.devices.registry import device, devices
+from cubestack.host.errors import TargetError
+from cubestack.host.experiments import measure as measuring
+from cubestack.host.experiments.facts import FactSummary
+from cubestack.host.experiments.measure import measure
+from cubestack.host.options import ANGLE, CORNER, Options, option, whole
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted(Options):
+    frames: int = option(1, "number of frames", whole(1, 9))
+    corner: tuple[int, int] = option((0, 0), "part", CORNER, metavar="X,Y")
+    tilt: float | None = option(None, "largest tilt", ANGLE)
+    way: str = option("up", "where to", choices=("up", "down"))
+    skip: tuple[str, ...] = option((), "left out", choices=("a", "b"), many=True)
+    quick: bool = option(False, "be quick")
+    left: int | None = option(None, "one side", whole(0), group="side")
+    right: int | None = option(None, "the other", whole(0), group="side")
+
+    def check(self) -> None:
+        if self.quick and self.given("tilt"):
+            raise ValueError("--tilt takes its time")
+
+
+@dataclass(frozen=True)
+class Number(Result):
+    number: int
+
+
+class Counting(Experiment[Any, Wanted, Number]):
+    options = Wanted
+    description = "Counts."
+    decides = ("layout",)
+
+    def count(self, options: Wanted) -> int:
+        return options.frames
+
+    def run(self, opened: Any, options: Wanted) -> Iterator[Number]:
+        yield from map(Number, range(options.frames))
+
+    def summarise(self, results: Sequence[Number]) -> Summary:
+        return FactSummary({"results": len(results)})
+
+
+@pytest.fixture
+def counting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device that is measured by counting."""
+    counted = replace(device("cubestar"), experiment=Counting)
+    monkeypatch.setattr(measuring, "registered", lambda _name: counted)
+
+
+@pytest.mark.usefixtures("counting")
+def test_results_come_one_by_one_with_progress() -> None:
+    told: list[tuple[int, int]] = []
+    results = measure("cubestar", frames=3, progress=lambda *done: told.append(done))
+    assert told == []
+    assert next(results).as_dict() == {"number": 0}
+    assert told == [(1, 3)]
+    assert [result.as_dict()["number"] for result in results] == [1, 2]
+    assert told == [(1, 3), (2, 3), (3, 3)]
+
+
+@pytest.mark.usefixtures("counting")
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"frame": 3}, "no option 'frame' for cubestar; known: frames, corner, tilt"),
+        ({"layout": "2"}, "no option 'layout'"),  # the experiment's own decision
+        ({"frames": 0}, "frames: 0 is not a whole number in 1..9"),
+        ({"frames": 2.5}, "frames: 2.5 is not a whole number"),
+        ({"corner": (1, 2, 3)}, "is not X,Y, as in 0,256"),
+        ({"tilt": 181}, "tilt: 181 is not an angle in 0..180 degrees"),
+        ({"way": "left"}, "way: 'left' is none of up, down"),
+        ({"skip": ("a", "c")}, "skip: 'c' is none of a, b"),
+        ({"quick": 2}, "quick: 2 is none of False, True"),
+        ({"left": 0, "right": 1}, "--left and --right exclude each other"),
+        ({"quick": True, "tilt": 1}, "--tilt takes its time"),
+    ],
+)
+def test_wrong_options_are_refused_at_once_with_what_is_right(
+    options: dict[str, Any], complaint: str
+) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        measure("cubestar", **options)
+
+
+def test_options_of_the_board_are_checked_as_such() -> None:
+    with pytest.raises(ValueError, match="layout of cubestar must be one of 1, 2, 3, two-boards"):
+        measure("cubestar", layout="4")
+    with pytest.raises(ValueError, match="no option 'layout' for cubesense"):
+        measure("cubesense", layout="2")
+
+
+def test_unknown_devices_and_those_without_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(TargetError, match="no device 'cubestarr'; known: cubestar"):
+        measure("cubestarr")
+    silent = replace(device("cubestar"), experiment=None)
+    monkeypatch.setattr(measuring, "registered", lambda _name: silent)
+    with pytest.raises(ValueError, match="nothing to measure with cubestar"):
+        measure("cubestar")
+
+
+def parse(*arguments: str) -> Wanted:
+    parser = argparse.ArgumentParser()
+    add_options(parser, Wanted)
+    return chosen(parser.parse_args(arguments), Wanted)
+
+
+def test_the_command_line_takes_what_programs_give() -> None:
+    assert parse() == Wanted()
+    assert parse("--frames", "3", "--corner", "0,256", "--tilt", "5") == Wanted(
+        frames=3, corner=(0, 256), tilt=5.0
+    )
+    assert parse("--skip", "a", "--skip", "b", "--quick") == Wanted(skip=("a", "b"), quick=True)
+    assert Wanted(corner="0,256", frames="3") == Wanted(corner=(0, 256), frames=3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("--frames", "0"), "argument --frames: '0' is not a whole number in 1..9"),
+        (("--left", "0", "--right", "1"), "not allowed with argument --left"),
+        (("--way", "left"), "invalid choice: 'left'"),
+    ],
+)
+def test_wrong_arguments(
+    arguments: tuple[str, ...], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        parse(*arguments)
+    assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", [one.name for one in devices()])
+def test_every_declared_experiment_report_and_demonstration_loads(name: str) -> None:
+    one = device(name)
+    assert one.experiment is not None
+    assert one.demo is not None
+    assert callable(one.demo())
+    experiments = [one.experiment(), *(report.load() for report in one.reports)]
+    for experiment in experiments:
+        assert experiment.options().declared()["seed"] if experiment.powers_up else True
+        assert experiment.count(experiment.options()) >= 1
+        assert set(experiment.decides) <= {option.name for option in one.options}
+    figures = [figure for benchmark in one.benchmarks() for figure in benchmark.figures]
+    assert len(figures) == len(set(figures)) > 0
