@@ -15,8 +15,8 @@ from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
-from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
 from tests.system.conftest import COMMAND, Served
@@ -91,7 +91,7 @@ def test_pictures_over_the_bench_are_what_the_camera_sent(
 ) -> None:
     with opened(scene) as session:
         session.client.client.pause(0.3)
-        bench = BenchClient(session.board.serial("bench_uart"))
+        bench = ServicePortClient(session.board.serial("bench_uart"))
         for camera in Camera:
             bench.take(camera)
             np.testing.assert_array_equal(bench.download(camera), sent(session, camera))

@@ -18,8 +18,8 @@ from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.clients.aramis.client import Aramis
-from cubestack.host.clients.cubesense.bench import BenchClient
 from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.emulated import open_device
@@ -194,7 +194,7 @@ def cubesense(scene: EarthSunScene | None = None) -> Iterator[Bench]:
     seen = scene or EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
     with open_device("cubesense", seen, seed=4) as session:
         bench = Bench("cubesense", session.board, CubeSense, session.client.client)
-        bench.bench_client = BenchClient(session.board.serial("bench_uart"))
+        bench.bench_client = ServicePortClient(session.board.serial("bench_uart"))
         yield bench
 
 
