@@ -109,69 +109,38 @@ def under_current(unit: Harness, _: Sky) -> None:
 # --- buses ----------------------------------------------------------------------------------------
 
 
-@flag("UART_ProtocolError")
-def uart_protocol(unit: Harness, _: Sky) -> None:
-    unit.uart(b"\x55")
+def overflow(send: Callable[[Harness], object]) -> Callable[[Harness], None]:
+    """One telecommand more than the queue holds."""
+
+    def fill(unit: Harness) -> None:
+        for _ in range(QUEUE_DEPTH + 1):
+            send(unit)
+        unit.run()
+
+    return fill
 
 
-@flag("UART_TcmdBufOfError")
-def uart_overflow(unit: Harness, _: Sky) -> None:
-    for _ in range(QUEUE_DEPTH + 1):
-        unit.send("Exposure")
-    unit.run()
-
-
-@flag("UART_Tcmd_TooManyParm")
-def uart_too_many(unit: Harness, _: Sky) -> None:
-    unit.uart(encode_frame(b"\x10\x00"))
-
-
-@flag("UART_Tcmd_TooFewParm")
-def uart_too_few(unit: Harness, _: Sky) -> None:
-    unit.uart(encode_frame(b"\x07\x00"))
-
-
-@flag("UART_MsgIncomplete")
-def uart_incomplete(unit: Harness, _: Sky) -> None:
-    unit.uart(b"\x1f\x7f\x07" + encode_frame(b"\x83"))
-
-
-@flag("UART_RXTimeout", "UART_MsgIncomplete")
-def uart_timeout(unit: Harness, _: Sky) -> None:
+def silence(unit: Harness) -> None:
     unit.uart(b"\x1f\x7f\x07")
-    unit.program.link.uart_silence()
+    unit.link.uart_silence()
 
 
-@flag("I2C_WaitForIDReadRequestError")
-def i2c_no_id(unit: Harness, _: Sky) -> None:
-    unit.i2c_read(1)
-
-
-@flag("I2C_TcmdBufOFError")
-def i2c_overflow(unit: Harness, _: Sky) -> None:
-    for _ in range(QUEUE_DEPTH + 1):
-        unit.i2c_write(b"\x07\x00\x00")
-    unit.run()
-
-
-@flag("I2C_TCMD_TooFewParm")
-def i2c_too_few(unit: Harness, _: Sky) -> None:
-    unit.i2c_write(b"\x07\x00")
-
-
-@flag("I2C_TCMD_TooManyparm")
-def i2c_too_many(unit: Harness, _: Sky) -> None:
-    unit.i2c_write(b"\x07\x00\x00\x00")
-
-
-@flag("TcmdIDError")
-def unknown_telecommand(unit: Harness, _: Sky) -> None:
-    unit.uart(encode_frame(b"\x63"))
-
-
-@flag("TlmIDError")
-def unknown_telemetry(unit: Harness, _: Sky) -> None:
-    unit.uart(encode_frame(b"\xc0"))
+BUS_CAUSES: dict[tuple[str, ...], Callable[[Harness], object]] = {
+    ("UART_ProtocolError",): lambda unit: unit.uart(b"\x55"),
+    ("UART_TcmdBufOfError",): overflow(lambda unit: unit.send("Exposure")),
+    ("UART_Tcmd_TooManyParm",): lambda unit: unit.frames(b"\x10\x00"),
+    ("UART_Tcmd_TooFewParm",): lambda unit: unit.frames(b"\x07\x00"),
+    ("UART_MsgIncomplete",): lambda unit: unit.uart(b"\x1f\x7f\x07" + encode_frame(b"\x83")),
+    ("UART_RXTimeout", "UART_MsgIncomplete"): silence,
+    ("I2C_WaitForIDReadRequestError",): lambda unit: unit.i2c_read(1),
+    ("I2C_TcmdBufOFError",): overflow(lambda unit: unit.i2c_write(b"\x07\x00\x00")),
+    ("I2C_TCMD_TooFewParm",): lambda unit: unit.i2c_write(b"\x07\x00"),
+    ("I2C_TCMD_TooManyparm",): lambda unit: unit.i2c_write(b"\x07\x00\x00\x00"),
+    ("TcmdIDError",): lambda unit: unit.frames(b"\x63"),
+    ("TlmIDError",): lambda unit: unit.frames(b"\xc0"),
+}
+for raised, act in BUS_CAUSES.items():
+    flag(*raised)(lambda unit, _sky, act=act: act(unit))
 
 
 # --- image sensor and picture ---------------------------------------------------------------------
