@@ -35,6 +35,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
 from cubestack.firmware_model.interface.cubesense.pins import (
     ACKNOWLEDGE,
     CLK,
+    DATA_I,
     EDGE,
     ENABLE,
     RNW,
@@ -229,7 +230,7 @@ class Acquisition:
         y, x = divmod(pixel, FULL_SIZE.columns)
         self._meter.charge(i16_add=2, port_write=2)
         for byte in address_bytes(x, y):
-            yield SetPin("DATA_I", byte)
+            yield SetPin(DATA_I, byte)
             yield SetPin(CLK, 1)
             yield SetPin(CLK, 0)
         yield SetPin(SHIFT, 1)

@@ -9,6 +9,7 @@ from amaranth.hdl import Cat, Module, Value
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.cubesense.pins import (
     COMMON_PINS,
+    DATA_I,
     OWN_PINS,
     PREFIXES,
     pair_pins,
@@ -50,7 +51,7 @@ class CubeSensePair(PinnedComponent):
         m = Module()
         m.submodules.sun = sun = CubeSenseFpga("sun", self.read_out, self.mcu_addressing)
         m.submodules.nadir = nadir = CubeSenseFpga("nadir", self.read_out, self.mcu_addressing)
-        common = [*COMMON_PINS, *("DATA_I",) * self.mcu_addressing]
+        common = [*COMMON_PINS, *(DATA_I,) * self.mcu_addressing]
         for prefix, fpga in zip(PREFIXES.values(), (sun, nadir), strict=True):
             own = [(name, prefix + name) for name in OWN_PORTS]
             connect_ports(m, fpga, self, own + [(name, name) for name in common])

@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.pins import CLK, PCLK
 from cubestack.hdl.blocks.frame_gap import FrameGap
 from cubestack.hdl.blocks.frame_writer import FrameWriter
 from cubestack.hdl.blocks.gray_counter import GrayCounter
@@ -19,9 +20,9 @@ from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
 __all__ = ["AREA_FILE", "LINK_CLOCK", "PIXEL_CLOCK", "TOPS"]
 
-PIXEL_CLOCK = Clock("PCLK", 74, "OV7620 at 13.5 MHz")
+PIXEL_CLOCK = Clock(PCLK, 74, "OV7620 at 13.5 MHz")
 LINK_CLOCK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
-_CLK = Clock("CLK", 400, "two instructions of the microcontroller at 5 MHz")
+_CLK = Clock(CLK, 400, "two instructions of the microcontroller at 5 MHz")
 
 _OPTION = ", the microcontroller sets the address"
 

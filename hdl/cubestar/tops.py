@@ -3,6 +3,7 @@
 from functools import partial
 from pathlib import Path
 
+from cubestack.firmware_model.interface.cubestar.pins import ALE, DCLK, ENABLE, PIXCLK, RNW
 from cubestack.hdl.blocks.frame_reader import FrameReader
 from cubestack.hdl.blocks.frame_writer import FrameWriter
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
@@ -14,10 +15,10 @@ from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
 __all__ = ["AREA_FILE", "TOPS"]
 
-_PIXCLK = Clock("PIXCLK", 100, "image sensor at 10 MHz")
-_DCLK = Clock("DCLK", 770.8, "37 cycles of the microcontroller's 48 MHz")
-_ENABLE = Clock("ENABLE", 1000, "microcontroller, a few times a second; latches BANK")
-_ALE = Clock("ALE", 83, "bus accesses of four cycles at 48 MHz")
+_PIXCLK = Clock(PIXCLK, 100, "image sensor at 10 MHz")
+_DCLK = Clock(DCLK, 770.8, "37 cycles of the microcontroller's 48 MHz")
+_ENABLE = Clock(ENABLE, 1000, "microcontroller, a few times a second; latches BANK")
+_ALE = Clock(ALE, 83, "bus accesses of four cycles at 48 MHz")
 
 #: Their tracked area, as ``cubestack hdl area --ice40 --fmax --json`` prints it.
 AREA_FILE = Path(__file__).parent / "area.json"
@@ -30,7 +31,7 @@ TOPS: TopTable = {
     "cubestar-double": Top(
         CubeStarDouble,
         "CubeStar, two SRAMs in turn",
-        (_PIXCLK, _ALE, Clock("RNW", 1000, "microcontroller, a few times a second; latches INTO")),
+        (_PIXCLK, _ALE, Clock(RNW, 1000, "microcontroller, a few times a second; latches INTO")),
     ),
     "cubestar-boards": Top(
         CubeStarTwoBoards,

@@ -22,7 +22,7 @@ from cubestack.emulator.boards.cubestar.wiring import (
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.interface.cubestar.pins import ENABLE, RNW
+from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
 
 __all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
 
@@ -101,7 +101,7 @@ def _one_fpga_states(pins: Pins, accessed: bool) -> States:
 
 def _two_board_states(pins: Pins, accessed: bool) -> States:
     """A board that stores is not accessed; else it is the first one that is."""
-    storing = [_stores(pins, board) for board in _TWO]
+    storing = [_stores(pins, board) for board in BOARD_PREFIXES]
     reading = storing.index(False) if accessed and not all(storing) else None
     states = {
         f"fpga{number + 1}": "storing" if stores else "reading" if number == reading else "standby"
@@ -110,7 +110,6 @@ def _two_board_states(pins: Pins, accessed: bool) -> States:
     return {**states, "memory": f"{sum(storing) + (reading is not None)} used"}
 
 
-_TWO = ("BOARD1_", "BOARD2_")
 _ONE_FPGA: Mapping[str, int] = {ENABLE: 0, RNW: 0}
 
 #: Every layout.
@@ -147,9 +146,9 @@ BOARDS = {
         "cubestar-shared",
         2,
         cubestar_two_boards_wiring,
-        {f"{board}{name}": 0 for board in _TWO for name in _ONE_FPGA},
+        {f"{board}{name}": 0 for board in BOARD_PREFIXES for name in _ONE_FPGA},
         _powered(("fpga1", "fpga2"), 2),
-        lambda pins: sum(_stores(pins, board) for board in _TWO),
+        lambda pins: sum(_stores(pins, board) for board in BOARD_PREFIXES),
         _two_board_states,
     ),
 }

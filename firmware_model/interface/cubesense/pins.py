@@ -29,6 +29,7 @@ __all__ = [
     "CONTENTION",
     "CONTROLS",
     "DATA",
+    "DATA_I",
     "EDGE",
     "ENABLE",
     "FPGA",
@@ -66,6 +67,9 @@ LINK_C = Pin(
     level=0b11,
     enables=2,
 )
+
+#: The microcontroller's bytes on DATA, with address control.
+DATA_I = f"{DATA}_I"
 
 CAMERA_PINS = (Y, HREF, PCLK)
 SRAM_PINS = sram_pins(19, "SRAM address, row : column")
