@@ -147,17 +147,19 @@ class EarthSunScene:
     @classmethod
     def facing(
         cls,
-        sun_deg: tuple[float, float] = (0.0, 0.0),
-        nadir_deg: tuple[float, float] = (0.0, 0.0),
+        sun_deg: tuple[float, float] | None = (0.0, 0.0),
+        nadir_deg: tuple[float, float] | None = (0.0, 0.0),
         **others: Any,
     ) -> "EarthSunScene":
         """A scene whose sensors should measure these (alpha, beta) at time 0.
 
-        ``others`` are attributes as of the class, but for ``sun`` and ``nadir``.
+        ``others`` are attributes as of the class; ``sun`` or ``nadir`` with None for its angles.
         """
         mounted = cls(**others)
-        others["sun"] = mounted.sun_camera.matrix.T @ vector_from_angles(*sun_deg)
-        others["nadir"] = mounted.nadir_camera.matrix.T @ vector_from_angles(*nadir_deg)
+        if sun_deg is not None:
+            others["sun"] = mounted.sun_camera.matrix.T @ vector_from_angles(*sun_deg)
+        if nadir_deg is not None:
+            others["nadir"] = mounted.nadir_camera.matrix.T @ vector_from_angles(*nadir_deg)
         return cls(**others)
 
     @property

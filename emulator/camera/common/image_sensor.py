@@ -50,6 +50,8 @@ class ImageSensor(Generic[S, C]):
         self._hz = hz
         self._registers = RegisterFile(table)
         self._clock: PixelClock | None = PixelClock(hz)
+        self._powered = True
+        self._in_reset = False
         self._made: tuple[Any, Grey] | None = None
 
     @property
@@ -99,9 +101,11 @@ class ImageSensor(Generic[S, C]):
 
     def power(self, on: bool, now_ps: int) -> None:
         """Turn the supply on or off; registers then have their reset values."""
-        self._start_or_stop(on, now_ps)
+        self._powered = on
+        self._start_or_stop(now_ps)
 
-    def _start_or_stop(self, run: bool, now_ps: int) -> None:
+    def _start_or_stop(self, now_ps: int) -> None:
+        run = self._powered and not self._in_reset
         if run == self.running:
             return
         self._registers.reset()

@@ -40,11 +40,11 @@ class Imager(ABC, Generic[Settings]):
         if isinstance(scene, PictureScene):
             return _photograph(scene, scene.part(optics.columns, optics.rows), shutter)
         light = star_light(scene, optics, shutter)
-        if not condition.noise:
-            return self.counts(light, shutter.exposure_s, condition, settings, None)
-        # By frame time, so that a frame nobody looked at does not change the next one's noise.
-        seed = [condition.seed, max(0, shutter.readout_ps)]
-        generator = np.random.Generator(np.random.SFC64(seed))
+        generator = None
+        if condition.noise:
+            # By frame time, so that a frame nobody looked at does not change the next one's noise.
+            seed = [condition.seed, max(0, shutter.readout_ps)]
+            generator = np.random.Generator(np.random.SFC64(seed))
         return self.counts(light, shutter.exposure_s, condition, settings, generator)
 
     @abstractmethod

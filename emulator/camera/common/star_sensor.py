@@ -29,8 +29,6 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
     ) -> None:
         """Power up with the reset pin high; see ``ImageSensor``."""
         self._table = table
-        self._powered = True
-        self._reset_pin = 1
         super().__init__(seen, condition, table, hz)
 
     def _check(self, scene: Scene, condition: SkyCondition) -> None:
@@ -48,15 +46,10 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
         """Temperature of the sensor, in degrees Celsius."""
         return self.condition.temperature_c
 
-    def power(self, on: bool, now_ps: int) -> None:
-        """Turn the supply on or off; registers then have their reset values."""
-        self._powered = on
-        self._start_or_stop(on and bool(self._reset_pin), now_ps)
-
     def set_reset_pin(self, level: int, now_ps: int) -> None:
         """Drive the reset pin, low active."""
-        self._reset_pin = level
-        self._start_or_stop(self._powered and bool(level), now_ps)
+        self._in_reset = not level
+        self._start_or_stop(now_ps)
 
     def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
         """A write message to the 7-bit ``address`` ended; returns whether it was acknowledged.

@@ -23,7 +23,7 @@ from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
-from cubestack.emulator.camera.mt9m001.noise import BACKGROUND_ELECTRONS_PER_S, NoiseTerms
+from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings, read_settings, write_word
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import (
@@ -81,7 +81,6 @@ class Mt9m001(StarSensor):
         seed: int = 0,
         clock_hz: int = PIXEL_CLOCK_HZ,
         noise: NoiseTerms | None = None,
-        background_electrons_per_s: float = BACKGROUND_ELECTRONS_PER_S,
     ) -> None:
         """Power up with the reset pin high.
 
@@ -91,10 +90,9 @@ class Mt9m001(StarSensor):
             seed: of the part's hot pixels.
             clock_hz: master clock; PIXCLK has the same frequency.
             noise: which terms of noise there are in a condition that has noise, all unless given.
-            background_electrons_per_s: light from elsewhere in each pixel.
         """
         super().__init__(scene, condition, REGISTERS, clock_hz)
-        self._imager = Mt9m001Imager(seed, noise, background_electrons_per_s)
+        self._imager = Mt9m001Imager(seed, noise)
         self._settings = read_settings(self._registers)
         self._since = 0  # edge of the last start or change: exposing anew begins there
         self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)

@@ -26,7 +26,6 @@ from typing import Any
 
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
 from cubestack.emulator.scene.file import (
     Readers,
@@ -51,19 +50,13 @@ def load_earth_sun_scene(path: Path) -> EarthSunView:
 
 def _view(table: dict[str, Any]) -> EarthSunView:
     values = read_table(table, _SCENE)
-    angles = {}
+    angles = {f"{name}_deg": values.pop(f"{name}_deg", None) for name in ("sun", "nadir")}
     for name in ("sun", "nadir"):
-        if f"{name}_deg" in values:
-            if name in values:
-                raise SceneError(f"give either {name} or {name}_deg, not both")
-            angles[name] = values.pop(f"{name}_deg")
+        if name in values and angles[f"{name}_deg"]:
+            raise SceneError(f"give either {name} or {name}_deg, not both")
     condition = FisheyeCondition(**values_for(FisheyeCondition, values))
-    values = values_for(EarthSunScene, values)
-    mounted = EarthSunScene(**values)
-    for name, (alpha, beta) in angles.items():
-        camera = mounted.sun_camera if name == "sun" else mounted.nadir_camera
-        values[name] = camera.matrix.T @ vector_from_angles(alpha, beta)
-    return EarthSunView(EarthSunScene(**values), condition)
+    scene = EarthSunScene.facing(**angles, **values_for(EarthSunScene, values))
+    return EarthSunView(scene, condition)
 
 
 def _mounting(value: Any) -> Mounting:
