@@ -3,6 +3,7 @@ import logging
 import pytest
 
 from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.firmware_model.interface.cameras.registers import (
     BitField,
     CameraRegister,
@@ -108,3 +109,15 @@ def test_modelled_accesses_are_silent(
             registers.write(byte)
     assert not caplog.records
     assert registers.active("RATE") == 0x0203
+
+
+def test_registers_of_sixteen_bits_behind_one_address() -> None:
+    registers = RegisterFile(mt9m001.REGISTERS)
+    registers.select(0x09)
+    assert registers.read() == 0x0419
+    registers.select(0x09)
+    assert registers.write(0xBEEF) is mt9m001.REGISTERS["SHUTTER_WIDTH"]
+    assert registers.active("SHUTTER_WIDTH") == 0xBEEF
+    registers.store("CHIP_VERSION", 0x1234)
+    assert registers.active("CHIP_VERSION") == 0x1234
+    assert mt9m001.REGISTERS["SHUTTER_WIDTH"].units(0xBEEF) == [0xBEEF]

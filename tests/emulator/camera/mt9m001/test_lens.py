@@ -1,11 +1,20 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.common.exposure import star_light, star_pixels
+from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.lens import (
     LIKELY_FIELD_DEG,
     PUBLISHED_FIELD_DEG,
     double_gauss,
 )
+from cubestack.emulator.scene.sky import SkyScene
+
+ORION = SkyScene.pointing(84.0, -1.0)
+LENS = double_gauss()
+SHUTTER = RollingShutter(10**12, Fraction(31_750_000), 3000, 3000)
 
 
 @pytest.mark.parametrize("field_deg", [LIKELY_FIELD_DEG, PUBLISHED_FIELD_DEG])
@@ -28,3 +37,18 @@ def test_the_shade_ends_the_field() -> None:
 def test_a_field_out_of_range_is_refused(field_deg: float) -> None:
     with pytest.raises(ValueError, match="5 to 40 deg"):
         double_gauss(field_deg)
+
+
+def test_light_has_the_sensor_s_size_and_falls_where_the_stars_are() -> None:
+    light = star_light(ORION, LENS, SHUTTER)
+    assert light.shape == (1024, 1280)
+    hip, pixels = star_pixels(ORION, LENS, SHUTTER)
+    x, y = np.rint(pixels[list(hip).index(24436)]).astype(int)  # Rigel
+    assert light[y - 1 : y + 2, x - 1 : x + 2].max() == light.max()
+
+
+def test_the_shade_keeps_stars_beyond_the_field_away() -> None:
+    y, x = np.mgrid[:1024, :1280]
+    outside = np.hypot(x - 639.5, y - 511.5) > 530
+    assert star_light(ORION, double_gauss(shade=False), SHUTTER)[outside].sum() > 0
+    assert star_light(ORION, LENS, SHUTTER)[outside].sum() == 0
