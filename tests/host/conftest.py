@@ -169,28 +169,13 @@ class FakeCubeSense(FakeNode):
         return super().telemetry(name)
 
 
-class UartLink:
-    """Transport to a node; ``mangle`` changes what the host receives, ``chunk`` its pieces.
+class Line:
+    """A host reads what is ``pending``, in pieces of ``chunk`` bytes; empty reads are noted."""
 
-    ``later`` is what comes behind the next answer.
-    """
-
-    def __init__(self, node: FakeNode) -> None:
-        self.node = node
-        self.mangle: Callable[[bytes], bytes] = lambda data: data
-        self.chunk = 4096
+    def __init__(self) -> None:
         self.pending = bytearray()
-        self.later = bytearray()
+        self.chunk = 4096
         self.silences: list[float] = []
-        self._decoder = FrameDecoder(256)
-
-    def write(self, data: bytes) -> None:
-        for byte in data:
-            if self._decoder.feed(byte) is FrameEvent.FRAME:
-                answer = self.node.answer(self._decoder.payload)
-                if answer is not None:
-                    self.pending += self.mangle(encode_frame(answer)) + self.later
-                    self.later.clear()
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         size = min(max_bytes, self.chunk)
@@ -202,6 +187,41 @@ class UartLink:
 
     def close(self) -> None:
         pass
+
+
+class LetterLine(Line):
+    """A serial line on which each letter has its answer."""
+
+    def __init__(self, **answers: bytes) -> None:
+        super().__init__()
+        self.answers = answers
+        self.requests = b""
+
+    def write(self, data: bytes) -> None:
+        self.requests += data
+        self.pending += self.answers.get(data.decode("latin-1"), b"")
+
+
+class UartLink(Line):
+    """Transport to a node; ``mangle`` changes what the host receives.
+
+    ``later`` is what comes behind the next answer.
+    """
+
+    def __init__(self, node: FakeNode) -> None:
+        super().__init__()
+        self.node = node
+        self.mangle: Callable[[bytes], bytes] = lambda data: data
+        self.later = bytearray()
+        self._decoder = FrameDecoder(256)
+
+    def write(self, data: bytes) -> None:
+        for byte in data:
+            if self._decoder.feed(byte) is FrameEvent.FRAME:
+                answer = self.node.answer(self._decoder.payload)
+                if answer is not None:
+                    self.pending += self.mangle(encode_frame(answer)) + self.later
+                    self.later.clear()
 
 
 class I2cLink:

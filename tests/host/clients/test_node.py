@@ -16,14 +16,6 @@ def client(uart: Any) -> NodeClient:
     return NodeClient(uart, INTERFACE)
 
 
-@pytest.mark.parametrize("message", INTERFACE.telecommands, ids=lambda m: m.name)
-def test_every_telecommand_arrives_with_its_parameters(
-    client: NodeClient, node: Any, message: Message
-) -> None:
-    client.command(message.name, **message.reset_values())
-    assert node.log == [(message.name, message.reset_values())]
-
-
 @pytest.mark.parametrize(
     "message", [m for m in INTERFACE.telemetries if m.supported], ids=lambda m: m.name
 )

@@ -21,6 +21,8 @@ from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetErro
 from cubestack.host.shell.language import Shell, ShellError
 from cubestack.host.shell.values import parse_value, parse_values
 
+from ..conftest import LetterLine
+
 
 class Bus:
     """Registers that hold what is written, one byte each, or zeros."""
@@ -39,22 +41,6 @@ class Bus:
             self._pointer, *data = bytes(message)
             if data:
                 self.held[self._pointer] = data[0]
-
-
-class BenchLine:
-    def __init__(self) -> None:
-        self.answers = {b"q": b"Y", b"s": bytes(100)}
-        self._pending = b""
-
-    def write(self, data: bytes) -> None:
-        self._pending += self.answers.get(data, b"")
-
-    def read(self, max_bytes: int, _timeout_s: float) -> bytes:
-        data, self._pending = self._pending[:max_bytes], self._pending[max_bytes:]
-        return data
-
-    def close(self) -> None:
-        pass
 
 
 class Controls:
@@ -97,7 +83,8 @@ def shell(node, uart) -> Shell:
 def sense_shell(sense, sense_uart) -> Shell:
     registers = RegisterClient(Bus(), CUBESENSE.registers, wait=lambda _s: None)
     client = NodeClient(sense_uart, CUBESENSE)
-    return Shell(Target("fake", CUBESENSE, client, sense_uart, registers, BenchLine(), Controls()))
+    letters = LetterLine(q=b"Y", s=bytes(100))
+    return Shell(Target("fake", CUBESENSE, client, sense_uart, registers, letters, Controls()))
 
 
 def test_every_telemetry_is_read(shell):
@@ -131,7 +118,7 @@ def test_messages_by_number(node, shell, sense_shell):
 @pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 def test_every_number_that_is_listed_means_its_name(interface):
     registers = interface.registers and RegisterClient(Bus(), interface.registers)
-    shell = Shell(Target("fake", interface, NodeClient(BenchLine(), interface), None, registers))
+    shell = Shell(Target("fake", interface, NodeClient(LetterLine(), interface), None, registers))
     listed = shell.execute("list")
     assert [name for _, name in listed.rows] == listed.data["names"]
     assert len({number for number, _ in listed.rows}) == len(listed.rows)
@@ -266,7 +253,7 @@ def test_addresses_that_are_none(sense_shell, line, text):
 
 @given(st.text(max_size=40))
 def test_any_line_runs_or_is_refused(line):
-    target = Target("fake", ARAMIS, NodeClient(BenchLine(), ARAMIS, retries=0), BenchLine())
+    target = Target("fake", ARAMIS, NodeClient(LetterLine(), ARAMIS, retries=0), LetterLine())
     shell = Shell(target)
     with contextlib.suppress(ValueError, NoAnswerError):
         shell.execute(line)
@@ -276,7 +263,7 @@ def test_any_line_runs_or_is_refused(line):
 @pytest.mark.parametrize("interface", [CUBESTAR, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 def test_every_name_completes(interface):
     registers = interface.registers and RegisterClient(Bus(), interface.registers)
-    shell = Shell(Target("fake", interface, NodeClient(BenchLine(), interface), None, registers))
+    shell = Shell(Target("fake", interface, NodeClient(LetterLine(), interface), None, registers))
     for message in interface.telemetries:
         if message.supported:
             assert message.name in shell.complete(f"read {message.name[:3].lower()}")

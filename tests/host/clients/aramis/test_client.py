@@ -8,7 +8,6 @@ import pytest
 
 from cubestack.firmware_model.interface.aramis import (
     INTERFACE,
-    AckError,
     CatalogueState,
     MeasurementMode,
     MeasurementOutcome,
@@ -16,11 +15,10 @@ from cubestack.firmware_model.interface.aramis import (
     SensorState,
 )
 from cubestack.host.clients.aramis.client import Aramis
-from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
+from cubestack.host.errors import BadAnswerError, StepFailedError
 
-from ...conftest import FakeNode, I2cLink, UartLink
+from ...conftest import FakeNode, UartLink
 
 SOLVED = {
     "Q0": 0.5,
@@ -100,12 +98,6 @@ def test_no_attitude_and_no_time(aramis: Aramis) -> None:
     assert aramis.julian_date() is None
 
 
-def test_a_quaternion_that_is_none_is_a_bad_answer(node: FakeAramis, aramis: Aramis) -> None:
-    node.values["Attitude"] = SOLVED | {"Q3": 2.0}
-    with pytest.raises(BadAnswerError, match="length"):
-        aramis.attitude()
-
-
 @pytest.mark.parametrize(
     ("arguments", "command", "parameters"),
     [
@@ -145,14 +137,6 @@ def test_julian_dates_are_split_exactly(node: FakeAramis, aramis: Aramis) -> Non
 def test_the_latch_up_action_is_off_then_on(node: FakeAramis, aramis: Aramis) -> None:
     aramis.latch_up_action()
     assert [values["Step"] for name, values in node.log] == [0, 1]
-
-
-def test_a_full_buffer_is_waited_for_once(node: FakeAramis, aramis: Aramis) -> None:
-    node.refusals.append(AckError.BUFFER_FULL)
-    aramis.deactivate()
-    node.refusals.extend([AckError.BUFFER_FULL] * 2)
-    with pytest.raises(CommandRefusedError, match="BUFFER_FULL"):
-        aramis.deactivate()
 
 
 def test_a_catalogue_arrives_whole(node: FakeAramis, aramis: Aramis) -> None:
@@ -200,9 +184,3 @@ def test_phase_times_in_ms(node: FakeAramis, aramis: Aramis) -> None:
     node.values["PhaseTimes"] = {"Spikes": 355_388, "Total": 519_668}
     times = aramis.phase_times()
     assert (times["spikes"], times["total"], times["faces"]) == (355.388, 519.668, 0)
-
-
-def test_a_picture_comes_over_a_uart_only(node: FakeAramis) -> None:
-    link = I2cLink(node, INTERFACE.i2c_address)
-    with pytest.raises(TypeError, match="UART"):
-        Aramis(I2cClient(link, INTERFACE, wait=link.waits.append)).image()

@@ -5,45 +5,22 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
-
-class Line:
-    """A bench line with a sensor that answers from ``answers``, in pieces of ``chunk`` bytes."""
-
-    def __init__(self, **answers: bytes) -> None:
-        self.answers = answers
-        self.pending = bytearray()
-        self.requests = b""
-        self.chunk = 1000
-        self.silences: list[float] = []
-
-    def write(self, data: bytes) -> None:
-        self.requests += data
-        self.pending += self.answers.get(data.decode("ascii"), b"")
-
-    def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        size = min(max_bytes, self.chunk)
-        data = bytes(self.pending[:size])
-        del self.pending[:size]
-        if not data:
-            self.silences.append(timeout_s)
-        return data
-
-    def close(self) -> None: ...
-
+from ...conftest import LetterLine
 
 PICTURE = np.random.default_rng(4).integers(0, 256, (480, 640), np.uint8)
 
 
 @pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"a"), (Camera.SUN, b"q")])
 def test_taking_a_picture(camera: Camera, letter: bytes) -> None:
-    line = Line(a=b"Y", q=b"Y")
+    line = LetterLine(a=b"Y", q=b"Y")
     ServicePortClient(line).take(camera)
     assert line.requests == letter
 
 
 @pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"s"), (Camera.SUN, b"w")])
 def test_downloading_a_picture(camera: Camera, letter: bytes) -> None:
-    line = Line(**{letter.decode(): PICTURE.tobytes()})
+    line = LetterLine(**{letter.decode(): PICTURE.tobytes()})
+    line.chunk = 1000
     seen: list[tuple[int, int]] = []
     picture = ServicePortClient(line).download(camera, lambda *done: seen.append(done))
     assert line.requests == letter
@@ -53,23 +30,23 @@ def test_downloading_a_picture(camera: Camera, letter: bytes) -> None:
 
 
 def test_what_came_before_is_dropped() -> None:
-    line = Line(s=PICTURE.tobytes())
+    line = LetterLine(s=PICTURE.tobytes())
     line.pending += b"Y" * 5000
     np.testing.assert_array_equal(ServicePortClient(line).download(Camera.NADIR), PICTURE)
 
 
 def test_nothing_beyond_the_answer_is_taken() -> None:
-    line = Line(s=PICTURE.tobytes() + b"more")
+    line = LetterLine(s=PICTURE.tobytes() + b"more")
     line.chunk = 10**6
     ServicePortClient(line).download(Camera.NADIR)
     assert line.pending == b"more"
-    line = Line(a=b"Yes")
+    line = LetterLine(a=b"Yes")
     ServicePortClient(line).take(Camera.NADIR)
     assert line.pending == b"es"
 
 
 def test_silence_and_wrong_answers_are_told() -> None:
-    line = Line(a=b"N", s=bytes(307_199))
+    line = LetterLine(a=b"N", s=bytes(307_199))
     with pytest.raises(NoAnswerError, match=r"bench letter 'q': 0 bytes of 1 came, .* for 3 s"):
         ServicePortClient(line, timeout_s=3.0).take(Camera.SUN)
     assert line.silences == [0.0, 3.0]

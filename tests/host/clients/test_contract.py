@@ -1,0 +1,73 @@
+"""What the clients of all devices, and the buses under them, have in common."""
+
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
+from cubestack.firmware_model.interface.codec.message import Interface, Message
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.quaternions import unit_quaternion
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, TargetError
+
+from ..conftest import FakeNode, I2cLink, UartLink
+
+
+def over_i2c(node: FakeNode) -> I2cClient:
+    link = I2cLink(node, node.interface.i2c_address)
+    return I2cClient(link, node.interface, wait=link.waits.append)
+
+
+@pytest.mark.parametrize("bus", ["uart", "i2c"])
+@pytest.mark.parametrize("message", CUBESTAR.telecommands, ids=lambda m: m.name)
+def test_every_telecommand_arrives_with_its_parameters(
+    node: FakeNode, bus: str, message: Message
+) -> None:
+    client = NodeClient(UartLink(node), CUBESTAR) if bus == "uart" else over_i2c(node)
+    client.command(message.name, **message.reset_values())
+    assert node.log == [(message.name, message.reset_values())]
+
+
+DEVICES = pytest.mark.parametrize(
+    ("interface", "device"), [(CUBESTAR, CubeStar), (ARAMIS, Aramis)], ids=["cubestar", "aramis"]
+)
+
+
+@DEVICES
+def test_a_full_buffer_is_waited_for_once(interface: Interface, device: type[DeviceClient]) -> None:
+    node = FakeNode(interface)
+    client = device(NodeClient(UartLink(node), interface))
+    node.refusals.append(AckError.BUFFER_FULL)
+    client._perform("StopLoop")
+    node.refusals.extend([AckError.BUFFER_FULL] * 2)
+    with pytest.raises(CommandRefusedError, match="BUFFER_FULL"):
+        client._perform("StopLoop")
+    assert [name for name, _ in node.log] == ["StopLoop"]
+
+
+@DEVICES
+def test_no_stars_and_no_stream_over_i2c(interface: Interface, device: type[Any]) -> None:
+    client = device(over_i2c(FakeNode(interface)))
+    assert client.stars() == []
+    with pytest.raises(TypeError, match=r"StreamDownImage: .* over a UART only"):
+        client._stream("StreamDownImage", 1, 128, None)
+
+
+@pytest.mark.parametrize("wrong", [{}, {"Q3": 0.5}, {"Q0": 2.0}, {"Q1": float("nan")}])
+def test_a_quaternion_that_is_no_rotation_is_told(wrong: dict[str, float]) -> None:
+    values = dict.fromkeys(("Q0", "Q1", "Q2", "Q3"), 0.0) | wrong
+    with pytest.raises(BadAnswerError, match=r"quaternion has length (0|0\.5|2|nan), not 1"):
+        unit_quaternion(values)
+
+
+def test_a_device_without_a_picture_says_so(node: FakeNode) -> None:
+    with pytest.raises(TargetError, match="CubeStar sends no picture"):
+        DeviceClient(NodeClient(UartLink(node), CUBESTAR)).picture()
+    with pytest.raises(TargetError, match="AraMiS sends its picture over a serial line only"):
+        Aramis(over_i2c(FakeNode(ARAMIS))).picture()
