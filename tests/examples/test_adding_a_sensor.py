@@ -71,6 +71,16 @@ def test_conformance(cubestack: Command) -> None:
     assert re.search(r"emulated:glow: \d\d passed, 0 failed, 0 skipped", said)
 
 
+def test_what_it_can_not_have_is_told() -> None:
+    with pytest.raises(ValueError, match="Glow has no FPGA: leave engine 'python' out"):
+        library.open_device("glow", engine="python")
+    with (
+        library.open_device("glow") as opened,
+        pytest.raises(TypeError, match="Glow sees a LightScene, not 3"),
+    ):
+        opened.scene = 3
+
+
 def test_it_shares_a_bus_with_another_device() -> None:
     with (
         library.open_device("aramis") as aramis,
@@ -84,7 +94,8 @@ def test_it_shares_a_bus_with_another_device() -> None:
 
 def test_a_new_interpreter_finds_it(glow: Installed) -> None:
     script = (
-        "import sys; from cubestack.host.devices.registry import device; print(device('glow').title);"
+        "import sys; from cubestack.host.devices.registry import device;"
+        "print(device('glow').title);"
         "print([m for m in sys.modules if m.startswith('cubestack.emulator')])"
     )
     done = glow.run(sys.executable, "-c", script)
