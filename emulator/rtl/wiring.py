@@ -98,7 +98,7 @@ class BusPins:
         """What the microcontroller's lines go to at ``event`` of ``transactions``.
 
         It drives the lower lines while they carry an address, or a byte to be written; after that
-        they keep their level. The order of events is that of ``docs/gateware-cubestar-next.md``.
+        they keep their level. The phases between events are ``firmware_model.mcu.external_bus``'s.
         """
         index, step = divmod(event, STEPS)
         address, low = int(transactions.addresses[index]), f"{self.low}_I"
