@@ -58,6 +58,13 @@ class PictureReader:
             self._next += end - start
         return self._acquisition.picture_open
 
+    def read_run(self, sram: Sram, start: int, count: int) -> Routine[bytes | None]:
+        """``count`` pixels from ``start`` on; None as where ``read`` gives False."""
+        data = np.zeros(count, np.uint8)
+        pixels = np.arange(start, start + count, dtype=np.int32)
+        done = yield from self.read(sram, pixels, data)
+        return data.tobytes() if done else None
+
     def _seek(self, sram: Sram, pixel: int) -> Routine[bool]:
         """Go to ``pixel``; what lies behind is reached from the first one again."""
         if not self._acquisition.picture_open or sram != self._sram or pixel < self._next:

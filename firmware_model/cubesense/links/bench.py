@@ -9,8 +9,6 @@ begin its own anew for every piece.
 
 from collections import deque
 
-import numpy as np
-
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
@@ -106,14 +104,13 @@ class BenchLink:
             now_us: int = yield ReadTimer()
             yield Sleep(now_us + too_many * _BYTE_US)
             return False
-        end = min(self._sent + CHUNK_BYTES, IMAGE_BYTES)
-        pixels = np.arange(self._sent, end, dtype=np.int32)
-        data = np.zeros(len(pixels), np.uint8)
-        if not (yield from self._reader.read(sram, pixels, data)):
+        count = min(CHUNK_BYTES, IMAGE_BYTES - self._sent)
+        data = yield from self._reader.read_run(sram, self._sent, count)
+        if data is None:
             return True
-        self._uart_send(data.tobytes())
-        self._sent = end
-        return end == IMAGE_BYTES
+        self._uart_send(data)
+        self._sent += count
+        return self._sent == IMAGE_BYTES
 
     def _uart_send(self, data: bytes) -> None:
         self._meter.charge(uart_interrupt=len(data))

@@ -12,8 +12,6 @@ stretched. A picture that can not be read, because its memory is off, is all ``F
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, TelecommandJob
@@ -99,13 +97,11 @@ class ImageStream:
         count = min(READ_AHEAD_BYTES - len(self._ahead), IMAGE_BYTES - start)
         if sram is None or count <= 0:
             return
-        data = np.zeros(count, np.uint8)
-        pixels = np.arange(start, start + count, dtype=np.int32)
-        done = yield from self._reader.read(sram, pixels, data)
+        data = yield from self._reader.read_run(sram, start, count)
         if turn != self._turn:  # the pointer moved meanwhile
             return
-        self._ahead += data.tobytes() if done else b""
-        self._fetched = start + count if done else IMAGE_BYTES
+        self._ahead += data or b""
+        self._fetched = IMAGE_BYTES if data is None else start + count
 
 
 class RegisterLink:
