@@ -116,7 +116,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """One measurement of what it costs to emulate a device.
+    """Measures what it costs to emulate a device.
 
     Attributes:
         figures: names of what it gives, as in the JSON output, with what each means.
@@ -148,7 +148,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.
         reports: further commands about it.
-        benchmarks: what can be measured of the cost of emulating it, in the order of the table.
+        benchmark: measures the cost of emulating it; None for nothing.
         demo: shows it end to end, with pictures; None for nothing.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
@@ -171,7 +171,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     has_fpga: bool = True
     experiment: Callable[[], AnyExperiment] | None = None
     reports: tuple[Report, ...] = ()
-    benchmarks: Callable[[], tuple[Benchmark, ...]] = tuple
+    benchmark: Callable[[], Benchmark] | None = None
     demo: Callable[[], Demo] | None = None
     tops: Callable[[], TopTable] = dict
     proofs: Callable[[], Mapping[str, Proof]] = dict

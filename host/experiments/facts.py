@@ -1,4 +1,4 @@
-"""An experiment that looks facts up, and needs no device for it."""
+"""Experiments that look facts up, and need no device for it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ from cubestack.host.devices.experiment import Experiment, Result, Summary
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options
 
-__all__ = ["FactSummary", "Lookup"]
+__all__ = ["Facts", "Lookup"]
 
 OptionsT = TypeVar("OptionsT", bound=Options)
-ResultT = TypeVar("ResultT", bound=Result)
 
 
 @dataclass(frozen=True)
-class FactSummary(Summary):
+class Facts(Result, Summary):
     """Facts by name, in their order."""
 
     facts: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return self.facts
 
     def lines(self, wall_s: float) -> Iterator[str]:
         """One for each fact."""
@@ -30,21 +33,20 @@ class FactSummary(Summary):
             yield f"{name.replace('_', ' '):>20}  {value}"
 
 
-class Lookup(Experiment[Opener[Any, Any], OptionsT, ResultT]):
+class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
     """Gives one result: facts."""
 
     label = ""
     powers_up = False
 
     @abstractmethod
-    def look_up(self, options: OptionsT, shown: Shown) -> ResultT:
-        """The facts; ValueError for options that make no sense."""
+    def look_up(self, options: OptionsT, shown: Shown) -> dict[str, Any]:
+        """The facts by name; ValueError for options that make no sense."""
 
-    def run(self, opened: Opener[Any, Any], options: OptionsT) -> Iterator[ResultT]:
+    def run(self, opened: Opener[Any, Any], options: OptionsT) -> Iterator[Facts]:
         """Yield them."""
-        yield self.look_up(options, opened.shown)
+        yield Facts(self.look_up(options, opened.shown))
 
-    def summarise(self, results: Sequence[ResultT]) -> Summary:
+    def summarise(self, results: Sequence[Facts]) -> Summary:
         """Each fact on a line."""
-        (result,) = results
-        return FactSummary(result.as_dict())
+        return results[0]

@@ -85,7 +85,7 @@ DEVICE: Device[AramisBoard, Aramis] = Device(
             _lazily("catalogue:EXPERIMENT"),
         ),
     ),
-    benchmarks=_lazily("benchmarks:BENCHMARKS"),
+    benchmark=_lazily("benchmark:BENCHMARK"),
     demo=_lazily("demo:show"),
     has_fpga=False,
     prepare=_prepare,

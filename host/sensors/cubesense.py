@@ -92,7 +92,7 @@ DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
             _lazily("memory:EXPERIMENT"),
         ),
     ),
-    benchmarks=_lazily("benchmarks:BENCHMARKS"),
+    benchmark=_lazily("benchmark:BENCHMARK"),
     demo=_lazily("demo:show"),
     options=(
         BoardOption(

@@ -125,7 +125,7 @@ DEVICE: Device[CubeStarBoard, CubeStar] = Device(
             _lazily("catalogue:EXPERIMENT"),
         ),
     ),
-    benchmarks=_lazily("benchmarks:BENCHMARKS"),
+    benchmark=_lazily("benchmark:BENCHMARK"),
     demo=_lazily("demo:show"),
     options=(
         BoardOption(

@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.devices.device import Shown
-from cubestack.host.devices.experiment import Result
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.options import NUMBER, PATH, Options, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 
-__all__ = ["EXPERIMENT", "CatalogueFacts", "CatalogueOptions"]
+__all__ = ["EXPERIMENT", "CatalogueOptions"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,32 +58,11 @@ class CatalogueOptions(Options):
         )
 
 
-@dataclass(frozen=True)
-class CatalogueFacts(Result):
-    """What is in it, beside the published numbers; sizes in bytes, wall time in seconds."""
-
-    fov_deg: float
-    stars_per_field: int
-    mag_limit: float
-    step_deg: float
-    longest_side_deg: float
-    epoch: float
-    stars: int
-    published_stars: int
-    triangles: int
-    published_triangles: int
-    star_numbers: str
-    bytes: int
-    bytes_of_parts: dict[str, int]
-    seconds: float
-    sha256: str
-
-
-class _Catalogue(Lookup[CatalogueOptions, CatalogueFacts]):
+class _Catalogue(Lookup[CatalogueOptions]):
     options = CatalogueOptions
     description = __doc__
 
-    def look_up(self, options: CatalogueOptions, shown: Shown) -> CatalogueFacts:
+    def look_up(self, options: CatalogueOptions, shown: Shown) -> dict[str, Any]:
         from cubestack.emulator.boards.aramis.catalogue import PUBLISHED, cached_database
 
         parameters = options.parameters()
@@ -94,23 +72,23 @@ class _Catalogue(Lookup[CatalogueOptions, CatalogueFacts]):
         image = database.pack()
         if options.output is not None:
             options.output.write_bytes(image)
-        return CatalogueFacts(
-            fov_deg=parameters.fov_deg,
-            stars_per_field=parameters.stars_per_field,
-            mag_limit=parameters.mag_limit,
-            step_deg=parameters.step_deg,
-            longest_side_deg=parameters.side_deg,
-            epoch=parameters.epoch,
-            stars=len(database.numbers),
-            published_stars=PUBLISHED["stars"],
-            triangles=len(database),
-            published_triangles=PUBLISHED["triangles"],
-            star_numbers="Hipparcos",
-            bytes=len(image),
-            bytes_of_parts=database.sizes,
-            seconds=round(seconds, 2),
-            sha256=hashlib.sha256(image).hexdigest(),
-        )
+        return {
+            "fov_deg": parameters.fov_deg,
+            "stars_per_field": parameters.stars_per_field,
+            "mag_limit": parameters.mag_limit,
+            "step_deg": parameters.step_deg,
+            "longest_side_deg": parameters.side_deg,
+            "epoch": parameters.epoch,
+            "stars": len(database.numbers),
+            "published_stars": PUBLISHED["stars"],
+            "triangles": len(database),
+            "published_triangles": PUBLISHED["triangles"],
+            "star_numbers": "Hipparcos",
+            "bytes": len(image),
+            "bytes_of_parts": database.sizes,
+            "seconds": round(seconds, 2),
+            "sha256": hashlib.sha256(image).hexdigest(),
+        }
 
 
 EXPERIMENT = _Catalogue()

@@ -8,43 +8,14 @@ example:
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cubestack.host.devices.device import Shown
-from cubestack.host.devices.experiment import Result, Summary
-from cubestack.host.experiments.facts import Lookup
+from cubestack.host.devices.experiment import Summary
+from cubestack.host.experiments.facts import Facts, Lookup
 from cubestack.host.options import Options
 
-if TYPE_CHECKING:
-    from cubestack.firmware_model.cubesense.memory import Buffer
-
-__all__ = ["EXPERIMENT", "MemoryBudget"]
-
-
-@dataclass(frozen=True)
-class MemoryBudget(Result):
-    """Every buffer of the firmware."""
-
-    buffers: tuple[Buffer, ...]
-
-    @property
-    def fits(self) -> bool:
-        """Whether no memory is too small."""
-        return all(memory["used"] <= memory["bytes"] for memory in self.as_dict().values())
-
-    def as_dict(self) -> dict[str, Any]:
-        """Size in bytes, sum and buffers of each memory by its name."""
-        from cubestack.firmware_model.cubesense.memory import CAPACITY, used
-
-        return {
-            memory.value: {
-                "bytes": CAPACITY[memory],
-                "used": total,
-                "buffers": {b.name: b.size for b in self.buffers if b.memory is memory},
-            }
-            for memory, total in used(self.buffers).items()
-        }
+__all__ = ["EXPERIMENT"]
 
 
 class _Table(Summary):
@@ -54,20 +25,31 @@ class _Table(Summary):
         yield report()
 
 
-class _Memory(Lookup[Options, MemoryBudget]):
+class _Memory(Lookup[Options]):
     options = Options
     description = __doc__
 
-    def look_up(self, options: Options, shown: Shown) -> MemoryBudget:
-        from cubestack.firmware_model.cubesense.memory import budget
+    def look_up(self, options: Options, shown: Shown) -> dict[str, Any]:
+        """Size in bytes, sum and buffers of each memory by its name."""
+        from cubestack.firmware_model.cubesense.memory import CAPACITY, budget, used
 
-        return MemoryBudget(budget())
+        buffers = budget()
+        return {
+            memory.value: {
+                "bytes": CAPACITY[memory],
+                "used": total,
+                "buffers": {b.name: b.size for b in buffers if b.memory is memory},
+            }
+            for memory, total in used(buffers).items()
+        }
 
-    def summarise(self, results: Sequence[MemoryBudget]) -> Summary:
+    def summarise(self, results: Sequence[Facts]) -> Summary:
         return _Table()
 
-    def succeeded(self, results: Sequence[MemoryBudget]) -> bool:
-        return all(result.fits for result in results)
+    def succeeded(self, results: Sequence[Facts]) -> bool:
+        """No memory is too small."""
+        (result,) = results
+        return all(memory["used"] <= memory["bytes"] for memory in result.facts.values())
 
 
 EXPERIMENT = _Memory()

@@ -9,13 +9,13 @@ examples:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from cubestack.host.devices.device import Shown
-from cubestack.host.devices.experiment import Result
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.options import NUMBER, Options, option
 
-__all__ = ["EXPERIMENT", "CatalogueFacts", "CatalogueOptions"]
+__all__ = ["EXPERIMENT", "CatalogueOptions"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,26 +27,11 @@ class CatalogueOptions(Options):
     pair_limit: float | None = option(None, "default: as flown", NUMBER, metavar="DEG")
 
 
-@dataclass(frozen=True)
-class CatalogueFacts(Result):
-    """What is in it; sizes in bytes."""
-
-    mag_limit: float
-    pair_limit_deg: float
-    epoch: float
-    stars: int
-    star_bytes: int
-    pairs: int
-    pair_bytes: int
-    closest_pairs_rad: list[float]
-    sha256: str
-
-
-class _Catalogue(Lookup[CatalogueOptions, CatalogueFacts]):
+class _Catalogue(Lookup[CatalogueOptions]):
     options = CatalogueOptions
     description = __doc__
 
-    def look_up(self, options: CatalogueOptions, shown: Shown) -> CatalogueFacts:
+    def look_up(self, options: CatalogueOptions, shown: Shown) -> dict[str, Any]:
         from cubestack.emulator.boards.cubestar.catalogue import (
             MAG_LIMIT,
             PAIR_LIMIT_DEG,
@@ -56,17 +41,17 @@ class _Catalogue(Lookup[CatalogueOptions, CatalogueFacts]):
         mag_limit = MAG_LIMIT if options.mag_limit is None else options.mag_limit
         pair_limit = PAIR_LIMIT_DEG if options.pair_limit is None else options.pair_limit
         catalogue = onboard_catalogue(mag_limit, pair_limit, options.epoch)
-        return CatalogueFacts(
-            mag_limit=mag_limit,
-            pair_limit_deg=pair_limit,
-            epoch=options.epoch,
-            stars=len(catalogue),
-            star_bytes=catalogue.star_bytes,
-            pairs=len(catalogue.pairs),
-            pair_bytes=catalogue.pair_bytes,
-            closest_pairs_rad=[float(angle) for angle in catalogue.pairs.angle[:2]],
-            sha256=catalogue.sha256(),
-        )
+        return {
+            "mag_limit": mag_limit,
+            "pair_limit_deg": pair_limit,
+            "epoch": options.epoch,
+            "stars": len(catalogue),
+            "star_bytes": catalogue.star_bytes,
+            "pairs": len(catalogue.pairs),
+            "pair_bytes": catalogue.pair_bytes,
+            "closest_pairs_rad": [float(angle) for angle in catalogue.pairs.angle[:2]],
+            "sha256": catalogue.sha256(),
+        }
 
 
 EXPERIMENT = _Catalogue()

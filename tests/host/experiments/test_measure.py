@@ -153,5 +153,5 @@ def test_every_declared_experiment_report_and_demonstration_loads(name: str) -> 
         assert experiment.options().declared()["seed"] if experiment.powers_up else True
         assert experiment.count(experiment.options()) >= 1
         assert set(experiment.decides) <= {option.name for option in one.options}
-    figures = [figure for benchmark in one.benchmarks() for figure in benchmark.figures]
-    assert len(figures) == len(set(figures)) > 0
+    assert one.benchmark is not None
+    assert one.benchmark().figures

@@ -15,7 +15,7 @@ from cubestack.host.experiments.benchmark import LOOP_S, ROUNDS, simulated_ratio
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
-__all__ = ["BENCHMARKS"]
+__all__ = ["BENCHMARK"]
 
 I2C_HZ = 400_000
 I2C_CLIENT = """
@@ -31,26 +31,25 @@ print(100 / times[len(times) // 2])
 """
 
 
-def _engine(_device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
+def _figures(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
     from cubestack.emulator.boards.cubestar.benchmark import rtl_clocks_per_s, strobes_per_s
+    from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+    from cubestack.emulator.rtl.benchmark import cold_build_s
+    from cubestack.emulator.scene.sky import SkyScene
 
-    return {
+    figures: dict[str, float] = {
         "rtl_clocks_per_s": round(rtl_clocks_per_s()),
         "strobes_per_s": round(strobes_per_s()),
     }
-
-
-def _device(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
-    from cubestack.emulator.scene.sky import SkyScene
-
     with power_up(device, SkyScene.pointing(84.0, -1.0), engine="compiled") as emulated:
-        figures = _capture(emulated)
+        figures |= _capture(emulated)
         client = emulated.client.client
         client.command("Trigger")
         client.pause(1.0)
         figures["realtime_ratio"] = simulated_ratio(emulated, lambda: client.pause(float(LOOP_S)))
         client.command("StopLoop")
-    return figures
+    figures["cold_build_s"] = round(cold_build_s(cubestar_wiring()), 1)
+    return figures | _i2c()
 
 
 def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, float]:
@@ -80,14 +79,7 @@ def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, flo
     }
 
 
-def _build(_device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
-    from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
-    from cubestack.emulator.rtl.benchmark import cold_build_s
-
-    return {"cold_build_s": round(cold_build_s(cubestar_wiring()), 1)}
-
-
-def _i2c(_device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
+def _i2c() -> dict[str, float]:
     """Rates of a program in a process of its own: the median of stretches of 100 reads."""
     figures: dict[str, float] = {}
     command = (sys.executable, "-m", "cubestack", "run", "--quiet")
@@ -104,29 +96,16 @@ def _i2c(_device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
     return figures
 
 
-BENCHMARKS = (
-    Benchmark(
-        {
-            "rtl_clocks_per_s": "pixel clocks a second through the compiled FPGA, none skipped",
-            "strobes_per_s": "data clocks a second through it, while a picture is read",
-        },
-        _engine,
-    ),
-    Benchmark(
-        {
-            "capture_wall_ms": "wall time of one capture: exposure, read-out, FPGA store",
-            "readout_wall_ms": "wall time of one transfer, FPGA's SRAM to processor",
-            "realtime_ratio": "simulated seconds per wall second of the full 1 Hz loop",
-        },
-        _device,
-    ),
-    Benchmark({"cold_build_s": "translating and compiling the FPGA with an empty cache"}, _build),
-    Benchmark(
-        {
-            "i2c_ROUTE_fast": "byte reads a second of a program below `cubestack run`, by either "
-            "route",
-            "i2c_ROUTE_real": "the same at 400 kHz in the wire's time, which would be 10 256",
-        },
-        _i2c,
-    ),
+BENCHMARK = Benchmark(
+    {
+        "rtl_clocks_per_s": "pixel clocks a second through the compiled FPGA, none skipped",
+        "strobes_per_s": "data clocks a second through it, while a picture is read",
+        "capture_wall_ms": "wall time of one capture: exposure, read-out, FPGA store",
+        "readout_wall_ms": "wall time of one transfer, FPGA's SRAM to processor",
+        "realtime_ratio": "simulated seconds per wall second of the full 1 Hz loop",
+        "cold_build_s": "translating and compiling the FPGA with an empty cache",
+        "i2c_ROUTE_fast": "byte reads a second of a program below `cubestack run`, by either route",
+        "i2c_ROUTE_real": "the same at 400 kHz in the wire's time, which would be 10 256",
+    },
+    _figures,
 )
