@@ -12,13 +12,13 @@ from cubestack.host.devices.experiment import Experiment, Result, Summary
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options
 
-__all__ = ["Facts", "Lookup"]
+__all__ = ["FactSummary", "Facts", "Lookup"]
 
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 
 @dataclass(frozen=True)
-class Facts(Result, Summary):
+class Facts(Result):
     """Facts by name, in their order."""
 
     facts: dict[str, Any]
@@ -26,6 +26,13 @@ class Facts(Result, Summary):
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return self.facts
+
+
+@dataclass(frozen=True)
+class FactSummary(Summary):
+    """Facts by name, in their order, for a reader."""
+
+    facts: dict[str, Any]
 
     def lines(self, wall_s: float) -> Iterator[str]:
         """One for each fact."""
@@ -49,4 +56,4 @@ class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
 
     def summarise(self, results: Sequence[Facts]) -> Summary:
         """Each fact on a line."""
-        return results[0]
+        return FactSummary(results[0].facts)
