@@ -43,7 +43,7 @@ test: .venv/ready-dev
 	@$(BIN)/pytest -n auto
 
 mutants: .venv/ready-dev
-	@$(BIN)/python tests/hdl/mutants $(MUTANTS)
+	@$(BIN)/python -m tests.hdl.mutants $(MUTANTS)
 
 test-hdl: .venv/ready-dev
 	@HDL_TIER=full HDL_SEED=$(SEED) HDL_SIMULATOR=$(SIMULATOR) HDL_COVERAGE=out/hdl/coverage \

@@ -3,7 +3,6 @@
 import os
 import re
 import shutil
-import sys
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -13,13 +12,18 @@ import pytest
 from amaranth.lib.wiring import Component
 from cocotb_tools.runner import Runner
 
-sys.path.append(str(Path(__file__).parent))
-
-import cover
-import waves
-from regression import BASE_SEED, HERE, SIMULATOR, build, frame_environment, simulate
-
 from cubestack.hdl.flow.generate import verilog_text
+from tests.hdl import waves
+from tests.hdl.coverage import hits
+from tests.hdl.regression import (
+    BASE_SEED,
+    PAIR,
+    SIMULATOR,
+    build,
+    frame_environment,
+    modules,
+    simulate,
+)
 
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.
@@ -52,19 +56,19 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     folder = os.environ.get("HDL_COVERAGE")
     here = not hasattr(session.config, "workerinput")
     judged = folder and here and exitstatus == 0 and SIMULATOR == "icarus"
-    if judged and cover.missed(cover.merged(Path(folder))):
+    if judged and hits.missed(hits.merged(Path(folder))):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     if folder := os.environ.get("HDL_COVERAGE"):
         terminalreporter.section("functional coverage")
-        for line in cover.table(cover.merged(Path(folder))):
+        for line in hits.table(hits.merged(Path(folder))):
             terminalreporter.write_line(line)
 
 
 #: Modules with tests that drive unknown levels, which Verilator does not have.
-X_MODULES = {"benches_dataflow", "benches_pair_addressing"}
+X_MODULES = {*modules(PAIR, "dataflow", "addressing")}
 
 
 class Icarus:
@@ -86,14 +90,14 @@ class Icarus:
         rows: int,
         *modules: str,
         seed: int,
-        harness: str | None = None,
+        harness: Path | None = None,
         initialised: bool = True,
         text: Callable[[Component, str], str] = verilog_text,
         environment: Mapping[str, str] | None = None,
     ) -> None:
-        """Run the cocotb ``modules`` on ``design``, or on the Verilog file ``harness`` around it.
+        """Run the cocotb ``modules`` on ``design``, or on the file ``harness`` around it.
 
-        ``harness`` is a file's name without ``.v``, in this folder or with a path.
+        The file's top module has its name.
         ``text`` makes Verilog of the design, as module of the name that it is given.
         Fails with the names of the cocotb tests that failed, the first one's waveform and the end
         of the log.
@@ -101,14 +105,14 @@ class Icarus:
         if SIMULATOR != "icarus" and (harness or not initialised or X_MODULES & {*modules}):
             pytest.skip(f"needs Icarus: {harness or 'unknown levels'}")
         print(f"{design.__name__} {columns}x{rows} COCOTB_RANDOM_SEED={seed + BASE_SEED}")
-        top = Path(harness).name if harness else "dut"
+        top = harness.stem if harness else "dut"
         name = f"{design.__name__}-{columns}x{rows}-{top}-{initialised}-{text.__name__}"
         folder = self._folder / name
         make = partial(
             build,
             folder / "dut.v",
             top=top,
-            further=[HERE / f"{harness}.v"] if harness else [],
+            further=[harness] if harness else [],
             parameters={"COLUMNS": columns, "ROWS": rows} if harness else {},
         )
         if name not in self._built:

@@ -38,8 +38,8 @@ from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 HERE = Path(__file__).parent
 
-#: Folders that the simulated Python finds its modules in.
-PATHS = (str(HERE), str(HERE / "cubesense"))
+#: Folder that the simulated Python finds its modules in, by their full names.
+ROOT = str(HERE.parents[1])
 
 SIMULATOR = os.environ.get("HDL_SIMULATOR", "icarus")
 if SIMULATOR not in ("icarus", "verilator"):
@@ -107,43 +107,66 @@ class Tier:
 #: The least picture that has all of CubeSense's cases.
 SMALLEST = ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1)
 
-PAIR_MODULES = (
-    "benches_pair_modes",
-    "benches_pair_read",
-    "benches_pair_store",
-    "benches_pair_failures",
-)
+#: Where the cocotb modules are, and the testbenches that some are for.
+STAR, PAIR = "tests.hdl.cubestar", "tests.hdl.cubesense"
+ANY_TOP, RATES = "tests.hdl.harness.any_top", "tests.hdl.harness.rates"
+
+
+def modules(package: str, *names: str) -> tuple[str, ...]:
+    """Full names of a sensor's cocotb modules."""
+    return tuple(f"{package}.testbenches.{name}" for name in names)
+
+
+PAIR_MODULES = modules(PAIR, "modes", "read", "store", "failures")
 
 
 def pair_environment(read_out: ReadOut, mcu_addressing: bool = False) -> dict[str, str]:
     """What the modules of CubeSense's folder read."""
-    return {"READ_OUT": json.dumps(asdict(read_out)), "MCU_ADDRESSING": str(int(mcu_addressing))}
+    return {
+        "READ_OUT": json.dumps(asdict(read_out)),
+        "MCU_ADDRESSING": str(int(mcu_addressing)),
+        "TESTBENCH": f"{PAIR}.pair:PairTestbench",
+    }
+
+
+def addressable(read_out: ReadOut) -> CubeSensePair:
+    """The pair with address control from the microcontroller."""
+    return CubeSensePair(read_out, mcu_addressing=True)
 
 
 def _pair(mcu_addressing: bool) -> Tier:
-    modules = PAIR_MODULES + ("benches_pair_addressing",) * mcu_addressing
-    environment = pair_environment(SMALLEST, mcu_addressing)
+    make = addressable if mcu_addressing else CubeSensePair
+    further = modules(PAIR, "addressing") if mcu_addressing else ()
 
     def design(columns: int, rows: int) -> Component:
-        return CubeSensePair(SMALLEST, mcu_addressing)
+        return make(SMALLEST)
 
-    design.__name__ = "addressable" if mcu_addressing else "CubeSensePair"
-    return Tier(design, SMALLEST.columns, SMALLEST.rows, modules, environment)
+    design.__name__ = make.__name__
+    environment = pair_environment(SMALLEST, mcu_addressing)
+    return Tier(design, SMALLEST.columns, SMALLEST.rows, PAIR_MODULES + further, environment)
 
 
-def _next(design: Callable[[int, int], Component], module: str, bench: str) -> Tier:
-    return Tier(design, 5, 3, (module, "benches_states"), {"BENCH": f"bench_next:{bench}"})
+def _star(
+    design: Callable[[int, int], Component],
+    testbench: str,
+    *names: str,
+    size: tuple[int, int] = (5, 3),
+) -> Tier:
+    return Tier(design, *size, modules(STAR, *names), {"TESTBENCH": f"{STAR}.{testbench}"})
 
+
+SHARED = "next_version:SharedTestbench"
+DOUBLE = "next_version:DoubleTestbench"
 
 #: By the tops' names, as the command line has them; some have a further one.
 TIERS = {
-    "cubestar": Tier(CubeStarTop, 5, 3, ("benches_read", "benches_modes", "benches_store")),
-    "cubestar-shared": _next(CubeStarShared, "benches_shared", "SharedBench"),
-    "cubestar-double": _next(CubeStarDouble, "benches_double", "DoubleBench"),
-    "cubestar-boards": _next(CubeStarTwoBoards, "benches_boards", "BoardsBench"),
+    "cubestar": _star(CubeStarTop, "published:PublishedTestbench", "read", "modes", "store"),
+    "cubestar-shared": _star(CubeStarShared, SHARED, "bus", "shared", "states"),
+    "cubestar-double": _star(CubeStarDouble, DOUBLE, "bus", "double", "states"),
+    "cubestar-boards": _star(CubeStarTwoBoards, "next_version:BoardsTestbench", "bus", "states"),
     # Addresses of more than 8 bits, so that there is an address latch.
-    "cubestar-shared-latch": Tier(CubeStarShared, 9, 9, ("benches_shared",)),
-    "cubestar-double-latch": Tier(CubeStarDouble, 9, 9, ("benches_double",)),
+    "cubestar-shared-latch": _star(CubeStarShared, SHARED, "bus", "shared", size=(9, 9)),
+    "cubestar-double-latch": _star(CubeStarDouble, DOUBLE, "bus", "double", size=(9, 9)),
     "cubesense-pair": _pair(mcu_addressing=False),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),
 }
@@ -183,7 +206,7 @@ def run_tier(
 
 
 def frame_environment(columns: int, rows: int) -> dict[str, str]:
-    """What geometry.py reads."""
+    """What ``harness.geometry`` reads."""
     return {"FRAME_COLUMNS": str(columns), "FRAME_ROWS": str(rows)}
 
 
@@ -286,9 +309,9 @@ def simulate(
 
 @contextmanager
 def _surroundings(limit_s: int, settings: Mapping[str, str]) -> Iterator[None]:
-    """The modules' folders, their settings, and a limit that ends a simulation which hangs."""
+    """The modules' folder, their settings, and a limit that ends a simulation which hangs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "path", [*PATHS, *(path for path in sys.path if path not in PATHS)])
+        patch.setattr(sys, "path", [ROOT, *(path for path in sys.path if path != ROOT)])
         if shutil.which("timeout"):
             patch.setenv("SIM_CMD_PREFIX", f"timeout --kill-after=5 {limit_s}")
         for name, value in settings.items():
@@ -314,7 +337,7 @@ def _outcome(
     ran = tuple(f"{case.get('classname')}.{case.get('name')}" for case in cases)
     problem = ""
     if not failed:
-        found = {str(case.get("classname")).split(".")[-1] for case in cases}
+        found = {str(case.get("classname")) for case in cases}
         if found != set(modules):
             problem = f"no test ran in {sorted(set(modules) - found)}"
         elif warned := [line for line in text.splitlines() if WARNING.search(line)]:

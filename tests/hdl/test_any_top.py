@@ -1,31 +1,22 @@
-"""What every top has to do, at every rate, on Icarus Verilog."""
+"""What every top has to do, at every rate and from every state, on Icarus Verilog."""
 
 from typing import Any
 
 import pytest
-from regression import FULL, TIERS
 
-BENCHES = {
-    "cubestar": "bench:Bench",
-    "cubestar-shared": "bench_next:SharedBench",
-    "cubestar-double": "bench_next:DoubleBench",
-    "cubestar-boards": "bench_next:BoardsBench",
-    "cubesense-pair": "pair:PairBench",
-}
+from tests.hdl.regression import ANY_TOP, FULL, PAIR, RATES, STAR, TIERS, modules
+
+CUBESTAR = ["cubestar", "cubestar-shared", "cubestar-double", "cubestar-boards"]
+CASES = [
+    *[(top, name) for top in (*CUBESTAR, "cubesense-pair") for name in (ANY_TOP, *[RATES] * FULL)],
+    *[(top, *modules(STAR, "states")) for top in CUBESTAR],
+    ("cubesense-pair", *modules(PAIR, "borders")),
+    *[(top, *modules(PAIR, "states")) for top in TIERS if top.startswith(("cubesense",) * FULL)],
+]
 
 
-@pytest.mark.parametrize("module", ["benches_any_top", *["benches_rates"] * FULL])
-@pytest.mark.parametrize("top", BENCHES)
-def test_any_top(icarus: Any, top: str, module: str) -> None:
+@pytest.mark.parametrize(("top", "module"), CASES)
+def test_top(icarus: Any, top: str, module: str) -> None:
     tier = TIERS[top]
-    environment = {**tier.environment, "BENCH": BENCHES[top]}
-    icarus.run(tier.design, tier.columns, tier.rows, module, seed=1, environment=environment)
-
-
-@pytest.mark.parametrize("top", [top for top in BENCHES if top.startswith("cubestar")])
-def test_is_left_in_every_state(icarus: Any, top: str) -> None:
-    tier = TIERS[top]
-    environment = {"BENCH": BENCHES[top]}
-    icarus.run(
-        tier.design, tier.columns, tier.rows, "benches_states", seed=1, environment=environment
-    )
+    settings = {"seed": 1, "environment": tier.environment}
+    icarus.run(tier.design, tier.columns, tier.rows, module, **settings)

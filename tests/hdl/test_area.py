@@ -5,7 +5,6 @@ import re
 from functools import cache
 from pathlib import Path
 
-import flow_checks
 import pytest
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In, Out
@@ -31,6 +30,7 @@ from cubestack.hdl.flow.area_report import (
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import have_nextpnr, have_yosys
 from cubestack.hdl.flow.top import Top, counted
+from tests.hdl import flow_checks
 
 #: Each sensor's designs, and the file with their areas.
 SENSORS = [(counted(sensor.TOPS), sensor.AREA_FILE) for sensor in (cubestar, cubesense)]

@@ -19,7 +19,7 @@ def failing(icarus: Any, tmp_path: Path) -> Any:
 
 def test_failing_cocotb_tests_are_named(failing: Any, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match=r"failed: \['fails', 'fails_in_the_background'\]"):
-        failing.run(MatrixCounter, 2, 2, "benches_failing", seed=1)
+        failing.run(MatrixCounter, 2, 2, "tests.hdl.harness.failing", seed=1)
     (waveform,) = (tmp_path / "waves").glob("*.vcd")
     assert waveform.stem == "conftest.failing_cocotb_tests_are_named.fails"
     assert "$enddefinitions" in waveform.read_text(encoding="utf-8")
@@ -30,11 +30,11 @@ def test_failing_cocotb_tests_are_named(failing: Any, tmp_path: Path) -> None:
 
 def test_waveform_goes_when_the_test_passes_again(failing: Any, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="waveform"):
-        failing.run(MatrixCounter, 2, 2, "benches_failing", seed=1)
-    failing.run(MatrixCounter, 2, 2, "benches_matrix_counter", seed=1)
+        failing.run(MatrixCounter, 2, 2, "tests.hdl.harness.failing", seed=1)
+    failing.run(MatrixCounter, 2, 2, "tests.hdl.blocks.testbenches.matrix_counter", seed=1)
     assert not list((tmp_path / "waves").iterdir())
 
 
 def test_module_that_cannot_be_loaded_fails(failing: Any) -> None:
     with pytest.raises((AssertionError, RuntimeError)):
-        failing.run(MatrixCounter, 2, 2, "benches_missing", seed=1)
+        failing.run(MatrixCounter, 2, 2, "tests.hdl.harness.missing", seed=1)

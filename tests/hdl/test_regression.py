@@ -4,11 +4,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from regression import TIERS, build, frame_environment, run_tier, simulate
 
 from cubestack.hdl.flow.generate import verilog_text
+from tests.hdl.regression import STAR, TIERS, build, frame_environment, modules, run_tier, simulate
 
 pytestmark = pytest.mark.cocotb
+
+READ = modules(STAR, "read")
 
 
 @pytest.fixture
@@ -36,7 +38,7 @@ def test_same_seed_same_run(verilog: Path, tmp_path: Path) -> None:
     for name, seed in (("first", 1), ("again", 1), ("other", 2)):
         environment = frame_environment(5, 3)
         run = tmp_path / name
-        outcome = simulate(runner, ["benches_read"], run, seed=seed, environment=environment)
+        outcome = simulate(runner, READ, run, seed=seed, environment=environment)
         assert outcome.passed
         found.append(moments(run / "results.xml"))
     first, again, other = found

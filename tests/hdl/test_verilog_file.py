@@ -7,9 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import flow_checks
 import pytest
-from flow_checks import TIMEOUT_S, quiet
 
 from cubestack.hdl.cubesense.tops import TOPS as CUBESENSE
 from cubestack.hdl.cubestar.top import CubeStarTop
@@ -17,6 +15,8 @@ from cubestack.hdl.cubestar.tops import TOPS as CUBESTAR
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.flow.top import Top, tops_in
 from cubestack.hdl.flow.verilog import verilog_file
+from tests.hdl import flow_checks
+from tests.hdl.flow_checks import TIMEOUT_S, quiet
 
 TOPS = tops_in({**CUBESTAR, **CUBESENSE})
 need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
@@ -72,7 +72,15 @@ def core(name: str, component: CubeStarTop) -> str:
 def test_core_stores_and_reads(icarus: Any) -> None:
     """The benches of the design, on the file's text; it has no initial values either."""
     text = {"text": lambda component, name: core(name, component)}
-    icarus.run(CubeStarTop, 8, 4, "benches_store", "benches_read", seed=1, **text)
+    icarus.run(
+        CubeStarTop,
+        8,
+        4,
+        "tests.hdl.cubestar.testbenches.store",
+        "tests.hdl.cubestar.testbenches.read",
+        seed=1,
+        **text,
+    )
 
 
 TRI_STATE = """

@@ -7,7 +7,7 @@ import json
 import re
 from pathlib import Path
 
-from regression import BASE_SEED, HERE, SIMULATOR, Outcome
+from tests.hdl.regression import BASE_SEED, HERE, SIMULATOR, Outcome
 
 #: Where they are kept.
 FOLDER = HERE.parents[1] / "out" / "hdl" / "waves"

@@ -3,12 +3,12 @@
 import random
 from typing import Any
 
-from bench import timed_test
 from i2c_bench import I2cBench, read
-from pair_reference import SIDES
-from small import READ_OUT
 
 from cubesense_fpga_i2c.register_table import Register
+from tests.hdl.cubesense.reference import SIDES
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.testbench import timed_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 

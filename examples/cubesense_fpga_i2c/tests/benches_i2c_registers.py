@@ -5,15 +5,10 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
-from bench import picture, timed_test
 from cocotb.triggers import Timer
-from geometry import GEOMETRY
 from i2c_bench import STANDBY, I2cBench, read
 from i2c_bus import SPEEDS
 from i2c_model import Phase
-from instants import ODD, wait
-from pair_reference import SIDES
-from small import READ_OUT
 
 from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
@@ -23,6 +18,12 @@ from cubesense_fpga_i2c.register_table import (
     Register,
     command_byte,
 )
+from tests.hdl.cubesense.reference import SIDES
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.camera import picture
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.testbench import timed_test
 
 FAST = 1_000_000
 ALL = (*ADDRESSES.values(), GROUP_ADDRESS)

@@ -3,12 +3,7 @@
 import random
 from typing import Any
 
-from bench import flat, lines, picture, timed_test
-from geometry import GEOMETRY
 from i2c_bench import STANDBY, I2cBench, read, store
-from pair import OTHER, frame
-from pair_reference import NOT_FOUND, SIDES
-from small import READ_OUT
 
 from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
@@ -16,6 +11,12 @@ from cubesense_fpga_i2c.register_table import (
     Register,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
+from tests.hdl.cubesense.pair import OTHER, frame
+from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.camera import flat, lines, picture
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.testbench import timed_test
 
 FAST = 1_000_000
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap

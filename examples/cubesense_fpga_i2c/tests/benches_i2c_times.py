@@ -6,19 +6,19 @@ from fractions import Fraction
 from typing import Any
 
 import i2c_times
-from bench import timed_test
-from geometry import GEOMETRY
 from i2c_bench import STANDBY, I2cBench, read
 from i2c_bus import SPEEDS
-from instants import now
-from pair_reference import SIDES
-from small import READ_OUT
 
 from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
     Register,
     pointer_bytes,
 )
+from tests.hdl.cubesense.reference import SIDES
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.instants import now
+from tests.hdl.harness.testbench import timed_test
 
 
 async def read_at(bench: I2cBench, side: str, x: int, y: int, count: int, down: bool) -> bytes:

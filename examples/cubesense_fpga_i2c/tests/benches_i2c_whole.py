@@ -6,8 +6,6 @@ from typing import Any
 import cocotb
 import i2c_times
 from cocotb.triggers import RisingEdge, Timer
-from instants import now
-from small import READ_OUT
 
 from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
@@ -15,6 +13,8 @@ from cubesense_fpga_i2c.register_table import (
     command_byte,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.instants import now
 
 PERIOD_PS = 10**6
 

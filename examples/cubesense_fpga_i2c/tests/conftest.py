@@ -4,7 +4,6 @@ import json
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +12,12 @@ from amaranth.lib.wiring import Component
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
-HERE = Path(__file__).parent
-HARNESS = HERE.parents[2] / "tests" / "hdl"
+# Folders in which this process and the simulated Python find their modules.
+sys.path += [str(Path(__file__).parents[n]) for n in (0, 2, 3)]
 
-#: Folders in which this process and the simulated Python find their modules.
-PATHS = [str(folder) for folder in (HERE, HERE.parents[1], HARNESS / "cubesense")]
-sys.path += [path for path in PATHS if path not in sys.path]
+from tests.hdl.conftest import icarus, pytest_collection_modifyitems
 
-_spec = spec_from_file_location("hdl_harness", HARNESS / "conftest.py")
-assert _spec
-assert _spec.loader
-_harness = module_from_spec(_spec)
-_spec.loader.exec_module(_harness)
-icarus = _harness.icarus
-pytest_collection_modifyitems = _harness.pytest_collection_modifyitems
+__all__ = ["icarus", "pytest_collection_modifyitems", "simulate"]
 
 
 @pytest.fixture

@@ -1,20 +1,14 @@
 """Bench of the pair on its bus: two cameras, two SRAMs, the master, and the scoreboard."""
 
 import random
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import cocotb
-from bench import Camera
-from cocotb.triggers import ReadOnly, Timer
-from geometry import GEOMETRY
+from cocotb.triggers import Timer
 from i2c_bus import SPEEDS, I2cMcu
 from i2c_model import FpgaModel
-from instants import ODD, now, wait
-from pair import OTHER, PREFIXES, frame
-from pair_reference import SIDES, Controls, Half, behaviour
-from small import READ_OUT
-from sram import UNKNOWN, Sram
 
 from cubesense_fpga_i2c.register_table import (
     RESET_COMMAND,
@@ -23,6 +17,14 @@ from cubesense_fpga_i2c.register_table import (
     command_of,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
+from tests.hdl.cubesense.pair import OTHER, PREFIXES, frame
+from tests.hdl.cubesense.reference import SIDES, Controls, Half, behaviour
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.camera import Camera
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.instants import ODD, now, wait
+from tests.hdl.harness.sram import UNKNOWN, Sram
+from tests.hdl.harness.watching import Levels, levels, never_high, watch
 
 STANDBY = Actions(Action.STANDBY, Action.STANDBY)
 
@@ -51,18 +53,6 @@ def read(*sides: str) -> Actions:
     return Actions(*(Action.READ if side in sides else Action.STANDBY for side in SIDES))
 
 
-class StoringClock:
-    """The clock that writes an FPGA's memory: its own camera's, or the other one's."""
-
-    def __init__(self, dut: Any, side: str) -> None:
-        self._linked = getattr(dut, side).registers.store_other
-        self._clocks = [getattr(dut, f"{PREFIXES[s]}_PCLK") for s in (side, OTHER[side])]
-
-    @property
-    def value(self) -> Any:
-        return self._clocks[int(self._linked.value)].value
-
-
 class I2cBench:
     """The pair with all that surrounds it. ``start`` it, use it, ``check`` it."""
 
@@ -74,7 +64,7 @@ class I2cBench:
         dut.SCL.value = 1
         dut.SDA_I.value = 1
         for side, prefix in PREFIXES.items():
-            for name in ("Y", "HREF", "PCLK", "SRAM_D_I"):
+            for name in ("Y", "HREF", "PCLK"):
                 getattr(dut, f"{prefix}_{name}").value = 0
             pins = SimpleNamespace(
                 PIXCLK=getattr(dut, f"{prefix}_PCLK"),
@@ -85,15 +75,18 @@ class I2cBench:
             self.cameras[side] = Camera(pins)
             # Bytes take microseconds, and every pixel clock costs the simulation.
             self.cameras[side].period = random.randrange(74_000, 600_000, 2)
-            names = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
-            memory = {f"SRAM_{name}": getattr(dut, f"{prefix}_SRAM_{name}") for name in names}
-            self.srams[side] = Sram(
-                SimpleNamespace(**memory, PIXCLK=StoringClock(dut, side)), GEOMETRY
-            )
+            clock = partial(self._storing_clock, side)
+            self.srams[side] = Sram(dut, f"{prefix}_SRAM_", clock)
         self.models = {side: FpgaModel(side, self.srams[side].memory) for side in SIDES}
         self.mcu = I2cMcu(dut, self.models, speed)
         self._before = [bytes(self.srams[side].memory) for side in SIDES]
-        self._ack: dict[str, list[tuple[int, int]]] = {side: [(0, 0)] for side in SIDES}
+        self._ack: dict[str, Levels] = {side: [(0, 0)] for side in SIDES}
+
+    def _storing_clock(self, side: str) -> int:
+        """What writes an FPGA's memory: its own camera's, or the other one's."""
+        linked = int(getattr(self.dut, side).registers.store_other.value)
+        storing = OTHER[side] if linked else side
+        return int(getattr(self.dut, f"{PREFIXES[storing]}_PCLK").value)
 
     @classmethod
     async def start(
@@ -115,37 +108,23 @@ class I2cBench:
                 getattr(dut, f"{PREFIXES[side]}_SRAM_D_I").value = UNKNOWN
             else:
                 bench.srams[side].start()
-            cocotb.start_soon(bench._watch_ack(side))
+            cocotb.start_soon(watch(getattr(dut, side).registers.ack, bench._ack[side]))
             if side in cameras:
                 cocotb.start_soon(bench.cameras[side].run())
             else:
                 getattr(dut, f"{PREFIXES[side]}_PCLK").value = random.getrandbits(1)
                 getattr(dut, f"{PREFIXES[side]}_HREF").value = random.getrandbits(1)
-        cocotb.start_soon(bench._watch_contention())
+        cocotb.start_soon(never_high(dut.CONTENTION, "two drivers on the link"))
         return bench
 
     def idle(self) -> None:
         """All outputs are as in standby, SDA is released."""
-        assert {name: int(getattr(self.dut, name).value) for name in LEVELS} == LEVELS
+        assert levels(self.dut, LEVELS) == LEVELS
         assert int(self.dut.SDA.value) == int(self.dut.SDA_I.value)
         for side in SIDES:
             fpga = getattr(self.dut, side)
             for name in ("LINK_D_O", "LINK_D_OE", "LINK_C_O", "LINK_C_OE", "SDA_OE"):
                 assert not int(getattr(fpga, name).value), (side, name)
-
-    async def _watch_ack(self, side: str) -> None:
-        ack, seen = getattr(self.dut, side).registers.ack, self._ack[side]
-        while True:
-            await ack.value_change
-            await ReadOnly()
-            if int(ack.value) != seen[-1][1]:
-                seen.append((now(), int(ack.value)))
-
-    async def _watch_contention(self) -> None:
-        while True:
-            await self.dut.CONTENTION.value_change
-            await ReadOnly()
-            assert not int(self.dut.CONTENTION.value), "two drivers on the link"
 
     async def acknowledged(self, side: str, polls: int = 1000) -> bool:
         """Poll STATUS; what it says is what was so two SCL periods before."""
@@ -155,9 +134,9 @@ class I2cBench:
             # The byte is taken with the falling SCL that ends the address' acknowledge.
             taken = self.mcu.falls[-10]
             third = self.mcu.falls[-12]
-            levels = [level for time, level in self._ack[side] if time < third][-1:]
-            levels += [level for time, level in self._ack[side] if third <= time <= taken]
-            assert int(shown) in levels, "STATUS does not show ACK"
+            shows = [level for time, level in self._ack[side] if time < third][-1:]
+            shows += [level for time, level in self._ack[side] if third <= time <= taken]
+            assert int(shown) in shows, "STATUS does not show ACK"
             if shown:
                 return True
         return False
@@ -165,7 +144,7 @@ class I2cBench:
     async def shoot(self, camera: str, memory: str, content: bytes) -> None:
         """From standby: one picture from a camera to a memory, to ACK, and to standby."""
         await self.mcu.command(store(camera, memory))
-        await self.cameras[camera].reach(len(self.cameras[camera].clocks) + 3)
+        await self.cameras[camera].started()
         self.cameras[camera].send(frame(content))
         assert await self.acknowledged(memory)
         await self.mcu.command(STANDBY)
@@ -173,9 +152,7 @@ class I2cBench:
 
     def stored(self, side: str) -> bytes:
         """A memory's picture, row by row."""
-        rows, columns = range(GEOMETRY.rows), range(GEOMETRY.columns)
-        memory = self.srams[side].memory
-        return bytes(memory[GEOMETRY.address(x, y)] for y in rows for x in columns)
+        return self.srams[side].picture()
 
     async def read_picture(self, side: str) -> bytes:
         """Over the bus, in pieces of any length, without a pixel clock; from reading."""

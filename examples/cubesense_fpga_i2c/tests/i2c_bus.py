@@ -12,7 +12,6 @@ import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly, Timer
 from cocotbext.i2c import I2cMaster
 from i2c_model import FpgaModel
-from instants import ODD, now, wait
 
 from cubesense_fpga_i2c.register_table import (
     ADDRESSES,
@@ -22,6 +21,7 @@ from cubesense_fpga_i2c.register_table import (
     pointer_bytes,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import Actions
+from tests.hdl.harness.instants import ODD, now, wait
 
 SPEEDS = (100_000, 400_000, 1_000_000)
 

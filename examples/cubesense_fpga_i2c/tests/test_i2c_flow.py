@@ -4,7 +4,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import flow_checks
 import pytest
 
 from cubesense_fpga_i2c.proofs import PROOFS
@@ -13,6 +12,7 @@ from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.flow.top import Top, counted, tops_in
 from cubestack.hdl.proofs.prover import prove
+from tests.hdl import flow_checks
 
 need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 

@@ -29,4 +29,4 @@ def test_full_size(simulate: Any) -> None:
 
 @pytest.mark.skipif("I2C_WHOLE" not in os.environ, reason="takes a minute: set I2C_WHOLE")
 def test_whole_read_outs(simulate: Any) -> None:
-    simulate(FULL_SIZE, "benches_i2c_whole", seed=1, harness=str(HERE / "i2c_full_frame"))
+    simulate(FULL_SIZE, "benches_i2c_whole", seed=1, harness=HERE / "i2c_full_frame.v")

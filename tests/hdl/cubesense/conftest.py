@@ -1,17 +1,13 @@
 """Runs cocotb modules of this folder on CubeSense's designs."""
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import pytest
 from amaranth.lib.wiring import Component
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-
-HERE = Path(__file__).parent
+from tests.hdl.regression import PAIR, modules, pair_environment
 
 #: Small pictures: no power of two; powers of two; and a window as large as the picture is high.
 SMALL = (
@@ -27,23 +23,29 @@ def read_out(request: pytest.FixtureRequest) -> ReadOut:
 
 
 @pytest.fixture
-def simulate(icarus: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """``simulate(make, read_out, *modules, seed=…)``: cocotb ``modules`` on ``make(read_out)``."""
+def simulate(icarus: Any) -> Callable[..., None]:
+    """``simulate(make, read_out, *names, seed=…)``: testbenches of this folder on a design.
+
+    ``make(read_out)`` makes it, with address control if the modules are to know of that
+    (``mcu_addressing``); ``side`` is that of one FPGA alone.
+    """
 
     def run(
         make: Callable[[ReadOut], Component],
         read_out: ReadOut,
-        *modules: str,
+        *names: str,
         name: str = "",
+        mcu_addressing: bool = False,
+        side: str = "",
         **options: Any,
     ) -> None:
         def design(columns: int, rows: int) -> Component:
             assert (columns, rows) == (read_out.columns, read_out.rows)
             return make(read_out)
 
-        design.__name__ = name or getattr(make, "__name__", "")
-        monkeypatch.syspath_prepend(HERE)
-        monkeypatch.setenv("READ_OUT", json.dumps(asdict(read_out)))
-        icarus.run(design, read_out.columns, read_out.rows, *modules, **options)
+        design.__name__ = name or make.__name__
+        environment = {**pair_environment(read_out, mcu_addressing), "SIDE": side}
+        size = read_out.columns, read_out.rows
+        icarus.run(design, *size, *modules(PAIR, *names), environment=environment, **options)
 
     return run

@@ -1,21 +1,29 @@
-"""Bench of the pair of FPGAs: two cameras, two SRAMs, one microcontroller, and the scoreboard."""
+"""Testbench of the pair of FPGAs: two cameras, two SRAMs, one microcontroller."""
 
 import random
+from functools import partial
 from itertools import product
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import cocotb
-import cover_pair
-from bench import Camera, flat, lines, patience, vsync
-from cocotb.triggers import ReadOnly, Timer
-from geometry import GEOMETRY
-from instants import ODD, now, wait
-from pair_reference import SIDES, Controls, Half, behaviour
-from reference import Tick
-from small import MCU_ADDRESSING, READ_OUT
-from sram import SLOWEST_ACCESS, UNKNOWN, Sram
-from timing import ANY, Timing
+from cocotb.triggers import Timer
+
+from tests.hdl.coverage import cubesense as coverage
+from tests.hdl.cubesense.reference import NOT_FOUND, SIDES, Controls, Half, behaviour
+from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
+from tests.hdl.harness.camera import Camera, flat, lines, vsync
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.processor import Processor
+from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.sram import UNKNOWN, Sram
+from tests.hdl.harness.testbench import Testbench
+from tests.hdl.harness.timing import ANY, Timing
+from tests.hdl.harness.watching import Levels, levels, never_high, watch
+
+#: Camera and memory.
+Place = tuple[str, str]
 
 PREFIXES = {"sun": "SUN", "nadir": "NAD"}
 OTHER = {"sun": "nadir", "nadir": "sun"}
@@ -40,64 +48,54 @@ STANDBY = {
 }
 
 
-def pin(dut: Any, path: str) -> Any:
-    """A port of the pair, or of one of its FPGAs."""
-    for name in path.split("."):
-        dut = getattr(dut, name)
-    return dut
-
-
-def levels(dut: Any) -> dict[str, int]:
-    """All outputs, as in ``STANDBY``."""
-    return {name: int(pin(dut, name).value) for name in STANDBY}
+def gap() -> list[Tick]:
+    """Between two frames."""
+    return list(vsync(READ_OUT.frame_gap + random.randint(1, 9)))
 
 
 def frame(content: bytes) -> list[Tick]:
     """A gap between frames, then all lines."""
-    return [*vsync(READ_OUT.frame_gap + random.randint(1, 9)), *flat(lines(content))]
+    return [*gap(), *flat(lines(content))]
 
 
-class StoringClock:
-    """The clock that writes an FPGA's memory: its own camera's, or the other one's."""
-
-    def __init__(self, dut: Any, side: str) -> None:
-        self._dut = dut
-        self._clocks = [getattr(dut, f"{PREFIXES[s]}_PCLK") for s in (side, OTHER[side])]
-
-    @property
-    def value(self) -> Any:
-        return self._clocks[int(self._dut.SHIFT.value)].value
+def dark() -> bytearray:
+    """A picture without a Sun."""
+    return bytearray(random.choices(range(200), k=GEOMETRY.pixels))
 
 
-class CubeSenseMcu:
-    """Drives the control pins at random moments of its own; the record is in the two lists."""
+def with_sun(x: int, y: int) -> bytes:
+    """A picture whose first Sun pixel is there; a dark one for ``NOT_FOUND``."""
+    content = dark()
+    if (x, y) != NOT_FOUND:
+        start = y * GEOMETRY.columns + x
+        content[start : start + 3] = bytes([200, 255, 231])
+    return bytes(content)
 
+
+class CubeSenseMcu(Processor[Controls]):
+    """Drives the control pins, and its data bus where that goes both ways.
+
+    Attributes:
+        bytes: what came, by the time of its data clock.
+        sent: what was on the data bus then.
+        drives: whether it drives that bus; at first it floats at some level.
+    """
+
+    CLOCK = "CLK"
     LINES = ("SHIFT", "EDGE", "RNW", "SUNEN", "NADEN")
 
     def __init__(self, dut: Any, timing: Timing = ANY) -> None:
-        self._dut = dut
-        self._timing = timing
-        self._moved = 0  # when an SRAM's address may have changed last
-        self._levels = dict.fromkeys(self.LINES, 0) | {"SUNEN": 1, "NADEN": 1}
-        self.controls = [Controls(now(), *self._levels.values())]
-        self.bytes: dict[int, int] = {}  # by the time of their clock
-        self.sent: dict[int, int] = {}  # what is on its data bus then
-        self.drives = False  # its data bus; at first that floats at some level
+        levels = dict.fromkeys(self.LINES, 0) | {"SUNEN": 1, "NADEN": 1}
+        super().__init__(dut, Controls, levels, timing)
+        self.bytes: dict[int, int] = {}
+        self.sent: dict[int, int] = {}
+        self.drives = False
         self._data: int | None = random.getrandbits(8)
         if MCU_ADDRESSING:
             dut.DATA_I.value = self._data
         dut.CLK.value = 0
-        for name, level in self._levels.items():
+        for name, level in levels.items():
             getattr(dut, name).value = level
-
-    async def set(self, after: int | None = None, **pins: int) -> None:
-        """Drive pins together, ``after`` ps or after a random idle time."""
-        await wait(self._timing.idle() if after is None else after, ODD)
-        for name, level in pins.items():
-            getattr(self._dut, name).value = level
-        self._moved = now()
-        self._levels.update(pins)
-        self.controls.append(Controls(now(), *self._levels.values()))
 
     async def command(self, shift: int, edge: int, rnw: int, sunen: int, naden: int) -> None:
         """From standby: a row of the command table, the enables last."""
@@ -117,25 +115,23 @@ class CubeSenseMcu:
             for name in random.sample(["SUNEN", "NADEN"], 2):
                 await self.set(**{name: 1})
 
-    async def store(self, side: str) -> None:
-        """From standby: own camera to own memory."""
-        await self.command(0, 0, 0, *enables(side))
-
-    async def store_linked(self, camera: str) -> None:
-        """From standby: a camera's picture to the other one's memory."""
-        await self.command(1, 0, 0 if camera == "sun" else 1, 0, 0)
+    async def store(self, camera: str, memory: str) -> None:
+        """From standby: a camera's picture to a memory."""
+        if camera == memory:
+            await self.command(0, 0, 0, *enables(camera))
+        else:
+            await self.command(1, 0, 0 if camera == "sun" else 1, 0, 0)
 
     async def read_picture(self, side: str) -> None:
         """From standby: ready to read a memory's picture."""
         await self.command(0, 0, 1, *enables(side))
 
-    async def read_edge(self, side: str) -> None:
-        """From standby: ready to read a sensor's edge data in its own memory."""
-        await self.command(0, 1, 1, *enables(side))
-
-    async def read_edge_linked(self, sensor: str) -> None:
-        """From standby: ready to read a sensor's edge data in the other one's memory."""
-        await self.command(1, 1, 0 if sensor == "sun" else 1, 0, 0)
+    async def read_edge(self, sensor: str, memory: str) -> None:
+        """From standby: ready to read a sensor's edge data in a memory."""
+        if sensor == memory:
+            await self.command(0, 1, 1, *enables(sensor))
+        else:
+            await self.command(1, 1, 0 if sensor == "sun" else 1, 0, 0)
 
     async def open_address(self, side: str) -> None:
         """From standby: ready to take an address."""
@@ -159,28 +155,15 @@ class CubeSenseMcu:
 
     async def acknowledged(self, side: str, patience: int = 10**9) -> bool:
         """Poll an FPGA's ACK for at most ``patience`` ps."""
-        ack = getattr(self._dut, f"{PREFIXES[side]}ACK")
-        limit = now() + patience
-        while not int(ack.value):
-            if now() > limit:
-                return False
-            await wait(random.randrange(300_000), ODD)
-        return True
+        return await self.sees(f"{PREFIXES[side]}ACK", patience)
 
     async def clock(self) -> int:
-        """One data clock, after the SRAM's access time; the byte it presents."""
-        await wait(max(self._timing.data_half(), self._moved + SLOWEST_ACCESS + 2 - now()), ODD)
-        self._dut.CLK.value = 1
-        time = self._moved = now()
+        byte = await super().clock()
+        time = self.data_clocks[-1]
+        self.bytes[time] = byte
         if self._data is not None:
             self.sent[time] = self._data
-        await wait(self._timing.data_half(), ODD)
-        self._dut.CLK.value = 0
-        self.bytes[time] = int(self._dut.DATA.value)
-        return self.bytes[time]
-
-    async def read(self, count: int) -> bytes:
-        return bytes([await self.clock() for _ in range(count)])
+        return byte
 
 
 def enables(side: str) -> tuple[int, int]:
@@ -188,11 +171,15 @@ def enables(side: str) -> tuple[int, int]:
     return (0, 1) if side == "sun" else (1, 0)
 
 
-class PairBench:
-    """The pair with all that surrounds it. ``start`` it, use it, ``check`` it."""
+class PairTestbench(Testbench[Place]):
+    """A place is a camera and a memory.
 
-    #: Camera and memory.
-    PLACES: ClassVar[tuple[tuple[str, str], ...]] = tuple(product(SIDES, SIDES))
+    Attributes:
+        dead_camera: whose clock stands still, if any.
+        failed_sram: that keeps nothing and offers unknown bytes, if any.
+    """
+
+    PLACES: ClassVar[tuple[Place, ...]] = tuple(product(SIDES, SIDES))
 
     def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         self.dut = dut
@@ -200,7 +187,7 @@ class PairBench:
         self.cameras: dict[str, Camera] = {}
         self.srams: dict[str, Sram] = {}
         for side, prefix in PREFIXES.items():
-            for name in ("Y", "HREF", "PCLK", "SRAM_D_I"):
+            for name in ("Y", "HREF", "PCLK"):
                 getattr(dut, f"{prefix}_{name}").value = 0
             pins = SimpleNamespace(
                 PIXCLK=getattr(dut, f"{prefix}_PCLK"),
@@ -209,113 +196,99 @@ class PairBench:
                 VSYNC=SimpleNamespace(),  # not wired
             )
             self.cameras[side] = Camera(pins, timing)
-            names = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
-            memory = {f"SRAM_{name}": getattr(dut, f"{prefix}_SRAM_{name}") for name in names}
-            self.srams[side] = Sram(
-                SimpleNamespace(**memory, PIXCLK=StoringClock(dut, side)), GEOMETRY
-            )
+            clock = partial(self._storing_clock, side)
+            self.srams[side] = Sram(dut, f"{prefix}_SRAM_", clock)
         self.dead_camera = self.failed_sram = ""
         self._before = [bytes(self.srams[side].memory) for side in SIDES]
-        self._ack: dict[str, list[tuple[int, int]]] = {side: [(0, 0)] for side in SIDES}
+        self._ack: dict[str, Levels] = {side: [(0, 0)] for side in SIDES}
+
+    def _storing_clock(self, side: str) -> int:
+        """What writes an FPGA's memory: its own camera's, or the other one's."""
+        storing = OTHER[side] if int(self.dut.SHIFT.value) else side
+        return int(getattr(self.dut, f"{PREFIXES[storing]}_PCLK").value)
 
     @classmethod
     async def start(
         cls, dut: Any, timing: Timing = ANY, *, dead_camera: str = "", failed_sram: str = ""
-    ) -> "PairBench":
-        """In standby, with both cameras' clocks running, but for a dead one, which stands still.
-
-        A failed SRAM keeps nothing and offers unknown bytes.
-        """
+    ) -> Self:
         bench = cls(dut, timing)
         bench.dead_camera, bench.failed_sram = dead_camera, failed_sram
         await Timer(1, unit="ns")
-        assert levels(dut) == STANDBY
-        for side in SIDES:
+        assert levels(dut, STANDBY) == STANDBY
+        for side, prefix in PREFIXES.items():
             if side == failed_sram:
-                getattr(dut, f"{PREFIXES[side]}_SRAM_D_I").value = UNKNOWN
+                getattr(dut, f"{prefix}_SRAM_D_I").value = UNKNOWN
             else:
                 bench.srams[side].start()
-            cocotb.start_soon(bench._watch_ack(side))
+            cocotb.start_soon(watch(getattr(dut, f"{prefix}ACK"), bench._ack[side]))
             if side == dead_camera:
-                getattr(dut, f"{PREFIXES[side]}_PCLK").value = random.getrandbits(1)
-                getattr(dut, f"{PREFIXES[side]}_HREF").value = random.getrandbits(1)
+                getattr(dut, f"{prefix}_PCLK").value = random.getrandbits(1)
+                getattr(dut, f"{prefix}_HREF").value = random.getrandbits(1)
             else:
                 cocotb.start_soon(bench.cameras[side].run())
-        cocotb.start_soon(bench._watch_contention())
-        cocotb.start_soon(bench._watch_data_bus())
+        cocotb.start_soon(never_high(dut.CONTENTION, "two drivers on one wire"))
+        both = "the microcontroller and an FPGA drive the data bus"
+        cocotb.start_soon(never_high(dut.DATA_OE, both, unless=lambda: not bench.mcu.drives))
         return bench
 
-    async def _watch_ack(self, side: str) -> None:
-        ack, seen = getattr(self.dut, f"{PREFIXES[side]}ACK"), self._ack[side]
-        while True:
-            await ack.value_change
-            await ReadOnly()
-            if int(ack.value) != seen[-1][1]:
-                seen.append((now(), int(ack.value)))
+    def camera_of(self, place: Place) -> Camera:
+        return self.cameras[place[0]]
 
-    async def _watch_contention(self) -> None:
-        while True:
-            await self.dut.CONTENTION.value_change
-            await ReadOnly()
-            assert not int(self.dut.CONTENTION.value), "two drivers on one wire"
+    def memory_of(self, place: Place) -> tuple[Sram, int]:
+        return self.srams[place[1]], 0
 
-    async def _watch_data_bus(self) -> None:
-        while True:
-            await self.dut.DATA_OE.value_change
-            await ReadOnly()
-            both = self.mcu.drives and int(self.dut.DATA_OE.value)
-            assert not both, "the microcontroller and an FPGA drive the data bus"
+    def frame(self, content: bytes) -> list[Tick]:
+        return frame(content)
 
-    async def begin(self, place: tuple[str, str], content: bytes) -> None:
-        camera, memory = place
-        if camera == memory:
-            await self.mcu.store(camera)
-        else:
-            await self.mcu.store_linked(camera)
-        # Reset's two clocks, and one more.
-        await self.cameras[camera].reach(len(self.cameras[camera].clocks) + 3)
-        self.cameras[camera].send(frame(content))
+    async def command(self, place: Place) -> None:
+        await self.mcu.store(*place)
 
-    async def acknowledged(self, place: tuple[str, str]) -> bool:
-        camera, memory = place
-        limit = (
-            patience(self.cameras[camera]) + 8 * READ_OUT.frame_gap * self.cameras[camera].period
-        )
-        return await self.mcu.acknowledged(memory, limit)
+    async def acknowledged(self, place: Place, patience: int | None = None) -> bool:
+        limit = self.patience(place) if patience is None else patience
+        return await self.mcu.acknowledged(place[1], limit)
+
+    def patience(self, place: Place) -> int:
+        return super().patience(place) + 8 * READ_OUT.frame_gap * self.camera_of(place).period
 
     async def standby(self) -> None:
         await self.mcu.standby()
 
-    async def fetch(self, place: tuple[str, str]) -> bytes:
-        _, memory = place
+    async def fetch(self, place: Place) -> bytes:
+        return await self.read(place[1], GEOMETRY.pixels)
+
+    async def read(self, memory: str, count: int) -> bytes:
+        """From standby to standby: a memory's picture, ``count`` bytes from its start on."""
         await self.mcu.read_picture(memory)
-        content = await self.mcu.read(GEOMETRY.pixels)
-        await self.mcu.standby()
+        content = await self.mcu.read(count)
+        await self.standby()
         return content
 
-    async def shoot(self, camera: str, memory: str, content: bytes) -> None:
-        """From standby: one picture from a camera to a memory, to ACK, and to standby."""
-        await self.begin((camera, memory), content)
-        assert await self.acknowledged((camera, memory))
-        await self.mcu.standby()
-        assert self.stored(memory) == content
+    async def read_edge(self, sensor: str, memory: str, count: int) -> bytes:
+        """From standby to standby: a sensor's edge data in a memory."""
+        await self.mcu.read_edge(sensor, memory)
+        data = await self.mcu.read(count)
+        await self.standby()
+        return data
 
-    def stored(self, side: str) -> bytes:
+    def content(self, side: str) -> bytes:
         """A memory's picture, row by row."""
-        rows, columns = range(GEOMETRY.rows), range(GEOMETRY.columns)
-        memory = self.srams[side].memory
-        return bytes(memory[GEOMETRY.address(x, y)] for y in rows for x in columns)
+        return self.srams[side].picture()
+
+    async def cameras_are_done(self) -> None:
+        """All that was sent is over."""
+        for camera in self.cameras.values():
+            await camera.sent()
 
     async def check(self) -> dict[str, Half]:
         """Go to standby; compare memories, write pulses, ACKs and bytes with the reference."""
-        await self.mcu.standby()
+        await self.standby()
         await Timer(1, unit="ns")
-        assert levels(self.dut) == STANDBY
+        assert levels(self.dut, STANDBY) == STANDBY
         halves, data = behaviour(
             self._before,
             [self.cameras[side].clocks for side in SIDES],
             self.mcu.controls,
-            list(self.mcu.bytes),
+            self.mcu.data_clocks,
             self.mcu.sent,
         )
         for side, half in halves.items():
@@ -324,10 +297,6 @@ class PairBench:
             assert self.srams[side].memory == half.memory, side
             assert self._ack[side] == half.ack, side
         assert self.mcu.bytes == {time: data.get(time, 0) for time in self.mcu.bytes}
-        cover_pair.sample(
-            halves,
-            {side: self.cameras[side].clocks for side in SIDES},
-            self.mcu.controls,
-            list(self.mcu.bytes),
-        )
+        clocks = {side: self.cameras[side].clocks for side in SIDES}
+        coverage.sample(halves, clocks, self.mcu.controls, self.mcu.data_clocks)
         return halves

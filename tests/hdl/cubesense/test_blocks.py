@@ -50,29 +50,26 @@ BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("block", BLOCKS)
 def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
-    simulate(BLOCKS[block], read_out, f"benches_{block}", name=block, seed=seed)
+    simulate(BLOCKS[block], read_out, block, name=block, seed=seed)
 
 
 @pytest.mark.parametrize("addressing", [False, True], ids=["published", "addressing"])
 @pytest.mark.parametrize("side", ["sun", "nadir"])
-def test_dataflow(
-    simulate: Any, side: Any, addressing: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("SIDE", side)
-    monkeypatch.setenv("MCU_ADDRESSING", str(int(addressing)))
+def test_dataflow(simulate: Any, side: Any, addressing: bool) -> None:
     simulate(
         lambda _: DataflowControl(side, mcu_addressing=addressing),
         ReadOut(),
-        "benches_dataflow",
+        "dataflow",
         name=f"{side}_dataflow_{addressing}",
+        mcu_addressing=addressing,
+        side=side,
         seed=1,
     )
 
 
 @pytest.mark.parametrize("side", ["sun", "nadir"])
-def test_fpga_alone(
-    simulate: Any, read_out: ReadOut, side: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("SIDE", side)
-    module = "benches_fpga_alone"
-    simulate(lambda size: CubeSenseFpga(side, size), read_out, module, name=f"{side}_fpga", seed=1)
+def test_fpga_alone(simulate: Any, read_out: ReadOut, side: Any) -> None:
+    name = f"{side}_fpga"
+    simulate(
+        lambda size: CubeSenseFpga(side, size), read_out, "fpga_alone", name=name, side=side, seed=1
+    )

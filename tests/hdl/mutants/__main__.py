@@ -1,10 +1,10 @@
-"""Mutation score of the test benches: how many wrong gates they notice.
+"""Mutation score of the testbenches: how many wrong gates they notice.
 
 examples, from the project's folder:
-  python tests/hdl/mutants                                all tops, 120 mutants of each
-  python tests/hdl/mutants cubestar --count 20 --seed 7
-  python tests/hdl/mutants cubesense-pair --all           takes hours; go on with the same command
-  python tests/hdl/mutants --json
+  python -m tests.hdl.mutants                                all tops, 120 mutants of each
+  python -m tests.hdl.mutants cubestar --count 20 --seed 7
+  python -m tests.hdl.mutants cubesense-pair --all           hours; the same command goes on
+  python -m tests.hdl.mutants --json
 
 Exit code 1 when fewer than 95 % of the mutants that are not equivalent are killed.
 """
@@ -19,10 +19,8 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn
 from rich.table import Table
 
-sys.path.append(str(Path(__file__).parents[1]))
-
-from scoring import Result, Score, Scoring
-from suites import SUITES
+from tests.hdl.mutants.scoring import Result, Score, Scoring
+from tests.hdl.mutants.suites import SUITES
 
 ENOUGH = 0.95
 FOLDER = Path(__file__).parents[3] / "out" / "mutants"

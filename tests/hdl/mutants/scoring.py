@@ -14,13 +14,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from regression import build, simulate
-from suites import Stage, Suite
-
 from cubestack.hdl.blocks.pinned import pins_of
 from cubestack.hdl.flow.generate import verilog_text
 from cubestack.hdl.mutants.equivalence import Equivalence
 from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
+from tests.hdl.mutants.suites import Stage, Suite
+from tests.hdl.regression import build, simulate
 
 __all__ = ["Result", "Score", "Scoring"]
 

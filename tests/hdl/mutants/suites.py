@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
-from published import AsPublished, DoubleAsPublished, SharedAsPublished
-from regression import TIERS, frame_environment
 
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
+from tests.hdl.regression import ANY_TOP, PAIR, STAR, TIERS, frame_environment, modules
 
 __all__ = ["SUITES", "Stage", "Suite"]
 
@@ -79,21 +79,20 @@ def _suite(
     environment = {
         **frame_environment(tier.columns, tier.rows),
         **tier.environment,
-        "BENCH": BENCHES[name],
         "HDL_COVERAGE": "",  # what a wrong design reaches counts for nothing
     }
     return Suite(tier.make, stages, environment, standby, kept, wrapper)
 
 
 def _next(name: str, wrapped: type[AsPublished], standby: Mapping[str, int]) -> Suite:
-    """A board of the next version: its own benches, and the published board's of storing."""
+    """A board of the next version: its own testbenches, and the published board's of storing."""
     tier = TIERS[name]
-    published = ("benches_store", "benches_borders")
+    published = modules(STAR, "store", "borders")
     return _suite(
         name,
         *_seeds(tier.modules, 1),
         *_seeds(published, 1, "published"),
-        *_seeds(("benches_unselected", "benches_any_top"), 1),
+        *_seeds((ANY_TOP,), 1),
         *_seeds(tier.modules, 3)[1:],
         *_seeds(published, 2, "published")[1:],
         standby=standby,
@@ -101,20 +100,12 @@ def _next(name: str, wrapped: type[AsPublished], standby: Mapping[str, int]) -> 
     )
 
 
-#: The tops' benches, for what is the same for all of them.
-BENCHES = {
-    "cubestar": "bench:Bench",
-    "cubestar-shared": "bench_next:SharedBench",
-    "cubestar-double": "bench_next:DoubleBench",
-    "cubesense-pair": "pair:PairBench",
-}
-
 #: By name: tops as on the command line, one's bus, and a block that is done in seconds.
 SUITES = {
     "cubestar": _suite(
         "cubestar",
         *_seeds(TIERS["cubestar"].modules, 1),
-        *_seeds(("benches_borders", "benches_any_top"), 1),
+        *_seeds((*modules(STAR, "borders"), ANY_TOP), 1),
         *_seeds(TIERS["cubestar"].modules, 3)[1:],
         standby={"ENABLE": 0},
     ),
@@ -123,7 +114,7 @@ SUITES = {
     "cubesense-pair": _suite(
         "cubesense-pair",
         *_seeds(TIERS["cubesense-pair"].modules, 1),
-        *_seeds(("benches_pair_borders", "benches_any_top"), 1),
+        *_seeds((*modules(PAIR, "borders"), ANY_TOP), 1),
         *_seeds(TIERS["cubesense-pair"].modules, 2)[1:],
         standby={"SUNEN": 1, "NADEN": 1},
         kept=("sun", "nadir"),
@@ -131,10 +122,10 @@ SUITES = {
     # A picture so large that its address needs the latch.
     "cubestar-shared-bus": Suite(
         lambda: CubeStarShared(5, 33),
-        _seeds(("benches_shared", "benches_unselected"), 2),
+        _seeds(modules(STAR, "bus", "shared"), 2),
         {
             **frame_environment(5, 33),
-            "BENCH": "bench_next:SharedBench",
+            "TESTBENCH": TIERS["cubestar-shared"].environment["TESTBENCH"],
             "HDL_COVERAGE": "",
         },
         {"ENABLE": 0},
@@ -142,7 +133,7 @@ SUITES = {
     ),
     "matrix-counter": Suite(
         lambda: CounterAlone(5, 3),
-        _seeds(("benches_matrix_counter",), 1),
+        _seeds(("tests.hdl.blocks.testbenches.matrix_counter",), 1),
         frame_environment(5, 3),
         {"rst": 1},
     ),

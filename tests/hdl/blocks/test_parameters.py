@@ -1,0 +1,37 @@
+"""What the blocks refuse, and how wide addresses are."""
+
+import gc
+from collections.abc import Callable
+
+import pytest
+from amaranth.lib.wiring import Component
+
+from cubestack.hdl.blocks.bus_port import BusPort
+from cubestack.hdl.blocks.frame_gap import FrameGap
+from cubestack.hdl.blocks.gray_counter import GrayCounter
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "bits"), [(2, 2, 2), (5, 3, 5), (8, 4, 5), (640, 480, 19), (1024, 512, 19)]
+)
+def test_address_width(columns: int, rows: int, bits: int) -> None:
+    assert MatrixCounter.address_width(columns, rows) == bits
+
+
+@pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
+@pytest.mark.parametrize(
+    ("make", "error"),
+    [
+        (lambda: MatrixCounter(1, 4), "columns must be at least 2"),
+        (lambda: MatrixCounter(8, 0), "rows must be at least 2"),
+        (lambda: BusPort(0), "address_width must be in 1..24, not 0"),
+        (lambda: BusPort(25), "address_width must be in 1..24, not 25"),
+        (lambda: FrameGap(0), "clocks must be at least 1, not 0"),
+        (lambda: GrayCounter(3), "positions must be at least 4, not 3"),
+    ],
+)
+def test_impossible_designs_are_refused(make: Callable[[], Component], error: str) -> None:
+    with pytest.raises(ValueError, match=error):
+        make()
+    gc.collect()  # what was refused is never elaborated; have Amaranth say so here

@@ -1,0 +1,34 @@
+"""The reader alone, with a memory that answers at once."""
+
+import random
+from typing import Any
+
+import cocotb
+from cocotb.triggers import Timer
+
+from tests.hdl.harness.geometry import GEOMETRY
+
+
+async def clock(dut: Any, memory: bytes, reset: int = 0) -> int:
+    """One data clock with ``memory`` behind the address; DATA after it."""
+    dut.dclk_clk.value = 0
+    dut.dclk_rst.value = reset
+    await Timer(random.randint(1, 50), unit="ns")
+    dut.memory.value = memory[int(dut.address.value)]
+    await Timer(random.randint(1, 50), unit="ns")
+    dut.dclk_clk.value = 1
+    await Timer(random.randint(1, 50), unit="ns")
+    dut.memory.value = random.randrange(256)
+    await Timer(1, unit="ns")
+    return int(dut.data.value)
+
+
+@cocotb.test()
+async def presents_the_picture_without_end(dut: Any) -> None:
+    for length in (GEOMETRY.pixels // 2, 3 * GEOMETRY.pixels):
+        memory = random.randbytes(GEOMETRY.bank_size)
+        rows, columns = range(GEOMETRY.rows), range(GEOMETRY.columns)
+        picture = [memory[GEOMETRY.address(x, y)] for y in rows for x in columns]
+        assert await clock(dut, memory, reset=1) == 0
+        for step in range(length):
+            assert await clock(dut, memory) == picture[step % GEOMETRY.pixels]

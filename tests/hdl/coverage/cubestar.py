@@ -1,0 +1,92 @@
+"""Which points of coverage CubeStar's tops reached, from what their pins did."""
+
+import os
+from collections.abc import Sequence
+
+from tests.hdl.coverage.hits import hit
+from tests.hdl.coverage.points import CUBESTAR
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import Clock, Controls, Window, windows
+from tests.hdl.harness.store_states import left_in, steps
+
+#: The design that is simulated, or None for one that is no top of ours.
+TOP = CUBESTAR.get(os.environ.get("DESIGN", ""))
+
+#: A clock that takes so many periods from edge to edge has stopped; stalls are shorter.
+STOPPED = 25
+
+
+def sample(
+    clocks: Sequence[Clock],
+    period: int,
+    controls: Sequence[Controls],
+    data_clocks: Sequence[int] | None = None,
+) -> None:
+    """All of one board's stores, and its read-outs if it has a data clock."""
+    if TOP is None:
+        return
+    for window in windows(controls):
+        before = next(c for c in reversed(controls) if c.time < window.end)
+        after = next(c for c in controls if c.time >= window.end)
+        left_by = _left_by(before, after)
+        if not window.rnw:
+            _store(window, clocks, period, left_by)
+        elif data_clocks is not None:
+            count = sum(window.start < time < window.end for time in data_clocks)
+            hit("cubestar read", left_in=_read_state(count), left_by=left_by)
+    if TOP == "published":
+        _commands(clocks, period, controls)
+
+
+def _left_by(before: Controls, after: Controls) -> str:
+    if before.enable == after.enable:
+        return "RNW"
+    return "ENABLE" if before.rnw == after.rnw else "both"
+
+
+def _read_state(count: int) -> str:
+    if count >= GEOMETRY.pixels:
+        return "last pixel" if count == GEOMETRY.pixels else "wrapped"
+    return "no clock" if not count else "first row" if count < GEOMETRY.columns else "further rows"
+
+
+def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -> None:
+    own = [clock for clock in clocks if window.start < clock.rise < window.end]
+    stepped = list(steps([clock.pins for clock in own]))
+    state = left_in(own, stepped, window.end)
+    if TOP == "published" or left_by == "ENABLE" or (left_by, TOP) == ("RNW", "double"):
+        hit("cubestar store", top=TOP, left_in=state, left_by=left_by)
+    if TOP != "published" or not own:
+        return
+    acknowledged = "yes" if any(step.state == "ACK" for step in stepped) else "no"
+    for case in stepped[-1].borders:
+        hit("cubestar border", case=case, acknowledged=acknowledged)
+    ends = [clock.rise for clock in own[1:]] + [window.end]
+    for clock, end in zip(own, ends, strict=True):
+        if end - clock.rise > STOPPED * period:
+            level = "high" if min(clock.fall, end) - clock.rise > STOPPED * period else "low"
+            hit("cubestar border", case=f"clock stops {level}", acknowledged=acknowledged)
+
+
+def _commands(clocks: Sequence[Clock], period: int, controls: Sequence[Controls]) -> None:
+    before = controls[0]
+    for now in controls[1:]:
+        if now.enable and not before.enable:
+            camera = _camera(clocks, period, now.time)
+            command = "read" if now.rnw else "store"
+            rnw = "before" if now.rnw == before.rnw else "with ENABLE"
+            if rnw == "before" or (command, camera) == ("store", "runs"):
+                hit("cubestar command", command=command, bank=now.bank, camera=camera, rnw=rnw)
+        before = now
+
+
+def _camera(clocks: Sequence[Clock], period: int, time: int) -> str:
+    before = [clock for clock in clocks if clock.rise < time]
+    after = [clock for clock in clocks if clock.rise >= time]
+    if not before:
+        return "never ran" if not after or after[0].rise - time > STOPPED * period else "runs"
+    if after and after[0].rise - before[-1].rise <= STOPPED * period:
+        return "runs"
+    if not after and time - before[-1].rise <= STOPPED * period:
+        return "runs"
+    return "stopped low" if before[-1].fall < time else "stopped high"

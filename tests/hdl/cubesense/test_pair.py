@@ -1,0 +1,47 @@
+"""The pair of FPGAs on its pins, on Icarus Verilog."""
+
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.hdl.cubesense.pair import CubeSensePair
+from tests.hdl.regression import SMALLEST, addressable
+
+NAMES = ["modes", "read", "store", "failures"]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", NAMES)
+def test_pair(simulate: Any, read_out: ReadOut, name: str, seed: int) -> None:
+    simulate(CubeSensePair, read_out, name, seed=seed)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
+    """Standby alone makes the state: the parts' flip-flops come up as they like."""
+    names = NAMES.copy()
+    random.Random(seed).shuffle(names)
+    simulate(CubeSensePair, SMALLEST, *names, seed=seed, initialised=False)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_addressing(simulate: Any, read_out: ReadOut, seed: int) -> None:
+    simulate(addressable, read_out, "addressing", mcu_addressing=True, seed=seed)
+
+
+def test_addressing_at_full_size(simulate: Any) -> None:
+    simulate(addressable, FULL_SIZE, "addressing", mcu_addressing=True, seed=1)
+
+
+@pytest.mark.parametrize("initialised", [True, False])
+def test_addressing_changes_nothing_else(simulate: Any, initialised: bool) -> None:
+    options = {"mcu_addressing": True, "initialised": initialised}
+    simulate(addressable, SMALLEST, *NAMES, seed=1, **options)
+
+
+def test_full_size(simulate: Any) -> None:
+    harness = Path(__file__).with_name("cubesense_full_frame.v")
+    simulate(CubeSensePair, FULL_SIZE, "full_size", seed=1, harness=harness)

@@ -1,0 +1,57 @@
+"""Dataflow control of one side against the command table, at all levels of its inputs."""
+
+import os
+from itertools import product
+from typing import Any
+
+import cocotb
+from cocotb.triggers import Timer
+from cocotb.types import LogicArray
+
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
+from tests.hdl.cubesense.settings import MCU_ADDRESSING
+
+SIDE = os.environ["SIDE"]
+OUTPUTS = {
+    "store": Action.STORE,
+    "read": Action.READ,
+    "edge_data": Action.EDGE,
+    "send_picture": Action.SEND_PICTURE,
+    "store_other": Action.STORE_OTHER,
+    "send_edge": Action.SEND_EDGE,
+    "pass_edge": Action.PASS_EDGE,
+}
+if MCU_ADDRESSING:
+    OUTPUTS |= {"take_address": Action.TAKE_ADDRESS, "read_from": Action.READ_FROM}
+
+
+@cocotb.test()
+async def every_row_and_every_unlisted_row(dut: Any) -> None:
+    done = set()
+    for shift, edge, rnw, own, other in product((0, 1), repeat=5):
+        dut.shift.value, dut.edge.value, dut.rnw.value = shift, edge, rnw
+        dut.en_n.value, dut.other_en_n.value = own, other
+        await Timer(1, unit="ns")
+        other = other if link_shows_enables(shift, edge) else 0
+        sunen, naden = (own, other) if SIDE == "sun" else (other, own)
+        listed = actions(shift, edge, rnw, sunen, naden, mcu_addressing=MCU_ADDRESSING)
+        expected = getattr(listed, SIDE)
+        taken = [action for name, action in OUTPUTS.items() if int(getattr(dut, name).value)]
+        assert taken == ([] if expected is Action.STANDBY else [expected])
+        done.add(expected)
+        if MCU_ADDRESSING:
+            addressing = expected in (Action.TAKE_ADDRESS, Action.READ_FROM)
+            assert int(dut.addressing.value) == addressing
+    assert done == {Action.STANDBY, *OUTPUTS.values()}
+
+
+@cocotb.test()
+async def other_enable_is_no_input_where_it_makes_no_difference(dut: Any) -> None:
+    """Else its change could disturb a picture that is being stored; unknown stands for a change."""
+    dut.other_en_n.value = LogicArray("X")
+    dut.en_n.value = 0
+    for shift, edge, rnw in ((0, 0, 0), (1, 0, 0), (1, 0, 1)):
+        dut.shift.value, dut.edge.value, dut.rnw.value = shift, edge, rnw
+        await Timer(1, unit="ns")
+        expected = getattr(actions(shift, edge, rnw, 0, 0), SIDE)
+        assert [a for name, a in OUTPUTS.items() if int(getattr(dut, name).value)] == [expected]

@@ -1,0 +1,135 @@
+"""The command table on the pins of the pair, changes at any moment, and standby."""
+
+import random
+from itertools import product
+from typing import Any
+
+from cocotb.triggers import Timer
+
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
+from tests.hdl.cubesense.pair import PREFIXES, STANDBY, PairTestbench, frame
+from tests.hdl.cubesense.reference import SIDES
+from tests.hdl.cubesense.settings import MCU_ADDRESSING
+from tests.hdl.harness.camera import picture
+from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.watching import disturb_in_standby, levels
+
+#: Idle times in ps, from a glitch to a few clocks.
+MOMENTS = (1, 100, 3_000, 20_000, 100_000, 1_000_000)
+
+#: What an action drives, and when: SRAM strobes, MCU bus, link data, link control other than the
+#: own enable.
+DRIVES = {
+    Action.STANDBY: (0, 0, 0, 0, 0),
+    Action.STORE: (1, 0, 0, 0, 0),
+    Action.READ: (1, 1, 1, 0, 0),
+    Action.EDGE: (1, 1, 1, 0, 0),
+    Action.SEND_PICTURE: (0, 0, 0, 1, 1),
+    Action.STORE_OTHER: (1, 0, 0, 0, 0),
+    Action.SEND_EDGE: (1, 1, 0, 1, 0),
+    Action.PASS_EDGE: (0, 0, 1, 0, 0),
+}
+if MCU_ADDRESSING:
+    DRIVES |= {Action.TAKE_ADDRESS: (0, 0, 0, 0, 0), Action.READ_FROM: (1, 1, 1, 0, 0)}
+
+
+async def works(bench: PairTestbench) -> None:
+    """Pictures are stored right, and come back right. From any state, to standby."""
+    await bench.standby()
+    await bench.cameras_are_done()
+    for place in (("sun", "sun"), ("nadir", "nadir"), random.choice(bench.PLACES)):
+        content = await bench.shoot(place)
+        assert await bench.read(place[1], 7) == content[:7]
+
+
+@timed_test
+async def every_row_and_every_unlisted_row(dut: Any) -> None:
+    """Which drivers are on, settled, with both cameras' clocks running."""
+    bench = await PairTestbench.start(dut)
+    done = set()
+    rows = list(product((0, 1), repeat=5))
+    for shift, edge, rnw, sunen, naden in random.sample(rows, len(rows)):
+        await bench.mcu.command(shift, edge, rnw, sunen, naden)
+        for camera in bench.cameras.values():
+            await camera.reach(len(camera.clocks) + 4)
+        wanted = actions(shift, edge, rnw, sunen, naden, mcu_addressing=MCU_ADDRESSING)
+        alone = sunen != naden and not link_shows_enables(shift, edge)
+        if alone:
+            # Unlisted, and the link is taken: a sender can not know that nobody listens. A
+            # receiver gets no clock and stays in reset.
+            seen = actions(shift, edge, rnw, 0, 0)
+            sends = {s: getattr(seen, s) is Action.SEND_PICTURE for s in SIDES}
+            enabled = "sun" if not sunen else "nadir"
+            wanted = wanted._replace(
+                **{enabled: Action.SEND_PICTURE if sends[enabled] else Action.STANDBY}
+            )
+        for index, side in enumerate(SIDES):
+            action = getattr(wanted, side)
+            prefix = PREFIXES[side]
+            chip, output, bus, link, copies = DRIVES[action]
+            fpga = getattr(dut, side)
+            assert int(getattr(dut, f"{prefix}_SRAM_CE_N").value) == 1 - chip
+            assert int(getattr(dut, f"{prefix}_SRAM_OE_N").value) == 1 - output
+            assert int(fpga.DATA_OE.value) == bus
+            assert int(fpga.LINK_D_OE.value) == link
+            shows = link_shows_enables(shift, edge) and not (sunen, naden)[index]
+            assert int(fpga.LINK_C_OE.value) == (3 if copies else shows << index)
+            done.add(action)
+        assert not int(dut.CONTENTION.value)
+        if wanted == (Action.STANDBY, Action.STANDBY):
+            quiet = {n: v for n, v in levels(dut).items() if not n.endswith("LINK_C_OE")}
+            assert quiet == {n: v for n, v in STANDBY.items() if n in quiet}
+        await bench.mcu.standby()
+        await Timer(1, unit="step")
+        assert levels(dut, STANDBY) == STANDBY
+    assert done == set(DRIVES)
+    await bench.check()
+
+
+@timed_test
+async def rows_one_after_the_other(dut: Any) -> None:
+    """Random rows, each left at any moment for standby, with cameras and data clock running."""
+    bench = await PairTestbench.start(dut)
+    await bench.shoot(("sun", "nadir"), picture())
+    await bench.shoot(("sun", "sun"), picture())
+    for _ in range(60):
+        for camera in bench.cameras.values():
+            if not camera.busy:
+                camera.send(frame(picture()))
+        await bench.mcu.command(*(random.getrandbits(1) for _ in range(5)))
+        if random.getrandbits(1):
+            await bench.mcu.read(random.randrange(1, 30))
+        else:
+            await wait(random.randrange(20) * bench.cameras["sun"].period, ODD)
+        await bench.mcu.standby()
+    await works(bench)
+    await bench.check()
+
+
+@timed_test
+async def controls_change_at_any_moment(dut: Any) -> None:
+    """Even in orders that the firmware keeps away from; afterwards all works."""
+    bench = await PairTestbench.start(dut)
+    for _ in range(4):
+        for camera in bench.cameras.values():
+            for _ in range(4):
+                camera.send(frame(picture()))
+        for _ in range(80):
+            lines = random.sample(bench.mcu.LINES, random.choice([1, 1, 1, 2]))
+            after = random.randrange(1, 2 * random.choice(MOMENTS))
+            await bench.mcu.set(after, **{name: random.getrandbits(1) for name in lines})
+            if random.random() < 0.2:
+                dut.CLK.value = 1
+                await wait(random.randrange(1, 50_000), ODD)
+                dut.CLK.value = 0
+        await works(bench)
+
+
+@timed_test
+async def idle_is_reset(dut: Any) -> None:
+    """With both enables high nothing on any other pin moves any output, not even for a glitch."""
+    bench = await PairTestbench.start(dut, dead_camera="sun")
+    await bench.mcu.standby()
+    pins = ["RNW", "EDGE", "SHIFT", "CLK", *(f"SUN_{n}" for n in ("PCLK", "HREF", "Y", "SRAM_D_I"))]
+    await disturb_in_standby(dut, STANDBY, pins, MOMENTS[:5], 600)

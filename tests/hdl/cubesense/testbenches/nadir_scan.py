@@ -1,0 +1,51 @@
+"""The scan alone: exactly the declared addresses, in order."""
+
+import random
+from typing import Any
+
+import cocotb
+
+from tests.hdl.cubesense.settings import READ_OUT, clock
+from tests.hdl.harness.geometry import GEOMETRY
+
+COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
+
+
+def pixels_by_hand() -> list[tuple[int, int] | None]:
+    """The scan in the words of its source, once through."""
+    found: list[tuple[int, int] | None] = [None]
+    y = READ_OUT.first_row
+    while y < ROWS:
+        found += [(x, y) for x in range(COLUMNS)]
+        y += READ_OUT.scan_step
+    found.append(None)
+    x = READ_OUT.first_column
+    while x < COLUMNS:
+        found += [(x, y) for y in range(ROWS)]
+        x += READ_OUT.scan_step
+    return found
+
+
+def addresses(count: int) -> list[int]:
+    """What the first ``count`` clocks present; the presets look at address 0."""
+    pixels = pixels_by_hand()
+    columns = pixels[1 + pixels[1:].index(None) + 1 :]
+    while len(pixels) < count:
+        pixels += columns
+    return [0 if pixel is None else GEOMETRY.address(*pixel) for pixel in pixels[:count]]
+
+
+@cocotb.test()
+async def declared_order(dut: Any) -> None:
+    assert list(READ_OUT.scan()) == pixels_by_hand()
+    assert READ_OUT.scan_clocks == len(pixels_by_hand())
+
+
+@cocotb.test()
+async def visits_the_declared_pixels_in_order(dut: Any) -> None:
+    once = READ_OUT.scan_clocks
+    for count in (once // 3, once + 1, 3 * once, random.randrange(once)):
+        await clock(dut, "scan", reset=1)
+        for expected in addresses(count):
+            assert int(dut.address.value) == expected
+            await clock(dut, "scan")

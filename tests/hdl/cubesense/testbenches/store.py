@@ -1,0 +1,169 @@
+"""Storing pictures: own memory, both at once, and across the link."""
+
+import random
+from itertools import product
+from typing import Any
+
+from tests.hdl.cubesense.pair import OTHER, PREFIXES, PairTestbench, frame, with_sun
+from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
+from tests.hdl.cubesense.settings import READ_OUT
+from tests.hdl.harness.camera import flat, line, lines, picture
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.testbench import timed_test
+
+COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
+
+
+def any_path() -> tuple[str, str]:
+    """A camera and a memory."""
+    return random.choice(SIDES), random.choice(SIDES)
+
+
+@timed_test
+async def every_camera_to_every_memory(dut: Any) -> None:
+    bench = await PairTestbench.start(dut)
+    paths = [(camera, memory) for camera in SIDES for memory in SIDES] * 2
+    random.shuffle(paths)
+    for camera, memory in paths:
+        other = bench.content(OTHER[memory])
+        before = len(bench.srams[memory].pulses)
+        await bench.shoot((camera, memory), picture())
+        assert [pulse.address for pulse in bench.srams[memory].pulses[before:]] == [
+            GEOMETRY.address(column, row) for row in range(ROWS) for column in range(COLUMNS)
+        ]
+        assert bench.content(OTHER[memory]) == other
+    await bench.check()
+
+
+@timed_test
+async def both_at_once(dut: Any) -> None:
+    """Each on its own clock; enabling or disabling one does not disturb the other."""
+    bench = await PairTestbench.start(dut)
+    for first, second in (SIDES, SIDES[::-1]):
+        contents = {side: picture() for side in SIDES}
+        first_en, second_en = (f"{PREFIXES[side]}EN" for side in (first, second))
+        await bench.mcu.set(SHIFT=0, EDGE=0, RNW=0)
+        await bench.mcu.set(**{first_en: 0})
+        camera = bench.cameras[first]
+        await camera.started()
+        start = await camera.begin(frame(contents[first]))
+        await camera.reach(start + random.randrange(GAP, GAP + GEOMETRY.pixels))
+        for level in (0, 1, 0):
+            await bench.mcu.set(camera.period // 4, **{second_en: level})
+        camera = bench.cameras[second]
+        await camera.started()
+        camera.send(frame(contents[second]))
+        assert await bench.mcu.acknowledged(second)
+        assert await bench.mcu.acknowledged(first)
+        await bench.mcu.standby()
+        assert {side: bench.content(side) for side in SIDES} == contents
+    await bench.check()
+
+
+@timed_test
+async def joined_anywhere(dut: Any) -> None:
+    """A frame that is joined after its gap has begun is dropped, and the next one stored."""
+    bench = await PairTestbench.start(dut)
+    for _ in range(8):
+        camera, memory = any_path()
+        first, second = frame(picture()), picture()
+        start = await bench.cameras[camera].begin(first)
+        await bench.cameras[camera].reach(start + random.randrange(len(first) - 3))
+        await bench.store((camera, memory))
+        bench.cameras[camera].send(frame(second))
+        assert await bench.mcu.acknowledged(memory)
+        await bench.mcu.standby()
+    await bench.check()
+
+
+@timed_test
+async def ack_stays_and_nothing_more_is_stored(dut: Any) -> None:
+    """Nor do the Sun's coordinates change, over gaps and whole frames."""
+    bench = await PairTestbench.start(dut)
+    for memory in SIDES:
+        content = bytearray(GEOMETRY.pixels)
+        content[2 * COLUMNS + 3 : 2 * COLUMNS + 6] = bytes([255] * 3)
+        await bench.store(("sun", memory))
+        sun = bench.cameras["sun"]
+        sun.send(frame(bytes(content)))
+        assert await bench.mcu.acknowledged(memory)
+        sun.send([*frame(picture()), *frame(bytes([255]) * GEOMETRY.pixels), *frame(picture())])
+        await sun.sent()
+        assert int(getattr(dut, f"{PREFIXES[memory]}ACK").value)
+        await bench.mcu.standby()
+        assert bench.content(memory) == bytes(content)
+        assert await bench.read_edge("sun", memory, 4) == bytes([3, 0, 2, 0])
+    await bench.check()
+
+
+@timed_test
+async def lines_too_long_and_too_short(dut: Any) -> None:
+    """Surplus pixels and rows are ignored; what is missing stays as it was."""
+    bench = await PairTestbench.start(dut)
+    for _ in range(6):
+        camera, memory = any_path()
+        await bench.store((camera, memory))
+        source = bench.cameras[camera]
+        sizes = [COLUMNS, COLUMNS - 1, 1, COLUMNS + 1, 2 * COLUMNS]
+        rows = [random.randbytes(random.choice(sizes)) for _ in range(ROWS - 1)]
+        rows.append(random.randbytes(COLUMNS))
+        source.send(frame(b"")[:-1])
+        source.send(flat(line(row) for row in rows))
+        source.send([*flat(lines(picture())), *frame(b"")])
+        await source.sent()
+        await bench.mcu.standby()
+    await bench.check()
+
+
+@timed_test
+async def sun_is_found_while_storing(dut: Any) -> None:
+    """In either memory; the coordinates outlive standby and the nadir camera's pictures."""
+    bench = await PairTestbench.start(dut)
+    for _ in range(6):
+        memory = random.choice(SIDES)
+        x, y = random.randrange(COLUMNS - 2), random.randrange(ROWS)
+        if random.random() >= 0.8:
+            x, y = NOT_FOUND
+        await bench.shoot(("sun", memory), with_sun(x, y))
+        if random.getrandbits(1):
+            await bench.shoot("nadir", random.choice(SIDES), picture())
+        expected = x.to_bytes(2, "little") + y.to_bytes(2, "little")
+        assert await bench.read_edge("sun", memory, 4) == expected
+    await bench.check()
+
+
+@timed_test
+async def any_waveform(dut: Any) -> None:
+    """Runs of any length, joined and left at any time, on both cameras."""
+    bench = await PairTestbench.start(dut)
+    for _ in range(12):
+        for source in bench.cameras.values():
+            for _ in range(3 * ROWS):
+                row = random.randbytes(random.choice([COLUMNS] * 8 + [1, COLUMNS + 1]))
+                source.send(line(row))
+                if random.random() < 1 / ROWS:
+                    source.send(frame(b"")[: random.choice([GAP - 2, GAP, GAP + 9])])
+        camera, memory = any_path()
+        await bench.store((camera, memory))
+        patience = 2 * GEOMETRY.pixels * bench.cameras[camera].period
+        await bench.mcu.acknowledged(memory, patience)
+        await bench.mcu.standby()
+    halves = await bench.check()
+    assert any(half.pulses for half in halves.values())
+
+
+@timed_test
+async def lines_a_gap_apart(dut: Any) -> None:
+    """As many low clocks as a gap may not have make no frame's end; one more does."""
+    bench = await PairTestbench.start(dut)
+    for camera, memory in product(SIDES, SIDES):
+        source = bench.cameras[camera]
+        content = picture()
+        for pause in (GAP, GAP + 1):
+            await bench.store((camera, memory))
+            source.send([*frame(b""), *flat(lines(content, pause))])
+            await source.sent()
+            acknowledged = await bench.mcu.acknowledged(memory, 4 * source.period)
+            assert acknowledged == (pause == GAP)
+            await bench.mcu.standby()
+    await bench.check()

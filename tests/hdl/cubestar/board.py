@@ -1,0 +1,189 @@
+"""Testbench of the boards of CubeStar: one camera, SRAMs, and processors with control pins."""
+
+import random
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar, Self
+
+import cocotb
+from cocotb.triggers import Timer
+
+from tests.hdl.coverage import cubestar as coverage
+from tests.hdl.harness.camera import Camera, frame
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.instants import EVEN
+from tests.hdl.harness.processor import Processor
+from tests.hdl.harness.reference import Controls, Pulse, Tick, behaviour
+from tests.hdl.harness.sram import Sram
+from tests.hdl.harness.testbench import Testbench
+from tests.hdl.harness.timing import ANY, Timing
+from tests.hdl.harness.watching import Levels, levels, watch
+
+
+class Mcu(Processor[Controls]):
+    """Drives ENABLE, RNW and BANK, or what stands for them on ``dut``."""
+
+    CLOCK = "DCLK"
+
+    def __init__(self, dut: Any, timing: Timing = ANY) -> None:
+        super().__init__(dut, Controls, {"ENABLE": 0, "RNW": 0, "BANK": 0}, timing)
+
+    @property
+    def storing(self) -> bool:
+        return bool(self._levels["ENABLE"] and not self._levels["RNW"])
+
+    async def store(self, bank: int = 0) -> None:
+        """From standby: store the next whole frame."""
+        await self.set(BANK=bank)
+        if random.random() < 0.5:
+            await self.set(RNW=0)
+            await self.set(ENABLE=1)
+        else:
+            await self.set(RNW=0, ENABLE=1)
+
+    async def acknowledged(self, patience: int = 10**9) -> bool:
+        """Poll ACK for at most ``patience`` ps."""
+        return await self.sees("ACK", patience)
+
+    async def open(self, bank: int = 0) -> None:
+        """From standby: make ready to read, byte by byte or on the bus."""
+        await self.set(BANK=bank, RNW=1)
+        await self.set(ENABLE=1)
+
+    async def standby(self) -> None:
+        await self.set(ENABLE=0)
+
+
+class CubeStarTestbench(Testbench[int]):
+    """A place is a bank, a memory or a board, by its number.
+
+    Attributes:
+        camera: the one camera.
+        mcus: who drives the control pins, of each board.
+        srams: all memories.
+    """
+
+    PLACES: ClassVar[tuple[int, ...]] = (0, 1)
+
+    #: Name in the declared coverage.
+    TOP: ClassVar[str]
+
+    #: What the names of each memory's pins begin with.
+    MEMORIES: ClassVar[tuple[str, ...]] = ("SRAM_",)
+
+    #: Inputs besides the camera's that are low at first.
+    LOW: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self, dut: Any, mcus: Sequence[Any], timing: Timing = ANY) -> None:
+        """``mcus``: the pins of each processor."""
+        self.dut = dut
+        for name in (*self.LOW, "PIXCLK", "PIXDATA", "HSYNC", "VSYNC"):
+            getattr(dut, name).value = 0
+        self.camera = Camera(dut, timing)
+        self.mcus = [Mcu(pins, timing) for pins in mcus]
+        self.srams = [
+            Sram(dut, prefix, lambda n=n: self.pixel_clock(n))
+            for n, prefix in enumerate(self.MEMORIES)
+        ]
+        self._acks: list[tuple[Any, Levels]] = [(pins.ACK, [(0, 0)]) for pins in mcus]
+
+    @classmethod
+    async def start(cls, dut: Any, timing: Timing = ANY) -> Self:
+        """In standby, with the camera's clock running."""
+        bench = await cls.without_camera(dut, timing)
+        cocotb.start_soon(bench.camera.run())
+        return bench
+
+    @classmethod
+    async def without_camera(cls, dut: Any, timing: Timing = ANY) -> Self:
+        """In standby, with the camera's clock still."""
+        bench = cls(dut, timing=timing)  # type: ignore[call-arg]
+        await Timer(1, unit="ns")
+        bench.in_standby()
+        for sram in bench.srams:
+            sram.start()
+        for signal, seen in bench._acks:
+            cocotb.start_soon(watch(signal, seen))
+        bench.watch()
+        return bench
+
+    def watch(self) -> None:
+        """Start what else is looked at in the background."""
+
+    def in_standby(self) -> None:
+        """AssertionError unless all outputs have their levels of standby; but for the bank."""
+        expected = self.standby_levels()
+        assert levels(self.dut, expected) == expected
+        for sram in self.MEMORIES:
+            address = int(getattr(self.dut, f"{sram}A").value)
+            assert address % GEOMETRY.bank_size == 0, "all but the bank"
+
+    @classmethod
+    def standby_levels(cls) -> dict[str, int]:
+        """The outputs in standby, without the addresses. The SRAMs' strobes are low active."""
+        strobes = {"D_OE": 0, "CE_N": 1, "OE_N": 1, "WE_N": 1}
+        return {f"{sram}{name}": strobes[name] for sram in cls.MEMORIES for name in strobes}
+
+    @property
+    def mcu(self) -> Mcu:
+        """The only one."""
+        (mcu,) = self.mcus
+        return mcu
+
+    def control(self, place: int) -> Mcu:
+        """Who drives the pins that lead to a place."""
+        return self.mcus[place % len(self.mcus)]
+
+    def storing(self) -> set[int]:
+        """Places that are stored at."""
+        return {place for place in self.PLACES if self.control(place).storing}
+
+    def pixel_clock(self, memory: int) -> int:
+        """The level of the clock that write pulses of a memory have to keep to."""
+        return int(self.dut.PIXCLK.value)
+
+    def camera_of(self, place: int) -> Camera:
+        return self.camera
+
+    def memory_of(self, place: int) -> tuple[Sram, int]:
+        return self.srams[place % len(self.srams)], place // len(self.srams)
+
+    def frame(self, content: bytes) -> list[Tick]:
+        return frame(content)
+
+    async def command(self, place: int) -> None:
+        await self.control(place).store(place // len(self.mcus))
+
+    async def acknowledged(self, place: int, patience: int | None = None) -> bool:
+        limit = self.patience(place) if patience is None else patience
+        return await self.control(place).acknowledged(limit)
+
+    async def standby(self) -> None:
+        for mcu in self.mcus:
+            await mcu.standby()
+
+    async def settle_in_standby(self) -> None:
+        """Go there; each write pulse was whole, and was as the scoreboard says."""
+        await self.standby()
+        await Timer(1, unit="ns")
+        self.in_standby()
+        for sram in self.srams:
+            assert sram.edges == len(sram.pulses), "a write pulse that was none"
+
+    async def check(self) -> object:
+        """ACK and the write pulses of all stores, to the ps, wherever in memory they went."""
+        await self.settle_in_standby()
+        for n, (mcu, (_, ack)) in enumerate(zip(self.mcus, self._acks, strict=True)):
+            srams = self.srams if len(self.mcus) == 1 else [self.srams[n]]
+            pulses = sorted(pulse for sram in srams for pulse in sram.pulses)
+            memory = bytes(2 * GEOMETRY.bank_size)
+            expected = behaviour(GEOMETRY, memory, self.camera.clocks, mcu.controls, ())
+            assert ack == expected.ack
+            # Those that the camera's clock began are at even ps.
+            own = [pulse for pulse in pulses if pulse.start % 2 == EVEN]
+            assert _positions(own) == _positions(expected.pulses)
+            coverage.sample(self.camera.clocks, self.camera.period, mcu.controls)
+        return None
+
+
+def _positions(pulses: Iterable[Pulse]) -> list[Pulse]:
+    return [pulse._replace(address=pulse.address % GEOMETRY.bank_size) for pulse in pulses]

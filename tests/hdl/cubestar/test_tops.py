@@ -1,0 +1,77 @@
+"""CubeStar's tops on their pins, on Icarus Verilog."""
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from amaranth.lib.wiring import Component
+
+from cubestack.hdl.cubestar.double_top import CubeStarDouble
+from cubestack.hdl.cubestar.shared_top import CubeStarShared
+from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import verilog_text
+from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
+from tests.hdl.regression import STAR, TIERS, modules
+
+SEEDS = [1, 2, 3]
+STORING = modules(STAR, "store", "borders")
+NEXT_VERSION = ["cubestar-shared", "cubestar-double", "cubestar-boards"]
+BOARDS: dict[type[AsPublished], type[Component]] = {
+    SharedAsPublished: CubeStarShared,
+    DoubleAsPublished: CubeStarDouble,
+}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("columns", "rows"), [(8, 4), (5, 3), (16, 8)])
+@pytest.mark.parametrize("name", ["store", "read", "modes"])
+def test_published(icarus: Any, name: str, columns: int, rows: int, seed: int) -> None:
+    icarus.run(CubeStarTop, columns, rows, *modules(STAR, name), seed=seed)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
+    """Standby alone makes the state: the part's flip-flops come up as they like."""
+    shuffled = [*modules(STAR, "store", "read", "modes")]
+    random.Random(seed).shuffle(shuffled)
+    icarus.run(CubeStarTop, 5, 3, *shuffled, seed=seed, initialised=False)
+
+
+def test_full_frame(icarus: Any) -> None:
+    harness = Path(__file__).with_name("full_frame.v")
+    icarus.run(CubeStarTop, 1024, 512, *modules(STAR, "full_frame"), seed=1, harness=harness)
+
+
+def test_published_borders(icarus: Any) -> None:
+    icarus.run(CubeStarTop, 5, 3, *modules(STAR, "borders"), seed=1)
+
+
+@pytest.mark.parametrize(("columns", "rows", "seed"), [(8, 4, 1), (5, 3, 2), (32, 16, 3)])
+@pytest.mark.parametrize("top", NEXT_VERSION)
+def test_bus(icarus: Any, top: str, columns: int, rows: int, seed: int) -> None:
+    tier = TIERS[top]
+    on_bus = [name for name in tier.modules if not name.endswith("states")]
+    icarus.run(tier.design, columns, rows, *on_bus, seed=seed, environment=tier.environment)
+
+
+@pytest.mark.parametrize("top", NEXT_VERSION)
+def test_bus_needs_no_initial_values(icarus: Any, top: str) -> None:
+    tier = TIERS[top]
+    settings = {"environment": tier.environment, "initialised": False}
+    icarus.run(tier.design, 5, 3, *modules(STAR, "bus"), seed=1, **settings)
+
+
+def with_board(wrapper: AsPublished, name: str) -> str:
+    """The wrapper and the board in it."""
+    board = BOARDS[type(wrapper)](wrapper.columns, wrapper.rows)
+    return verilog_text(wrapper, name) + verilog_text(board, "board")
+
+
+@pytest.mark.parametrize(("columns", "rows", "seed"), [(5, 3, 1), (8, 4, 2)])
+@pytest.mark.parametrize("wrapper", BOARDS)
+def test_next_version_stores_as_the_published_board(
+    icarus: Any, wrapper: Callable[[int, int], Component], columns: int, rows: int, seed: int
+) -> None:
+    icarus.run(wrapper, columns, rows, *STORING, seed=seed, text=with_board)

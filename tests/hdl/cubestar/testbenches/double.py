@@ -1,0 +1,46 @@
+"""Two SRAMs in turn: the camera fills one while the bus has the other."""
+
+import random
+from typing import Any
+
+from cocotb.triggers import Timer
+
+from tests.hdl.cubestar.next_version import DoubleTestbench
+from tests.hdl.cubestar.testbenches.bus import works_on
+from tests.hdl.harness.camera import picture
+from tests.hdl.harness.testbench import timed_test
+
+
+async def fills(bench: DoubleTestbench, memory: int) -> None:
+    """To ACK, and back to the bus."""
+    content = picture()
+    await bench.begin(memory, content)
+    assert await bench.acknowledged(memory), "no ACK"
+    await bench.mcu.set(RNW=1)
+    assert bench.stored(memory) == content
+    await Timer(1, unit="ns")
+    assert not int(bench.dut.ACK.value)
+
+
+@timed_test
+async def one_memory_serves_both_in_turn(dut: Any) -> None:
+    """The other one has failed: it is not stored in, not asked, and never selected."""
+    bench = await DoubleTestbench.start(dut)
+    good = random.getrandbits(1)
+    failed = getattr(dut, f"SRAM{2 - good}_CE_N")
+    for _ in range(3):
+        await fills(bench, good)
+        await works_on(bench, 20, good)
+        assert int(failed.value)
+    await bench.check()
+
+
+@timed_test
+async def standby_turns_all_off(dut: Any) -> None:
+    bench = await DoubleTestbench.start(dut)
+    await bench.begin(random.getrandbits(1), picture())
+    await bench.camera.reach(len(bench.camera.clocks) + random.randrange(20))
+    await bench.check()
+    await bench.open()
+    await fills(bench, 1)
+    await bench.check()

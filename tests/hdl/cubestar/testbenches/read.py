@@ -1,0 +1,188 @@
+"""Reading the stored bytes with the microcontroller's clock, and choosing the bank."""
+
+import random
+from itertools import product
+from typing import Any
+
+import cocotb
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from tests.hdl.coverage.cubestar import STOPPED
+from tests.hdl.cubestar.published import PublishedTestbench
+from tests.hdl.harness.camera import frame, picture
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.instants import ODD, wait
+from tests.hdl.harness.testbench import timed_test
+
+
+def wrapped(content: bytes, count: int) -> bytes:
+    """The first ``count`` bytes of ``content`` without end."""
+    return (content * (count // len(content) + 1))[:count]
+
+
+@timed_test
+async def starts_at_the_first_pixel(dut: Any) -> None:
+    """However far the last reading came, and whichever pin ended it."""
+    bench = await PublishedTestbench.start(dut)
+    for end in ({"ENABLE": 0}, {"RNW": 0}, {"ENABLE": 0, "RNW": 0}, {"ENABLE": 0}):
+        await bench.mcu.open()
+        count = random.choice([1, GEOMETRY.columns, random.randrange(GEOMETRY.pixels)])
+        assert await bench.mcu.read(count) == bench.stored()[:count]
+        await bench.mcu.set(**end)
+        if end == {"RNW": 0}:
+            await bench.mcu.set(RNW=1)
+            assert await bench.mcu.read(3) == bench.stored()[:3]
+            await bench.mcu.standby()
+    await bench.check()
+
+
+@timed_test
+async def wraps_past_the_last_pixel(dut: Any) -> None:
+    bench = await PublishedTestbench.start(dut)
+    await bench.mcu.open()
+    count = 2 * GEOMETRY.pixels + random.randrange(GEOMETRY.pixels)
+    assert await bench.mcu.read(count) == wrapped(bench.stored(), count)
+    await bench.check()
+
+
+@timed_test
+async def without_a_camera(dut: Any) -> None:
+    """No pixel clock since power-up; storing waits, reading works."""
+    bench = await PublishedTestbench.without_camera(dut)
+    await bench.mcu.store()
+    assert not await bench.mcu.acknowledged(10**6)
+    await bench.mcu.standby()
+    await bench.mcu.open(bank=1)
+    assert await bench.mcu.read(GEOMETRY.pixels) == bench.stored(1)
+    await bench.check()
+
+
+@timed_test
+async def camera_dies_while_storing(dut: Any) -> None:
+    """At any level of its clock, in a write pulse too; with ENABLE held or not."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(8):
+        await bench.store()
+        start = await bench.camera.begin(frame(picture()))
+        await bench.camera.reach(start + random.randrange(4, GEOMETRY.pixels))
+        await bench.mcu.set(after=random.randrange(bench.camera.period))
+        bench.camera.stop()
+        if random.getrandbits(1):
+            await bench.mcu.standby()
+            await bench.mcu.open()
+        else:
+            await bench.mcu.set(RNW=1)
+        count = random.randrange(1, 10)
+        read = await bench.mcu.read(count)
+        assert read == bench.stored()[:count]
+        await bench.mcu.set(ENABLE=0, RNW=0)
+        bench.camera.go()
+        await bench.camera.sent()
+    await bench.check()
+
+
+@timed_test
+async def both_banks(dut: Any) -> None:
+    """BANK counts when ENABLE rises only; the other bank's picture is left alone."""
+    bench = await PublishedTestbench.start(dut)
+    content = {bank: bench.stored(bank) for bank in (0, 1)}
+    for _ in range(6):
+        bank = random.getrandbits(1)
+        content[bank] = picture()
+        await bench.store(bank)
+        bench.camera.send(frame(content[bank]))
+        while bench.camera.busy:
+            await bench.mcu.set(BANK=random.getrandbits(1))
+        assert await bench.mcu.acknowledged(4 * bench.camera.period)
+        await bench.mcu.standby()
+        assert [bench.stored(0), bench.stored(1)] == [content[0], content[1]]
+        bank = random.getrandbits(1)
+        await bench.mcu.open(bank)
+        for expected in content[bank]:
+            await bench.mcu.set(BANK=random.getrandbits(1))
+            assert await bench.mcu.clock() == expected
+        await bench.mcu.set(ENABLE=0, RNW=0)
+    await bench.check()
+
+
+@timed_test
+async def byte_stands_until_the_next_clock(dut: Any) -> None:
+    """DATA keeps still between rising edges, whatever the memory offers meanwhile."""
+    bench = await PublishedTestbench.start(dut)
+    await bench.mcu.open()
+    for expected in bench.stored():
+        assert await bench.mcu.clock() == expected
+        await bench.mcu.set(after=random.randrange(200_000))
+        assert int(dut.DATA.value) == expected
+    await bench.check()
+
+
+@timed_test
+async def left_after_any_count_by_any_pin(dut: Any) -> None:
+    """The next reading starts at the first pixel all the same."""
+    bench = await PublishedTestbench.start(dut)
+    pixels, columns = GEOMETRY.pixels, GEOMETRY.columns
+    further = random.randrange(columns, pixels)
+    counts = (0, random.randrange(1, columns), further, pixels, pixels + random.randrange(1, 9))
+    for count, end in product(counts, ({"ENABLE": 0}, {"RNW": 0}, {"ENABLE": 0, "RNW": 0})):
+        bank = random.getrandbits(1)
+        await bench.mcu.open(bank)
+        assert await bench.mcu.read(count) == wrapped(bench.stored(bank), count)
+        await bench.mcu.set(**end)
+        await bench.mcu.set(ENABLE=0)
+    await bench.check()
+
+
+@timed_test
+async def every_command_without_a_clock(dut: Any) -> None:
+    """The camera's never ran, or stopped long ago at either level."""
+    bench = await PublishedTestbench.without_camera(dut)
+    await every_command(bench)
+    cocotb.start_soon(bench.camera.run())
+    await bench.camera.reach(3)
+    for edge in (RisingEdge, FallingEdge):
+        await stop(bench, edge)
+        await every_command(bench)
+        bench.camera.go()
+        await bench.camera.reach(len(bench.camera.clocks) + 3)
+    await bench.check()
+
+
+async def stop(bench: PublishedTestbench, edge: Any) -> None:
+    """The camera's clock stops after an edge, for longer than any stall."""
+    await edge(bench.dut.PIXCLK)
+    await bench.mcu.set(after=1)
+    bench.camera.stop()
+    await wait(2 * STOPPED * bench.camera.period, ODD)
+
+
+async def every_command(bench: PublishedTestbench) -> None:
+    """In either bank; from standby to standby."""
+    for bank in (0, 1):
+        await bench.mcu.set(BANK=bank, RNW=0)
+        await bench.mcu.set(ENABLE=1)
+        assert not await bench.mcu.acknowledged(10**6)
+        await bench.mcu.standby()
+        await bench.mcu.open(bank)
+        assert await bench.mcu.read(3) == bench.stored(bank)[:3]
+        await bench.mcu.standby()
+
+
+@timed_test
+async def clock_stops_while_storing(dut: Any) -> None:
+    """At either level, in a picture that is given up and in one that goes on to ACK."""
+    bench = await PublishedTestbench.start(dut)
+    for edge, goes_on in product((RisingEdge, FallingEdge), (True, False)):
+        content = picture()
+        await bench.store()
+        start = await bench.camera.begin(frame(content))
+        await bench.camera.reach(start + random.randrange(4, GEOMETRY.pixels))
+        await stop(bench, edge)
+        if goes_on:
+            bench.camera.go()
+            assert await bench.acknowledged(0)
+            assert bench.stored() == content
+        await bench.mcu.standby()
+        bench.camera.go()
+        await bench.camera.sent()
+    await bench.check()

@@ -1,0 +1,221 @@
+"""Storing a frame: which pixels reach the SRAM, and when ACK rises.
+
+``PublishedTestbench.check`` compares every write pulse, ACK and the memory with the reference. What
+a test asserts besides says in plain words what that must have come to.
+"""
+
+import random
+from typing import Any
+
+from tests.hdl.cubestar.published import PublishedTestbench
+from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
+from tests.hdl.harness.geometry import GEOMETRY
+from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.testbench import timed_test
+
+COLUMNS, ROWS = GEOMETRY
+TIMES = 4  # repetitions of a case, each with new pictures, blanking and moments
+
+
+async def join(bench: PublishedTestbench, clock: int) -> None:
+    """Enable storing between two rising edges: ``clock`` of them are over."""
+    await bench.camera.reach(clock)
+    await bench.mcu.set(after=random.randrange(1, bench.camera.period - 10), ENABLE=1)
+
+
+async def is_stored(bench: PublishedTestbench, content: bytes) -> None:
+    """ACK comes without sending more, and the picture is in bank 0. Ends in standby."""
+    await bench.camera.sent()
+    assert await bench.mcu.acknowledged(4 * bench.camera.period)
+    assert bench.stored() == content
+    await bench.mcu.standby()
+
+
+async def is_dropped(bench: PublishedTestbench) -> None:
+    """All was sent, and ACK does not come; the next frame is stored. Ends in standby."""
+    await bench.camera.sent()
+    assert not await bench.mcu.acknowledged(4 * bench.camera.period)
+    content = picture()
+    bench.camera.send(frame(content))
+    await is_stored(bench, content)
+
+
+@timed_test
+async def whole_frame(dut: Any) -> None:
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(TIMES):
+        bank = random.getrandbits(1)
+        before = len(bench.sram.pulses)
+        await bench.store(bank)
+        content = picture()
+        bench.camera.send(frame(content))
+        assert await bench.mcu.acknowledged()
+        assert bench.stored(bank) == content
+        assert [pulse.address for pulse in bench.sram.pulses[before:]] == [
+            GEOMETRY.address(column, row, bank) for row in range(ROWS) for column in range(COLUMNS)
+        ]
+        await bench.mcu.standby()
+    await bench.check()
+
+
+@timed_test
+async def joined_at_every_clock(dut: Any) -> None:
+    """A frame that is joined in the middle is dropped, and the next one stored in its place."""
+    between = 4
+    positions = range(between + ROWS * (COLUMNS + 2))
+    if len(positions) > 64:
+        positions = sorted(random.sample(positions, 16))
+    bench = await PublishedTestbench.start(dut)
+    for position in positions:
+        first, second = picture(), picture()
+        start = await bench.camera.begin([*vsync(between), *flat(lines(first, 2))])
+        await join(bench, start + position)
+        if position + 2 < between:  # two clocks of reset, then HSYNC is still seen low
+            await is_stored(bench, first)
+        else:
+            await bench.camera.sent()
+            assert not await bench.mcu.acknowledged(4 * bench.camera.period)
+            bench.camera.send(frame(second))
+            await is_stored(bench, second)
+    await bench.check()
+
+
+@timed_test
+async def split_picture_without_vsync(dut: Any) -> None:
+    """Joined in a line, no VSYNC to the next frame: the rest of one, the start of the other."""
+    bench = await PublishedTestbench.start(dut)
+    for row in range(ROWS):
+        first, second = picture(), picture()
+        upper = [list(vsync()), *lines(first)]
+        start = await bench.camera.begin(flat([*upper, *lines(second)]))
+        start += len(flat(upper[: row + 1])) + random.randrange(COLUMNS - 1)
+        await join(bench, start)
+        next_line = (row + 1) * COLUMNS
+        await is_stored(bench, first[next_line:] + second[:next_line])
+    await bench.check()
+
+
+@timed_test
+async def ack_stays(dut: Any) -> None:
+    """Over VSYNC and whole frames, with nothing stored, until ENABLE falls or RNW rises."""
+    bench = await PublishedTestbench.start(dut)
+    for release in ({"ENABLE": 0}, {"RNW": 1}) * 2:
+        await bench.store()
+        content = picture()
+        bench.camera.send(frame(content))
+        assert await bench.mcu.acknowledged()
+        pulses = len(bench.sram.pulses)
+        bench.camera.send([*frame(picture()), *frame(picture()), *vsync()])
+        await bench.camera.sent()
+        assert int(dut.ACK.value)
+        assert (len(bench.sram.pulses), bench.stored()) == (pulses, content)
+        await bench.mcu.set(**release)
+        await bench.mcu.set(after=1)
+        assert not int(dut.ACK.value)
+        await bench.mcu.set(ENABLE=0, RNW=0)
+    expected = await bench.check()
+    last_pulses = [pulse.end for pulse in expected.pulses[GEOMETRY.pixels - 1 :: GEOMETRY.pixels]]
+    assert [time for time, level in expected.ack if level] == last_pulses
+
+
+@timed_test
+async def vsync_starts_again(dut: Any) -> None:
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(2 * TIMES):
+        await bench.store()
+        cut = random.randrange(1, ROWS * COLUMNS)
+        content = picture()
+        bench.camera.send([*frame(picture()[:cut]), *frame(content)])
+        await is_stored(bench, content)
+    await bench.check()
+
+
+@timed_test
+async def vsync_in_a_line_ends_it(dut: Any) -> None:
+    """What follows VSYNC without HSYNC in between is no line's start."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(TIMES):
+        await bench.store()
+        content = picture()
+        levels = flat([level] * random.randrange(1, COLUMNS) for level in (1, 0, 1))
+        broken = [Tick(random.randrange(256), 1, level) for level in levels]
+        bench.camera.send([*frame(picture()[:-COLUMNS]), *broken, *line([])])
+        bench.camera.send(flat(lines(content)))
+        await is_stored(bench, content)
+    await bench.check()
+
+
+@timed_test
+async def line_too_long(dut: Any) -> None:
+    """Surplus pixels are ignored."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(TIMES):
+        await bench.store()
+        content = picture()
+        rows = [content[row * COLUMNS : (row + 1) * COLUMNS] for row in range(ROWS)]
+        rows = [row + random.randbytes(random.choice([0, 1, 2, 3 * COLUMNS])) for row in rows]
+        bench.camera.send([*vsync(), *flat([list(line(row)) for row in rows])])
+        await is_stored(bench, content)
+    await bench.check()
+
+
+@timed_test
+async def line_too_short(dut: Any) -> None:
+    """The rest of the row stays as it was; the frame counts, unless it was the last row."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(TIMES):
+        await bench.store()
+        old, new = bench.stored(), picture()
+        sizes = [random.choice([1, COLUMNS - 1, COLUMNS]) for _ in range(ROWS - 1)] + [COLUMNS]
+        rows = [new[row * COLUMNS :][:size] for row, size in enumerate(sizes)]
+        bench.camera.send([*vsync(), *flat([list(line(row)) for row in rows])])
+        kept = [old[row * COLUMNS :][size:COLUMNS] for row, size in enumerate(sizes)]
+        await is_stored(bench, b"".join(flat([[a, b] for a, b in zip(rows, kept, strict=True)])))
+    await bench.check()
+
+
+@timed_test
+async def last_row_too_short(dut: Any) -> None:
+    """No ACK; further lines are not stored either."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(TIMES):
+        await bench.store()
+        cut = random.randrange(1, COLUMNS)
+        before = len(bench.sram.pulses)
+        bench.camera.send([*frame(picture()[:-cut]), *flat(lines(picture()))])
+        await bench.camera.sent()
+        assert len(bench.sram.pulses) - before == GEOMETRY.pixels - cut
+        await is_dropped(bench)
+    await bench.check()
+
+
+@timed_test
+async def hsync_missing(dut: Any) -> None:
+    """Two lines in one: the second is surplus, and a row is missing at the end."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(TIMES):
+        await bench.store()
+        rows = lines(picture())
+        merged = random.randrange(ROWS - 1)
+        rows[merged] = [tick for tick in rows[merged] if tick.hsync]
+        bench.camera.send([*vsync(), *flat(rows)])
+        await is_dropped(bench)
+    await bench.check()
+
+
+@timed_test
+async def any_waveform(dut: Any) -> None:
+    """Runs of any length on both sync lines, joined and left at any time."""
+    bench = await PublishedTestbench.start(dut)
+    for _ in range(200 * ROWS):
+        size = random.choice([COLUMNS] * 6 + [1, COLUMNS - 1, COLUMNS + 1, 2 * COLUMNS])
+        bench.camera.send(line(random.randbytes(size)))
+        if random.random() < 0.4 / ROWS:
+            levels = [(random.getrandbits(1), random.getrandbits(1)) for _ in range(3)]
+            bench.camera.send(Tick(random.randrange(256), *pair) for pair in levels)
+    for _ in range(40):
+        await bench.mcu.store(random.getrandbits(1))
+        await bench.mcu.acknowledged(3 * ROWS * COLUMNS * bench.camera.period)
+        await bench.mcu.standby()
+    expected = await bench.check()
+    assert any(level for _, level in expected.ack)

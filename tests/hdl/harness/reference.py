@@ -1,0 +1,141 @@
+"""What the frame buffer has to do, worked out afterwards from what the pins did.
+
+Follows the wording of FrameWriter's, FrameReader's and CubeStarTop's docstrings; whole lines and
+whole frames at once, not clock by clock, so that it shares no structure with the design.
+"""
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+from tests.hdl.harness.geometry import Geometry
+
+
+class Tick(NamedTuple):
+    """Camera pins at one rising edge of the pixel clock."""
+
+    pixel: int
+    hsync: int
+    vsync: int
+
+
+class Clock(NamedTuple):
+    """One period of the pixel clock: its two edges in ps, and the pins at the rising one."""
+
+    rise: int
+    fall: int
+    pins: Tick
+
+
+class Pulse(NamedTuple):
+    """One write pulse: WE_N low from ``start`` to ``end``, in ps."""
+
+    start: int
+    end: int
+    address: int
+    value: int
+
+
+class Controls(NamedTuple):
+    """Levels that the microcontroller drives, from ``time`` (ps) on."""
+
+    time: int
+    enable: int
+    rnw: int
+    bank: int
+
+
+class Window(NamedTuple):
+    """Time in ps for which the board stores (``rnw`` = 0) or is read (``rnw`` = 1)."""
+
+    start: int
+    end: int
+    rnw: int
+    bank: int
+
+
+class Behaviour(NamedTuple):
+    """What is expected: write pulses, and (time in ps, new value) of ACK and of DATA."""
+
+    pulses: list[Pulse]
+    ack: list[tuple[int, int]]
+    data: list[tuple[int, int]]
+    memory: bytearray
+
+
+def taken(ticks: Sequence[Tick], geometry: Geometry) -> tuple[list[tuple[int, int]], int | None]:
+    """Pixels to store, as (index into ``ticks``, address in the bank), and the tick of ACK."""
+    pixels: list[tuple[int, int]] = []
+    for vsync, frame in groupby(enumerate(ticks), key=lambda item: item[1].vsync):
+        if not vsync:
+            continue
+        runs = [list(run) for hsync, run in groupby(frame, key=lambda i: i[1].hsync) if hsync]
+        lines = [[index for index, _ in run] for run in runs]
+        lines = [line for line in lines if line[0] > 0 and not ticks[line[0] - 1].hsync]
+        for row, line in enumerate(lines[: geometry.rows]):
+            pixels += [
+                (index, geometry.address(column, row))
+                for column, index in enumerate(line[: geometry.columns])
+            ]
+        if len(lines) >= geometry.rows and len(lines[geometry.rows - 1]) >= geometry.columns:
+            return pixels, pixels[-1][0] + 1
+    return pixels, None
+
+
+def windows(controls: Sequence[Controls]) -> list[Window]:
+    """Storing and reading times; ``controls`` begins and ends in standby."""
+    found = []
+    before = controls[0]
+    start = bank = 0
+    for now in controls[1:]:
+        if (now.enable, now.rnw) != (before.enable, before.rnw):
+            if before.enable:
+                found.append(Window(start, now.time, before.rnw, bank))
+            elif now.enable:
+                bank = now.bank
+            start = now.time
+        before = now
+    return found
+
+
+def behaviour(
+    geometry: Geometry,
+    memory: bytes,
+    camera: Sequence[Clock],
+    controls: Sequence[Controls],
+    data_clocks: Sequence[int],
+) -> Behaviour:
+    """Work out everything from the initial ``memory`` and what the inputs did since."""
+    done = Behaviour([], [(0, 0)], [(0, 0)], bytearray(memory))
+    for window in windows(controls):
+        if window.rnw:
+            _read(done, geometry, window, [t for t in data_clocks if window.start < t < window.end])
+        else:
+            _store(
+                done, geometry, window, [c for c in camera if window.start < c.rise < window.end]
+            )
+    return done
+
+
+def _store(done: Behaviour, geometry: Geometry, window: Window, clocks: list[Clock]) -> None:
+    clocks = clocks[2:]  # the reset is released through two flip-flops
+    pixels, ack = taken([clock.pins for clock in clocks], geometry)
+    ends = [clock.rise for clock in clocks[1:]] + [window.end]
+    for index, position in pixels:
+        address = window.bank * geometry.bank_size + position
+        if clocks[index].fall < window.end:
+            value = clocks[index].pins.pixel
+            done.pulses.append(Pulse(clocks[index].fall, ends[index], address, value))
+            done.memory[address] = value
+    if ack is not None and ack < len(clocks):
+        done.ack.extend([(clocks[ack].rise, 1), (window.end, 0)])
+
+
+def _read(done: Behaviour, geometry: Geometry, window: Window, data_clocks: list[int]) -> None:
+    values = []
+    for step, time in enumerate(data_clocks):
+        row, column = divmod(step % geometry.pixels, geometry.columns)
+        values.append((time, done.memory[geometry.address(column, row, window.bank)]))
+    for time, value in [*values, (window.end, 0)]:
+        if value != done.data[-1][1]:
+            done.data.append((time, value))

@@ -1,0 +1,91 @@
+"""What the testbench of every top has in common."""
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, Generic, Self, TypeVar
+
+import cocotb
+
+from tests.hdl.harness.camera import Camera, patience, picture
+from tests.hdl.harness.reference import Tick
+from tests.hdl.harness.sram import Sram
+from tests.hdl.harness.timing import ANY, Timing
+
+P = TypeVar("P")
+
+#: Decorator of tests: as `cocotb.test`, and long before this much time they are over.
+timed_test = cocotb.test(timeout_time=30, timeout_unit="ms")
+
+
+class Testbench(ABC, Generic[P]):
+    """A top with all that surrounds it. ``start`` it, use it, ``check`` it.
+
+    A place (of type ``P``) is one that a picture is stored at. ``shoot`` a picture to one,
+    ``fetch`` it; or ``begin`` one and leave it at any moment with ``standby``.
+    """
+
+    PLACES: ClassVar[tuple[Any, ...]]
+
+    @classmethod
+    @abstractmethod
+    async def start(cls, dut: Any, timing: Timing = ANY) -> Self:
+        """In standby, with the camera's clock running."""
+
+    @abstractmethod
+    def camera_of(self, place: P) -> Camera:
+        """Where its picture comes from."""
+
+    @abstractmethod
+    def memory_of(self, place: P) -> tuple[Sram, int]:
+        """Memory and bank."""
+
+    @abstractmethod
+    def frame(self, content: bytes) -> list[Tick]:
+        """A frame as the cameras send it, with what comes before it."""
+
+    @abstractmethod
+    async def command(self, place: P) -> None:
+        """From standby to storing, without waiting for the camera."""
+
+    @abstractmethod
+    async def acknowledged(self, place: P, patience: int | None = None) -> bool:
+        """Wait for ACK, for as long as the picture may take, or for ``patience`` ps."""
+
+    @abstractmethod
+    async def standby(self) -> None:
+        """At any moment, from any state."""
+
+    @abstractmethod
+    async def fetch(self, place: P) -> bytes:
+        """From standby to standby: the processor reads the picture there."""
+
+    @abstractmethod
+    async def check(self) -> object:
+        """In the end: everything is as the scoreboard says. Ends in standby."""
+
+    async def store(self, place: P) -> None:
+        """From standby to storing, in time for a frame that is sent from now on."""
+        await self.command(place)
+        await self.camera_of(place).started()
+
+    async def begin(self, place: P, content: bytes) -> None:
+        """From standby: storing begins, and a picture is sent."""
+        await self.store(place)
+        self.camera_of(place).send(self.frame(content))
+
+    async def shoot(self, place: P, content: bytes | None = None) -> bytes:
+        """From standby to standby: a picture is stored, a random one unless it is given."""
+        content = picture() if content is None else content
+        await self.begin(place, content)
+        assert await self.acknowledged(place), "no ACK"
+        await self.standby()
+        assert self.stored(place) == content
+        return content
+
+    def stored(self, place: P) -> bytes:
+        """The picture in a memory, row by row."""
+        sram, bank = self.memory_of(place)
+        return sram.picture(bank)
+
+    def patience(self, place: P) -> int:
+        """Time in ps in which a picture is over, however often the camera's clock stalls."""
+        return patience(self.camera_of(place))

@@ -1,0 +1,118 @@
+"""Mutants' fast tier: those of a block; `make mutants` takes those of the tops."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cubestack.hdl.blocks.pinned import pins_of
+from cubestack.hdl.flow.tools import have_yosys
+from cubestack.hdl.mutants.equivalence import Equivalence
+from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
+from tests.hdl.mutants.suites import CounterAlone
+
+pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+
+ROOT = Path(__file__).parents[3]
+COLUMNS, ROWS = 3, 2
+
+
+@pytest.fixture(scope="module")
+def design() -> CounterAlone:
+    return CounterAlone(COLUMNS, ROWS)
+
+
+@pytest.fixture(scope="module")
+def counter(design: CounterAlone) -> Netlist:
+    return netlist(design)
+
+
+@pytest.fixture(scope="module")
+def every(counter: Netlist) -> list[Mutant]:
+    return mutants(counter)
+
+
+@pytest.fixture(scope="module")
+def equivalence(design: CounterAlone, counter: Netlist) -> Equivalence:
+    return Equivalence(counter, pins_of(design), {"rst": 1})
+
+
+def at(every: list[Mutant], mode: str, wire: str, port: str) -> Mutant:
+    """A mutant by what it does to a wire of the design."""
+    return next(m for m in every if (m.mode, m.wire, m.port) == (mode, wire, port))
+
+
+def test_same_seed_gives_the_same_mutants(counter: Netlist, every: list[Mutant]) -> None:
+    some = mutants(counter, 20, seed=3)
+    assert some == mutants(counter, 20, seed=3)
+    assert some != mutants(counter, 20, seed=4)
+    assert len(set(some)) == 20
+    places = {(m.cell, m.port, m.bit) for m in every}
+    assert {(m.cell, m.port, m.bit) for m in some} < places
+
+
+def test_netlist_is_the_same_everywhere(counter: Netlist) -> None:
+    assert netlist(CounterAlone(COLUMNS, ROWS)) == counter
+    assert str(Path(__file__).parent.anchor) + "home" not in counter.text
+    assert 'src "matrix_counter.py:' in counter.text
+    assert "\\init" not in counter.text
+
+
+def test_all_mutants_are_in_one_text(counter: Netlist, every: list[Mutant]) -> None:
+    text = selectable(counter, every)
+    assert text.count("$value$plusargs") == 1
+    assert all(f"chosen_mutant == 16'h{n:04x}" in text for n in range(1, len(every) + 1))
+
+
+def test_too_many_mutants_are_refused(counter: Netlist, every: list[Mutant]) -> None:
+    with pytest.raises(ValueError, match="at most 65535 mutants, not 65536"):
+        selectable(counter, every[:1] * 65536)
+
+
+def test_difference_is_found(every: list[Mutant], equivalence: Equivalence) -> None:
+    stuck = equivalence.compare(at(every, "const0", "address[1]", "Q"))
+    assert (stuck.equivalent, stuck.steps) == (False, 2 * (COLUMNS - 1) + 1)
+
+
+def test_what_no_reset_reaches_is_a_difference(
+    every: list[Mutant], equivalence: Equivalence
+) -> None:
+    unreset = next(m for m in every if (m.mode, m.port) == ("const0", "ARST"))
+    verdict = equivalence.compare(unreset)
+    assert (verdict.equivalent, verdict.steps) == (False, 1)
+
+
+def test_where_no_state_differs_is_proved(every: list[Mutant], equivalence: Equivalence) -> None:
+    """The last column is 2, so its lower bit need not be looked at: 3 never comes."""
+    last = next(
+        m
+        for m in every
+        if (m.mode, m.port, m.bit, *m.source) == ("const0", "A", 0, "matrix_counter.py:67")
+    )
+    assert equivalence.compare(last).equivalent
+
+
+def score(*options: str) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-m", "tests.hdl.mutants", *options]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_block_is_scored(tmp_path: Path) -> None:
+    """Three wrong gates that the bench notices and one that makes no difference."""
+    options = ("matrix-counter", "--count", "4", "--seed", "23", "--out", str(tmp_path), "--json")
+    done = score(*options)
+    assert done.returncode == 0, done.stderr
+    (found,) = json.loads(done.stdout).values()
+    assert (found["killed"], found["equivalent"], found["survived"]) == (3, 1, 0)
+    kept = tmp_path / "matrix-counter" / "results.jsonl"
+    before = kept.read_text(encoding="utf-8")
+    assert json.loads(score(*options).stdout)["matrix-counter"] == found
+    assert kept.read_text(encoding="utf-8") == before, "what is known is not tried again"
+
+
+def test_unknown_name_is_refused() -> None:
+    done = score("cubestars")
+    assert done.returncode == 2
+    assert "'cubestars' has no mutants; there are cubestar," in done.stderr

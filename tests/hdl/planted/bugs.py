@@ -1,0 +1,293 @@
+"""Bugs planted by hand in the source of the designs, for the regression to catch."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+
+@dataclass(frozen=True)
+class Bug:
+    """One text of a module of ``cubestack.hdl`` that is replaced by another one.
+
+    Attributes:
+        kind: what sort of mistake it is.
+        title: which it is.
+        module: where it is made.
+        old, new: the text, which the module has once, and what stands in its place.
+        tops: those that have it; names of ``regression.TIERS``.
+    """
+
+    kind: str
+    title: str
+    module: str
+    old: str
+    new: str
+    tops: tuple[str, ...]
+
+
+STAR, SHARED, DOUBLE, BOARDS, PAIR = (
+    "cubestar",
+    "cubestar-shared",
+    "cubestar-double",
+    "cubestar-boards",
+    "cubesense-pair",
+)
+ADDRESSING = "cubesense-pair-addressing"
+WRITERS = (STAR, SHARED, DOUBLE, PAIR)
+
+#: Address of a picture's last pixel, in a top of CubeStar.
+_LAST = "((self.rows - 1) << MatrixCounter.address_width(self.columns, 1)) + self.columns - 1"
+
+_BY_KIND = {
+    "off by one": (
+        (
+            "a row ends a column early",
+            "blocks.matrix_counter",
+            "column == self._columns - 1",
+            "column == self._columns - 2",
+            (*WRITERS, BOARDS),
+        ),
+        (
+            "a frame has a row more",
+            "blocks.matrix_counter",
+            "row == self._rows - 1",
+            "row == self._rows % (1 << len(row))",
+            WRITERS,
+        ),
+        (
+            "a nadir scan's line ends early",
+            "cubesense.nadir_scan",
+            "size.rows - 1, size.columns - 1",
+            "size.rows - 2, size.columns - 1",
+            (PAIR,),
+        ),
+        (
+            "the Sun window starts a column too far right",
+            "cubesense.sun_window",
+            "right, last_column = self._position(m, size.window_left, in_window)",
+            "right, last_column = self._position(m, size.window_left - 1, in_window)",
+            (PAIR,),
+        ),
+        (
+            "a gap is one clock shorter",
+            "blocks.frame_gap",
+            "low_clocks == self._clocks",
+            "low_clocks == self._clocks - 1",
+            (PAIR,),
+        ),
+    ),
+    "swapped condition": (
+        (
+            "a line is taken while HSYNC is low",
+            "blocks.frame_writer",
+            "                self.hsync\n                & self.vsync\n",
+            "                ~self.hsync\n                & self.vsync\n",
+            WRITERS,
+        ),
+        (
+            "the address multiplexer's sides",
+            "cubestar.top",
+            "Mux(self.RNW, reader.address, writer.address)",
+            "Mux(self.RNW, writer.address, reader.address)",
+            (STAR,),
+        ),
+        (
+            "reading and writing on the bus",
+            "blocks.bus_port",
+            "self.writing.eq(self.selected & self.re_n & ~self.we_n)",
+            "self.writing.eq(self.selected & ~self.we_n)",
+            (SHARED, DOUBLE, BOARDS),
+        ),
+        (
+            "the direction across the link",
+            "cubesense.dataflow",
+            "(self.rnw, command.rnw),",
+            "(self.rnw ^ (self.shift & ~self.edge), command.rnw),",
+            (PAIR,),
+        ),
+    ),
+    "missing reset": (
+        (
+            "a store that begins inside of a line takes it",
+            "blocks.frame_writer",
+            "between_lines_seen = Signal()",
+            "between_lines_seen = Signal(reset_less=True)",
+            (STAR,),
+        ),
+        (
+            "rows are counted on",
+            "blocks.matrix_counter",
+            "row = Signal(range(self._rows))",
+            "row = Signal(range(self._rows), reset_less=True)",
+            (STAR, PAIR),
+        ),
+        (
+            "a short last row is not forgotten",
+            "blocks.frame_writer",
+            "frame_full = Signal()  # the",
+            "frame_full = Signal(reset_less=True)  # the",
+            (STAR,),
+        ),
+        (
+            "the reader goes on where it was",
+            "cubestar.top",
+            'ResetSignal("dclk").eq(~reading)',
+            'ResetSignal("dclk").eq(0)',
+            (STAR,),
+        ),
+        (
+            "the address latch keeps what it has",
+            "blocks.bus_port",
+            'ResetSignal("ale").eq(~self.on)',
+            'ResetSignal("ale").eq(0)',
+            ("cubestar-shared-latch",),
+        ),
+        (
+            "a scan goes on where it was",
+            "cubesense.nadir_scan",
+            "vertical = Signal()",
+            "vertical = Signal(reset_less=True)",
+            (PAIR,),
+        ),
+        (
+            "a taken address outlives standby",
+            "cubesense.reader",
+            "picture_wanted = self.picture | self.addressing",
+            "picture_wanted = self.picture | self.addressing | ~(self.scan | self.window)",
+            (ADDRESSING,),
+        ),
+    ),
+    "wrong bank": (
+        (
+            "BANK is inverted",
+            "cubestar.top",
+            "bank.eq(self.BANK)",
+            "bank.eq(~self.BANK)",
+            (STAR,),
+        ),
+        (
+            "BANK is not latched",
+            "cubestar.top",
+            "m.d.enable += bank.eq(self.BANK)",
+            "m.d.comb += bank.eq(self.BANK)",
+            (STAR,),
+        ),
+        (
+            "BANK is not latched",
+            "cubestar.shared_top",
+            "m.d.enable += bank.eq(self.BANK)",
+            "m.d.comb += bank.eq(~self.BANK)",
+            (SHARED, BOARDS),
+        ),
+        (
+            "the other memory is stored in",
+            "cubestar.double_top",
+            "m.d.start += into.eq(self.INTO)",
+            "m.d.start += into.eq(~self.INTO)",
+            (DOUBLE,),
+        ),
+        (
+            "own and other sensor's order",
+            "cubesense.top",
+            "own_edge, other_edge = orders if is_sun else orders[::-1]",
+            "own_edge, other_edge = orders[::-1] if is_sun else orders",
+            (PAIR,),
+        ),
+        (
+            "the Sun is looked for in the other camera's picture",
+            "cubesense.top",
+            "sun_writer = own_writer if is_sun else link_writer",
+            "sun_writer = link_writer if is_sun else own_writer",
+            (PAIR,),
+        ),
+    ),
+    "late ACK": (
+        (
+            "one pixel clock",
+            "blocks.frame_writer",
+            "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
+            "(late := Signal()).eq(storing_last_column & counter.last_row),\n"
+            "            self.ack.eq(self.ack | late),",
+            WRITERS,
+        ),
+    ),
+    "early ACK": (
+        (
+            "a row",
+            "blocks.frame_writer",
+            "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
+            "self.ack.eq(self.ack | (self.store & counter.last_row)),",
+            WRITERS,
+        ),
+        (
+            "before the last write pulse",
+            "cubestar.top",
+            "self.ACK.eq(writer.ack)",
+            f"self.ACK.eq(writer.ack | (writer.store & (writer.address == {_LAST})))",
+            (STAR,),
+        ),
+        (
+            "before the last write pulse",
+            "cubesense.top",
+            "self.ACK.eq(own_writer.ack | link_writer.ack)",
+            "self.ACK.eq(own_writer.ack | link_writer.ack | (own_writer.store & (own_writer.address"
+            f" == {_LAST.replace('self.', 'self.read_out.')})))",
+            (PAIR,),
+        ),
+    ),
+    "extra WE pulse": (
+        (
+            "after the last pixel",
+            "blocks.frame_writer",
+            "self.store.eq(accept),",
+            "self.store.eq(accept | (storing_last_column & counter.last_row)),",
+            WRITERS,
+        ),
+        (
+            "after a row",
+            "blocks.frame_writer",
+            "                & ~storing_last_column\n",
+            "",
+            WRITERS,
+        ),
+        (
+            "in the clock's high half",
+            "cubestar.top",
+            "self.SRAM_WE_N.eq(~writer.store | self.PIXCLK)",
+            "self.SRAM_WE_N.eq(~writer.store)",
+            (STAR,),
+        ),
+    ),
+}
+
+BUGS = tuple(Bug(kind, *parts) for kind, bugs in _BY_KIND.items() for parts in bugs)
+
+
+@contextmanager
+def planted(bug: Bug) -> Iterator[dict[str, object]]:
+    """Everything that the designs and the tiers know of the bug's module has the bug.
+
+    Gives the names that the module defines. ValueError when it does not have the text once.
+    """
+    module = import_module(f"cubestack.hdl.{bug.module}")
+    text = Path(str(module.__file__)).read_text(encoding="utf-8")
+    if text.count(bug.old) != 1:
+        raise ValueError(f"{bug.module} has {bug.old!r} {text.count(bug.old)} times, not once")
+    copy = ModuleType(module.__name__)
+    copy.__file__ = module.__file__
+    exec(compile(text.replace(bug.old, bug.new), str(module.__file__), "exec"), vars(copy))
+    replaced = {name: (vars(module)[name], vars(copy)[name]) for name in vars(module)["__all__"]}
+    with pytest.MonkeyPatch.context() as patch:
+        for other in list(sys.modules.values()):
+            name = getattr(other, "__name__", "")
+            if name == "tests.hdl.regression" or name.startswith("cubestack.hdl."):
+                for key, (right, wrong) in replaced.items():
+                    if vars(other).get(key) is right:
+                        patch.setattr(other, key, wrong)
+        yield {name: wrong for name, (_, wrong) in replaced.items()}
