@@ -13,7 +13,8 @@ from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+from cubestack.emulator.i2cdev.direct import DirectI2c
+from cubestack.emulator.ports.direct import DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Processor, Program

@@ -78,7 +78,7 @@ class FaultySource:
         self._cut: tuple[tuple[object, ...], list[_Piece]] | None = None
 
     def segment_at(self, time_ps: int) -> PixelSegment | None:
-        """See PixelSource."""
+        """What the source sends then, cut where a clock is lost or comes twice."""
         if active(self.injections, CameraDead, time_ps):
             return None
         base = self._source.segment_at(time_ps)

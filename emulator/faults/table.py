@@ -1,7 +1,6 @@
 """Every fault there is, declared once."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from cubestack.emulator.faults.declaration import (
     Fault,
@@ -52,8 +51,7 @@ _Y = "line as sent, from 0"
 class UartDrop(Fault):
     """A byte on the serial line is lost."""
 
-    kind: ClassVar[str] = "uart-drop"
-    site: ClassVar[Site] = Site.UART
+    kind, site = "uart-drop", Site.UART
     rate: float = number(1.0, _PART.format("bytes"), "", 0, 1)
     direction: str = choice("both", "way of the bytes", *_BOTH)
 
@@ -62,8 +60,7 @@ class UartDrop(Fault):
 class UartCorrupt(Fault):
     """A byte on the serial line arrives with bits turned over."""
 
-    kind: ClassVar[str] = "uart-corrupt"
-    site: ClassVar[Site] = Site.UART
+    kind, site = "uart-corrupt", Site.UART
     rate: float = number(1.0, _PART.format("bytes"), "", 0, 1)
     direction: str = choice("both", "way of the bytes", *_BOTH)
     mask: int = number(0, "bits to turn over; 0 draws one for each byte", "", 0, 255)
@@ -73,8 +70,7 @@ class UartCorrupt(Fault):
 class UartDelay(Fault):
     """A byte on the serial line is held up, and those behind it with it."""
 
-    kind: ClassVar[str] = "uart-delay"
-    site: ClassVar[Site] = Site.UART
+    kind, site = "uart-delay", Site.UART
     rate: float = number(1.0, _PART.format("bytes"), "", 0, 1)
     direction: str = choice("both", "way of the bytes", *_BOTH)
     delay_ms: float = number(50.0, "how long", "ms", 0, 10_000)
@@ -84,8 +80,7 @@ class UartDelay(Fault):
 class I2cNack(Fault):
     """An address, or a byte that the host writes, gets no acknowledge; the target misses it."""
 
-    kind: ClassVar[str] = "i2c-nack"
-    site: ClassVar[Site] = Site.I2C
+    kind, site = "i2c-nack", Site.I2C
     rate: float = number(1.0, _PART.format("addresses or bytes"), "", 0, 1)
     on: str = choice("address", "what is not acknowledged", "address", "byte")
 
@@ -94,8 +89,7 @@ class I2cNack(Fault):
 class I2cStretch(Fault):
     """The clock is held low after a byte; for over 1 s the host gives up."""
 
-    kind: ClassVar[str] = "i2c-stretch"
-    site: ClassVar[Site] = Site.I2C
+    kind, site = "i2c-stretch", Site.I2C
     rate: float = number(1.0, _PART.format("bytes"), "", 0, 1)
     stretch_us: float = number(500.0, "how long", "us", 0, 10_000_000)
 
@@ -104,8 +98,7 @@ class I2cStretch(Fault):
 class I2cStuck(Fault):
     """A line of the I2C bus is held low."""
 
-    kind: ClassVar[str] = "i2c-stuck"
-    site: ClassVar[Site] = Site.I2C
+    kind, site = "i2c-stuck", Site.I2C
     line: str = choice("SDA", "which one", "SDA", "SCL")
 
 
@@ -113,8 +106,7 @@ class I2cStuck(Fault):
 class AckLate(Fault):
     """The processor sees the rise of the acknowledge too late."""
 
-    kind: ClassVar[str] = "ack-late"
-    site: ClassVar[Site] = Site.ACKNOWLEDGE
+    kind, site = "ack-late", Site.ACKNOWLEDGE
     delay_us: float = number(1_000.0, "how late", "us", 0, 10_000_000)
 
 
@@ -122,16 +114,14 @@ class AckLate(Fault):
 class AckLost(Fault):
     """The processor never sees the acknowledge rise."""
 
-    kind: ClassVar[str] = "ack-lost"
-    site: ClassVar[Site] = Site.ACKNOWLEDGE
+    kind, site = "ack-lost", Site.ACKNOWLEDGE
 
 
 @dataclass(frozen=True)
 class AckStuck(Fault):
     """The acknowledge has one level for the processor, whatever the FPGA says."""
 
-    kind: ClassVar[str] = "ack-stuck"
-    site: ClassVar[Site] = Site.ACKNOWLEDGE
+    kind, site = "ack-stuck", Site.ACKNOWLEDGE
     level: int = number(1, "its level", "", 0, 1)
 
 
@@ -139,9 +129,7 @@ class AckStuck(Fault):
 class ControlGlitch(Fault):
     """A control pin of the FPGA has the other level for a moment."""
 
-    kind: ClassVar[str] = "control-glitch"
-    site: ClassVar[Site] = Site.CONTROL
-    momentary: ClassVar[bool] = True
+    kind, site, momentary = "control-glitch", Site.CONTROL, True
     width_ns: float = number(200.0, "how long", "ns", 1, 1_000_000)
 
 
@@ -149,8 +137,7 @@ class ControlGlitch(Fault):
 class ClockLost(Fault):
     """One pulse of the pixel clock in a line is missing, so a pixel is."""
 
-    kind: ClassVar[str] = "clock-lost"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "clock-lost", Site.CAMERA
     rate: float = number(1.0, _PART.format("frames"), "", 0, 1)
     row: int | None = place(_Y, 2047)
     column: int | None = place(_X, 2047)
@@ -160,8 +147,7 @@ class ClockLost(Fault):
 class ClockExtra(Fault):
     """One pulse of the pixel clock in a line comes twice, so a pixel does."""
 
-    kind: ClassVar[str] = "clock-extra"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "clock-extra", Site.CAMERA
     rate: float = number(1.0, _PART.format("frames"), "", 0, 1)
     row: int | None = place(_Y, 2047)
     column: int | None = place(_X, 2047)
@@ -171,8 +157,7 @@ class ClockExtra(Fault):
 class LineMissing(Fault):
     """The line pin (HSync, HREF) stays low for one line of a frame."""
 
-    kind: ClassVar[str] = "line-missing"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "line-missing", Site.CAMERA
     rate: float = number(1.0, _PART.format("frames"), "", 0, 1)
     row: int | None = place(_Y, 2047)
 
@@ -181,8 +166,7 @@ class LineMissing(Fault):
 class PixelHot(Fault):
     """A pixel is bright without light."""
 
-    kind: ClassVar[str] = "pixel-hot"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "pixel-hot", Site.CAMERA
     x: int | None = place(_X, 2047)
     y: int | None = place(_Y, 2047)
     level: int = number(255, "its value", "DN", 1, 255)
@@ -192,8 +176,7 @@ class PixelHot(Fault):
 class PixelDead(Fault):
     """A pixel is dark in any light."""
 
-    kind: ClassVar[str] = "pixel-dead"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "pixel-dead", Site.CAMERA
     x: int | None = place(_X, 2047)
     y: int | None = place(_Y, 2047)
 
@@ -202,8 +185,7 @@ class PixelDead(Fault):
 class ColumnDefect(Fault):
     """A column of pixels has one value."""
 
-    kind: ClassVar[str] = "column-defect"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "column-defect", Site.CAMERA
     x: int | None = place(_X, 2047)
     level: int = number(255, "the value", "DN", 0, 255)
 
@@ -212,8 +194,7 @@ class ColumnDefect(Fault):
 class Blooming(Fault):
     """Bright pixels spill over along their column."""
 
-    kind: ClassVar[str] = "blooming"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "blooming", Site.CAMERA
     threshold: int = number(250, "least value of a pixel that spills", "DN", 1, 255)
     length: int = number(20, "how far, to either side", "px", 1, 2047)
 
@@ -222,17 +203,14 @@ class Blooming(Fault):
 class CameraDead(Fault):
     """A camera stops as without supply; back again, its registers have their reset values."""
 
-    kind: ClassVar[str] = "camera-dead"
-    site: ClassVar[Site] = Site.CAMERA
+    kind, site = "camera-dead", Site.CAMERA
 
 
 @dataclass(frozen=True)
 class MemoryFlip(Fault):
     """One bit of a memory turns over."""
 
-    kind: ClassVar[str] = "memory-flip"
-    site: ClassVar[Site] = Site.MEMORY
-    momentary: ClassVar[bool] = True
+    kind, site, momentary = "memory-flip", Site.MEMORY, True
     address: int | None = place("byte", 2**25)
     bit: int | None = place("bit of it", 7)
 
@@ -241,8 +219,7 @@ class MemoryFlip(Fault):
 class MemoryUpsets(Fault):
     """Bits of a memory turn over at random places and times."""
 
-    kind: ClassVar[str] = "memory-upsets"
-    site: ClassVar[Site] = Site.MEMORY
+    kind, site = "memory-upsets", Site.MEMORY
     rate: float = number(1e-6, "mean rate of each bit", "/s", 1e-15, 1)
 
 
@@ -250,8 +227,7 @@ class MemoryUpsets(Fault):
 class MemoryStuck(Fault):
     """One bit of a memory always reads the same."""
 
-    kind: ClassVar[str] = "memory-stuck"
-    site: ClassVar[Site] = Site.MEMORY
+    kind, site = "memory-stuck", Site.MEMORY
     address: int | None = place("byte", 2**25)
     bit: int | None = place("bit of it", 7)
     level: int = number(1, "what it reads", "", 0, 1)
@@ -261,9 +237,7 @@ class MemoryStuck(Fault):
 class RegisterFlip(Fault):
     """One bit of a register in the FPGA turns over; in reset it comes back at once."""
 
-    kind: ClassVar[str] = "register-flip"
-    site: ClassVar[Site] = Site.FPGA
-    momentary: ClassVar[bool] = True
+    kind, site, momentary = "register-flip", Site.FPGA, True
     register: str | None = choice(None, "path of the register in the design")
     bit: int | None = place("bit of it", 31)
 
@@ -272,8 +246,7 @@ class RegisterFlip(Fault):
 class RegisterUpsets(Fault):
     """Bits of the FPGA's registers turn over at random places and times."""
 
-    kind: ClassVar[str] = "register-upsets"
-    site: ClassVar[Site] = Site.FPGA
+    kind, site = "register-upsets", Site.FPGA
     rate: float = number(1e-2, "mean rate of each bit", "/s", 1e-15, 1e3)
 
 
@@ -281,43 +254,13 @@ class RegisterUpsets(Fault):
 class LatchUp(Fault):
     """A supply channel draws too much until it is switched off."""
 
-    kind: ClassVar[str] = "latch-up"
-    site: ClassVar[Site] = Site.SUPPLY
-    momentary: ClassVar[bool] = True
+    kind, site, momentary = "latch-up", Site.SUPPLY, True
     extra_ma: float = number(300.0, "current on top", "mA", 1, 5_000)
     lasting: bool = flag(False, "whether it comes back with each switching on")
 
 
-#: Every fault by its kind.
-FAULTS: dict[str, type[Fault]] = {
-    fault.kind: fault
-    for fault in (
-        UartDrop,
-        UartCorrupt,
-        UartDelay,
-        I2cNack,
-        I2cStretch,
-        I2cStuck,
-        AckLate,
-        AckLost,
-        AckStuck,
-        ControlGlitch,
-        ClockLost,
-        ClockExtra,
-        LineMissing,
-        PixelHot,
-        PixelDead,
-        ColumnDefect,
-        Blooming,
-        CameraDead,
-        MemoryFlip,
-        MemoryUpsets,
-        MemoryStuck,
-        RegisterFlip,
-        RegisterUpsets,
-        LatchUp,
-    )
-}
+#: Every fault by its kind, in the order of their declarations.
+FAULTS: dict[str, type[Fault]] = {fault.kind: fault for fault in Fault.__subclasses__()}
 
 
 def make_fault(kind: str, **parameters: object) -> Fault:

@@ -53,7 +53,7 @@ class LineFaults:
     def to_host(
         self, data: bytes, first_ps: int, byte_ps: int, line: Callable[[bytes, int, int], None]
     ) -> None:
-        """See FaultHook."""
+        """Hand ``line`` what arrives of ``data``, of which the first byte ends at ``first_ps``."""
         last_ps = first_ps + (len(data) - 1) * byte_ps
         near = any(
             injection.start_ps <= last_ps
@@ -72,7 +72,7 @@ class LineFaults:
                 line(bytes([arrived]), arrival_ps, byte_ps)
 
     def to_device(self, byte: int, start_ps: int, hear: Callable[[int, int], None]) -> None:
-        """See FaultHook."""
+        """Tell ``hear`` what arrives of a byte that began at ``start_ps``, now or later."""
         arrived, delay_ps = self._disturb(byte, start_ps, "to-device")
         if arrived is None:
             return
@@ -137,24 +137,22 @@ class BusFaults:
         self._injections.remove(injection)
 
     def before_start(self) -> Steps:
-        """See I2cFaultHook. EBUSY: a line was low for longer than a host waits."""
+        """Wait until both lines are high; EBUSY for one that is low for over 1 s."""
         give_up_ps = self._env.now + LONGEST_STRETCH_PS
         while (held := self._stuck()) is not None:
             line, injection = held
             self._report(self._env.now, injection, f"{line} is low, no start is possible")
-            until_ps = give_up_ps if injection.end_ps is None else injection.end_ps
-            yield self._env.timeout(min(until_ps, give_up_ps) - self._env.now)
-            if self._env.now >= give_up_ps:
-                raise I2cError(errno.EBUSY, f"I2C line {line} was low for over 1 s")
+            error = I2cError(errno.EBUSY, f"I2C line {line} was low for over 1 s")
+            yield from self._wait_for_end(injection, give_up_ps, error)
 
     def after_address(self, address: int) -> Steps:
-        """See I2cFaultHook."""
+        """Fail as where nobody answers, or where a line is held."""
         yield from self._lines_free(address)
         if self._nack("address"):
             raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
 
     def after_byte(self, address: int, read: bool) -> Steps:
-        """See I2cFaultHook."""
+        """Stretch the clock, or refuse a byte that the host writes."""
         yield from self._lines_free(address)
         for injection in self._acting():
             fault = injection.fault
@@ -184,10 +182,13 @@ class BusFaults:
             self._report(self._env.now, injection, f"{line} is low in a transfer")
             if line == "SDA":
                 raise I2cError(errno.EAGAIN, "I2C arbitration lost: SDA is held low")
-            until_ps = give_up_ps if injection.end_ps is None else injection.end_ps
-            yield self._env.timeout(min(until_ps, give_up_ps) - self._env.now)
-            if self._env.now >= give_up_ps:
-                raise _timeout(address)
+            yield from self._wait_for_end(injection, give_up_ps, _timeout(address))
+
+    def _wait_for_end(self, injection: Injection, give_up_ps: int, error: I2cError) -> Steps:
+        until_ps = give_up_ps if injection.end_ps is None else injection.end_ps
+        yield self._env.timeout(min(until_ps, give_up_ps) - self._env.now)
+        if self._env.now >= give_up_ps:
+            raise error
 
     def _nack(self, on: str) -> bool:
         for injection in self._acting():

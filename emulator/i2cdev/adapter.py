@@ -104,21 +104,17 @@ class I2cAdapter:
         else:
             self.env.process(self._perform(messages, done))
 
-    def drive(self, kernel: Kernel, goes_on: Callable[[], bool]) -> None:
-        """Take ``kernel`` through the transfer under way, else through the oldest that waits.
+    def drive(self, goes_on: Callable[[], bool]) -> None:
+        """Take the kernel through the transfer under way, else through the oldest that waits.
 
-        Not to be called by what ``kernel`` runs. Ends early when ``goes_on``, asked every
+        Not to be called by what the kernel runs. Ends early when ``goes_on``, asked every
         ``EVENTS`` events, says no; whoever runs the kernel then takes the transfer on.
-
-        Args:
-            kernel: ``env``, or kernels joined to it.
-            goes_on: see above.
         """
         if self._driven is None or self._driven.ended:
             if not self._waiting:
                 return
             self._driven = _Driven(self._perform(*self._waiting.popleft()))
-        self._driven.drive(kernel, goes_on)
+        self._driven.drive(self.env, goes_on)
 
     def _perform(self, messages: list[I2cMessage], done: Done) -> Generator[simpy.Event, Any, None]:
         give_up_ps = self.env.now + self.timeout_ps
@@ -170,7 +166,7 @@ class _Driven:
         self._event: simpy.Event | None = None
 
     def drive(self, kernel: Kernel, goes_on: Callable[[], bool]) -> None:
-        """See I2cAdapter."""
+        """Take ``kernel`` through the steps, as long as ``goes_on`` says so."""
         event, left = self._event, 0
         if event is None:
             event, left = self._go_on(None), EVENTS

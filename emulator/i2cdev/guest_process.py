@@ -24,7 +24,7 @@ from cubestack.emulator.i2cdev.preload.elf import is_static
 from cubestack.emulator.i2cdev.seccomp.filter import make_filter, native_abi
 from cubestack.emulator.i2cdev.seccomp.notify import Listener, read_memory
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor, descriptor_range
-from cubestack.emulator.ports.serial_port import poll_now
+from cubestack.emulator.ports.endpoint import Endpoint, poll_now
 
 __all__ = [
     "GuestProcess",
@@ -56,14 +56,12 @@ def bus_environment(bus: int, path: str) -> dict[str, str]:
     return {"CUBESTACK_I2C_BUS": str(bus), "CUBESTACK_I2C_SOCKET": path}
 
 
-class GuestProcess:
-    """A running program; as a port of the pump it wakes it when the program ends.
+class GuestProcess(Endpoint):
+    """A running program; as a port of a scheduler it wakes that when the program ends.
 
     Attributes:
         name: what was started.
     """
-
-    congested = False
 
     def __init__(
         self, process: "subprocess.Popen[bytes]", name: str, *, adopts: bool = False
@@ -90,23 +88,19 @@ class GuestProcess:
         self._process.send_signal(number)
 
     def watched(self) -> list[tuple[int, int]]:
-        """See Endpoint."""
+        """Its end, which comes once."""
         return [] if self.ended else [(self._pidfd, select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint."""
+        """Note its end; afterwards bury what it left behind."""
         if not self.ended:
             if poll_now(self._pidfd, select.POLLIN):
                 self._process.poll()
         elif self._adopts:
             _bury_children()
 
-    def release_ps(self, count: int) -> int | None:
-        """See Endpoint."""
-        return None
-
     def close(self) -> None:
-        """See Endpoint."""
+        """Watch it no longer; it goes on."""
         os.close(self._pidfd)
 
 

@@ -7,8 +7,8 @@ import struct
 import time
 from collections.abc import Sequence
 
+from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.realtime import Watched
-from cubestack.emulator.ports.serial_port import Endpoint
 
 __all__ = ["Watch", "has_priority", "sharpen_timers", "wait_precisely"]
 
@@ -99,7 +99,7 @@ def sharpen_timers() -> None:
 
 
 def wait_precisely(watched: Watched, timeout_s: float) -> None:
-    """Like the pump's ``wait_ready``, but never too late: it may end ``EARLY_S`` early."""
+    """Like the scheduler's ``wait_ready``, but never too late: it may end ``EARLY_S`` early."""
     entries = b"".join(_ENTRY.pack(fileno, events, 0) for fileno, events in watched)
     timeout_ns = max(0, int((timeout_s - EARLY_S) * NS_PER_S))
     _libc.ppoll(entries, len(watched), _TIMEOUT.pack(*divmod(timeout_ns, NS_PER_S)), None)

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from cubestack.emulator.ports.serial_port import PortError
-from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, reply, request
+from cubestack.emulator.ports.endpoint import Endpoint, PortError
+from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, reply, request, take_packet
 
 __all__ = ["RemoteBus"]
 
@@ -17,14 +17,12 @@ CHUNK_BYTES = 1 << 16
 Done = Callable[[bytes], None]
 
 
-class RemoteBus:
-    """A port of the pump, as in ``emulator/ports/endpoint.py``.
+class RemoteBus(Endpoint):
+    """Its answers, as a port of a scheduler.
 
     Attributes:
         name: path of the socket.
     """
-
-    congested = False
 
     def __init__(self, path: Path) -> None:
         """Use the socket at ``path``; raises PortError when nobody serves it."""
@@ -60,21 +58,17 @@ class RemoteBus:
         return link
 
     def watched(self) -> list[tuple[int, int]]:
-        """See Endpoint."""
+        """All connections at once."""
         return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint."""
+        """Send and receive on the connections that are ready."""
         for fileno, _ in self._poller.poll(0):
             if fileno in self._files:
                 self._files[fileno].exchange()
 
-    def release_ps(self, count: int) -> int | None:
-        """See Endpoint."""
-        return None
-
     def close(self) -> None:
-        """See Endpoint."""
+        """Close all files; their calls fail."""
         for file in list(self._files.values()):
             file.close()
         self._poller.close()
@@ -97,7 +91,7 @@ class _RemoteFile:
         self.gone = False
 
     def perform(self, call: Call, body: bytes, done: Done) -> None:
-        """See OpenFile; EIO when the emulation has gone."""
+        """Send a call; ``done`` gets the packed reply, EIO when the emulation has gone."""
         if self.gone:
             done(reply(-errno.EIO))
             return
@@ -107,7 +101,7 @@ class _RemoteFile:
         self._send()
 
     def close(self) -> None:
-        """See OpenFile."""
+        """Hang up; calls that are not answered yet fail with EIO."""
         if self.gone:
             return
         self.gone = True
@@ -127,21 +121,10 @@ class _RemoteFile:
         except OSError:
             data = b""
         self._received += data
-        while self._due and (answer := self._take_answer()) is not None:
+        while self._due and (answer := take_packet(self._received)) is not None:
             self._due.popleft()(answer)
         if not data:
             self.close()
-
-    def _take_answer(self) -> bytes | None:
-        if len(self._received) < LENGTH.size:
-            return None
-        (length,) = LENGTH.unpack_from(self._received)
-        end = LENGTH.size + length
-        if len(self._received) < end:
-            return None
-        answer = bytes(self._received[LENGTH.size : end])
-        del self._received[:end]
-        return answer
 
     def _send(self) -> None:
         try:

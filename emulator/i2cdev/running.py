@@ -43,7 +43,7 @@ class HostBus:
         kernel: what to drive.
         busy: whether its devices have work of their own.
         adapter: its master; None when that is in another process.
-        port: to serve with the pump.
+        port: to be served by the scheduler.
         files: opens a device file of it.
         path: of the socket that serves it.
     """
@@ -150,7 +150,7 @@ def _emulate(
 
 
 def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
-    """Serve without a pump: the bus is in another process."""
+    """Serve without a scheduler: the bus is in another process."""
     watch = Watch(ports)
     while not run.ended:
         ready = watch.wait(TURNAROUND_NS, awake=True) or watch.wait(IDLE_NS)
@@ -159,16 +159,14 @@ def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
     watch.close()
 
 
-class _Run:
-    """A program under way; as a port of the pump it notices the end.
+class _Run(Endpoint):
+    """A program under way; as a port of the scheduler it notices the end.
 
     Attributes:
         name: of the program.
         ports: what has to be served for it.
         on_end: called when there is nobody left to serve.
     """
-
-    congested = False
 
     def __init__(self, program: GuestProcess, supervisor: Supervisor | None) -> None:
         self.name = program.name
@@ -199,18 +197,10 @@ class _Run:
         elif number != signal.SIGINT:
             self._program.send(number)
 
-    def watched(self) -> list[tuple[int, int]]:
-        """See Endpoint; ``ports`` are watched by themselves."""
-        return []
-
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint."""
+        """Tell of the end; ``ports`` are served by themselves."""
         if self.ended:
             self.on_end()
-
-    def release_ps(self, count: int) -> int | None:
-        """See Endpoint."""
-        return None
 
     def close(self) -> None:
         """Release program and supervisor; the bus is the caller's."""

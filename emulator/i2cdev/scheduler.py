@@ -1,9 +1,9 @@
-"""Takes turns with programs: their calls come in, transfers run, answers go out in time.
+"""Serves programs on a bus: their calls come in, transfers run, answers go out in time.
 
-The pump looks at each event, and at all ports between two of them. A transfer of one byte takes
-less time on the wire than that, so here transfers are done in one go, and the next call is awaited
-at once. Paced, virtual time runs ahead for that, and each answer is held back until wall time gets
-to the end of its transfer.
+The scheduler of all ports looks at each event, and at all ports between two of them. A transfer of
+one byte takes less time on the wire than that, so here transfers are done in one go, and the next
+call is awaited at once. Paced, virtual time runs ahead for that, and each answer is held back until
+wall time gets to the end of its transfer.
 
 When a transfer begins, paced: the way of a call to us and of the answer back is no part of a bus.
 
@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.pacing import Watch
-from cubestack.emulator.ports.serial_port import Endpoint
-from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
+from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.sim.virtual_time import PS_PER_MS
 
 __all__ = ["AHEAD_PS", "MAX_DEBT_NS", "SPIN_NS", "TURNAROUND_NS", "I2cScheduler"]
 
@@ -34,31 +34,28 @@ MAX_DEBT_NS = 1_000_000
 """Lateness that is made up for; what is beyond it was lost to other work on this machine."""
 
 SPIN_NS = 200_000
-"""An answer that is due so soon is waited for without sleep; the pump wakes that early for it."""
+"""An answer that is due so soon is waited for without sleep, and waking comes that early."""
 
 SPARE_NS = 30_000
 """Answers that are ready no longer than this before they are due are worth the processor time
 that it takes to be quicker."""
 
 VISIT_NS = 5_000_000
-"""Wall time between two looks of the pump at its other ports."""
+"""Wall time between two looks at the other ports."""
 
 PS_PER_NS = 1000
 
 
-class I2cScheduler:
-    """Ports that lead to one bus, as one port of the pump.
+class I2cScheduler(Endpoint):
+    """Ports that lead to one bus, as one port of the scheduler of all ports.
 
     Attributes:
         name: what it serves.
     """
 
-    congested = False
-
     def __init__(
         self,
         name: str,
-        kernel: Kernel,
         adapter: I2cAdapter,
         ports: Sequence[Endpoint],
         busy: Callable[[], bool],
@@ -70,7 +67,6 @@ class I2cScheduler:
 
         Args:
             name: for messages.
-            kernel: that of ``adapter``, or kernels joined to it; its time is in ps.
             adapter: the master of the bus; from now on driven.
             ports: where calls come from; closed by their owner.
             busy: whether devices have work of their own.
@@ -78,7 +74,7 @@ class I2cScheduler:
             always_asleep: whether the next call is never waited for awake.
         """
         self.name = name
-        self._kernel = kernel
+        self._kernel = adapter.env
         self._adapter = adapter
         self._ports = ports
         self._busy = busy
@@ -93,9 +89,9 @@ class I2cScheduler:
         adapter.holding = not fast
 
     def clock_ns(self) -> int:
-        """Wall time for the pump; paced, so far back that a call may begin before it came.
+        """Wall time by which all ports are paced, so far back that a call may begin before it came.
 
-        It is virtual time when the pump starts, so that both have one scale.
+        It is virtual time at the start, so that both have one scale.
         """
         if not self._begun:
             self._origin_ns = time.monotonic_ns() - self._kernel.now // PS_PER_NS - self._behind_ns
@@ -105,20 +101,20 @@ class I2cScheduler:
         return time.monotonic_ns() - self._origin_ns
 
     def watched(self) -> list[tuple[int, int]]:
-        """See Endpoint."""
+        """Those of all its ports."""
         return [item for port in self._ports for item in port.watched()]
 
     def release_ps(self, count: int) -> int | None:
-        """See Endpoint; on the scale of ``clock_ns``."""
+        """When the next answer is due, on the scale of ``clock_ns``."""
         due_ps = self._adapter.release_ps()
         return None if due_ps is None else due_ps - self._behind_ns * PS_PER_NS
 
     def close(self) -> None:
-        """See Endpoint; the ports are their owner's."""
+        """Watch no longer; the ports are their owner's."""
         self._watch.close()
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint; goes on as long as calls come one after the other, up to ``VISIT_NS``."""
+        """Serve calls; goes on as long as they come one after the other, up to ``VISIT_NS``."""
         self._begun = True
         came = bool(self._watch.wait(0))
         self._serve(self._ports, came=came)
@@ -172,7 +168,7 @@ class I2cScheduler:
             def goes_on() -> bool:
                 return clock() < end_ns and (kernel.horizon() or 0) <= limit_ps
 
-        adapter.drive(kernel, goes_on)
+        adapter.drive(goes_on)
         while kernel.horizon() == kernel.now:  # what is left of it
             kernel.step()
 

@@ -18,13 +18,14 @@ from pathlib import Path
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
-from cubestack.emulator.ports.serial_port import PortError
+from cubestack.emulator.ports.endpoint import Endpoint, PortError
 from cubestack.firmware_model.formats.linux_i2c import (
     LENGTH,
     MAX_REQUEST_BYTES,
     Call,
     reply,
     split_request,
+    take_packet,
 )
 
 __all__ = ["MAX_CLIENTS", "I2cServer"]
@@ -36,14 +37,12 @@ CHUNK_BYTES = 1 << 16
 HUNG_UP = select.EPOLLHUP | select.EPOLLERR
 
 
-class I2cServer:
-    """The port, as the pump serves it (see ``emulator/ports/endpoint.py``).
+class I2cServer(Endpoint):
+    """All connections, as one port of a scheduler.
 
     Attributes:
         name: path of the socket.
     """
-
-    congested = False
 
     def __init__(self, path: Path, adapter: I2cAdapter) -> None:
         """Listen at ``path``, whose folder is made for this user alone.
@@ -74,11 +73,11 @@ class I2cServer:
         return len(self._clients)
 
     def watched(self) -> list[tuple[int, int]]:
-        """See Endpoint."""
+        """All connections at once, and whoever comes."""
         return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint; answers go out at the end of their transfer, whenever that is."""
+        """Takes calls; answers go out at the end of their transfer, whenever that is."""
         for fileno, events in self._poller.poll(0):
             client = self._clients.get(fileno)
             if client is None:
@@ -107,12 +106,8 @@ class I2cServer:
         self._poller.unregister(fileno)
         self._clients.pop(fileno).close()
 
-    def release_ps(self, count: int) -> int | None:
-        """See Endpoint; nothing waits here for its time."""
-        return None
-
     def close(self) -> None:
-        """See Endpoint."""
+        """Hang up on all clients, and remove the socket."""
         for client in self._clients.values():
             client.close()
         self._clients.clear()
@@ -186,19 +181,11 @@ class _Client:
 
     def _take_call(self) -> bool:
         """Start the oldest whole call; returns whether there was one."""
-        if len(self._received) < LENGTH.size:
-            return False
-        (length,) = LENGTH.unpack_from(self._received)
-        if length > MAX_REQUEST_BYTES:
-            self.gone = True
-            return False
-        end = LENGTH.size + length
-        if len(self._received) < end:
-            return False
-        data = bytes(self._received[LENGTH.size : end])
-        del self._received[:end]
-        self._waiting = True
         try:
+            data = take_packet(self._received, MAX_REQUEST_BYTES)
+            if data is None:
+                return False
+            self._waiting = True
             key, call, body = split_request(data)
             if call is Call.OPEN:
                 self._key = key

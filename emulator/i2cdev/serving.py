@@ -12,8 +12,8 @@ from typing import Literal
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.pacing import sharpen_timers, wait_precisely
 from cubestack.emulator.i2cdev.scheduler import I2cScheduler
+from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
-from cubestack.emulator.ports.serial_port import Endpoint
 from cubestack.emulator.sim.virtual_time import Kernel
 
 __all__ = ["open_scheduler"]
@@ -57,7 +57,6 @@ def open_scheduler(
     sharpen_timers()
     calls = I2cScheduler(
         "I2C bus",
-        kernel,
         adapter,
         i2c_ports,
         busy,

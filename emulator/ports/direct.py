@@ -1,26 +1,14 @@
-"""In-process links: a host in the same Python process drives virtual time by waiting.
+"""In-process serial link: a host in the same Python process drives virtual time by waiting.
 
-The host side has the transport interface of `cubestack.host` (write, read, close) for the serial
-line, and for the I2C bus the one method of smbus2 that carries any transfer (i2c_rdwr); for all
-others give it to ``cubestack.host.transport.smbus.CubeSMBus``. Waiting for an answer runs the
-simulation; nothing else does, so a run is repeatable to the byte.
+It has the transport interface of `cubestack.host` (write, read, close). Waiting for an answer runs
+the simulation; nothing else does, so a run is repeatable to the byte.
 """
 
-import errno
-from typing import Any
-
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.i2cdev.adapter import I2cAdapter
-from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
-__all__ = ["DirectI2c", "DirectSerial"]
-
-I2C_M_RD = 0x0001
-"""Flag of a message that reads, as in linux/i2c.h; no other flag is supported."""
+__all__ = ["DirectSerial"]
 
 
 class DirectSerial:
@@ -57,55 +45,3 @@ class DirectSerial:
     def close(self) -> None:
         """Unplug; later output is lost."""
         self._line.unplug()
-
-
-class DirectI2c:
-    """The host's end of an I2C bus, with smbus2's ``i2c_rdwr``; also one opened device file."""
-
-    def __init__(self, env: Kernel, bus: I2cBus) -> None:
-        """Become a master of ``bus``."""
-        self._env = env
-        self._bus = bus
-        self._file = DeviceFile(I2cAdapter(env, bus))
-
-    def i2c_rdwr(self, *messages: Any) -> None:
-        """Perform one combined transfer of smbus2 ``i2c_msg`` objects.
-
-        Raises OSError: I2cError when something is not acknowledged, EOPNOTSUPP for a message
-        with other flags than that for reading.
-        """
-        plain = [_to_plain(message) for message in messages]
-        self._env.run(until=self._env.process(self._bus.transfer(plain)))
-        for message, done in zip(messages, plain, strict=True):
-            if done.read:
-                for index, byte in enumerate(done.data):
-                    message.buf[index] = bytes([byte])
-
-    def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        """Do a packed call of the device file (see ``firmware_model/formats/linux_i2c.py``).
-
-        Returns the result, 0 or more or a negative errno, and data.
-        """
-        replies: list[bytes] = []
-        self._file.perform(call, body, replies.append)
-        while not replies:
-            self._env.step()
-        return split_reply(replies[0])
-
-    def close(self) -> None:
-        """Nothing is left behind."""
-
-    def wait(self, seconds: float) -> None:
-        """Let ``seconds`` of virtual time pass."""
-        self._env.advance_to(self._env.now + int(seconds * PS_PER_S))
-
-
-def _to_plain(message: Any) -> I2cMessage:
-    if message.flags & ~I2C_M_RD:
-        raise OSError(
-            errno.EOPNOTSUPP, f"I2C message flags {message.flags:#06x}: only reading is supported"
-        )
-    if message.flags & I2C_M_RD:
-        return I2cMessage(message.addr, read=message.len)
-    # Not bytearray(message): that is the structure itself, by the buffer protocol of ctypes.
-    return I2cMessage(message.addr, bytearray(bytes(message)))

@@ -1,7 +1,7 @@
-"""The pump: alternates between virtual time and the open ports.
+"""The scheduler that alternates between virtual time and the open ports.
 
-Paced "real", virtual time follows wall time; when the machine can not keep up, the pump says by
-how much. Paced "fast", virtual time runs ahead as long as the device has work or bytes are on a
+Paced "real", virtual time follows wall time; when the machine can not keep up, the scheduler says
+by how much. Paced "fast", virtual time runs ahead as long as the device has work or bytes are on a
 wire, and follows wall time while everything waits for the host, or a client reads too slowly.
 """
 
@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Literal
 
-from cubestack.emulator.ports.serial_port import Endpoint
+from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 __all__ = [
@@ -72,10 +72,10 @@ class RealtimeScheduler:
             env: kernel; its time is in ps.
             endpoints: open ports.
             busy: whether the device has work, or bytes are on a wire.
-            pace: see the module's text.
+            pace: whether virtual time follows wall time or runs ahead (text of the module).
             report: receives a line when pace "real" can not be kept.
             clock_ns: wall time in ns from any origin; never runs back.
-            wait: see ``wait_ready``.
+            wait: waits for descriptors, at most so many s, as ``wait_ready`` does.
         """
         self._env = env
         self._endpoints = endpoints

@@ -1,7 +1,7 @@
 """A serial port on TCP whose client chooses baud rate and format: RFC 2217, through pyserial.
 
 The device's end keeps its format. A client that chooses another one hears garbage and is not
-understood, as on a real line; see ``emulator.bus.line_format``. Bytes with errors reach the client
+understood, as on a real line (``emulator.bus.line_format``). Bytes with errors reach the client
 as they were received, as Linux's serial drivers hand them on; who asks for line states is told of
 them. A client that says nothing of a format has the device's. Accepted without effect: flow
 control and modem lines, as the line has neither.
@@ -17,8 +17,8 @@ from serial.rfc2217 import IAC, IAC_DOUBLED, SERVER_NOTIFY_LINESTATE, PortManage
 
 from cubestack.emulator.bus.line_format import LineFormat, Parity
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.endpoint import TcpEndpoint
 from cubestack.emulator.ports.line import HostLine
+from cubestack.emulator.ports.tcp import TcpEndpoint
 
 __all__ = ["Rfc2217Endpoint"]
 
@@ -38,7 +38,7 @@ class Rfc2217Endpoint(TcpEndpoint):
     scheme = "rfc2217"
 
     def __init__(self, host: str, port: int, uart: Uart, *, allow_remote: bool = False) -> None:
-        """See TcpEndpoint."""
+        """Listen on ``host``:``port``, as :class:`TcpEndpoint` does; same errors."""
         self._device_form = uart.form
         self._written = bytearray()
         self._replies = bytearray()
@@ -47,7 +47,7 @@ class Rfc2217Endpoint(TcpEndpoint):
         super().__init__(host, port, uart, allow_remote=allow_remote)
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint."""
+        """Also tells a client that asked for it of errors on the line, and sends what was left."""
         self._now_ps = now_ps
         errors = self._line.framing_errors, self._line.parity_errors
         super().exchange(now_ps)

@@ -1,4 +1,4 @@
-"""What a port is that other programs can open, and what all serial ports have in common.
+"""What all serial ports that other programs can open have in common.
 
 A serial port moves bytes between a client's descriptor and a UART line; neither side can flood it:
 
@@ -11,13 +11,13 @@ A serial port moves bytes between a client's descriptor and a UART line; neither
 """
 
 import select
-from abc import ABC, abstractmethod
-from typing import Protocol
+from abc import abstractmethod
 
 from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.line import HostLine
 
-__all__ = ["MAX_UNREAD", "MAX_UNSENT", "Endpoint", "PortError", "SerialPort", "poll_now"]
+__all__ = ["MAX_UNREAD", "MAX_UNSENT", "SerialPort"]
 
 MAX_UNREAD = 1 << 16
 """Bytes that wait for a slow client before the oldest are dropped."""
@@ -26,36 +26,8 @@ MAX_UNSENT = 4096
 """Bytes that wait for the wire to the device: the size of Linux's own buffer of a serial port."""
 
 
-class PortError(OSError):
-    """A port can not be opened; the text names it and what would be right."""
-
-
-class Endpoint(Protocol):
-    """A port that the pump serves."""
-
-    name: str
-
-    @property
-    def congested(self) -> bool:
-        """Whether the client reads more slowly than the device's output is released."""
-
-    def watched(self) -> list[tuple[int, int]]:
-        """Descriptors and the events of ``select.poll`` that should wake the pump."""
-
-    def exchange(self, now_ps: int) -> None:
-        """Move what can be moved at virtual time ``now_ps``, without blocking."""
-
-    def release_ps(self, count: int) -> int | None:
-        """When the next ``count`` bytes from the device, or all, have arrived; None without any."""
-
-    def close(self) -> None:
-        """Release the port."""
-
-
-class SerialPort(ABC):
+class SerialPort(Endpoint):
     """The buffers, and the order of an exchange; a subclass knows the descriptors."""
-
-    name: str
 
     def __init__(self, uart: Uart) -> None:
         """Plug into ``uart``."""
@@ -65,11 +37,11 @@ class SerialPort(ABC):
 
     @property
     def congested(self) -> bool:
-        """See Endpoint."""
+        """Whether released bytes wait here for the client."""
         return bool(self._unread)
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint."""
+        """Client to line as far as there is room; line to the client that is there."""
         while (room := self._room()) > 0 and (data := self._read(room)):
             self._line.write(data)
         arrived = self._line.take(now_ps)
@@ -84,11 +56,11 @@ class SerialPort(ABC):
             del self._unread[: self._write(self._unread)]
 
     def release_ps(self, count: int) -> int | None:
-        """See Endpoint."""
+        """When the line has delivered the next ``count`` bytes, or all; None without any."""
         return self._line.arrival_ps(count)
 
     def close(self) -> None:
-        """See Endpoint."""
+        """Take the line's plug out."""
         self._line.unplug()
 
     def _room(self) -> int:
@@ -110,11 +82,3 @@ class SerialPort(ABC):
     @abstractmethod
     def _write(self, data: bytearray) -> int:
         """Hand ``data`` to the client; returns how many bytes it could take."""
-
-
-def poll_now(fileno: int, events: int) -> int:
-    """Events of one descriptor now, POLLHUP and POLLERR always among them."""
-    poller = select.poll()
-    poller.register(fileno, events)
-    ready = poller.poll(0)
-    return ready[0][1] if ready else 0

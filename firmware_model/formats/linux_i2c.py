@@ -51,6 +51,7 @@ __all__ = [
     "split_rdwr",
     "split_reply",
     "split_request",
+    "take_packet",
     "unpack_ioctl",
     "unpack_rdwr",
     "unpack_read",
@@ -210,6 +211,24 @@ def split_request(data: bytes) -> tuple[int, Call, bytes]:
 def reply(result: int, data: bytes = b"") -> bytes:
     """A reply without the length before it."""
     return _RESULT.pack(result) + data
+
+
+def take_packet(received: bytearray, most: int | None = None) -> bytes | None:
+    """Take the oldest packet from what was ``received``; None unless it is whole.
+
+    Raises ValueError for one of more than ``most`` bytes behind its length.
+    """
+    if len(received) < LENGTH.size:
+        return None
+    (length,) = LENGTH.unpack_from(received)
+    if most is not None and length > most:
+        raise ValueError(f"a packet has {most} bytes at most, not {length}")
+    end = LENGTH.size + length
+    if len(received) < end:
+        return None
+    packet = bytes(received[LENGTH.size : end])
+    del received[:end]
+    return packet
 
 
 def split_reply(data: bytes) -> tuple[int, bytes]:

@@ -14,7 +14,7 @@ from cubestack.host.devices.registry import device_names
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
-    from cubestack.emulator.ports.serial_port import Endpoint
+    from cubestack.emulator.ports.endpoint import Endpoint
 
 __all__ = ["add_port_arguments", "open_ports"]
 
@@ -79,8 +79,9 @@ def _open(
     index: int,
     count: int,
 ) -> Endpoint:
-    from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
+    from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
     from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
+    from cubestack.emulator.ports.tcp import TcpEndpoint
 
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     if first is None:

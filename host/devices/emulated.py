@@ -113,7 +113,7 @@ class EmulatedDevice(Generic[BoardT_co, ClientT_co]):
         subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
         """
         from cubestack.emulator.i2cdev.serving import open_scheduler
-        from cubestack.emulator.ports.endpoint import PtyEndpoint
+        from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 
         self._client = None
         with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:

@@ -37,7 +37,7 @@ def install(libc: ctypes.CDLL, number: int, steps: bytes) -> int:
 
 
 def main(link_fd: str, number: str, *command: str) -> None:
-    """See the module's text."""
+    """Install the filter, hand the listener over, become the program."""
     link = socket.socket(fileno=int(link_fd))
     link.set_inheritable(False)
     libc = ctypes.CDLL(None, use_errno=True)

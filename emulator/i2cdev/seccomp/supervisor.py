@@ -27,6 +27,7 @@ from cubestack.emulator.i2cdev.seccomp.notify import (
     read_text,
     write_memory,
 )
+from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
 __all__ = ["Files", "OpenFile", "Supervisor", "descriptor_range"]
@@ -62,16 +63,14 @@ def descriptor_range() -> range:
     return range(max(3, end - DESCRIPTORS), end)
 
 
-class Supervisor:
-    """A port of the pump, as in ``emulator/ports/endpoint.py``.
+class Supervisor(Endpoint):
+    """The filtered program's calls, as a port of a scheduler.
 
     Attributes:
         name: what it serves.
         ended: whether every process under the filter has ended.
-        hands_over: see Listener.
+        hands_over: whether callers wake this process on their own processor, and wait for it.
     """
-
-    congested = False
 
     def __init__(
         self, listener: Listener, abi: Abi, node: DeviceNode, descriptors: range, files: Files
@@ -95,11 +94,11 @@ class Supervisor:
         }
 
     def watched(self) -> list[tuple[int, int]]:
-        """See Endpoint."""
+        """What the kernel tells the listener, until all processes have ended."""
         return [] if self.ended else [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """See Endpoint; answers go out at the end of their transfer, whenever that is."""
+        """Takes calls; answers go out at the end of their transfer, whenever that is."""
         while not self.ended and (ready := self._poller.poll(0)):
             for fd, events in ready:
                 if fd != self._listener.fd:
@@ -111,12 +110,8 @@ class Supervisor:
             if self._transfers:
                 break  # which is what the caller waits for
 
-    def release_ps(self, count: int) -> int | None:
-        """See Endpoint; nothing waits here for its time."""
-        return None
-
     def close(self) -> None:
-        """See Endpoint."""
+        """Close all device files, and let the kernel fail what is called from now on."""
         for file, end in self._opened.values():
             end.close()
             file.close()

@@ -124,7 +124,7 @@ def test_driven_transfers_are_the_same(patience, steps):
 
     def run():
         while adapter.busy:
-            adapter.drive(kernel, Patience(patience))
+            adapter.drive(Patience(patience))
             for _ in range(steps):
                 if kernel.horizon() is not None:
                     kernel.step()
@@ -135,9 +135,9 @@ def test_driven_transfers_are_the_same(patience, steps):
 def test_a_drive_without_a_transfer(kernel, adapter):
     adapter.driven = True
     assert not adapter.beginning
-    adapter.drive(kernel, lambda: True)
+    adapter.drive(lambda: True)
     adapter.submit([I2cMessage(0x1A)], lambda _result: None)
     assert adapter.beginning
-    adapter.drive(kernel, lambda: True)
+    adapter.drive(lambda: True)
     assert not adapter.beginning
     assert not adapter.busy

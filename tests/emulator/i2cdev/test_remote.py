@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.i2cdev.remote import RemoteBus
-from cubestack.emulator.ports.serial_port import PortError
+from cubestack.emulator.ports.endpoint import PortError
 from cubestack.firmware_model.formats.linux_i2c import (
     Call,
     Ioctl,

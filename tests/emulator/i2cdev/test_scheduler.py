@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
-from cubestack.emulator.i2cdev import scheduler as turns
+from cubestack.emulator.i2cdev import scheduler as module
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, I2cScheduler
 from cubestack.emulator.ports.realtime import RealtimeScheduler
@@ -106,7 +106,7 @@ class GuestProcess:
 
     def __init__(
         self,
-        bench: "Bench",
+        bench: "ScheduledWorld",
         wait_ns: int,
         think_ns: int,
         calls: int,
@@ -149,8 +149,8 @@ class GuestProcess:
         return self.times[-1][1] - self.times[0][1]
 
 
-class Bench:
-    """I2cScheduler and a pump in a world."""
+class ScheduledWorld:
+    """Both schedulers in a world."""
 
     def __init__(
         self,
@@ -160,27 +160,27 @@ class Bench:
         busy: Callable[[], bool] = lambda: False,
     ) -> None:
         self.world = World()
-        patch.setattr(turns, "time", self.world)
-        patch.setattr(turns, "Watch", AtWork)
+        patch.setattr(module, "time", self.world)
+        patch.setattr(module, "Watch", AtWork)
         self.kernel = Kernel()
         bus = I2cBus(self.kernel, 10**9 // BIT_NS)
         bus.attach(0x1A, Registers())
         self.adapter = I2cAdapter(self.kernel, bus)
         self.running = 0
         port = Port(self.world)
-        self.turns = I2cScheduler("calls", self.kernel, self.adapter, [port], busy, fast=fast)
-        self.pump = RealtimeScheduler(
+        self.calls = I2cScheduler("calls", self.adapter, [port], busy, fast=fast)
+        self.scheduler = RealtimeScheduler(
             self.kernel,
-            [self.turns, port],
+            [self.calls, port],
             lambda: self.adapter.busy or busy(),
             pace="fast" if fast else "real",
-            clock_ns=self.turns.clock_ns,
+            clock_ns=self.calls.clock_ns,
             wait=self._wait,
         )
 
     def _wait(self, _watched: object, timeout_s: float) -> None:
         if not self.running:
-            self.pump.stop()
+            self.scheduler.stop()
         self.world.sleep(max(0, int(timeout_s * 1e9) - 150 * US))
 
     def program(
@@ -221,14 +221,14 @@ class AtWork:
 
 
 @pytest.fixture
-def make(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Bench]:
-    return partial(Bench, monkeypatch)
+def make(monkeypatch: pytest.MonkeyPatch) -> Callable[..., ScheduledWorld]:
+    return partial(ScheduledWorld, monkeypatch)
 
 
 def test_transfers_one_after_the_other_take_the_time_of_the_wire(make):
     bench = make()
     program = bench.program(think_ns=8 * US, calls=201)
-    bench.pump.run()
+    bench.scheduler.run()
     assert program.span / 200 == pytest.approx(READ_NS, rel=0.01)
     assert min(program.durations[1:]) > READ_NS - 8 * US - US
 
@@ -238,9 +238,9 @@ def test_transfers_one_after_the_other_take_the_time_of_the_wire(make):
 def test_no_answer_is_early(think_us):
     """Whatever the programs do, the wire does one thing at a time."""
     with pytest.MonkeyPatch.context() as patch:
-        bench = Bench(patch)
+        bench = ScheduledWorld(patch)
         programs = [bench.program(think * US, 20) for think in think_us]
-        bench.pump.run()
+        bench.scheduler.run()
     seen = sorted(end for program in programs for _, end in program.times)
     began = min(program.times[0][0] for program in programs)
     for count, end in enumerate(seen, 1):
@@ -251,7 +251,7 @@ def test_no_answer_is_early(think_us):
 def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
     bench = make()
     program = bench.quick_and_slow(think_ns=think_us * US, calls=20)
-    bench.pump.run()
+    bench.scheduler.run()
     assert len(program.durations) == 20
     for duration in program.durations:
         assert duration == pytest.approx(READ_NS, abs=5 * US)
@@ -260,7 +260,7 @@ def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
 def test_nothing_is_known_of_the_first_call(make):
     bench = make()
     program = bench.program(think_ns=1_000 * US, calls=1)
-    bench.pump.run()
+    bench.scheduler.run()
     assert program.durations[0] == pytest.approx(READ_NS + 2 * WAY_NS, abs=5 * US)
 
 
@@ -274,7 +274,7 @@ def test_a_late_answer_is_made_up_for(make, think_us, when_us):
         bench = make()
         bench.world.stalls = stalls
         program = bench.quick_and_slow(think_ns=think_us * US, calls=101)
-        bench.pump.run()
+        bench.scheduler.run()
         spans.append(program.span)
     assert spans[1] == pytest.approx(spans[0], abs=50 * US)
 
@@ -285,7 +285,7 @@ def test_what_is_too_late_is_lost(make, when_us, stall_us):
     bench = make()
     bench.world.stalls = [(bench.world.now_ns + when_us * US, stall_us * US)]
     program = bench.program(think_ns=8 * US, calls=101)
-    bench.pump.run()
+    bench.scheduler.run()
     lost_us = (program.span - 100 * READ_NS) / US
     assert stall_us - 1_050 < lost_us < stall_us + 200
 
@@ -294,7 +294,7 @@ def test_what_is_too_late_is_lost(make, when_us, stall_us):
 def test_a_long_transfer(make, bytes_):
     bench = make()
     program = bench.program(8 * US, 5, lambda: [I2cMessage(0x1A, read=bytes_)])
-    bench.pump.run()
+    bench.scheduler.run()
     wire_ns = (1 + 9 + 9 * bytes_ + 1) * BIT_NS
     assert program.span / 4 == pytest.approx(wire_ns, rel=0.01)
 
@@ -302,7 +302,7 @@ def test_a_long_transfer(make, bytes_):
 def test_programs_take_turns_on_the_wire(make):
     bench = make()
     programs = [bench.program(think_ns=8 * US, calls=51) for _ in range(3)]
-    bench.pump.run()
+    bench.scheduler.run()
     for program in programs:
         assert program.span / 50 == pytest.approx(3 * READ_NS, rel=0.05)
 
@@ -310,7 +310,7 @@ def test_programs_take_turns_on_the_wire(make):
 def test_as_fast_as_possible_virtual_time_is_that_of_the_wire(make):
     bench = make(fast=True)
     program = bench.program(think_ns=0, calls=101)
-    bench.pump.run()
+    bench.scheduler.run()
     assert program.span / 100 < READ_NS * 0.7
     assert bench.kernel.now >= 101 * READ_NS * US
 
@@ -320,6 +320,6 @@ def test_as_fast_as_possible_a_device_at_work_goes_ahead(make):
     bench = make(fast=True, busy=lambda: bool(program.ends) and bench.kernel.now < 10**11)
     bench.kernel.process(bench.kernel.timeout(10**9) for _ in range(100))
     program = bench.program(think_ns=0, calls=10)
-    bench.pump.run()
+    bench.scheduler.run()
     assert program.ends[0] < 10**10
     assert program.ends[1] > 10**11

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cubestack.emulator.i2cdev.server import MAX_CLIENTS, _Client
-from cubestack.emulator.ports.serial_port import PortError
+from cubestack.emulator.ports.endpoint import PortError
 from cubestack.firmware_model.formats.linux_i2c import (
     LENGTH,
     MAX_REQUEST_BYTES,

@@ -17,9 +17,10 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
+from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
-from cubestack.emulator.ports.serial_port import Endpoint
+from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.emulator.sim.virtual_time import Kernel
 
 TIMEOUT_S = 20.0  # of a client that waits for what must come
@@ -194,18 +195,18 @@ def connection_to() -> type[Connection]:
 
 @contextlib.contextmanager
 def _served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
-    pump = RealtimeScheduler(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
-    thread = threading.Thread(target=pump.run)
+    scheduler = RealtimeScheduler(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
+    thread = threading.Thread(target=scheduler.run)
     thread.start()
     try:
         yield
     finally:
-        pump.stop()
+        scheduler.stop()
         thread.join(TIMEOUT_S)
         assert not thread.is_alive()
 
 
 @pytest.fixture
 def served() -> Callable[..., contextlib.AbstractContextManager[None]]:
-    """served(device, endpoint, pace): the endpoint is served by a pump in a thread."""
+    """served(device, endpoint, pace): the endpoint is served by a scheduler in a thread."""
     return _served

@@ -13,10 +13,11 @@ from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
+from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import (
     LENGTH,
@@ -68,7 +69,7 @@ class Target:
 
 
 class Wall:
-    """Wall time that passes when the pump waits, as rounded by ``wait_ready``.
+    """Wall time that passes when the scheduler waits, as rounded by ``wait_ready``.
 
     Something happens in each wait.
     """
@@ -170,7 +171,7 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path, terminal_at, connec
         desk.clients["i2c", "stopped"].write(READ_BYTES[:-1])
         got = dict.fromkeys((*SERIAL, "i2c"), 0)
         steps = 0
-        pump = RealtimeScheduler(
+        scheduler = RealtimeScheduler(
             desk.kernel,
             [*desk.ports.values(), desk.server],
             desk.busy,
@@ -192,10 +193,10 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path, terminal_at, connec
             if steps == 200:
                 tracemalloc.start()
             if steps == 600:
-                pump.stop()
+                scheduler.stop()
 
         wall.during_wait = step
-        pump.run()
+        scheduler.run()
         grown, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         assert desk.kernel.now > PS_PER_S // 2
@@ -225,7 +226,7 @@ def test_two_lines_of_a_device_at_once(tmp_path, terminal_at):
         clients = [terminal_at(tmp_path / name) for name in ("tty", "tty.bench")]
         for thing in (*ports, *clients):
             stack.callback(thing.close)
-        pump = RealtimeScheduler(
+        scheduler = RealtimeScheduler(
             kernel,
             ports,
             lambda: node.uart.busy or bench.uart.busy,
@@ -242,8 +243,8 @@ def test_two_lines_of_a_device_at_once(tmp_path, terminal_at):
                 clients[0].write(b"abc")
                 clients[1].write(b"q")
             if waits == 20:
-                pump.stop()
+                scheduler.stop()
 
         wall.during_wait = step
-        pump.run()
+        scheduler.run()
         assert (clients[0].read(3), clients[1].read(3)) == (b"abc", b"qqq")

@@ -6,7 +6,8 @@ import pytest
 from smbus2 import i2c_msg
 
 from cubestack.emulator.bus.i2c import I2cBus, I2cError
-from cubestack.emulator.ports.direct import DirectI2c, DirectSerial
+from cubestack.emulator.i2cdev.direct import DirectI2c
+from cubestack.emulator.ports.direct import DirectSerial
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, pack_ioctl, pack_read
 

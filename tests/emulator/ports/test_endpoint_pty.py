@@ -1,4 +1,4 @@
-"""The pseudo-terminal against real programs, with every look of the pump made by the test."""
+"""The pseudo-terminal against real programs, with every look of the scheduler made by the test."""
 
 import contextlib
 import fcntl
@@ -10,9 +10,10 @@ import tty
 
 import pytest
 
-from cubestack.emulator.ports.endpoint import PortError, PtyEndpoint
+from cubestack.emulator.ports.endpoint import PortError, poll_now
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import wait_ready
-from cubestack.emulator.ports.serial_port import MAX_UNSENT, poll_now
+from cubestack.emulator.ports.serial_port import MAX_UNSENT
 
 ALL_BYTES = bytes(range(256))
 STTY_TIMEOUT_S = 20.0
@@ -20,7 +21,7 @@ TIOCGEXCL = 0x80045440  # linux/asm-generic/ioctls.h; termios has the setters on
 
 
 def ready(port: PtyEndpoint) -> list[int]:
-    """Which of the port's descriptors would wake the pump at once."""
+    """Which of the port's descriptors would wake the scheduler at once."""
     return [fd for fd, events in port.watched() if poll_now(fd, events)]
 
 
@@ -122,7 +123,7 @@ def test_pty_is_raw_again_after_a_client_that_changed_it(pty, device, open_termi
 
 @pytest.mark.parametrize("settings", ["sane", "cooked echo 9600", "raw -echo 115200"])
 def test_pty_is_raw_again_after_stty(pty, device, path, open_terminal, settings):
-    """The program comes and goes between two looks of the pump."""
+    """The program comes and goes between two looks of the scheduler."""
     subprocess.run(["stty", "-F", path, *settings.split()], check=True, timeout=STTY_TIMEOUT_S)
     pty.exchange(device.kernel.now)
     terminal = open_terminal()

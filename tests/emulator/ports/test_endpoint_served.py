@@ -1,4 +1,4 @@
-"""The ports served by the pump in a thread, for pyserial and plain files."""
+"""The ports served by the scheduler in a thread, for pyserial and plain files."""
 
 import contextlib
 from pathlib import Path

@@ -1,13 +1,14 @@
-"""The TCP port against real sockets, with every look of the pump made by the test."""
+"""The TCP port against real sockets, with every look of the scheduler made by the test."""
 
 import contextlib
 import socket
 
 import pytest
 
-from cubestack.emulator.ports.endpoint import PortError, TcpEndpoint
+from cubestack.emulator.ports.endpoint import PortError, poll_now
 from cubestack.emulator.ports.realtime import wait_ready
-from cubestack.emulator.ports.serial_port import MAX_UNSENT, poll_now
+from cubestack.emulator.ports.serial_port import MAX_UNSENT
+from cubestack.emulator.ports.tcp import TcpEndpoint
 
 ALL_BYTES = bytes(range(256))
 LOOPBACK = "127.0.0.1"
@@ -15,7 +16,7 @@ TIMEOUT_S = 20.0
 
 
 def ready(port: TcpEndpoint) -> list[int]:
-    """Which of the port's descriptors would wake the pump at once."""
+    """Which of the port's descriptors would wake the scheduler at once."""
     return [fd for fd, events in port.watched() if poll_now(fd, events)]
 
 

@@ -1,4 +1,4 @@
-"""Programs that know nothing of us, on the ports that the pump serves."""
+"""Programs that know nothing of us, on the ports that the scheduler serves."""
 
 import os
 import shutil

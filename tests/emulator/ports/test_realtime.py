@@ -1,4 +1,4 @@
-"""The pump on a wall clock of the test's own: every reading of it costs 10 us."""
+"""The scheduler on a wall clock of the test's own: every reading of it costs 10 us."""
 
 import select
 import signal
@@ -50,7 +50,7 @@ class Wall:
 
 
 class FakePort:
-    """An endpoint that takes note of its calls and stops the pump in the end."""
+    """An endpoint that takes note of its calls and stops the scheduler in the end."""
 
     name = "fake"
 
@@ -78,7 +78,7 @@ class FakePort:
         pass
 
 
-class Bench:
+class TimedPort:
     def __init__(self) -> None:
         self.kernel = Kernel()
         self.wall = Wall()
@@ -86,9 +86,9 @@ class Bench:
         self.reports: list[tuple[float, str]] = []
         self.busy: Callable[[], bool] = lambda: False
 
-    def run(self, pace: Any, wall_ms: float) -> "Bench":
-        """Let the pump serve for so long on the test's clock."""
-        pump = RealtimeScheduler(
+    def run(self, pace: Any, wall_ms: float) -> "TimedPort":
+        """Let the scheduler serve for so long on the test's clock."""
+        scheduler = RealtimeScheduler(
             self.kernel,
             [self.port],
             lambda: self.busy(),
@@ -97,8 +97,8 @@ class Bench:
             clock_ns=self.wall.clock,
             wait=self.wall.wait,
         )
-        self.port.on_exchange = lambda: pump.stop() if self.wall.ms >= wall_ms else None
-        pump.run()
+        self.port.on_exchange = lambda: scheduler.stop() if self.wall.ms >= wall_ms else None
+        scheduler.run()
         return self
 
     def tick(self, period_ps: int, cost_ns: int = 0, until_ps: int | None = None) -> list[Any]:
@@ -116,15 +116,15 @@ class Bench:
 
 
 @pytest.fixture
-def bench() -> Bench:
-    return Bench()
+def bench() -> TimedPort:
+    return TimedPort()
 
 
 # --- real pace ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("pace", ["real", "fast"])
-def test_idle_pump_sleeps(bench, pace):
+def test_idle_scheduler_sleeps(bench, pace):
     bench.run(pace, 10_000)
     assert min(bench.wall.waits) == IDLE_S
     assert len(bench.wall.waits) <= 10 / IDLE_S
@@ -138,14 +138,14 @@ def test_virtual_time_follows_wall_time(bench):
     assert bench.kernel.now / PS_PER_MS == pytest.approx(5000, abs=IDLE_S * 1000 + 1)
 
 
-def test_pump_sleeps_until_something_is_due(bench):
+def test_scheduler_sleeps_until_something_is_due(bench):
     bench.tick(7 * PS_PER_MS)
     bench.run("real", 1000)
     assert bench.wall.waits[0] == pytest.approx(0.007, abs=0.0002)
     assert len(bench.wall.waits) == pytest.approx(1000 / 7, abs=3)
 
 
-def test_pump_sleeps_until_a_byte_is_due(bench):
+def test_scheduler_sleeps_until_a_byte_is_due(bench):
     bench.port.releases = [3 * PS_PER_MS, 5 * PS_PER_MS]
     bench.run("real", 100)
     assert bench.wall.waits[0] == pytest.approx(0.003, abs=0.0002)
@@ -159,7 +159,7 @@ def test_virtual_time_starts_where_it_stands(bench):
 
 
 def test_what_a_client_writes_comes_at_the_time_of_its_writing(bench):
-    """Not at the time when the pump went to sleep."""
+    """Not at the time when the scheduler went to sleep."""
 
     def write() -> None:
         bench.wall.ns += 11 * NS_PER_MS
@@ -257,7 +257,7 @@ def test_slow_client_holds_virtual_time_back(bench):
     assert bench.kernel.now / PS_PER_MS == pytest.approx(1000, abs=50)
 
 
-def test_busy_device_without_events_does_not_make_the_pump_spin(bench):
+def test_busy_device_without_events_does_not_make_the_scheduler_spin(bench):
     bench.busy = lambda: True
     bench.run("fast", 1000)
     assert min(bench.wall.waits) == IDLE_S
@@ -267,22 +267,22 @@ def test_busy_device_without_events_does_not_make_the_pump_spin(bench):
 
 
 def test_stop_before_the_start():
-    pump = RealtimeScheduler(Kernel(), [], lambda: False, pace="real")
-    pump.stop()
-    pump.run()
+    scheduler = RealtimeScheduler(Kernel(), [], lambda: False, pace="real")
+    scheduler.stop()
+    scheduler.run()
 
 
 def test_stop_from_a_signal_handler(bench):
-    pump = RealtimeScheduler(
+    scheduler = RealtimeScheduler(
         bench.kernel,
         [],
         lambda: False,
         pace="real",
         wait=lambda _watched, _timeout: signal.raise_signal(signal.SIGUSR1),
     )
-    before = signal.signal(signal.SIGUSR1, lambda _number, _frame: pump.stop())
+    before = signal.signal(signal.SIGUSR1, lambda _number, _frame: scheduler.stop())
     try:
-        pump.run()
+        scheduler.run()
     finally:
         signal.signal(signal.SIGUSR1, before)
 
@@ -290,10 +290,10 @@ def test_stop_from_a_signal_handler(bench):
 @pytest.mark.parametrize("pace", ["real", "fast"])
 def test_stop_from_another_thread_while_the_device_is_busy(bench, pace):
     bench.tick(PS_PER_MS)
-    pump = RealtimeScheduler(bench.kernel, [], lambda: True, pace=pace)
-    thread = threading.Thread(target=pump.run)
+    scheduler = RealtimeScheduler(bench.kernel, [], lambda: True, pace=pace)
+    thread = threading.Thread(target=scheduler.run)
     thread.start()
-    pump.stop()
+    scheduler.stop()
     thread.join(20)
     assert not thread.is_alive()
 

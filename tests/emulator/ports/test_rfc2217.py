@@ -10,10 +10,10 @@ import serial
 from serial import rfc2217 as telnet
 
 from cubestack.emulator.bus.line_format import LineFormat
-from cubestack.emulator.ports.endpoint import PortError
+from cubestack.emulator.ports.endpoint import PortError, poll_now
 from cubestack.emulator.ports.realtime import wait_ready
 from cubestack.emulator.ports.rfc2217 import CHUNK_BYTES, Rfc2217Endpoint
-from cubestack.emulator.ports.serial_port import MAX_UNREAD, poll_now
+from cubestack.emulator.ports.serial_port import MAX_UNREAD
 
 # pyserial calls setDaemon and setName of a thread.
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")

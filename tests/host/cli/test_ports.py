@@ -8,7 +8,7 @@ import pytest
 
 from cubestack.emulator.boards.contract import SerialLine
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.serial_port import PortError
+from cubestack.emulator.ports.endpoint import PortError
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 

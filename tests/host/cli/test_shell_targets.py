@@ -9,9 +9,10 @@ import pytest
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.ports.endpoint import PtyEndpoint, TcpEndpoint
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
+from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.recording import load_recording
@@ -51,13 +52,13 @@ def serving(kind, folder):
             port = make("127.0.0.1", 0, board.uart)
             target = port.name
         stack.callback(port.close)
-        pump = RealtimeScheduler(
+        scheduler = RealtimeScheduler(
             board.kernel, [port], lambda: board.busy() or adapter.busy, pace="fast"
         )
-        thread = threading.Thread(target=pump.run)
+        thread = threading.Thread(target=scheduler.run)
         thread.start()
         stack.callback(thread.join, TIMEOUT_S)
-        stack.callback(pump.stop)
+        stack.callback(scheduler.stop)
         yield target
 
 

@@ -8,7 +8,7 @@ import pytest
 from smbus2 import SMBus, i2c_msg
 
 from cubestack.emulator.bus.i2c import I2cBus
-from cubestack.emulator.ports.direct import DirectI2c
+from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.formats.linux_i2c import MessageFlag
 from cubestack.host.errors import PortClosedError, PortOpenError

@@ -20,7 +20,7 @@ from .conftest import NADIR_DEG, SUN_DEG
 TURNS = 6
 
 Wire = list[tuple[bytes, int, int]]
-I2cScheduler = list[dict[Camera, Measurement]]
+Turns = list[dict[Camera, Measurement]]
 
 
 def turning(seed: int = 1) -> EarthSunScene:
@@ -29,11 +29,11 @@ def turning(seed: int = 1) -> EarthSunScene:
     )
 
 
-def loop(session: AnyEmulated, turns: int = TURNS) -> I2cScheduler:
+def loop(session: AnyEmulated, turns: int = TURNS) -> Turns:
     """Read both results every second; the memories change places from turn to turn."""
     cubesense, kernel = session.client, session.board.kernel
     cubesense.client.pause(0.3)
-    found: I2cScheduler = []
+    found: Turns = []
     for turn in range(turns + 1):
         due = kernel.now + PS_PER_S
         found.append(

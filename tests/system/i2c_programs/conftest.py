@@ -68,17 +68,17 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     board.i2c_bus.attach(LATCH, Latch(), general_call=True)
     adapter = I2cAdapter(board.kernel, board.i2c_bus)
     server = I2cServer(path, adapter)
-    pump = RealtimeScheduler(
+    scheduler = RealtimeScheduler(
         board.kernel,
         [server],
         lambda: board.busy() or adapter.busy,
         pace="fast",
         wait=wait_precisely,
     )
-    thread = threading.Thread(target=pump.run)
+    thread = threading.Thread(target=scheduler.run)
     thread.start()
     yield path
-    pump.stop()
+    scheduler.stop()
     thread.join(TIMEOUT_S)
     server.close()
     board.close()

@@ -78,7 +78,7 @@ async def every_row_and_every_unlisted_row(dut: Any) -> None:
             done.add(action)
         assert not int(dut.CONTENTION.value)
         if wanted == (Action.STANDBY, Action.STANDBY):
-            quiet = {n: v for n, v in levels(dut).items() if not n.endswith("LINK_C_OE")}
+            quiet = {n: v for n, v in levels(dut, STANDBY).items() if not n.endswith("LINK_C_OE")}
             assert quiet == {n: v for n, v in STANDBY.items() if n in quiet}
         await bench.mcu.standby()
         await Timer(1, unit="step")

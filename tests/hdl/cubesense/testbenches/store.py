@@ -126,7 +126,7 @@ async def sun_is_found_while_storing(dut: Any) -> None:
             x, y = NOT_FOUND
         await bench.shoot(("sun", memory), with_sun(x, y))
         if random.getrandbits(1):
-            await bench.shoot("nadir", random.choice(SIDES), picture())
+            await bench.shoot(("nadir", random.choice(SIDES)))
         expected = x.to_bytes(2, "little") + y.to_bytes(2, "little")
         assert await bench.read_edge("sun", memory, 4) == expected
     await bench.check()

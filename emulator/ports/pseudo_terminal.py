@@ -1,0 +1,115 @@
+"""A serial port of the emulator that other programs open as a pseudo-terminal."""
+
+import contextlib
+import errno
+import fcntl
+import os
+import pty
+import select
+import termios
+import tty
+from pathlib import Path
+
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.ports.endpoint import PortError, poll_now
+from cubestack.emulator.ports.serial_port import SerialPort
+
+__all__ = ["PtyEndpoint"]
+
+
+class PtyEndpoint(SerialPort):
+    """A pseudo-terminal whose slave is reachable under a symbolic link.
+
+    A client is there while any program has the slave open. When the last one closes, what was not
+    read is dropped, raw mode is restored and exclusive use ends, so the next client finds the port
+    like new; bytes from the device that nobody is there for are dropped as well. The scheduler
+    notices the end at once and the beginning at its next look. A client that closes and opens again
+    before that is taken for one that stayed.
+    """
+
+    def __init__(self, path: Path, uart: Uart) -> None:
+        """Open it; ``path`` must be free or a stale link of an earlier run, else PortError."""
+        if path.is_symlink() and not path.exists():
+            path.unlink()
+        if path.is_symlink() or path.exists():
+            raise PortError(f"{path} exists already: choose another --pty path or remove it")
+        self._master, self._terminal = _open_terminal()
+        self._raw = termios.tcgetattr(self._master)
+        self._path = path
+        self.name = str(path)
+        try:
+            path.symlink_to(self._terminal)
+        except OSError as error:
+            os.close(self._master)
+            raise PortError(f"can not make the link {path}: {error.strerror}") from error
+        self._connected = False
+        super().__init__(uart)
+
+    def watched(self) -> list[tuple[int, int]]:
+        """Nothing without a client, as a hung-up master is always ready."""
+        return [(self._master, self._events(reading=True))] if self._connected else []
+
+    def close(self) -> None:
+        """Remove the link, if it is still ours, and the terminal."""
+        super().close()
+        with contextlib.suppress(OSError):
+            if self._path.readlink() == Path(self._terminal):
+                self._path.unlink()
+        os.close(self._master)
+
+    def _look(self) -> object | None:
+        hung_up = poll_now(self._master, 0) & select.POLLHUP
+        # A client may come and go between two looks, and leave other settings.
+        if hung_up and (self._connected or termios.tcgetattr(self._master) != self._raw):
+            self._renew()
+        self._connected = not hung_up
+        return self._master if self._connected else None
+
+    def _read(self, max_bytes: int) -> bytes:
+        try:
+            return os.read(self._master, max_bytes)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno == errno.EIO:  # hung up, and nothing is left
+                return b""
+            raise
+
+    def _write(self, data: bytearray) -> int:
+        try:
+            return os.write(self._master, data)
+        except BlockingIOError:
+            return 0
+
+    def _renew(self) -> None:
+        """Undo what the last client left behind."""
+        try:
+            slave = os.open(self._terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError:
+            # Locked by TIOCEXCL, which outlives its client: only a new terminal helps.
+            self._replace()
+            return
+        fcntl.ioctl(slave, termios.TIOCNXCL)
+        termios.tcsetattr(slave, termios.TCSANOW, self._raw)
+        termios.tcflush(slave, termios.TCIFLUSH)
+        os.close(slave)
+
+    def _replace(self) -> None:
+        """Put a new terminal under the same link."""
+        master, self._terminal = _open_terminal()
+        os.dup2(master, self._master, inheritable=False)
+        os.close(master)
+        new_link = self._path.with_name(f".{self._path.name}.new")
+        new_link.unlink(missing_ok=True)
+        new_link.symlink_to(self._terminal)
+        new_link.replace(self._path)
+
+
+def _open_terminal() -> tuple[int, str]:
+    """Open a raw pseudo-terminal: its master, and the path of its slave, which is closed."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    path = os.ttyname(slave)
+    os.close(slave)
+    os.set_blocking(master, False)
+    return master, path

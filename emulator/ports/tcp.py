@@ -1,0 +1,137 @@
+"""A serial port of the emulator that other programs open as a TCP socket."""
+
+import contextlib
+import ipaddress
+import select
+import socket
+
+from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.ports.endpoint import PortError, poll_now
+from cubestack.emulator.ports.serial_port import SerialPort
+
+__all__ = ["TcpEndpoint"]
+
+TCP_RECEIVE_BUFFER = 4096
+"""Bytes. Small, so that little of a client that floods the port and dies is still delivered."""
+
+REFUSAL = b"cubestack: this port has a client already\r\n"
+
+
+class TcpEndpoint(SerialPort):
+    """A listening socket that serves one client at a time; a second one is refused with a line.
+
+    A client that has shut down or closed its side still gets the device's output while it takes
+    any, but makes room for the next one, and what it sent last is lost if the wire was too slow.
+    """
+
+    scheme = "tcp"
+
+    def __init__(self, host: str, port: int, uart: Uart, *, allow_remote: bool = False) -> None:
+        """Listen on ``host``:``port`` (port 0: any free one).
+
+        Args:
+            host: address or name of this machine's interface.
+            port: 0..65535.
+            uart: the serial line.
+            allow_remote: permit addresses that other machines can reach; there is no protection.
+
+        Raises:
+            PortError: the address is unknown, taken, or not a loopback address.
+        """
+        self._server = _listen(host, port, allow_remote=allow_remote)
+        self._client: socket.socket | None = None
+        self._input_ended = False
+        self.address: tuple[str, int] = self._server.getsockname()[:2]
+        name = f"[{self.address[0]}]" if ":" in self.address[0] else self.address[0]
+        self.name = f"{self.scheme}://{name}:{self.address[1]}"
+        super().__init__(uart)
+
+    def watched(self) -> list[tuple[int, int]]:
+        """The server socket, and the client's while it can do something."""
+        watched = [(self._server.fileno(), select.POLLIN)]
+        if self._client is not None:
+            # Without an event to wait for, a client that has gone would still be reported.
+            events = self._events(reading=not self._input_ended)
+            if events:
+                watched.append((self._client.fileno(), events))
+        return watched
+
+    def close(self) -> None:
+        """Drop the client and stop listening."""
+        super().close()
+        self._drop()
+        self._server.close()
+
+    def _look(self) -> object | None:
+        try:
+            newcomer = self._server.accept()[0]
+        except OSError:  # nobody, or gone again
+            return self._client
+        newcomer.setblocking(False)
+        if self._client is not None and not self._leaving(self._client):
+            with contextlib.suppress(OSError):
+                newcomer.send(REFUSAL)
+            newcomer.close()
+            return self._client
+        self._drop()
+        newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client = newcomer
+        self._welcome()
+        return self._client
+
+    def _welcome(self) -> None:
+        """A client has come."""
+
+    def _leaving(self, client: socket.socket) -> bool:
+        gone = select.POLLRDHUP | select.POLLHUP | select.POLLERR
+        return bool(poll_now(client.fileno(), select.POLLRDHUP) & gone)
+
+    def _read(self, max_bytes: int) -> bytes:
+        if self._client is None or self._input_ended:
+            return b""
+        try:
+            data = self._client.recv(max_bytes)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            self._drop()
+            return b""
+        self._input_ended = not data
+        return data
+
+    def _write(self, data: bytearray) -> int:
+        assert self._client is not None
+        try:
+            return self._client.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            self._drop()
+            return len(data)
+
+    def _drop(self) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._client = None
+        self._input_ended = False
+        self._unread.clear()
+
+
+def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
+    if not 0 <= port <= 0xFFFF:
+        raise PortError(f"TCP port {port} is not in 0..65535")
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except (socket.gaierror, UnicodeError) as error:
+        raise PortError(f"no address of this machine is called {host!r}; try 127.0.0.1") from error
+    if not allow_remote and not ipaddress.ip_address(address[0]).is_loopback:
+        raise PortError(f"{host} is open to other machines: listen on 127.0.0.1 or allow that")
+    try:
+        server = socket.create_server((str(address[0]), port), family=family)
+    except OSError as error:
+        raise PortError(
+            f"can not listen on {host}:{port}: {error.strerror}; choose another port"
+        ) from error
+    server.setblocking(False)
+    server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
+    return server
