@@ -20,7 +20,7 @@ help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test      set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
-	@echo "make mutants   set up, then count the wrong gates that the gateware's benches notice; takes long"
+	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make lint      ruff and mypy"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
