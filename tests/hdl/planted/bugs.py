@@ -42,7 +42,7 @@ ADDRESSING = "cubesense-pair-addressing"
 WRITERS = (STAR, SHARED, DOUBLE, PAIR)
 
 #: Address of a picture's last pixel, in a top of CubeStar.
-_LAST = "((self.rows - 1) << MatrixCounter.address_width(self.columns, 1)) + self.columns - 1"
+_LAST = "((self.rows - 1) << (self.columns - 1).bit_length()) + self.columns - 1"
 
 _BY_KIND = {
     "off by one": (
@@ -228,8 +228,9 @@ _BY_KIND = {
         (
             "before the last write pulse",
             "cubestar.top",
-            "self.ACK.eq(writer.ack)",
-            f"self.ACK.eq(writer.ack | (writer.store & (writer.address == {_LAST})))",
+            "writer = self._add_writer(m, storing)\n",
+            "writer = self._add_writer(m, storing)\n        m.d.comb += "
+            f"self.ACK.eq(writer.ack | (writer.store & (writer.address == {_LAST})))\n",
             (STAR,),
         ),
         (
