@@ -263,7 +263,7 @@ def open_device(
     """Power up a registered device.
 
     Args:
-        name: of the device, such as ``"cubestar"``.
+        name: of the device, one of ``device_names()``.
         scene: what its cameras see: a scene, the path of a scene file, or None for the default.
         seed: of everything random.
         engine: how its FPGA is run.

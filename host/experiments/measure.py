@@ -24,7 +24,7 @@ def measure(
     """Measure a device end to end; yields each result, beside the truth, as soon as it is there.
 
     Args:
-        name: of the device, such as ``"cubestar"``.
+        name: of the device, one of ``device_names()``.
         progress: called with the number of results so far, and of all.
         engine: how its FPGA is run.
         options: as `cubestack measure NAME --help` has them, with underscores: ``frames=20``,

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
-from cubestack.host.clients.contract import Client
 from cubestack.host.conformance.effects import check_camera_register, check_stream
 from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report, Shown
+from cubestack.host.devices.lazily import call, get
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
@@ -22,13 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = ["DEVICE"]
 
+EXPERIMENTS = "cubestack.host.experiments.aramis"
+
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
-
-
-def _client(client: Client) -> Aramis:
-    from cubestack.host.clients.aramis.client import Aramis
-
-    return Aramis(client)
 
 
 def _open_board(
@@ -62,31 +56,26 @@ def _prepare(shown: Shown) -> None:
     onboard_database(progress=shown)
 
 
-def _lazily(what: str) -> Callable[[], Any]:
-    """Gives something of this sensor's experiments, which are loaded then."""
-    return partial(resolve_name, f"cubestack.host.experiments.aramis.{what}")
-
-
 DEVICE: Device[AramisBoard, Aramis] = Device(
     name="aramis",
     title="AraMiS",
     summary="attitudes of the star tracker without FPGA",
     interface=INTERFACE,
-    client=_client,
+    client=call("cubestack.host.clients.aramis.client:Aramis"),
     open_board=_open_board,
     load_scene=_load_scene,
     default_scene=_default_scene,
     default_scene_title="Orion",
-    experiment=_lazily("measure:EXPERIMENT"),
+    experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
     reports=(
         Report(
             "catalogue",
             "compile the onboard star catalogue and say what is in it",
-            _lazily("catalogue:EXPERIMENT"),
+            get(f"{EXPERIMENTS}.catalogue:EXPERIMENT"),
         ),
     ),
-    benchmark=_lazily("benchmark:BENCHMARK"),
-    demo=_lazily("demo:show"),
+    benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
+    demo=get(f"{EXPERIMENTS}.demo:show"),
     has_fpga=False,
     prepare=_prepare,
     conformance=ConformanceNotes(

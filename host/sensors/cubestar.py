@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.clients.contract import Client
 from cubestack.host.conformance.effects import (
     check_camera_register,
     check_stream,
@@ -19,26 +16,21 @@ from cubestack.host.conformance.effects import (
     check_watchdog,
 )
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
+from cubestack.host.devices.lazily import call, get
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
-    from cubestack.hdl.flow.top import TopTable
-    from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.clients.cubestar.client import CubeStar
 
 __all__ = ["DEVICE"]
 
+EXPERIMENTS = "cubestack.host.experiments.cubestar"
+
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 MAG_LIMIT = 3.8
 """Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
-
-
-def _client(client: Client) -> CubeStar:
-    from cubestack.host.clients.cubestar.client import CubeStar
-
-    return CubeStar(client)
 
 
 def _open_board(
@@ -85,48 +77,31 @@ def _layout_notice(value: str) -> str | None:
     )
 
 
-def _tops() -> TopTable:
-    from cubestack.hdl.cubestar.tops import TOPS
-
-    return TOPS
-
-
-def _proofs() -> Mapping[str, Proof]:
-    from cubestack.hdl.proofs.cubestar import PROOFS
-
-    return PROOFS
-
-
-def _lazily(what: str) -> Callable[[], Any]:
-    """Gives something of this sensor's experiments, which are loaded then."""
-    return partial(resolve_name, f"cubestack.host.experiments.cubestar.{what}")
-
-
 DEVICE: Device[CubeStarBoard, CubeStar] = Device(
     name="cubestar",
     title="CubeStar",
     summary="attitudes of the star tracker",
     interface=INTERFACE,
-    client=_client,
+    client=call("cubestack.host.clients.cubestar.client:CubeStar"),
     open_board=_open_board,
     load_scene=_load_scene,
     default_scene=_default_scene,
     default_scene_title="Orion",
-    experiment=_lazily("measure:EXPERIMENT"),
+    experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
     reports=(
         Report(
             "layouts",
             "compare CubeStar's memory layouts: rate, age, power, pins",
-            _lazily("layouts:EXPERIMENT"),
+            get(f"{EXPERIMENTS}.layouts:EXPERIMENT"),
         ),
         Report(
             "catalogue",
             "compile the onboard star catalogue and say what is in it",
-            _lazily("catalogue:EXPERIMENT"),
+            get(f"{EXPERIMENTS}.catalogue:EXPERIMENT"),
         ),
     ),
-    benchmark=_lazily("benchmark:BENCHMARK"),
-    demo=_lazily("demo:show"),
+    benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
+    demo=get(f"{EXPERIMENTS}.demo:show"),
     options=(
         BoardOption(
             "layout",
@@ -137,8 +112,8 @@ DEVICE: Device[CubeStarBoard, CubeStar] = Device(
             notice=_layout_notice,
         ),
     ),
-    tops=_tops,
-    proofs=_proofs,
+    tops=get("cubestack.hdl.cubestar.tops:TOPS"),
+    proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     conformance=ConformanceNotes(
         effects={
             "StreamDownImage": partial(check_stream, picture_bytes=IMAGE_BYTES),
