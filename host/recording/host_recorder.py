@@ -54,38 +54,40 @@ class HostRecorder:
         self._writer = RecordingWriter(self._stream, device, dict(bauds), self._setup)
 
     def line(self, transport: Transport, port: str, baud: int) -> Transport:
-        """``transport``, with its bytes on the tape."""
-        return _TapedLine(self, transport, port, BITS_PER_BYTE * PS_PER_S // baud)
+        """``transport``, with its bytes recorded."""
+        return _RecordingLine(self, transport, port, BITS_PER_BYTE * PS_PER_S // baud)
 
     def bus(self, bus: I2cBus) -> I2cBus:
-        """``bus``, with its transfers on the tape."""
-        return _TapedBus(self, bus)
+        """``bus``, with its transfers recorded."""
+        return _RecordingBus(self, bus)
 
     def now_ps(self) -> int:
         """Time since the beginning."""
         return (self._clock_ns() - self._start_ns) * PS_PER_NS
 
     def write(self, event: LineBytes | BusTransfer) -> None:
-        """Put an event on the tape."""
+        """Record an event."""
         assert self._writer is not None
         self._writer.write(event)
 
 
-class _TapedLine:
-    def __init__(self, tape: HostRecorder, transport: Transport, port: str, byte_ps: int) -> None:
-        self._tape = tape
+class _RecordingLine:
+    def __init__(
+        self, recorder: HostRecorder, transport: Transport, port: str, byte_ps: int
+    ) -> None:
+        self._recorder = recorder
         self._transport = transport
         self._port = port
         self._byte_ps = byte_ps
         self._last_ps = 0
 
     def write(self, data: bytes) -> None:
-        self._put("host", data, self._tape.now_ps())
+        self._put("host", data, self._recorder.now_ps())
         self._transport.write(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         data = self._transport.read(max_bytes, timeout_s)
-        self._put("device", data, self._tape.now_ps())
+        self._put("device", data, self._recorder.now_ps())
         return data
 
     def close(self) -> None:
@@ -95,17 +97,17 @@ class _TapedLine:
         """In the order of the calls: what was read was there before what is written next."""
         if data:
             first_ps = max(self._last_ps, now_ps - (side == "device") * len(data) * self._byte_ps)
-            self._tape.write(LineBytes(first_ps, self._port, side, data, self._byte_ps))
+            self._recorder.write(LineBytes(first_ps, self._port, side, data, self._byte_ps))
             self._last_ps = first_ps + len(data) * self._byte_ps
 
 
-class _TapedBus:
-    def __init__(self, tape: HostRecorder, bus: I2cBus) -> None:
-        self._tape = tape
+class _RecordingBus:
+    def __init__(self, recorder: HostRecorder, bus: I2cBus) -> None:
+        self._recorder = recorder
         self._bus = bus
 
     def i2c_rdwr(self, *messages: Any) -> None:
-        start_ps, errno = self._tape.now_ps(), 0
+        start_ps, errno = self._recorder.now_ps(), 0
         try:
             self._bus.i2c_rdwr(*messages)
         except OSError as error:
@@ -113,4 +115,6 @@ class _TapedBus:
             raise
         finally:
             found = tuple(BusMessage(m.addr, bytes(m), bool(m.flags & I2C_M_RD)) for m in messages)
-            self._tape.write(BusTransfer(start_ps, "i2c", self._tape.now_ps(), found, errno))
+            self._recorder.write(
+                BusTransfer(start_ps, "i2c", self._recorder.now_ps(), found, errno)
+            )

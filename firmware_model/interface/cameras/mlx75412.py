@@ -2,9 +2,9 @@
 
 CubeStar thesis, appendix D (and appendix C for the device address). The thesis names registers and
 what they do, but reset values and the positions of most feature bits only where they matter to
-it; what we chose is said in each register's ``assumed``. Which registers wait for the sync register
-is not printed either: we take that all do but the mode select register, whose enable bit the
-published firmware uses without a sync.
+it; what is chosen here stands in each register's ``assumed``. Which registers wait for the sync
+register is not printed either: it is taken that all do but the mode select register, whose enable
+bit the published firmware uses without a sync.
 """
 
 from functools import partial

@@ -73,7 +73,7 @@ class CameraRegister:
         needs_sync: a written value waits for the sync register before it takes effect.
         modelled: False when the camera model stores the value, with all its fields, and does
             nothing with it.
-        assumed: what here is our choice because nothing is published; empty when all is published.
+        assumed: what here is chosen because nothing is published; empty when all is published.
         unit_bits: bits behind one address.
     """
 

@@ -53,7 +53,7 @@ POLL_PERIOD_S = 0.04
 #: What hosts give a capture.
 CAPTURE_TIMEOUT_S = 1.0
 
-#: What we give a detection after its capture; assumed, a good ten times the published 245 ms.
+#: What a detection is given after its capture; assumed, a good ten times the published 245 ms.
 DETECT_TIMEOUT_S = 3.0
 
 #: What an area without a mask reads as.
@@ -221,7 +221,7 @@ class CubeSense(DeviceClient):
         return {name.lower(): int(value) / 1000.0 for name, value in values.items()}
 
     def details(self, camera: Camera) -> dict[str, Value]:
-        """What a camera's latest measurement rests on: the fields of our telemetry Details."""
+        """What a camera's latest measurement rests on: the fields of telemetry Details."""
         return self.client.telemetry(f"Details{camera + 1}")
 
     def edges(self) -> NDArray[np.float64]:
