@@ -108,7 +108,8 @@ class CubeSense(DeviceClient):
             self.client.pause(POLL_PERIOD_S)
             found = self.result(camera)
         raise NoAnswerError(
-            f"detection of the {Camera(camera).name} camera still pending after {DETECT_TIMEOUT_S:g} s"
+            f"detection of the {Camera(camera).name} camera still pending "
+            f"after {DETECT_TIMEOUT_S:g} s"
         )
 
     def set_threshold(self, camera: Camera, threshold: int) -> None:
@@ -252,7 +253,8 @@ class CubeSense(DeviceClient):
             lambda: self.result(camera),
             lambda found: found.capture is not CaptureResult.PENDING,
             CAPTURE_TIMEOUT_S,
-            f"capture of the {Camera(camera).name} camera still pending after {CAPTURE_TIMEOUT_S:g} s",
+            f"capture of the {Camera(camera).name} camera still pending "
+            f"after {CAPTURE_TIMEOUT_S:g} s",
             POLL_PERIOD_S,
         )
 
