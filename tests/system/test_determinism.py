@@ -16,6 +16,7 @@ def run(session: Callable[..., Any], seed: int) -> Wire:
     scene = SkyView(SkyScene.pointing(84, -1), replace(CONDITION, seed=seed))
     with session(scene, seed=seed) as opened:
         wire: Wire = []
+        cubestar, client = opened.client, opened.client.client
         deliver = opened.board.uart.line
 
         def listen(data: bytes, first_ps: int, byte_ps: int) -> None:
@@ -23,7 +24,6 @@ def run(session: Callable[..., Any], seed: int) -> Wire:
             deliver(data, first_ps, byte_ps)
 
         opened.board.uart.line = listen
-        cubestar, client = opened.client, opened.client.client
         cubestar.capture_and_process()
         cubestar.stars()
         client.telemetry("ImageBlock")

@@ -68,6 +68,7 @@ def wire(opened: Callable[..., Any], seed: int) -> tuple[Wire, list[bytes], int]
     sent: Wire = []
     view = EarthSunView(turning(seed), FisheyeCondition(hot_pixels=20, seed=seed))
     with opened(view, seed=seed) as session:
+        client = session.client.client  # at the line before it is listened to
         deliver = session.board.uart.line
 
         def listen(data: bytes, first_ps: int, byte_ps: int) -> None:
@@ -76,8 +77,8 @@ def wire(opened: Callable[..., Any], seed: int) -> tuple[Wire, list[bytes], int]
 
         session.board.uart.line = listen
         loop(session, 3)
-        for message in session.client.client.interface.telemetries:
-            session.client.client.request(bytes([message.id]))
+        for message in client.interface.telemetries:
+            client.request(bytes([message.id]))
         memories = [memory.tobytes() for memory in session.board.engine.memories.values()]
         return sent, memories, session.board.kernel.now
 
