@@ -1,0 +1,152 @@
+"""The program of a plain node: telecommands in order, settings, flags, what it says of itself."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.field import u8, u16
+from cubestack.firmware_model.interface.codec.message import Interface, Message
+from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import NODE_TELECOMMANDS, node_telemetry
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.node.program import TELECOMMAND, Action, NodeProgram, Source
+from cubestack.firmware_model.node.queue import QUEUE_DEPTH
+
+from ..host_side import HostSide
+from ..runner import Runner
+
+WORK_US = 500
+
+_LEVEL = u8("Level", "a setting", reset=7)
+INTERFACE = Interface(
+    name="Plain",
+    version=3,
+    i2c_address=0x30,
+    baud=57_600,
+    telecommands=(
+        *NODE_TELECOMMANDS,
+        Message(10, "Work", "take some time").of(u8("Amount", "to be added", maximum=9)),
+        Message(11, "SetLevel", "set the level").of(_LEVEL),
+    ),
+    telemetries=(
+        *node_telemetry(99, {"Overdone": "more than 9 in all"}),
+        Message(140, "Done", "all amounts").of(u16("Sum", "of them")),
+        Message(141, "Settings", "what was set").of(_LEVEL),
+    ),
+    ack_errors=AckError,
+)
+
+
+class Adder(NodeProgram):
+    total = 0
+
+    def actions(self) -> Mapping[str, Action]:
+        return {"Work": self._work}
+
+    def sources(self) -> Mapping[str, Source]:
+        return {
+            "Done": lambda: {"Sum": self.total},
+            "Settings": lambda: self.settings.all("SetLevel"),
+        }
+
+    def _work(self, values: dict[str, Any]) -> Routine[None]:
+        now_us: int = yield ReadTimer()
+        yield Sleep(now_us + WORK_US, wakeable=False)
+        self.total += values["Amount"]
+        if self.total > 9:
+            self.state.raise_flag("Overdone")
+
+
+class Node(Runner, HostSide):
+    interface = INTERFACE
+
+    def __init__(self) -> None:
+        HostSide.__init__(self)
+        Runner.__init__(self, CORTEX_M3)
+        self._boot()
+
+    def start(self) -> Routine[None]:
+        self.program = Adder(self, self.meter, INTERFACE)
+        return self.program.main()
+
+    @property
+    def link(self) -> Any:
+        return self.program.link
+
+    def command(self, name: str, **values: object) -> None:
+        assert self.send(name, **values) == AckError.OK
+        Runner.run(self)
+
+
+@pytest.fixture
+def node() -> Node:
+    return Node()
+
+
+def test_telecommands_are_executed_one_after_the_other(node: Node) -> None:
+    for amount in (1, 2, 3):
+        assert node.send("Work", Amount=amount) == AckError.OK
+    processed = node.telemetry("TcmdProcessed")
+    assert processed == {"Processed": 0, "Waiting": 3, "Latest": 10, "Error": AckError.OK}
+    Runner.run(node, until_us=WORK_US // 2)
+    assert node.telemetry("TcmdProcessed") == {**processed, "Waiting": 2}
+    Runner.run(node)
+    assert node.now_us >= 3 * WORK_US
+    assert node.telemetry("Done") == {"Sum": 6}
+    assert node.telemetry("TcmdProcessed")["Processed"] == 1
+
+
+def test_a_telecommand_without_an_action_is_a_setting(node: Node) -> None:
+    assert node.telemetry("Settings") == {"Level": 7}
+    node.command("SetLevel", Level=200)
+    assert node.telemetry("Settings") == {"Level": 200}
+
+
+@pytest.mark.parametrize(
+    ("payload", "error", "flag"),
+    [
+        (bytes([10, 10]), AckError.BAD_PARAMETER, "TcmdRefused"),
+        (bytes([10]), AckError.WRONG_LENGTH, "TcmdRefused"),
+        (bytes([77]), AckError.INVALID_ID, "TcmdRefused"),
+    ],
+)
+def test_what_is_refused_raises_a_flag(
+    node: Node, payload: bytes, error: AckError, flag: str
+) -> None:
+    assert node.frames(payload) == [bytes([error])]
+    assert [name for name, up in node.telemetry("ErrorFlags").items() if up] == [flag]
+    assert node.telemetry("TcmdProcessed")["Error"] == error
+
+
+def test_a_full_queue_refuses(node: Node) -> None:
+    for _ in range(QUEUE_DEPTH):
+        assert node.send("SetLevel") == AckError.OK
+    assert node.send("SetLevel") == AckError.BUFFER_FULL
+    assert node.telemetry("ErrorFlags")["TcmdBufferOverflow"]
+
+
+def test_own_flags_rise_and_are_cleared(node: Node) -> None:
+    node.command("Work", Amount=9)
+    node.command("Work", Amount=1)
+    assert node.telemetry("ErrorFlags")["Overdone"]
+    node.command("ClearErrorFlags")
+    assert not any(node.telemetry("ErrorFlags").values())
+
+
+def test_a_reset_forgets_all_but_the_time(node: Node) -> None:
+    node.command("SetLevel", Level=1)
+    node.now_us = 2_345_000
+    node.command("Reset")
+    assert node.resets == [TELECOMMAND]
+    assert node.telemetry("Settings") == {"Level": 7}
+    identification = node.telemetry("Identification")
+    assert (identification["NodeType"], identification["InterfaceVersion"]) == (99, 3)
+    assert (identification["RuntimeSeconds"], identification["RuntimeMilliseconds"]) == (2, 345)
+
+
+def test_both_buses_carry_the_same(node: Node) -> None:
+    node.i2c_write(bytes([10, 4]))
+    Runner.run(node)
+    assert node.i2c_read(3, 140) == bytes([4, 0, 255])
