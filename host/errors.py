@@ -23,21 +23,6 @@ before anything is sent.
 
 from enum import IntEnum
 
-__all__ = [
-    "BadAnswerError",
-    "CameraFileError",
-    "CommandRefusedError",
-    "HostError",
-    "NoAnswerError",
-    "NodeError",
-    "PortClosedError",
-    "PortOpenError",
-    "RecordingMismatchError",
-    "StepFailedError",
-    "TargetError",
-    "TransportError",
-]
-
 
 class TargetError(ValueError):
     """The text that names a target makes no sense."""

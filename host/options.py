@@ -12,23 +12,6 @@ from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-__all__ = [
-    "ANGLE",
-    "CORNER",
-    "NUMBER",
-    "PATH",
-    "PLAN",
-    "POSITIVE",
-    "SCENE",
-    "Kind",
-    "Option",
-    "Options",
-    "between",
-    "flag",
-    "option",
-    "whole",
-]
-
 T = TypeVar("T")
 
 

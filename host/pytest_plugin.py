@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from cubestack.host.devices.device import Engine
     from cubestack.host.devices.emulated import AnyEmulated
 
-__all__: list[str] = []
-
 MARKER = "cubestack"
 KEYS = ("scene", "seed", "faults")
 LINES_SHOWN = 40

@@ -14,8 +14,6 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-__all__ = ["console", "progress", "progress_bar", "say"]
-
 console = Console()
 _errors = Console(stderr=True)
 

@@ -15,30 +15,15 @@ PACKAGES = ("hdl", "firmware_model", "emulator", "host")
 TABLES = ("firmware_model.interface", "firmware_model.formats")
 
 #: What each package may import of the others.
-BELOW = {
-    "hdl": TABLES,
-    "firmware_model": (),
-    "emulator": ("hdl", "firmware_model"),
-    "host": TABLES,
-}
+BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_model"), "host": TABLES}
 #: Parts of ``host`` that may import the other packages, as long as they do so lazily: listing
 #: devices and asking for help must load no emulator.
 LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
-    "hdl": (
-        "blocks",
-        "flow",
-        "cubestar cubesense mutants",
-        "proofs",
-    ),
-    "firmware_model": (
-        "interface",
-        "formats mcu",
-        "attitude node",
-        "cubestar cubesense aramis",
-    ),
+    "hdl": ("blocks", "flow", "cubestar cubesense mutants", "proofs"),
+    "firmware_model": ("interface", "formats mcu", "attitude node", "cubestar cubesense aramis"),
     "host": (
         "errors options terminal",
         "transport export",

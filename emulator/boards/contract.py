@@ -20,8 +20,6 @@ from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Processor, Program
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["Board", "SerialLine"]
-
 SILENCE_BYTES = 100
 """Byte times of silence after which a UART gives up half a message: assumed."""
 

@@ -15,8 +15,6 @@ from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
 from cubestack.firmware_model.node.program import POWER_ON, NodeProgram
 
-__all__ = ["NodeBoard"]
-
 ProgramT = TypeVar("ProgramT", bound=NodeProgram)
 SceneT = TypeVar("SceneT")
 

@@ -7,8 +7,6 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US
 from cubestack.firmware_model.mcu.requests import CameraTransfer
 from cubestack.firmware_model.node.hardware import NodeHardware
 
-__all__ = ["I2cCameraBus", "NodePeripherals"]
-
 
 class NodePeripherals(NodeHardware):
     """What every node's program uses; a board's own class adds the rest."""

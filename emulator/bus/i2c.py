@@ -16,16 +16,6 @@ import simpy
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = [
-    "CurrentTarget",
-    "I2cBus",
-    "I2cError",
-    "I2cFaultHook",
-    "I2cMessage",
-    "I2cTap",
-    "I2cTarget",
-]
-
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
 LONGEST_STRETCH_PS = PS_PER_S

@@ -16,8 +16,6 @@ from typing import Literal, NamedTuple
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-__all__ = ["FASTEST_BAUD", "Character", "LineFormat", "LineSampler", "Parity"]
-
 FASTEST_BAUD = 12_000_000  # of the EFM32GG: 48 MHz with fourfold oversampling
 
 Parity = Literal["N", "E", "O", "M", "S"]

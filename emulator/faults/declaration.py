@@ -5,8 +5,6 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, ClassVar, get_args
 
-__all__ = ["Fault", "FaultError", "Parameter", "Site", "choice", "flag", "number", "place"]
-
 
 class FaultError(ValueError):
     """A fault, one of its parameters or its target makes no sense."""

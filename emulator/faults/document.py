@@ -3,8 +3,6 @@
 from cubestack.emulator.faults.declaration import Fault, Parameter
 from cubestack.emulator.faults.table import FAULTS
 
-__all__ = ["markdown_table"]
-
 HEAD = ("kind", "hits a", "what it does", "parameters, with range and default")
 
 

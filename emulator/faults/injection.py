@@ -9,8 +9,6 @@ import numpy as np
 from cubestack.emulator.faults.declaration import Fault
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-__all__ = ["FaultEvent", "Injection", "Report", "active"]
-
 F = TypeVar("F", bound=Fault)
 
 

@@ -5,12 +5,7 @@ from typing import Any, Protocol, cast
 
 from cubestack.emulator.faults.declaration import Fault, FaultError, Site
 from cubestack.emulator.faults.injection import FaultEvent, Injection
-from cubestack.emulator.faults.parts import (
-    CameraFaults,
-    MemoryFaults,
-    RegisterFaults,
-    SupplyFaults,
-)
+from cubestack.emulator.faults.parts import CameraFaults, MemoryFaults, RegisterFaults, SupplyFaults
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.plan import Plan
 from cubestack.emulator.faults.sites import Sites
@@ -23,8 +18,6 @@ from cubestack.emulator.faults.table import (
 )
 from cubestack.emulator.faults.wire import BusFaults, LineFaults
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-
-__all__ = ["LOG_LIMIT", "Faults"]
 
 LOG_LIMIT = 100_000
 """Events kept in the log; all are counted."""
@@ -131,10 +124,7 @@ class Faults:
             try:
                 injections.append(
                     self.inject(
-                        planned.fault,
-                        target=planned.target,
-                        at_s=planned.at_s,
-                        for_s=planned.for_s,
+                        planned.fault, target=planned.target, at_s=planned.at_s, for_s=planned.for_s
                     )
                 )
             except ValueError as error:

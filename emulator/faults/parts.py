@@ -26,8 +26,6 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["CameraFaults", "MemoryFaults", "RegisterFaults", "SupplyFaults"]
-
 Steps = Generator[simpy.Event, Any, None]
 
 MOST_UPSETS_PER_S = 10_000.0

@@ -16,8 +16,6 @@ from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlG
 from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 
-__all__ = ["PinFaults"]
-
 PS_PER_NS = 1000
 
 

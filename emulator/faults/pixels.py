@@ -24,8 +24,6 @@ from cubestack.emulator.faults.table import (
 )
 from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
 
-__all__ = ["FaultySource"]
-
 Picture = NDArray[np.uint8]
 
 _CLOCK_FAULTS = (ClockLost, ClockExtra, LineMissing)

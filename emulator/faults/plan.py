@@ -23,8 +23,6 @@ from typing import Any
 from cubestack.emulator.faults.declaration import Fault, FaultError
 from cubestack.emulator.faults.table import make_fault
 
-__all__ = ["Plan", "PlannedFault", "load_plan", "parse_plan"]
-
 _OWN = ("kind", "target", "at", "for")
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["flip_bit", "flip_bits"]
-
 
 def flip_bits(memory: NDArray[np.uint8], rate: float, generator: np.random.Generator) -> int:
     """Turn over each bit of ``memory`` with probability ``rate``, 0 to 1; returns how many.

@@ -14,8 +14,6 @@ from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["CameraSite", "Sites"]
-
 
 @dataclass(frozen=True)
 class CameraSite:

@@ -12,35 +12,6 @@ from cubestack.emulator.faults.declaration import (
     place,
 )
 
-__all__ = [
-    "FAULTS",
-    "AckLate",
-    "AckLost",
-    "AckStuck",
-    "Blooming",
-    "CameraDead",
-    "ClockExtra",
-    "ClockLost",
-    "ColumnDefect",
-    "ControlGlitch",
-    "I2cNack",
-    "I2cStretch",
-    "I2cStuck",
-    "LatchUp",
-    "LineMissing",
-    "MemoryFlip",
-    "MemoryStuck",
-    "MemoryUpsets",
-    "PixelDead",
-    "PixelHot",
-    "RegisterFlip",
-    "RegisterUpsets",
-    "UartCorrupt",
-    "UartDelay",
-    "UartDrop",
-    "make_fault",
-]
-
 _BOTH = ("both", "to-device", "to-host")
 _PART = "part of the {} that it hits"
 _X = "column as sent, from 0"

@@ -19,8 +19,6 @@ from cubestack.emulator.faults.table import (
 )
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
 
-__all__ = ["BusFaults", "LineFaults"]
-
 Steps = Generator[simpy.Event, Any, None]
 
 

@@ -11,8 +11,6 @@ from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Function
 
-__all__ = ["FUNCTIONS", "I2cAdapter"]
-
 EVENTS = 8
 """Of the kernel; fewer than in a transfer of a few bytes."""
 

@@ -30,8 +30,6 @@ from cubestack.firmware_model.formats.linux_i2c import (
     unpack_smbus,
 )
 
-__all__ = ["DeviceFile", "Reply"]
-
 Reply = Callable[[bytes], None]
 
 TIMEOUT_UNIT_PS = 10 * PS_PER_MS

@@ -5,8 +5,6 @@ import stat
 import struct
 from enum import Enum, auto
 
-__all__ = ["I2C_MAJOR", "DeviceNode", "Found"]
-
 I2C_MAJOR = 89
 """Device number of Linux's I2C devices; the minor number is the bus."""
 

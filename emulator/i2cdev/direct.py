@@ -14,8 +14,6 @@ from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
-__all__ = ["DirectI2c"]
-
 I2C_M_RD = 0x0001
 """Flag of a message that reads, as in linux/i2c.h; no other flag is supported."""
 

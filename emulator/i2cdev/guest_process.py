@@ -26,15 +26,6 @@ from cubestack.emulator.i2cdev.seccomp.notify import Listener, read_memory
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor, descriptor_range
 from cubestack.emulator.ports.endpoint import Endpoint, poll_now
 
-__all__ = [
-    "GuestProcess",
-    "Route",
-    "RouteError",
-    "bus_environment",
-    "start_filtered",
-    "start_preloaded",
-]
-
 Route = Literal["seccomp", "preload"]
 
 LAUNCHER = Path(__file__).parent / "seccomp" / "launcher.py"

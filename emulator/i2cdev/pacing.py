@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.realtime import Watched
 
-__all__ = ["Watch", "has_priority", "sharpen_timers", "wait_precisely"]
-
 PR_SET_TIMERSLACK = 29
 NS_PER_S = 10**9
 

@@ -11,8 +11,6 @@ from pathlib import Path
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
 from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, reply, request, take_packet
 
-__all__ = ["RemoteBus"]
-
 CHUNK_BYTES = 1 << 16
 Done = Callable[[bytes], None]
 

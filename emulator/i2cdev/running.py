@@ -28,8 +28,6 @@ from cubestack.emulator.i2cdev.serving import open_scheduler
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["HostBus", "attached_bus", "emulated_bus", "run_program"]
-
 IDLE_NS = 100_000_000
 
 FORWARDED = (signal.SIGTERM, signal.SIGHUP)

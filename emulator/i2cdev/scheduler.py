@@ -22,8 +22,6 @@ from cubestack.emulator.i2cdev.pacing import Watch
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
 
-__all__ = ["AHEAD_PS", "MAX_DEBT_NS", "SPIN_NS", "TURNAROUND_NS", "I2cScheduler"]
-
 AHEAD_PS = 2 * PS_PER_MS
 """How far virtual time may be ahead of wall time during a transfer, when it is paced."""
 

@@ -28,8 +28,6 @@ from cubestack.firmware_model.formats.linux_i2c import (
     take_packet,
 )
 
-__all__ = ["MAX_CLIENTS", "I2cServer"]
-
 MAX_CLIENTS = 64
 """Connections at one time; a program takes one, and one for each device file it has open."""
 

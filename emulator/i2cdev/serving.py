@@ -16,8 +16,6 @@ from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["open_scheduler"]
-
 
 @contextmanager
 def open_scheduler(
@@ -56,12 +54,7 @@ def open_scheduler(
     adapter = i2c
     sharpen_timers()
     calls = I2cScheduler(
-        "I2C bus",
-        adapter,
-        i2c_ports,
-        busy,
-        fast=pace == "fast",
-        always_asleep=always_asleep,
+        "I2C bus", adapter, i2c_ports, busy, fast=pace == "fast", always_asleep=always_asleep
     )
     try:
         yield RealtimeScheduler(

@@ -15,8 +15,6 @@ from cubestack.firmware_model.formats.linux_i2c import (
     SmbusSize,
 )
 
-__all__ = ["Transaction", "checksum"]
-
 _BLOCKS = (SmbusSize.BLOCK_DATA, SmbusSize.BLOCK_PROCESS_CALL, SmbusSize.I2C_BLOCK_DATA)
 _CALLS = (SmbusSize.PROCESS_CALL, SmbusSize.BLOCK_PROCESS_CALL)
 _WITHOUT_CHECKSUM = (SmbusSize.QUICK, SmbusSize.I2C_BLOCK_DATA)

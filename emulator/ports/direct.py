@@ -8,8 +8,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = ["DirectSerial"]
-
 
 class DirectSerial:
     """The host's end of a UART line."""

@@ -3,8 +3,6 @@
 import select
 from abc import ABC, abstractmethod
 
-__all__ = ["Endpoint", "PortError", "poll_now"]
-
 
 class PortError(OSError):
     """A port can not be opened; the text names it and what would be right."""

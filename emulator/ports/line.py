@@ -5,8 +5,6 @@ from collections import deque
 from cubestack.emulator.bus.line_format import LineFormat, LineSampler
 from cubestack.emulator.bus.uart import Uart
 
-__all__ = ["HostLine"]
-
 
 class HostLine:
     """Plugged into a UART; the line that was there before is unplugged by that.

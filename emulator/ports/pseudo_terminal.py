@@ -14,8 +14,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PortError, poll_now
 from cubestack.emulator.ports.serial_port import SerialPort
 
-__all__ = ["PtyEndpoint"]
-
 
 class PtyEndpoint(SerialPort):
     """A pseudo-terminal whose slave is reachable under a symbolic link.

@@ -13,15 +13,6 @@ from typing import Literal
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
-__all__ = [
-    "IDLE_S",
-    "LAG_REPORT_S",
-    "LAG_WORTH_SAYING_S",
-    "SLICE_S",
-    "RealtimeScheduler",
-    "wait_ready",
-]
-
 SLICE_S = 0.005
 """Wall time between two looks at the ports while events are worked off."""
 

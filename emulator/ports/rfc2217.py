@@ -20,8 +20,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.ports.tcp import TcpEndpoint
 
-__all__ = ["Rfc2217Endpoint"]
-
 CHUNK_BYTES = 4096
 """Bytes handed to the socket at once, and of unsent replies before a client is not read from."""
 

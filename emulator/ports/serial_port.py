@@ -17,8 +17,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.line import HostLine
 
-__all__ = ["MAX_UNREAD", "MAX_UNSENT", "SerialPort"]
-
 MAX_UNREAD = 1 << 16
 """Bytes that wait for a slow client before the oldest are dropped."""
 

@@ -9,8 +9,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PortError, poll_now
 from cubestack.emulator.ports.serial_port import SerialPort
 
-__all__ = ["TcpEndpoint"]
-
 TCP_RECEIVE_BUFFER = 4096
 """Bytes. Small, so that little of a client that floods the port and dies is still delivered."""
 

@@ -22,8 +22,6 @@ from cubestack.firmware_model.formats.recording import (
 )
 from cubestack.firmware_model.formats.setup import Setup
 
-__all__ = ["Recorder"]
-
 BLOCK_BYTES = 256
 """Longest run of bytes in one event."""
 
@@ -32,11 +30,7 @@ class Recorder:
     """Writes a recording; attach it before anything is said."""
 
     def __init__(
-        self,
-        stream: IO[str],
-        device: str,
-        uarts: Mapping[str, Uart],
-        setup: Setup | None = None,
+        self, stream: IO[str], device: str, uarts: Mapping[str, Uart], setup: Setup | None = None
     ) -> None:
         """Record ``uarts`` by the names of their ports; ``stream`` stays its owner's."""
         bauds = {port: uart.form.baud for port, uart in uarts.items()}

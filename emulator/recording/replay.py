@@ -24,8 +24,6 @@ from cubestack.firmware_model.formats.recording import (
 )
 from cubestack.firmware_model.interface.codec.message import Interface
 
-__all__ = ["Replay"]
-
 SETTLE_PS = PS_PER_S
 """How long a replay goes on after the last event: what comes late is different, too."""
 

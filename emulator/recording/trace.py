@@ -22,8 +22,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["Probes", "VcdTrace"]
-
 PS_PER_NS = 1000
 
 Probes = Callable[[], Mapping[str, int | str]]

@@ -7,8 +7,6 @@ from pathlib import Path
 from cubestack.emulator.rtl.cxxrtl.build import library_for
 from cubestack.emulator.rtl.wiring import Wiring
 
-__all__ = ["ROUNDS", "cold_build_s"]
-
 ROUNDS = 5
 """Times that a figure is measured; the best one counts: the others were disturbed."""
 

@@ -16,8 +16,6 @@ from cubestack.emulator.rtl.sram import Violation, ViolationKind
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import FpgaPort
 
-__all__ = ["PinEvent", "PixelSegment", "PixelSource", "RtlEngine"]
-
 
 class PixelSegment(Protocol):
     """A stretch of the camera's output with an unbroken pixel clock: blanking, or whole lines."""

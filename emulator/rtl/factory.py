@@ -10,8 +10,6 @@ from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
 
-__all__ = ["EngineKind", "make_engine"]
-
 EngineKind = Literal["auto", "compiled", "python"]
 """How FPGAs are run."""
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
 
-__all__ = ["LoadedSegment"]
-
 
 @dataclass
 class LoadedSegment:

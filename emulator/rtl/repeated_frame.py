@@ -8,8 +8,6 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RepeatedFrame"]
-
 
 @dataclass(frozen=True)
 class _Segment:

@@ -21,8 +21,6 @@ from cubestack.emulator.rtl.sram import (
 from cubestack.emulator.rtl.stepping import BurstEnd, SteppingEngine
 from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
-__all__ = ["SimulatedEngine"]
-
 
 @dataclass
 class _Stream:

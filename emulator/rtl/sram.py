@@ -12,18 +12,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "BETWEEN_FPGAS",
-    "MAX_VIOLATIONS",
-    "RULES",
-    "Sram",
-    "SramPins",
-    "SramTiming",
-    "Violation",
-    "ViolationKind",
-    "ViolationLog",
-]
-
 _log = logging.getLogger(__name__)
 
 ViolationKind = Literal[

@@ -20,8 +20,6 @@ from cubestack.emulator.rtl.sram import Violation, ViolationKind, ViolationLog
 from cubestack.emulator.rtl.wiring import CameraPins, Wiring
 from cubestack.emulator.sim.fpga_port import STEPS, TAKE, Transactions
 
-__all__ = ["BurstEnd", "SteppingEngine"]
-
 
 class BurstEnd(Enum):
     """Why a burst of pixel clock edges ended."""

@@ -11,16 +11,6 @@ from amaranth.lib.wiring import Component, In
 
 from cubestack.emulator.sim.fpga_port import STEPS, Transactions
 
-__all__ = [
-    "MEMORY_PINS",
-    "BusPins",
-    "CameraPins",
-    "Level",
-    "Levels",
-    "MemoryPins",
-    "Wiring",
-]
-
 #: An SRAM's pins, seen from the FPGA.
 MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 

@@ -7,8 +7,6 @@ angle from the boresight, and they divide it into x (right) and y (down).
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["angles_from_vector", "vector_from_angles"]
-
 
 def vector_from_angles(alpha_deg: ArrayLike, beta_deg: ArrayLike) -> NDArray[np.float64]:
     """Unit vectors (..., 3) in camera axes of alpha and beta."""

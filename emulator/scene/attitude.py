@@ -10,18 +10,6 @@ All arrays are float64.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "attitude_error_deg",
-    "matrix_from_pointing",
-    "matrix_from_quaternion",
-    "pointing_from_matrix",
-    "propagate",
-    "quaternion_from_matrix",
-    "quaternion_from_pointing",
-    "random_quaternion",
-    "unit_quaternion",
-]
-
 
 def unit_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
     """``quaternion`` scaled to length 1, shape (4,); ValueError when that is not possible."""

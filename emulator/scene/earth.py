@@ -15,8 +15,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EARTH_RADIUS_KM", "Earth", "angular_radius_deg"]
-
 EARTH_RADIUS_KM = 6378.136
 
 TWILIGHT = 0.05

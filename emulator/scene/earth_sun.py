@@ -18,8 +18,6 @@ from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-__all__ = ["EarthSunScene", "Mounting", "Reflection", "SensorTruth", "Target"]
-
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 

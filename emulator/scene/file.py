@@ -12,22 +12,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = [
-    "Readers",
-    "SceneError",
-    "flag",
-    "number",
-    "read_scene_file",
-    "read_table",
-    "refuse_negative",
-    "refuse_zero",
-    "several",
-    "subtable",
-    "text",
-    "values_for",
-    "whole",
-]
-
 Readers = dict[str, Callable[[Any], Any]]
 V = TypeVar("V")
 

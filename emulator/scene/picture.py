@@ -10,8 +10,6 @@ from PIL import Image, UnidentifiedImageError
 from cubestack.emulator.scene.attitude import unit_quaternion
 from cubestack.emulator.scene.file import SceneError, refuse_zero
 
-__all__ = ["FORMATS", "PictureScene", "check_quaternion", "load_picture"]
-
 FORMATS = ("PNG", "JPEG", "TIFF")
 
 

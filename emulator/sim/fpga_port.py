@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.external_bus import EBI, BusTiming
 
-__all__ = ["STEPS", "TAKE", "FpgaPort", "Transactions"]
-
 STEPS = 6
 """Events of a transaction: latch opens, latch closes, select, strobe falls, strobe rises, release.
 """

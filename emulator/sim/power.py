@@ -7,8 +7,6 @@ import simpy
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
 
-__all__ = ["COMPARATOR_US", "Part", "PowerModel", "PowerTable"]
-
 COMPARATOR_US = 2
 """Response time of monitor and comparator: assumed."""
 

@@ -30,8 +30,6 @@ from cubestack.firmware_model.mcu.requests import (
     StrobeRead,
 )
 
-__all__ = ["LOOK_AHEAD_PS", "CameraBus", "Pins", "Processor", "Program"]
-
 LOOK_AHEAD_PS = 10 * PS_PER_MS
 
 Steps = Generator[simpy.Event, Any, Any]
@@ -140,12 +138,7 @@ class Processor:
         self._follow()
         addresses = np.arange(address, address + count, dtype=np.int32)
         reads = Transactions(
-            addresses,
-            np.zeros(count, np.uint8),
-            False,
-            self._cycle,
-            cycles,
-            select,
+            addresses, np.zeros(count, np.uint8), False, self._cycle, cycles, select
         )
         self._reached.access(reads, self._reached.now_ps + int(count * reads.period))
         return reads.data.tobytes()

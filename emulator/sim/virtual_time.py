@@ -2,8 +2,6 @@
 
 import simpy
 
-__all__ = ["PS_PER_MS", "PS_PER_S", "PS_PER_US", "CycleClock", "Kernel"]
-
 PS_PER_S = 10**12
 PS_PER_MS = 10**9
 PS_PER_US = 10**6

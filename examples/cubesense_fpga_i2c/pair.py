@@ -14,8 +14,6 @@ from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
 from cubestack.hdl.cubesense.pair import OWN_PORTS, driven, released
 
-__all__ = ["CubeSenseI2cPair"]
-
 
 class CubeSenseI2cPair(PinnedComponent):
     """The two FPGAs with all of their pins but those of the link.
@@ -40,10 +38,7 @@ class CubeSenseI2cPair(PinnedComponent):
         m.submodules.nadir = nadir = CubeSenseI2cFpga("nadir", self.read_out)
         link_data = driven(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
         link_control = released(
-            sun.LINK_C_O,
-            sun.LINK_C_OE.replicate(2),
-            nadir.LINK_C_O,
-            nadir.LINK_C_OE.replicate(2),
+            sun.LINK_C_O, sun.LINK_C_OE.replicate(2), nadir.LINK_C_O, nadir.LINK_C_OE.replicate(2)
         )
         for prefix, fpga in zip(PREFIXES.values(), (sun, nadir), strict=True):
             own = [(name, prefix + name) for name in OWN_PORTS]

@@ -9,8 +9,6 @@ from cubestack.firmware_model.interface.cubesense.pins import (
 )
 from cubestack.firmware_model.interface.pins import Pin
 
-__all__ = ["FPGA", "PAIR"]
-
 SCL = Pin("SCL", "input", "I2C clock, Schmitt trigger; pulled up on the board", level=1)
 RESET_N = Pin("RESET_N", "input", "reset, low active, with the supply")
 

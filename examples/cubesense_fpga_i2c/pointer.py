@@ -11,8 +11,6 @@ from amaranth.lib.wiring import Component, In, Out
 from cubesense_fpga_i2c.register_table import PointerBits
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
-__all__ = ["MemoryPointer"]
-
 
 class MemoryPointer(Component):
     """Row and column, in the domain ``domain``.

@@ -8,11 +8,7 @@ from amaranth.hdl._ast import Initial  # not among the public names, though docu
 
 from cubesense_fpga_i2c.pair import CubeSenseI2cPair
 from cubesense_fpga_i2c.pins import FPGA
-from cubesense_fpga_i2c.register_table import (
-    ADDRESSES,
-    GROUP_ADDRESS,
-    command_of,
-)
+from cubesense_fpga_i2c.register_table import ADDRESSES, GROUP_ADDRESS, command_of
 from cubesense_fpga_i2c.top import CubeSenseI2cFpga
 from cubestack.firmware_model.interface.cubesense.fpga import Action
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
@@ -29,8 +25,6 @@ from cubestack.hdl.proofs.properties import (
     writer_wires,
 )
 from cubestack.hdl.proofs.prover import Fault, Proof, past
-
-__all__ = ["PROOFS"]
 
 _TARGET = (
     "addressing",
@@ -203,11 +197,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             Fault("registers.target.reading", 1),
         ),
         f"{side}-ack-i2c": Proof(
-            ACKNOWLEDGES,
-            _fpga(side),
-            _WRITERS,
-            _acknowledges,
-            Fault("pix_writer.ack", 1),
+            ACKNOWLEDGES, _fpga(side), _WRITERS, _acknowledges, Fault("pix_writer.ack", 1)
         ),
     }
 

@@ -29,23 +29,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     address_bytes,
 )
 
-__all__ = [
-    "ADDRESSES",
-    "GROUP_ADDRESS",
-    "I2C_COMMANDS",
-    "REGISTERS",
-    "REGISTER_BITS",
-    "RESET_COMMAND",
-    "WHO",
-    "CommandBits",
-    "PointerBits",
-    "Register",
-    "StatusBits",
-    "command_byte",
-    "command_of",
-    "pointer_bytes",
-]
-
 #: 7-bit addresses on the bus between microcontroller and FPGAs; both FPGAs take the group's.
 ADDRESSES = {"sun": 0x31, "nadir": 0x32}
 GROUP_ADDRESS = 0x30

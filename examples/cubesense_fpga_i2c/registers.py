@@ -30,8 +30,6 @@ from cubesense_fpga_i2c.target import I2cTarget
 from cubestack.firmware_model.interface.cubesense.fpga import Action, FpgaCommand, ReadOut
 from cubestack.hdl.cubesense.dataflow import Side
 
-__all__ = ["CubeSenseI2cRegisters"]
-
 
 class CubeSenseI2cRegisters(Component):
     """The target with its registers, in the domain ``domain`` of the parent's making.

@@ -14,8 +14,6 @@ boards have no clock that always runs, so a target that samples the bus is not p
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal, Value
 from amaranth.lib.wiring import Component, In, Out
 
-__all__ = ["I2cTarget"]
-
 
 class I2cTarget(Component):
     """A register number and bytes, in the domain ``domain``, whose clock is the falling SCL.

@@ -28,8 +28,6 @@ from cubestack.hdl.cubesense.dataflow import Side, checked
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.writer import add_writer
 
-__all__ = ["CubeSenseI2cFpga"]
-
 
 class CubeSenseI2cFpga(PinnedComponent):
     """The sun sensor's or the nadir sensor's FPGA.

@@ -14,8 +14,6 @@ from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.tops import LINK_CLOCK, PIXEL_CLOCK
 from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
-__all__ = ["AREA_FILE", "TOPS"]
-
 _SCL = Clock("SCL", 1000, "I2C at 1 MHz, both edges")
 _SDA = Clock("SDA", 1000, "I2C's START and STOP, both edges")
 

@@ -24,8 +24,6 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep
 
-__all__ = ["Camera"]
-
 SETTLE_US = 2_000
 """From power-up to the first register access; assumed."""
 

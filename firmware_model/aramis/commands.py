@@ -26,8 +26,6 @@ from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
-__all__ = ["Commands"]
-
 STREAM_BACKLOG_BYTES = 4 * BLOCK_BYTES
 
 

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["FOV_DEG", "Field"]
-
 FOV_DEG = 21 + 32 / 60 + 4.7 / 3600
 
 _ONE = np.float32(1)

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.hardware import NodeHardware
 
-__all__ = ["AramisHardware", "FrameEnd"]
-
 
 class FrameEnd(IntEnum):
     """How a frame's transfer ended, as the interface's status register tells it."""

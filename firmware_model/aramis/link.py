@@ -15,8 +15,6 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
 from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
 
-__all__ = ["SEND_BUFFER_BYTES", "AramisLink"]
-
 SEND_BUFFER_BYTES = 8 * BLOCK_BYTES
 """What the UART may still have to send: assumed."""
 

@@ -42,8 +42,6 @@ from cubestack.firmware_model.interface.aramis import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 
-__all__ = ["Measuring", "configuration"]
-
 Direction = NDArray[np.float32]
 
 

@@ -8,15 +8,6 @@ picture, a second one that comes while the first is worked on, and the catalogue
 from cubestack.firmware_model.aramis.catalogue.hamming import coded_size
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, MOST_CATALOGUE_BYTES
 
-__all__ = [
-    "CATALOGUE_AT",
-    "FLASH_BYTES",
-    "PICTURES_AT",
-    "SDRAM_BYTES",
-    "SECTOR_BYTES",
-    "UPLOAD_AT",
-]
-
 MB = 1 << 20
 
 SDRAM_BYTES = 32 * MB

@@ -20,8 +20,6 @@ from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["PUBLISHED", "VERIFIED", "Configuration", "Detection", "detect", "explain", "solve"]
-
 
 @dataclass(frozen=True)
 class Detection:

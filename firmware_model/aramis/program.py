@@ -17,8 +17,6 @@ from cubestack.firmware_model.interface.aramis import MeasurementMode
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine, Sleep
 
-__all__ = ["LATE_US", "AramisProgram"]
-
 LATE_US = 10_000
 """An iteration that starts later than this after its time is a timing error; assumed."""
 
@@ -46,13 +44,7 @@ class AramisProgram:
             hardware, meter, state, self._camera, self._catalogue, self._measuring
         )
         telemetry = Telemetry(
-            hardware,
-            meter,
-            state,
-            self._camera,
-            self._catalogue,
-            self.commands,
-            lambda: self.link,
+            hardware, meter, state, self._camera, self._catalogue, self.commands, lambda: self.link
         )
         self.link = AramisLink(hardware, meter, state, telemetry.values, self.commands.urgent)
 

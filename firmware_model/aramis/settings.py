@@ -13,8 +13,6 @@ from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.settings import Settings
 
-__all__ = ["BODY_PAGE", "CONFIG_PAGE", "SETTING_COMMANDS", "StoredSettings"]
-
 #: Telecommands whose parameters are kept.
 SETTING_COMMANDS = tuple(SETTINGS_SHOWN.values())
 

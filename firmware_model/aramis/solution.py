@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
-__all__ = ["NONE", "Profile", "Solution", "StarList", "unsolved"]
-
 NONE = -1
 """Mark of a measured star without identity."""
 

@@ -19,8 +19,6 @@ from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.state import NodeState
 
-__all__ = ["Clock", "Measurement", "State"]
-
 
 class Clock:
     """Julian date, counted on from the instant that a host set it (thesis, section 2.2)."""

@@ -20,8 +20,6 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
 
-__all__ = ["Telemetry", "body_quaternion"]
-
 NODE_TYPE = 6
 
 _U16, _U32 = 0xFFFF, 0xFFFF_FFFF

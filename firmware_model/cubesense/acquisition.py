@@ -44,8 +44,6 @@ from cubestack.firmware_model.interface.cubesense.pins import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
 
-__all__ = ["ACK_POLL_CYCLES", "ACK_TIMEOUT_US", "CHUNK", "Acquisition"]
-
 ACK_POLL_CYCLES = 9
 """Port read (2) and loop step (7) of the cost table."""
 

@@ -20,15 +20,9 @@ from cubestack.firmware_model.interface.cameras.ov7620 import (
     window_row,
 )
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
-from cubestack.firmware_model.interface.cubesense.pins import (
-    CAMERA_POWER,
-    CAMERA_SCL,
-    CAMERA_SDA,
-)
+from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER, CAMERA_SCL, CAMERA_SDA
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadPin, ReadTimer, Routine, SetPin
-
-__all__ = ["EXPOSURE_SETTLE_US", "CameraControl", "register_values"]
 
 START_UP_US = 2_000
 """From a camera's switch to the first write; assumed."""

@@ -33,8 +33,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
-__all__ = ["SOFTWARE_RESET", "Commands"]
-
 SOFTWARE_RESET = 1
 """Cause of the program's own reset."""
 

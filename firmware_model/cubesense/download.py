@@ -29,8 +29,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
-__all__ = ["Download", "PictureReader"]
-
 
 class PictureReader:
     """Any pixels of a picture; in ascending order it is read once."""

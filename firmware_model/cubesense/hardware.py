@@ -11,8 +11,6 @@ from typing import Protocol
 from cubestack.firmware_model.interface.cubesense.pins import Monitor
 from cubestack.firmware_model.node.hardware import NodeHardware
 
-__all__ = ["CubeSenseHardware", "Port"]
-
 
 class Port(StrEnum):
     """A serial port; the part has one, so either is in use, and the model serves both."""

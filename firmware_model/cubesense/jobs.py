@@ -15,8 +15,6 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, ImageSize
 from cubestack.firmware_model.mcu.requests import Routine
 from cubestack.firmware_model.node.queue import BoundedQueue
 
-__all__ = ["Background", "FrameRequest", "Job", "JobQueue", "Measure", "TelecommandJob"]
-
 
 @dataclass(frozen=True, eq=False)
 class FrameRequest:

@@ -13,12 +13,7 @@ from functools import cache
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
-from cubestack.firmware_model.cubesense.timer import (
-    microseconds,
-    read_ticks,
-    ticks_of,
-    ticks_since,
-)
+from cubestack.firmware_model.cubesense.timer import microseconds, read_ticks, ticks_of, ticks_since
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
@@ -42,8 +37,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
-
-__all__ = ["READ_OUT_TICKS", "Measurement"]
 
 READ_OUT_TICKS = ticks_of(ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
 """From a picture's first row to its end: 30.5 ms."""

@@ -16,10 +16,7 @@ from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import FRAME_BYTES, MASK_AREAS, Camera
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
-from cubestack.firmware_model.interface.cubesense.telecommands import (
-    DISTORTION_TERMS,
-    TELECOMMANDS,
-)
+from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS, TELECOMMANDS
 from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 

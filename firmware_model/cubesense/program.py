@@ -19,8 +19,6 @@ from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Reset, Routine
 
-__all__ = ["DRAIN_US", "CubeSenseProgram"]
-
 DRAIN_US = 100_000
 """A reset waits so long at most for the UART; its longest answer takes half of it. Assumed."""
 

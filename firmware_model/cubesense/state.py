@@ -26,8 +26,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.node.state import NodeState
 
-__all__ = ["CameraSettings", "Result", "State", "distortion_of"]
-
 ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
 """Of telemetry CommunicationStatus."""
 

@@ -13,8 +13,6 @@ from cubestack.firmware_model.interface.cubesense.pins import MA_PER_COUNT, SRAM
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, SetPin, Sleep
 
-__all__ = ["OFF_TIME_US", "OVER_CURRENT_MA", "SAMPLE_US", "SETTLE_US", "Supply"]
-
 OVER_CURRENT_MA = 60.0
 """Assumed, no limit is published: four times what a working memory draws here (15 mA, and table 7.1
 has some 5 mA at 5 V), and far below what a latch-up does."""

@@ -24,8 +24,6 @@ from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import identification
 
-__all__ = ["NODE_TYPE", "SERIAL_BYTES", "Telemetry"]
-
 NODE_TYPE = 4
 """Assumed; the public material names no number."""
 

@@ -20,8 +20,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     ImageSize,
 )
 
-__all__ = ["OUTSIDE", "frame_pixels", "thumbnail"]
-
 #: Number of a pixel that lies outside of the picture.
 OUTSIDE = -1
 

@@ -7,8 +7,6 @@ CubeSense thesis, section 7.4: time = ticks x 256 / 5 MHz, so a tick is 51.2 us 
 from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
-__all__ = ["PRESCALER", "microseconds", "read_ticks", "ticks_of", "ticks_since"]
-
 PRESCALER = 256
 
 _CYCLES_PER_US = INSTRUCTION_HZ // 1_000_000

@@ -17,8 +17,6 @@ from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, Sleep
 
-__all__ = ["ImageCapture"]
-
 ACK_POLL_CYCLES = 8
 """Port read (3) and loop step (5) of the cost table."""
 

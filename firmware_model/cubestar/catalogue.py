@@ -230,7 +230,5 @@ def _list_pairs(vectors: NDArray[np.float64], limit_rad: float) -> PairList:
     stored = angle[close].astype(np.float32)
     order = np.argsort(stored, kind="stable")
     return PairList(
-        first[close][order].astype(np.uint16),
-        second[close][order].astype(np.uint16),
-        stored[order],
+        first[close][order].astype(np.uint16), second[close][order].astype(np.uint16), stored[order]
     )

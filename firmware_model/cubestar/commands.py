@@ -25,8 +25,6 @@ from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
-__all__ = ["WATCHDOG_US", "Commands"]
-
 WATCHDOG_US = 2_000_000
 """Period of the watchdog; assumed, the sources give none."""
 

@@ -7,8 +7,6 @@ from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.node.settings import Settings
 
-__all__ = ["camera_parameters", "detection_config", "field_radius_deg"]
-
 
 def detection_config(settings: Settings) -> DetectionConfig:
     """Region, thresholds and limits of the search."""

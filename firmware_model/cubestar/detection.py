@@ -30,18 +30,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = [
-    "Detection",
-    "DetectionConfig",
-    "DetectionConfigError",
-    "Look",
-    "Put",
-    "Search",
-    "SearchEnd",
-    "detect_stars",
-    "search_stars",
-]
-
 BLOCK = 1024
 """Pixels of an array that are compared at once: speed only."""
 
@@ -330,10 +318,7 @@ def _charge_growing(area: _Area, meter: Meter) -> None:
     """Per pixel: a call, its list entry and its brightness; per neighbour: a test."""
     count = len(area.offsets)
     meter.charge(
-        call=count,
-        ram_write=2 * count,
-        loop=area.looked_at,
-        i32_add=5 * count + 3 * area.looked_at,
+        call=count, ram_write=2 * count, loop=area.looked_at, i32_add=5 * count + 3 * area.looked_at
     )
 
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.hardware import NodeHardware
 
-__all__ = ["CubeStarHardware"]
-
 
 class CubeStarHardware(NodeHardware, Protocol):
     """Peripherals that the program uses without waiting for them.

@@ -15,8 +15,6 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import (
 )
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep
 
-__all__ = ["ImageSensor"]
-
 SETTLE_US = 2_000
 """From power-up to the first register access; assumed."""
 

@@ -11,8 +11,6 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
 from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
 
-__all__ = ["SEND_BUFFER_BYTES", "CubeStarLink"]
-
 SEND_BUFFER_BYTES = 2048
 """What the UART may still have to send: assumed, a third of a second at the default baud rate."""
 

@@ -13,12 +13,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
-from cubestack.firmware_model.cubestar.state import (
-    ATTITUDE_PAGE,
-    CONFIG_PAGE,
-    MODE_PAGE,
-    State,
-)
+from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter

@@ -6,8 +6,6 @@ The phases are those of table 6.2 in the CubeStar thesis, and the steps of secti
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
-__all__ = ["Phases"]
-
 
 class Phases:
     """Measures phases into the ``*_us`` fields of ``Retained``."""

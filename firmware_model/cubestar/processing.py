@@ -33,8 +33,6 @@ from cubestack.firmware_model.interface.cubestar.codes import IdMode, MatchMode,
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
-__all__ = ["Processing", "Results"]
-
 _SEARCH_FLAGS = {
     SearchEnd.STARS: "MaxStarsDetection",
     SearchEnd.INVALID: "MaxInvalidStarsDetectionError",

@@ -7,8 +7,6 @@ in flash by SaveConfig.
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 
-__all__ = ["SETTINGS_BYTES", "SETTING_COMMANDS"]
-
 #: Telecommands whose parameters are kept.
 SETTING_COMMANDS = (
     "setDelayTimerTimeout",

@@ -23,8 +23,6 @@ from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskSta
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
 
-__all__ = ["ATTITUDE_PAGE", "CONFIG_PAGE", "MODE_PAGE", "Attitude", "Retained", "State"]
-
 CONFIG_PAGE = "config"
 ATTITUDE_PAGE = "attitude"
 MODE_PAGE = "mode"

@@ -7,8 +7,6 @@ from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
-__all__ = ["CHANNELS", "OFF_TIME_US", "UNDER_CURRENT_MA", "SupplyMonitor"]
-
 #: The processor's SRAM; the boards of FPGA and image sensor.
 CHANNELS = ("memory", "imager")
 

@@ -19,8 +19,6 @@ from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
 
-__all__ = ["Telemetry"]
-
 NODE_TYPE = 5
 
 Values = dict[str, Any]

@@ -10,8 +10,6 @@ from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.frames import ESCAPE, START, FrameDecoder, FrameEvent
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 
-__all__ = ["name_answer_byte", "name_bus_byte", "name_request_byte", "payload_offset"]
-
 LONGEST_PAYLOAD = 4096
 
 

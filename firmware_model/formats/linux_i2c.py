@@ -25,39 +25,6 @@ from enum import IntEnum, IntFlag
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "LENGTH",
-    "MAX_BLOCK_BYTES",
-    "MAX_MESSAGES",
-    "MAX_MESSAGE_BYTES",
-    "MAX_REPLY_BYTES",
-    "MAX_REQUEST_BYTES",
-    "SMBUS_DATA_BYTES",
-    "Call",
-    "Function",
-    "Ioctl",
-    "MessageFlag",
-    "RdwrMessage",
-    "SmbusCall",
-    "SmbusSize",
-    "pack_ioctl",
-    "pack_rdwr",
-    "pack_read",
-    "pack_smbus",
-    "reply",
-    "request",
-    "smbus_data_bytes",
-    "socket_path",
-    "split_rdwr",
-    "split_reply",
-    "split_request",
-    "take_packet",
-    "unpack_ioctl",
-    "unpack_rdwr",
-    "unpack_read",
-    "unpack_smbus",
-]
-
 MAX_MESSAGES = 42
 """Messages of one I2C_RDWR."""
 

@@ -21,19 +21,6 @@ from typing import IO, Any, Literal
 
 from cubestack.firmware_model.formats.setup import Setup
 
-__all__ = [
-    "BusMessage",
-    "BusTransfer",
-    "Control",
-    "LineBytes",
-    "LineError",
-    "Recording",
-    "RecordingError",
-    "RecordingWriter",
-    "Side",
-    "load_recording",
-]
-
 VERSION = 1
 
 Side = Literal["host", "device"]

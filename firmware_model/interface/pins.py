@@ -4,8 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Direction", "Pin", "Port", "resized", "sram_pins"]
-
 #: Seen from the FPGA; "tristate" is an output that can be off.
 Direction = Literal["input", "output", "tristate", "inout"]
 

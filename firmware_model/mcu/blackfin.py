@@ -12,8 +12,6 @@ width), that is 80 core cycles; a 32-bit word that is read in sequence then cost
 
 from cubestack.firmware_model.mcu.costs import Cost, CostTable
 
-__all__ = ["BLACKFIN_BF533", "CORE_HZ", "blackfin_bf533"]
-
 CORE_HZ = 600_000_000
 BUS_DIVIDER = 5
 LINE_FILL_BUS_CLOCKS = 16

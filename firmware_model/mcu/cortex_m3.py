@@ -6,8 +6,6 @@ published duration (Table 6.2), so every other duration is a prediction.
 
 from cubestack.firmware_model.mcu.costs import Cost, CostTable
 
-__all__ = ["CORTEX_M3", "cortex_m3"]
-
 
 def cortex_m3(
     *, clock_hz: int = 48_000_000, flash_waits: int = 2, ebi_waits: int = 6, gpio_waits: int = 0

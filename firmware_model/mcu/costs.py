@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-__all__ = ["Cost", "CostError", "CostTable", "Meter", "Provenance"]
-
 Provenance = Literal["measured", "published", "fitted", "assumed"]
 
 

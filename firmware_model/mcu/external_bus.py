@@ -8,8 +8,6 @@ registers, so their values are assumed.
 
 from dataclasses import dataclass
 
-__all__ = ["EBI", "BusTiming"]
-
 LONGEST = {"address_setup": 3, "address_hold": 3, "setup": 3, "strobe": 63, "hold": 3}
 
 

@@ -1,7 +1,5 @@
 """Non-volatile memory of a processor."""
 
-__all__ = ["FlashStore"]
-
 
 class FlashStore:
     """Flash pages by name: survives resets and power cycles.

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from enum import Enum
 
-__all__ = ["Buffer", "Memory", "used"]
-
 
 class Memory(Enum):
     """A memory of a processor board."""

@@ -9,15 +9,6 @@ else is, so the nadir sensor's time is a prediction.
 
 from cubestack.firmware_model.mcu.costs import Cost, CostTable
 
-__all__ = [
-    "FITTED_SUN_PIXELS",
-    "FITTED_SUN_SECONDS",
-    "INSTRUCTION_HZ",
-    "LIBRARY_FACTOR",
-    "PIC18F45K20",
-    "pic18f45k20",
-]
-
 INSTRUCTION_HZ = 5_000_000
 
 FITTED_SUN_SECONDS = 0.0704 - 0.048

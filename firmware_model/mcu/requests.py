@@ -14,21 +14,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "AwaitPin",
-    "BusAccess",
-    "CameraTransfer",
-    "Pay",
-    "ReadPin",
-    "ReadTimer",
-    "Request",
-    "Reset",
-    "Routine",
-    "SetPin",
-    "Sleep",
-    "StrobeRead",
-]
-
 
 @dataclass(frozen=True)
 class Pay:

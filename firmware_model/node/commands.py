@@ -8,8 +8,6 @@ from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.queue import QueuedCommand
 from cubestack.firmware_model.node.settings import Settings
 
-__all__ = ["CommandExecutor"]
-
 STREAM_PAUSE_US = 20_000
 
 

@@ -2,8 +2,6 @@
 
 from typing import Protocol
 
-__all__ = ["NodeHardware"]
-
 
 class NodeHardware(Protocol):
     """Peripherals that every node's program uses without waiting for them."""

@@ -4,8 +4,6 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.message import Interface
 
-__all__ = ["FIRMWARE_VERSION", "SERIAL_NUMBER", "identification"]
-
 FIRMWARE_VERSION = (0, 1)
 SERIAL_NUMBER = 1
 

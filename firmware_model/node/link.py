@@ -15,18 +15,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.codec.message import (
-    TELEMETRY_BIT,
-    Interface,
-    Kind,
-    Message,
-)
+from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Interface, Kind, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.state import NodeState
-
-__all__ = ["BusFlags", "LinkFlags", "SatelliteLink", "longest_command"]
 
 NO_DATA = 0xFF
 """What a read delivers beyond the end of a message, or without one."""

@@ -6,8 +6,6 @@ from typing import Any, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
 
-__all__ = ["QUEUE_DEPTH", "BoundedQueue", "QueuedCommand"]
-
 QUEUE_DEPTH = 4
 """So many wait at most, as the hosts of these nodes expect."""
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.message import Interface
 
-__all__ = ["Settings"]
-
 
 class Settings:
     """Current parameters of every setting telecommand.

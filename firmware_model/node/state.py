@@ -2,8 +2,6 @@
 
 from collections.abc import Iterable
 
-__all__ = ["NodeState"]
-
 
 class NodeState:
     """What the RAM of every node's program holds.

@@ -9,8 +9,6 @@ own (SN74LVCH16373A) on the processor board.
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal
 from amaranth.lib.wiring import Component, In, Out
 
-__all__ = ["BusPort"]
-
 
 class BusPort(Component):
     """Address latch and strobes.

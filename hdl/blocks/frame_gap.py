@@ -7,8 +7,6 @@ How a frame's start is found from them is not published: it is assumed.
 from amaranth.hdl import Module, Signal
 from amaranth.lib.wiring import Component, In, Out
 
-__all__ = ["FrameGap"]
-
 
 class FrameGap(Component):
     """Makes a VSync: low until the first frame starts, and low in each later gap.

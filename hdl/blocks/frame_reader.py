@@ -9,8 +9,6 @@ from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
-__all__ = ["FrameReader"]
-
 
 class FrameReader(Component):
     """Presents the next byte at each rising edge of its domain's clock, the data clock.

@@ -10,8 +10,6 @@ from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
-__all__ = ["FrameWriter"]
-
 
 class FrameWriter(Component):
     """Stores the first whole frame after its domain leaves reset.

@@ -8,8 +8,6 @@ from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib.wiring import Component, In, Out
 from amaranth.utils import ceil_log2
 
-__all__ = ["GrayCounter"]
-
 
 class GrayCounter(Component):
     """Position in a picture that lies in the memory without gaps, in one clock domain.
@@ -32,12 +30,7 @@ class GrayCounter(Component):
         self._positions = positions
         self._domain = domain
         super().__init__(
-            {
-                "step": In(1),
-                "clear": In(1),
-                "last": Out(1),
-                "address": Out(ceil_log2(positions)),
-            }
+            {"step": In(1), "clear": In(1), "last": Out(1), "address": Out(ceil_log2(positions))}
         )
 
     def elaborate(self, platform: object) -> Module:

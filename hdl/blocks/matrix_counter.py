@@ -9,8 +9,6 @@ from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib.wiring import Component, In, Out
 from amaranth.utils import ceil_log2
 
-__all__ = ["MatrixCounter"]
-
 
 class MatrixCounter(Component):
     """Position inside a frame of ``columns`` x ``rows`` pixels, in one clock domain.

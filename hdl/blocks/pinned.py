@@ -7,8 +7,6 @@ from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.pins import Pin
 
-__all__ = ["PinnedComponent", "connect_ports", "pins_of"]
-
 
 class PinnedComponent(Component):
     """A whole FPGA, or a model of several: its ports are those of a table of pins.

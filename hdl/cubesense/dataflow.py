@@ -20,8 +20,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
     link_shows_enables,
 )
 
-__all__ = ["SIDES", "DataflowControl", "Side", "checked"]
-
 Side = Literal["sun", "nadir"]
 SIDES: tuple[Side, ...] = get_args(Side)
 

@@ -10,8 +10,6 @@ from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
-__all__ = ["NadirScan"]
-
 
 class NadirScan(Component):
     """Steps at each rising edge of its domain's clock, through figure 6.7's states.

@@ -18,8 +18,6 @@ from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
-__all__ = ["OWN_PORTS", "CubeSensePair", "driven", "released"]
-
 #: Ports that each FPGA has for itself; in the pair SUN_ or NAD_ goes before their names.
 OWN_PORTS = [port.name for pin in OWN_PINS for port in pin.ports]
 

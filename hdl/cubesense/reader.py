@@ -13,8 +13,6 @@ from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.cubesense.nadir_scan import NadirScan
 from cubestack.hdl.cubesense.sun_window import SunWindow
 
-__all__ = ["CubeSenseReader"]
-
 
 class CubeSenseReader(Component):
     """Presents the next byte at each rising edge of ``clk``, in one of three orders.

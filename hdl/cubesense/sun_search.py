@@ -10,8 +10,6 @@ from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, ReadOut
 
-__all__ = ["SunSearch"]
-
 
 class SunSearch(Component):
     """Looks at each pixel in the clock period in which it is written.

@@ -9,8 +9,6 @@ from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
-__all__ = ["SunWindow"]
-
 
 class SunWindow(Component):
     """Steps at each rising edge of its domain's clock, through figure 6.16's states.

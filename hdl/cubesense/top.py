@@ -30,8 +30,6 @@ from cubestack.hdl.cubesense.reader import CubeSenseReader
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.writer import add_writer
 
-__all__ = ["CubeSenseFpga"]
-
 
 class CubeSenseFpga(PinnedComponent):
     """The sun sensor's or the nadir sensor's FPGA with the pins of table 3.4.

@@ -18,8 +18,6 @@ from cubestack.hdl.cubesense.sun_window import SunWindow
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
-__all__ = ["AREA_FILE", "LINK_CLOCK", "PIXEL_CLOCK", "TOPS"]
-
 PIXEL_CLOCK = Clock(PCLK, 74, "OV7620 at 13.5 MHz")
 LINK_CLOCK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
 _CLK = Clock(CLK, 400, "two instructions of the microcontroller at 5 MHz")

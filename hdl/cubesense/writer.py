@@ -10,8 +10,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 from cubestack.hdl.blocks.frame_gap import FrameGap
 from cubestack.hdl.blocks.frame_writer import FrameWriter
 
-__all__ = ["add_writer"]
-
 
 def add_writer(
     m: Module, domain: str, wanted: Value, clock: Value, href: Value, pixel: Value, size: ReadOut

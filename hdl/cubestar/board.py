@@ -14,8 +14,6 @@ from cubestack.hdl.blocks.frame_writer import FrameWriter
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.blocks.pinned import PinnedComponent
 
-__all__ = ["CubeStarBoard"]
-
 
 class CubeStarBoard(PinnedComponent):
     """A board, or a model of two, that stores images of ``columns`` x ``rows`` pixels."""

@@ -16,8 +16,6 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module, Signal
 from cubestack.firmware_model.interface.cubestar.pins import DOUBLE
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
-__all__ = ["CubeStarDouble"]
-
 _SRAM = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 
@@ -41,10 +39,7 @@ class CubeStarDouble(CubeStarBoard):
         storing = Signal()
         into = Signal()
         m.d.start += into.eq(self.INTO)
-        m.d.comb += [
-            storing.eq(self.ENABLE & ~self.RNW),
-            ClockSignal("start").eq(self.RNW),
-        ]
+        m.d.comb += [storing.eq(self.ENABLE & ~self.RNW), ClockSignal("start").eq(self.RNW)]
         writer = self._add_writer(m, storing)
         bus = self._add_bus(m, self.ENABLE, len(self.SRAM1_A) + 1)
         offered = []

@@ -16,8 +16,6 @@ from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Signal
 from cubestack.firmware_model.interface.cubestar.pins import SHARED
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
-__all__ = ["CubeStarShared"]
-
 
 class CubeStarShared(CubeStarBoard):
     """Frame buffer and bus switch.
@@ -37,10 +35,7 @@ class CubeStarShared(CubeStarBoard):
         storing = Signal()
         bank = Signal()
         m.d.enable += bank.eq(self.BANK)
-        m.d.comb += [
-            storing.eq(self.ENABLE & ~self.RNW),
-            ClockSignal("enable").eq(self.ENABLE),
-        ]
+        m.d.comb += [storing.eq(self.ENABLE & ~self.RNW), ClockSignal("enable").eq(self.ENABLE)]
         writer = self._add_writer(m, storing)
         bus = self._add_bus(m, self.ENABLE & self.RNW, len(self.SRAM_A))
         m.d.comb += [

@@ -21,8 +21,6 @@ from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
 from cubestack.hdl.blocks.frame_reader import FrameReader
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
-__all__ = ["CubeStarTop"]
-
 
 class CubeStarTop(CubeStarBoard):
     """The frame buffer with the pins of table C.2 and its SRAM of two banks.

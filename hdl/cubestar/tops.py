@@ -13,8 +13,6 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
-__all__ = ["AREA_FILE", "TOPS"]
-
 _PIXCLK = Clock(PIXCLK, 100, "image sensor at 10 MHz")
 _DCLK = Clock(DCLK, 770.8, "37 cycles of the microcontroller's 48 MHz")
 _ENABLE = Clock(ENABLE, 1000, "microcontroller, a few times a second; latches BANK")

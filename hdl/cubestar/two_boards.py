@@ -17,8 +17,6 @@ from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 
-__all__ = ["CubeStarTwoBoards"]
-
 _OWN = [port.name for pin in OWN_PINS for port in pin.ports]
 _COMMON = [
     port.name for pin in SHARED if pin not in OWN_PINS for port in pin.ports if not port.output

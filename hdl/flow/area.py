@@ -13,8 +13,6 @@ from amaranth.lib.wiring import Component
 from cubestack.hdl.flow.generate import built_in_yosys, rtlil_text
 from cubestack.hdl.flow.lut_cover import FALSE, TRUE, GateNetwork
 
-__all__ = ["AGLN030_PINS", "AGLN030_TILES", "TileCount", "UnknownCellError", "count_tiles"]
-
 #: Tiles and user pins of the part that all sensors' FPGA boards carry; the pins by section 3.2.2 of
 #: the CubeSense thesis.
 AGLN030_TILES = 768

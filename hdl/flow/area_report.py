@@ -19,19 +19,6 @@ from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import run_nextpnr_ice40, yosys_files
 from cubestack.hdl.flow.top import Top, TopTable
 
-__all__ = [
-    "GROWTH",
-    "Area",
-    "Ice40Count",
-    "area_json",
-    "area_table",
-    "areas",
-    "count_ice40",
-    "grown",
-    "ice40_fmax",
-    "recorded_areas",
-]
-
 #: A design may grow by this part of what the tracked file says.
 GROWTH = 0.05
 

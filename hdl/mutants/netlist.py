@@ -18,8 +18,6 @@ from amaranth.lib.wiring import Component
 
 from cubestack.hdl.flow.tools import yosys_files
 
-__all__ = ["Mutant", "Netlist", "mutants", "netlist", "selectable"]
-
 _SIMPLIFY = """
 read_rtlil design.il
 hierarchy -top dut

@@ -20,20 +20,6 @@ from amaranth.hdl._ast import Initial  # not among the public names, though docu
 from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.proofs.prover import past
 
-__all__ = [
-    "ACKNOWLEDGES",
-    "WRITER_WIRES",
-    "acknowledges",
-    "acknowledges_all_rows",
-    "domain",
-    "idle_is_reset",
-    "one_sram_driver",
-    "outputs_rest",
-    "starts_in",
-    "writer_wires",
-    "written_is_driven",
-]
-
 #: What :func:`acknowledges` asserts.
 ACKNOWLEDGES = "ACK is high exactly from when all rows of a frame are stored"
 
@@ -89,11 +75,7 @@ def idle_is_reset(m: Module, d: SimpleNamespace, standby: Value, retained: set[s
 
 
 def outputs_rest(
-    m: Module,
-    d: SimpleNamespace,
-    standby: Value,
-    pins: Iterable[Pin],
-    but: Collection[str] = (),
+    m: Module, d: SimpleNamespace, standby: Value, pins: Iterable[Pin], but: Collection[str] = ()
 ) -> None:
     """In standby each output of ``pins`` has its reset level; ``but`` are ports that need not."""
     for port in (port for pin in pins for port in pin.ports):

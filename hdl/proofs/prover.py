@@ -23,8 +23,6 @@ from amaranth.lib.wiring import Component, In
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import yosys_files
 
-__all__ = ["Fault", "Proof", "ProofResult", "Register", "UnknownWireError", "past", "prove"]
-
 _FLATTEN = """
 read_rtlil design.il
 hierarchy -top design

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 from cubestack.hdl.proofs.prover import Proof, ProofResult, prove
 
-__all__ = ["Verdict", "verdict_json", "verdict_text", "verdicts"]
-
 
 class Verdict(NamedTuple):
     """What became of a proof, and of the same with a fault planted."""

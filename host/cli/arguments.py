@@ -9,8 +9,6 @@ from typing import Any, NoReturn, TypeVar
 from cubestack.host import options
 from cubestack.host.options import Kind, Options, flag
 
-__all__ = ["Parser", "add_options", "chosen", "whole"]
-
 T = TypeVar("T")
 OptionsT = TypeVar("OptionsT", bound=Options)
 

@@ -8,8 +8,6 @@ import json
 from cubestack.host.devices.registry import devices
 from cubestack.host.terminal import console
 
-__all__ = ["add_arguments", "run"]
-
 COMPARISON = "What compares the engines that can run the FPGA designs is `make bench-engines`."
 
 

@@ -9,14 +9,6 @@ from typing import Any, get_args
 from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
 from cubestack.host.devices.registry import devices
 
-__all__ = [
-    "add_board_arguments",
-    "add_engine_arguments",
-    "add_option",
-    "chosen_options",
-    "tell_notices",
-]
-
 
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the option that says how the FPGA is run."""

@@ -20,8 +20,6 @@ from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.suite import compare, run_suite
 
-__all__ = ["add_arguments", "run"]
-
 MARKS = {Verdict.PASSED: "ok", Verdict.FAILED: "FAILED"}
 NAME_COLUMNS = 52
 DETAIL_COLUMNS = 100

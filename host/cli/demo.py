@@ -15,17 +15,12 @@ from pathlib import Path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.registry import devices
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     names = [one.name for one in devices() if one.demo is not None]
     parser.add_argument(
-        "device",
-        nargs="?",
-        choices=names,
-        help="show this one only; default: all of them",
+        "device", nargs="?", choices=names, help="show this one only; default: all of them"
     )
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the pictures")
     parser.add_argument(

@@ -34,8 +34,6 @@ from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import progress, say
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cubestack.emulator.faults.injector import Faults
 
-__all__ = ["add_faults_argument", "inject_plan"]
-
 
 def add_faults_argument(parser: argparse.ArgumentParser) -> None:
     """Declare the option."""

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
 
-__all__ = ["add_arguments", "run"]
-
 Entry = TypeVar("Entry")
 
 AREA = """How many of the AGLN030's 768 tiles each design takes: a tile is one

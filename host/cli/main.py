@@ -17,8 +17,6 @@ from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
 
-__all__ = ["main"]
-
 DONE, FAILED, WRONG_CALL = 0, 1, 2
 
 #: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).

@@ -29,8 +29,6 @@ from cubestack.host.experiments.measure import board_options, experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.terminal import console, progress, say
 
-__all__ = ["add_arguments", "add_board", "run", "run_experiment"]
-
 SHOWN = 40
 """Rows of a table."""
 
@@ -57,9 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_board(
-    parser: argparse.ArgumentParser,
-    device: AnyDevice,
-    experiment: AnyExperiment,
+    parser: argparse.ArgumentParser, device: AnyDevice, experiment: AnyExperiment
 ) -> None:
     """Declare how the device's FPGA is run, and what of its board the user chooses."""
     if device.has_fpga and experiment.powers_up:

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
     from cubestack.emulator.ports.endpoint import Endpoint
 
-__all__ = ["add_port_arguments", "open_ports"]
-
 LOOPBACK = "127.0.0.1"
 LAST_PORT = 65535
 

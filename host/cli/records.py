@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.recording.recorder import Recorder
     from cubestack.firmware_model.formats.setup import Setup
 
-__all__ = ["add_record_arguments", "record"]
-
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
@@ -31,10 +29,7 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def record(
-    args: argparse.Namespace,
-    emulated: AnyEmulated,
-    stack: ExitStack,
-    setup: Setup | None = None,
+    args: argparse.Namespace, emulated: AnyEmulated, stack: ExitStack, setup: Setup | None = None
 ) -> Recorder | None:
     """Start what the options ask for; ``stack`` ends it. Before any port is opened.
 

@@ -12,8 +12,6 @@ import argparse
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.export.interface import FORMATS, render
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""

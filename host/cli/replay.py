@@ -33,8 +33,6 @@ from cubestack.host.devices.registry import device
 from cubestack.host.recording.setups import setup_for, written
 from cubestack.host.terminal import say
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""

@@ -11,8 +11,6 @@ from cubestack.host.devices.experiment import AnyExperiment
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import flag
 
-__all__ = ["Reports", "reports"]
-
 Found = tuple[AnyDevice, AnyExperiment]
 
 

@@ -33,8 +33,6 @@ from cubestack.host.terminal import say
 if TYPE_CHECKING:
     from cubestack.emulator.i2cdev.running import HostBus
 
-__all__ = ["add_arguments", "run"]
-
 DEFAULT_BUS = 7
 STANDARD_HZ = 100_000
 BOOT_LIMIT_PS = 10**12

@@ -29,8 +29,6 @@ from cubestack.host.errors import HostError
 from cubestack.host.shell.language import Result, Shell
 from cubestack.host.terminal import say
 
-__all__ = ["add_arguments", "run"]
-
 PROMPT = "{}> "
 HISTORY_LINES = 1000
 

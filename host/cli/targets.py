@@ -9,8 +9,6 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.registry import device_names
 from cubestack.host.devices.targets import FORMS, Target, open_target
 
-__all__ = ["add_target_arguments", "open_any_target"]
-
 
 def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the target and its options."""

@@ -14,8 +14,6 @@ from typing import NamedTuple
 
 from vcd.reader import TokenKind, VCDParseError, tokenize
 
-__all__ = ["Trace", "find", "read", "show"]
-
 #: Programs that show a waveform, the first one installed is taken.
 VIEWERS = ("gtkwave", "surfer")
 

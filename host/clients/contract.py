@@ -10,18 +10,11 @@ from typing import TYPE_CHECKING, Self, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.host.errors import (
-    BadAnswerError,
-    CommandRefusedError,
-    NoAnswerError,
-    TargetError,
-)
+from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError, TargetError
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-__all__ = ["POLL_PERIOD_S", "Client", "Closable", "DeviceClient", "Progress"]
 
 #: Called with (pieces done, pieces in all) during a transfer.
 Progress = Callable[[int, int], None]

@@ -16,8 +16,6 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message,
 from cubestack.host.clients.contract import Client
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
 
-__all__ = ["I2cBus", "I2cClient"]
-
 RETRY_PERIOD_S = 0.01
 
 

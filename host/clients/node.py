@@ -12,8 +12,6 @@ from cubestack.host.clients.contract import Client
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["NodeClient"]
-
 READ_BYTES = 4096
 
 #: Reads without a whole frame after which a babbling line counts as no answer.

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.errors import BadAnswerError
 
-__all__ = ["unit_quaternion"]
-
 LENGTH_TOLERANCE = 0.01
 
 

@@ -15,8 +15,6 @@ from cubestack.host.clients.contract import Progress
 from cubestack.host.clients.i2c import RETRY_PERIOD_S, I2cBus
 from cubestack.host.errors import NoAnswerError, TransportError
 
-__all__ = ["RegisterClient"]
-
 #: Longest read that the Linux kernel's I2C_RDWR takes.
 CHUNK_BYTES = 8192
 

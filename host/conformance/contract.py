@@ -17,16 +17,6 @@ from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NoAnswerError, NodeError
 
-__all__ = [
-    "LATE_S",
-    "CheckResult",
-    "CheckRun",
-    "FailedError",
-    "PassedError",
-    "SkippedError",
-    "Verdict",
-]
-
 LATE_S = 0.04
 """What an answer may take beside its time on the wire: the poll period of real hosts."""
 

@@ -8,8 +8,6 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
 
-__all__ = ["check_camera_register", "check_stream", "check_upload", "check_watchdog"]
-
 UPLOADED = 3
 """Number of the block that is uploaded."""
 

@@ -14,8 +14,6 @@ from cubestack.host.conformance.contract import (
     SkippedError,
 )
 
-__all__ = ["check_reads"]
-
 UNKNOWN_SAMPLES = 3
 """Unknown telemetry IDs that are tried: each costs a time-out."""
 

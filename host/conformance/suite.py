@@ -13,8 +13,6 @@ from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.devices.targets import Target
 
-__all__ = ["compare", "run_suite"]
-
 
 def run_suite(
     target: Target,

@@ -7,8 +7,6 @@ from cubestack.firmware_model.interface.codec.field import Field, InterfaceError
 from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.host.devices.device import ConformanceNotes
 
-__all__ = ["keys_of", "limits_of", "read_back", "values_to_try", "violations"]
-
 
 def read_back(
     interface: Interface, message: Message, notes: ConformanceNotes

@@ -21,8 +21,6 @@ from cubestack.host.conformance.values import (
 from cubestack.host.errors import CommandRefusedError
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["check_writes"]
-
 LETTER_TIMEOUT_S = 3.0
 READ_BYTES = 4096
 

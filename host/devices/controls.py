@@ -12,8 +12,6 @@ from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.errors import TargetError
 from cubestack.host.recording.setups import read_document, written
 
-__all__ = ["EmulatedControls"]
-
 CLEAR = "clear"
 """Ends all faults."""
 

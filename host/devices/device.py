@@ -21,19 +21,6 @@ if TYPE_CHECKING:
     from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.devices.experiment import AnyExperiment
 
-__all__ = [
-    "AnyDevice",
-    "Benchmark",
-    "BoardOption",
-    "BoardT_co",
-    "ClientT_co",
-    "ConformanceNotes",
-    "Device",
-    "Engine",
-    "Report",
-    "Shown",
-]
-
 #: How an FPGA is run: compiled where there is a compiler, always compiled, or Amaranth's simulator.
 Engine = Literal["auto", "compiled", "python"]
 

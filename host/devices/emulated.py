@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.ports.realtime import RealtimeScheduler
     from cubestack.emulator.sim.virtual_time import Kernel
 
-__all__ = ["AnyEmulated", "EmulatedDevice", "check_options", "open_device", "power_up"]
-
 PORT = "{port}"
 """What ``run`` replaces in a command by the path of the serial port."""
 
@@ -102,10 +100,7 @@ class EmulatedDevice(Generic[BoardT_co, ClientT_co]):
         return CubeSMBus(link=self.board.i2c())
 
     def run(
-        self,
-        *command: str | Path,
-        timeout_s: float = 60.0,
-        pace: Literal["real", "fast"] = "fast",
+        self, *command: str | Path, timeout_s: float = 60.0, pace: Literal["real", "fast"] = "fast"
     ) -> subprocess.CompletedProcess[str]:
         """Run a program against the serial line; its exit code and output.
 

@@ -8,8 +8,6 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 from cubestack.host.options import Options
 
-__all__ = ["AnyExperiment", "Experiment", "Result", "Summary"]
-
 
 class Result:
     """One result; a frozen dataclass whose attributes are those of the JSON output."""

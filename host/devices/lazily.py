@@ -5,8 +5,6 @@ from functools import partial
 from pkgutil import resolve_name
 from typing import Any
 
-__all__ = ["call", "get"]
-
 
 def get(what: str) -> Callable[[], Any]:
     """A callable that gives it."""

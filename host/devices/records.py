@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.recording.trace import VcdTrace
     from cubestack.firmware_model.formats.setup import Setup
 
-__all__ = ["create_file", "start_recorder", "start_trace"]
-
 
 def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None = None) -> Recorder:
     """Record every byte of all ports; before any port is opened.

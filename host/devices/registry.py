@@ -13,8 +13,6 @@ from importlib.metadata import EntryPoint, entry_points
 from cubestack.host.devices.device import AnyDevice, Device
 from cubestack.host.errors import TargetError
 
-__all__ = ["GROUP", "device", "device_names", "devices"]
-
 GROUP = "cubestack.devices"
 
 #: Those that come with this distribution, in the order of all lists.

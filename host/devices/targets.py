@@ -41,8 +41,6 @@ from cubestack.host.transport.streams import Transport, open_transport
 if TYPE_CHECKING:
     from smbus2 import SMBus
 
-__all__ = ["FORMS", "Target", "connect", "device_of", "open_target", "with_i2c"]
-
 I2C, RECORDED, EMULATED = "i2c:", "recorded:", "emulated:"
 
 FORMS = (

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cubestack.emulator.ports.direct import DirectSerial
 
-__all__ = ["PS_PER_S", "VirtualSerial"]
-
 PS_PER_S = 10**12
 
 LONGEST_S = 3600.0

@@ -16,33 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from cubestack.host.devices.experiment import Experiment, Result, Summary
 from cubestack.host.experiments.opener import MeasureOptions
-from cubestack.host.options import (
-    ANGLE,
-    CORNER,
-    NUMBER,
-    PATH,
-    SCENE,
-    option,
-    whole,
-)
+from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.view import SkyCondition, SkyView
-
-__all__ = [
-    "AttitudeExperiment",
-    "AttitudeResult",
-    "AttitudeSummary",
-    "SkyOptions",
-    "arcsec",
-    "compare",
-    "count_wrong",
-    "errors",
-    "is_right",
-    "percentile_95",
-    "random_view",
-    "rough_boresight",
-]
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3

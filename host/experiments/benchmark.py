@@ -7,8 +7,6 @@ from collections.abc import Callable
 
 from cubestack.host.devices.emulated import AnyEmulated
 
-__all__ = ["LOOP_S", "ROUNDS", "best_ms", "simulated_ratio"]
-
 LOOP_S = 10
 """Virtual time over which a loop is measured."""
 

@@ -19,8 +19,6 @@ from cubestack.host.errors import PortClosedError, PortOpenError
 from cubestack.host.terminal import console, progress_bar, say
 from cubestack.host.transport.streams import open_transport
 
-__all__ = ["Demo", "download", "tell_times"]
-
 BOOT_TIMEOUT_S = 120.0  # the first start compiles the FPGA
 ANSWER_TIMEOUT_S = 5.0
 

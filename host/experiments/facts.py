@@ -12,8 +12,6 @@ from cubestack.host.devices.experiment import Experiment, Result, Summary
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options
 
-__all__ = ["FactSummary", "Facts", "Lookup"]
-
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 

@@ -11,8 +11,6 @@ from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.opener import Opener
 
-__all__ = ["experiment_of", "measure"]
-
 
 def measure(
     name: str,

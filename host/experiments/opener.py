@@ -14,8 +14,6 @@ from cubestack.host.options import PLAN, SCENE, Options, option, whole
 if TYPE_CHECKING:
     from cubestack.emulator.faults.plan import Plan
 
-__all__ = ["MeasureOptions", "Opener"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureOptions(Options):

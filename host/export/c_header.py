@@ -11,8 +11,6 @@ from enum import IntEnum
 from cubestack.firmware_model.interface.codec.message import Field, Interface, Kind, Message
 from cubestack.host.export.side_protocols import side_c
 
-__all__ = ["c_header"]
-
 _ACCESSORS = """
 static inline uint8_t {p}_get_u8(const uint8_t *data, unsigned offset)
 {{

@@ -2,8 +2,6 @@
 
 from cubestack.firmware_model.interface.codec.field import Choices, Field
 
-__all__ = ["choice_rows", "field_details", "field_json", "field_type"]
-
 
 def field_type(field: Field) -> str:
     """Type, and what a raw count is divided by."""

@@ -11,8 +11,6 @@ from cubestack.host.export.c_header import c_header
 from cubestack.host.export.field_text import choice_rows, field_details, field_json, field_type
 from cubestack.host.export.side_protocols import side_json, side_markdown, side_table
 
-__all__ = ["FORMATS", "render"]
-
 
 def _table(interface: Interface) -> str:
     """Plain text, one line for each message and one for each field."""

@@ -11,8 +11,6 @@ from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
 from cubestack.host.export.field_text import field_details, field_json, field_type
 
-__all__ = ["side_c", "side_json", "side_markdown", "side_table"]
-
 
 def side_table(interface: Interface) -> Iterator[str]:
     """Plain text, one line for each register and letter."""

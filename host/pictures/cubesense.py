@@ -17,8 +17,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.host.clients.cubesense.client import direction
 
-__all__ = ["annotate_nadir", "annotate_sun", "limb", "pixel"]
-
 SCALE = 2
 INSET_SCALE = 16
 INSET_MARGIN = 4
@@ -54,10 +52,7 @@ def limb(alpha_deg: float, beta_deg: float, radius_deg: float) -> Pixels:
 
 
 def annotate_nadir(
-    picture: NDArray[np.uint8],
-    edges: Pixels,
-    fitted: tuple[float, float, float] | None,
-    path: Path,
+    picture: NDArray[np.uint8], edges: Pixels, fitted: tuple[float, float, float] | None, path: Path
 ) -> None:
     """Write the nadir ``picture`` (480, 640) with its ``edges`` (n, 2) and the ``fitted`` Earth.
 

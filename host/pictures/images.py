@@ -10,8 +10,6 @@ from PIL import Image, ImageDraw
 
 from cubestack.host.pictures.star_names import star_name
 
-__all__ = ["annotate", "save_picture"]
-
 RADIUS_PX = 9
 TEXT_PX = 12
 IDENTIFIED = (120, 255, 120)

@@ -3,8 +3,6 @@
 IAU Working Group on Star Names.
 """
 
-__all__ = ["star_name"]
-
 _NAMES = {
     677: "Alpheratz",
     3419: "Diphda",

@@ -21,8 +21,6 @@ from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.clients.i2c import I2cBus
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["HostRecorder"]
-
 PS_PER_NS = 1000
 PS_PER_S = 10**12
 BITS_PER_BYTE = 10

@@ -11,8 +11,6 @@ from cubestack.firmware_model.formats.recording import Recording
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.errors import RecordingMismatchError
 
-__all__ = ["RecordedI2c", "RecordedTransport"]
-
 
 class RecordedTransport:
     """A serial line of a recording, as a ``Transport``."""

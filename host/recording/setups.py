@@ -11,8 +11,6 @@ from pathlib import Path
 from cubestack.firmware_model.formats.recording import Recording
 from cubestack.firmware_model.formats.setup import Document, Option, Setup
 
-__all__ = ["emulated_setup", "read_document", "setup_for", "taped_setup", "written"]
-
 DISTRIBUTION = "cubestack"
 
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.aramis.client import Aramis
 
-__all__ = ["DEVICE"]
-
 EXPERIMENTS = "cubestack.host.experiments.aramis"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt

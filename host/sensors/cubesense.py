@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.host.clients.cubesense.client import CubeSense
 
-__all__ = ["DEVICE"]
-
 EXPERIMENTS = "cubestack.host.experiments.cubesense"
 
 SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
@@ -63,8 +61,7 @@ DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
     demo=get(f"{EXPERIMENTS}.demo:show"),
     options=(
         BoardOption(
-            "mcu_addressing",
-            "FPGAs that let the processor choose addresses (telecommand 100)",
+            "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"
         ),
     ),
     tops=get("cubestack.hdl.cubesense.tops:TOPS"),

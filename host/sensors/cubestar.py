@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.cubestar.client import CubeStar
 
-__all__ = ["DEVICE"]
-
 EXPERIMENTS = "cubestack.host.experiments.cubestar"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt

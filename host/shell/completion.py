@@ -8,8 +8,6 @@ from cubestack.host.devices.targets import Target
 from cubestack.host.shell.controls import LOG, ON_OFF
 from cubestack.host.shell.names import Names
 
-__all__ = ["complete"]
-
 
 def complete(target: Target, names: Names, commands: Iterable[str], line: str) -> list[str]:
     """Words that may stand where ``line`` ends, in the order of the tables."""

@@ -6,8 +6,6 @@ from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.targets import Target
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
 
-__all__ = ["LOG", "ON_OFF", "ControlCommands"]
-
 ON_OFF = ("on", "off")
 
 SCENE = "scene FILE"
@@ -29,12 +27,7 @@ class ControlCommands:
         """What they are called."""
         return [
             ShellCommand(SCENE, "show another scene", self._scene, True),
-            ShellCommand(
-                FAULT,
-                "let something break; fault clear, fault log",
-                self._fault,
-                True,
-            ),
+            ShellCommand(FAULT, "let something break; fault clear, fault log", self._fault, True),
             ShellCommand(POWER, "supply currents, load switches", self._power, True),
             ShellCommand(TIME, "virtual time; let it pass", self._time, True),
         ]

@@ -11,8 +11,6 @@ from cubestack.firmware_model.interface.codec.register_pointer import PointerReg
 from cubestack.host.devices.targets import Target
 from cubestack.host.shell.result import ShellError
 
-__all__ = ["Names", "number_of"]
-
 ADDRESS = "@"
 NEAR = 3
 """How many names or numbers a refusal suggests."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["PortCommands"]
-
 RAW_TIMEOUT_S = 0.3
 """Silence after which the answer to raw bytes is over."""
 

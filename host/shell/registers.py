@@ -20,8 +20,6 @@ from cubestack.host.shell.result import (
 )
 from cubestack.host.shell.values import parse_value, parse_values
 
-__all__ = ["RegisterCommands"]
-
 WATCH_PERIOD_S = 1.0
 WATCH_COUNT = 10
 PROCESSING_TIMEOUT_S = 10.0
@@ -79,8 +77,7 @@ class RegisterCommands:
             data = self._target.registers.read(register.name)
             text = register.field.label(data)
         return Result(
-            [(register.name, text)],
-            {"name": register.name, "values": {register.name: plain(data)}},
+            [(register.name, text)], {"name": register.name, "values": {register.name: plain(data)}}
         )
 
     def _write(self, words: list[str]) -> Result:

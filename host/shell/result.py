@@ -6,8 +6,6 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.field import Value
 
-__all__ = ["Result", "ShellCommand", "ShellError", "check_count", "plain", "to_number"]
-
 GREATEST = 1e9
 """Of a number on a line."""
 

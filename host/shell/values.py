@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError
 from cubestack.firmware_model.interface.codec.message import Message
 
-__all__ = ["parse_value", "parse_values"]
-
 
 def parse_value(field: Field, text: str) -> object:
     """A number (decimal, 0x, 0b), a choice's name, true or false, or hexadecimal bytes.

@@ -40,8 +40,6 @@ from cubestack.firmware_model.formats.linux_i2c import (
 )
 from cubestack.host.errors import PortClosedError, PortOpenError
 
-__all__ = ["BusLink", "CubeSMBus"]
-
 READ, WRITE = 1, 0
 DEVICE = "/dev/i2c-"
 
@@ -60,11 +58,7 @@ class CubeSMBus(SMBus):
     """An SMBus whose bus is emulated, by another process or in this one."""
 
     def __init__(
-        self,
-        bus: int | str | None = None,
-        force: bool = False,
-        *,
-        link: BusLink | None = None,
+        self, bus: int | str | None = None, force: bool = False, *, link: BusLink | None = None
     ) -> None:
         """Open ``bus``: a number, ``/dev/i2c-N``, or the path of the socket that serves it.
 

@@ -14,8 +14,6 @@ import serial
 
 from cubestack.host.errors import PortClosedError, PortOpenError, TargetError
 
-__all__ = ["Rfc2217Transport", "SerialTransport", "TcpTransport", "Transport", "open_transport"]
-
 CONNECT_TIMEOUT_S = 5.0
 
 

@@ -54,10 +54,7 @@ def test_measure(cubestack: Command, tmp_path: Path) -> None:
     assert "largest error" in cubestack("measure", "glow", "--frames", "3")
     (tmp_path / "dim.toml").write_text('kind = "light"\nlux = 800\n')
     results = list(library.measure("glow", scene=tmp_path / "dim.toml", seed=2))
-    assert results[0].as_dict() == {
-        "measured_lux": pytest.approx(800, abs=80),
-        "truth_lux": 800.0,
-    }
+    assert results[0].as_dict() == {"measured_lux": pytest.approx(800, abs=80), "truth_lux": 800.0}
 
 
 def test_shell(cubestack: Command) -> None:

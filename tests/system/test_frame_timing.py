@@ -26,8 +26,7 @@ def enable_to_ack_ms(cubestar: Any, delay_ms: int) -> float:
 
 
 @pytest.mark.parametrize(
-    ("register", "published_fps"),
-    [(30, 11.110), (9, 3.333), (8, 2.966), (7, 2.593), (6, 2.224)],
+    ("register", "published_fps"), [(30, 11.110), (9, 3.333), (8, 2.966), (7, 2.593), (6, 2.224)]
 )
 def test_frame_rate_register(session: Any, register: int, published_fps: float) -> None:
     with session(SkyScene.pointing(0, 0)) as opened:

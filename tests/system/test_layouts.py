@@ -361,12 +361,7 @@ def test_a_trace_shows_the_bus(node: AnyEmulated) -> None:
     stream = io.StringIO()
     board = node.board
     trace = VcdTrace(
-        stream,
-        "cubestar",
-        board.kernel,
-        {"uart": board.uart},
-        board.engine,
-        board.probes,
+        stream, "cubestar", board.kernel, {"uart": board.uart}, board.engine, board.probes
     )
     node.client.capture()
     blocks(node, range(3))

@@ -33,11 +33,7 @@ def coverage(limit: float, rng: np.random.Generator) -> tuple[float, float, floa
     boresights /= np.linalg.norm(boresights, axis=1, keepdims=True)
     cosines = boresights.astype(np.float32) @ load_sky(EPOCH, limit).vectors.T.astype(np.float32)
     seen = np.count_nonzero(cosines > np.cos(np.radians(DIAMETER_DEG / 2)), axis=1)
-    return (
-        float(100 * np.mean(seen >= 3)),
-        float(100 * np.mean(seen >= 5)),
-        float(np.mean(seen)),
-    )
+    return (float(100 * np.mean(seen >= 3)), float(100 * np.mean(seen >= 5)), float(np.mean(seen)))
 
 
 @pytest.mark.parametrize("limit", PUBLISHED)

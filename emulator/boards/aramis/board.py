@@ -38,8 +38,6 @@ from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
-__all__ = ["AramisBoard"]
-
 BOOT_US = 50_000
 """Reset to main: the boot code copies the program from flash to memory (assumed)."""
 

@@ -30,15 +30,6 @@ from cubestack.firmware_model.aramis.catalogue.geodesic import geodesic_sphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
 from cubestack.firmware_model.aramis.field import FOV_DEG
 
-__all__ = [
-    "PUBLISHED",
-    "CatalogueParameters",
-    "build_database",
-    "cached_database",
-    "onboard_database",
-    "select_stars",
-]
-
 Progress = Callable[[Iterable[int], int, str], Iterable[int]]
 """Passes items through and shows how many of a total are done, under a label."""
 
@@ -252,9 +243,7 @@ def _triples(
     return np.concatenate(parts)
 
 
-def _properties(
-    corners: NDArray[np.float64],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _properties(corners: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Areas and polar moments (m,) of triangles (m, 3, 3): equations 5.7 and 5.17."""
     first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
     a = np.linalg.norm(first - second, axis=1)

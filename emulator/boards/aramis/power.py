@@ -2,8 +2,6 @@
 
 from cubestack.emulator.sim.power import Part, PowerTable
 
-__all__ = ["ARAMIS_POWER"]
-
 #: MT9M001 data sheet: 363 mW working, 294 uW in standby, at 3.3 V. The others are assumed; the
 #: thesis sums its parts in a figure only (2.16).
 ARAMIS_POWER = PowerTable(

@@ -23,8 +23,6 @@ from cubestack.emulator.camera.common.stream import StreamSegment
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.aramis.hardware import FrameEnd
 
-__all__ = ["PixelLines", "Ppi"]
-
 
 class PixelLines(Protocol):
     """A camera's pixel lines."""

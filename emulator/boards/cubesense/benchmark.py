@@ -19,8 +19,6 @@ from cubestack.firmware_model.interface.cameras.ov7620 import (
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.pins import ACKNOWLEDGE, CONTROLS
 
-__all__ = ["STORES", "pair_scan_ms", "pair_store_ms", "pair_with_cameras"]
-
 _SUN, _NADIR = ACKNOWLEDGE.values()
 
 #: Ways to store: levels of SHIFT, EDGE, RNW, SUNEN and NADEN, and the acknowledges.

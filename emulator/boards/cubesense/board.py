@@ -46,8 +46,6 @@ from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PO
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
-__all__ = ["CubeSenseBoard"]
-
 BOOT_US = 1_000
 """Oscillator start-up and the C library's own start: assumed."""
 

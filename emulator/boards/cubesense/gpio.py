@@ -17,8 +17,6 @@ from cubestack.firmware_model.interface.cubesense.pins import (
     SRAM_POWER,
 )
 
-__all__ = ["CHANNELS", "GpioPins"]
-
 #: Load switch of the power table behind each switching pin.
 CHANNELS = {
     **{SRAM_POWER[sram]: sram.name for sram in Sram},

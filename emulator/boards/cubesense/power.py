@@ -2,8 +2,6 @@
 
 from cubestack.emulator.sim.power import Part, PowerTable
 
-__all__ = ["CUBESENSE_POWER"]
-
 _SRAM = {"standby": 4.6, "active": 7.6}
 _CAMERA = {"on": 25.15}
 

@@ -15,8 +15,6 @@ from cubestack.firmware_model.interface.cubesense.pins import (
     Monitor,
 )
 
-__all__ = ["Pic18f45k20"]
-
 
 class Pic18f45k20(NodePeripherals):
     """The peripherals; see ``firmware_model.cubesense.hardware``."""

@@ -18,8 +18,6 @@ from cubestack.firmware_model.interface.cubesense.pins import (
 )
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
-__all__ = ["cubesense_wiring"]
-
 
 def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool = False) -> Wiring:
     """Both FPGAs: cameras and memories "sun" and "nadir".

@@ -15,8 +15,6 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE
 from cubestack.firmware_model.interface.cubestar.pins import ACK, ENABLE, RNW
 from cubestack.hdl.cubestar.top import CubeStarTop
 
-__all__ = ["rtl_clocks_per_s", "stored_frame", "strobes_per_s"]
-
 PERIOD = Fraction(PS_PER_S, CRYSTAL_HZ)
 
 

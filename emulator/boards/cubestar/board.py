@@ -34,8 +34,6 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
-__all__ = ["CubeStarBoard"]
-
 BOOT_US = 3_000
 """Reset to main: "a few milliseconds" (section 5.3.6)."""
 

@@ -16,8 +16,6 @@ import numpy as np
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH, load_sky
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
-__all__ = ["MAG_LIMIT", "PAIR_LIMIT_DEG", "onboard_catalogue"]
-
 MAG_LIMIT = 3.8
 PAIR_LIMIT_DEG = 57.3
 

@@ -24,8 +24,6 @@ from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
 
-__all__ = ["BOARDS", "Fpga", "LayoutBoard", "fpga_of"]
-
 Pins = Mapping[str, int]
 States = dict[str, str]
 

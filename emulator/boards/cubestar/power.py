@@ -2,8 +2,6 @@
 
 from cubestack.emulator.sim.power import Part, PowerTable
 
-__all__ = ["CUBESTAR_POWER"]
-
 #: CubeStar thesis, sections 5.2.3 and 6.3, table 6.2: the whole stack's current in four modes. The
 #: split into parts is fitted to them, with two parts known otherwise: the two LEDs (396.2 mW less
 #: 350 mW), and the processor's 200 uA/MHz running and 50 uA/MHz asleep (appendix E). Trip currents

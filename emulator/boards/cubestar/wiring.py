@@ -11,13 +11,6 @@ from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
-__all__ = [
-    "cubestar_double_wiring",
-    "cubestar_shared_wiring",
-    "cubestar_two_boards_wiring",
-    "cubestar_wiring",
-]
-
 _IMAGER = CameraPins("imager", pins.PIXCLK, pins.PIXDATA, pins.HSYNC, pins.VSYNC)
 
 #: A board while it stores, and the external bus between two accesses.

@@ -22,8 +22,6 @@ from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-__all__ = ["FAINTEST_V", "star_light", "star_pixels"]
-
 FAINTEST_V = 8.0
 """Stars beyond it are left out: at the longest exposure their peak is below one count of 8 bits."""
 

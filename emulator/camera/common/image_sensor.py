@@ -13,8 +13,6 @@ from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 
-__all__ = ["ImageSensor"]
-
 S = TypeVar("S")
 C = TypeVar("C")
 

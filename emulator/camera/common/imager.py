@@ -12,8 +12,6 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.scene.sky import PictureScene, Scene
 
-__all__ = ["Grey", "Imager", "Light", "doubled", "hot_pixels"]
-
 Light = NDArray[np.float32]
 Grey = NDArray[np.uint8]
 Settings = TypeVar("Settings", contravariant=True)

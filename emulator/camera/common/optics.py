@@ -13,8 +13,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Distortion", "Optics"]
-
 PHOTONS_V0 = 1000.0
 """Flux of a star of V = 0 in photons / (s cm^2 Angstrom) (published, eq. 3.4.2)."""
 

@@ -13,8 +13,6 @@ from cubestack.firmware_model.interface.cameras.registers import (
     RegisterAccess,
 )
 
-__all__ = ["RegisterFile"]
-
 logger = logging.getLogger(__name__)
 
 

@@ -41,8 +41,6 @@ from cubestack.emulator.scene.file import (
 )
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
 
-__all__ = ["load_scene"]
-
 
 def load_scene(path: Path, condition: SkyCondition) -> SkyView:
     """What the TOML file ``path`` gives; SceneError names the key that is wrong.

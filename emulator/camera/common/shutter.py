@@ -9,8 +9,6 @@ from fractions import Fraction
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-__all__ = ["RollingShutter"]
-
 
 @dataclass(frozen=True)
 class RollingShutter:

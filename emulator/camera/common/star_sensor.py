@@ -7,8 +7,6 @@ from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 
-__all__ = ["StarSensor"]
-
 
 class StarSensor(ImageSensor[Scene, SkyCondition]):
     """A sensor that looks at the sky or at a picture.

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
-__all__ = ["PixelClock", "StreamSegment"]
-
 
 @dataclass(frozen=True)
 class StreamSegment:

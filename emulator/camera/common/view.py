@@ -7,8 +7,6 @@ from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.scene.file import SceneError, refuse_negative
 from cubestack.emulator.scene.sky import Scene
 
-__all__ = ["SkyCondition", "SkyView", "View"]
-
 S = TypeVar("S")
 C = TypeVar("C")
 

@@ -18,8 +18,6 @@ from cubestack.emulator.camera.common.imager import Grey, Imager, Light, doubled
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
-__all__ = ["Corrections", "Mlx75412Imager", "dark_dn12_per_second", "ideal_counts"]
-
 ELECTRONS_PER_DN12 = 2.28  # per count of 12 bits (published)
 FULL_SCALE_DN12 = 4095  # the converter saturates here
 DN12_PER_DN8 = 16  # only the upper 8 of 12 bits are wired (appendix C)

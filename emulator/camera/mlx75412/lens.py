@@ -13,8 +13,6 @@ from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
-__all__ = ["CONDITION", "EFFECTIVE_WIDTH_A", "LENS"]
-
 EFFECTIVE_WIDTH_A = 4780.0
 """Bandwidth in Angstrom times transmission times quantum efficiency: fitted.
 

@@ -35,8 +35,6 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import (
     SYNC_APPLY,
 )
 
-__all__ = ["Mlx75412"]
-
 IDLE_CLOCKS = 4096 * LINE_CLOCKS
 """Length in which the endless blanking of the disabled sensor is handed out."""
 

@@ -25,8 +25,6 @@ from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 
-__all__ = ["Mt9m001Imager"]
-
 
 class Mt9m001Imager(Imager[SensorSettings]):
     """Renders frames of one sensor's window."""

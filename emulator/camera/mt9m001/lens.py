@@ -18,13 +18,6 @@ from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
-__all__ = [
-    "CONDITION",
-    "LIKELY_FIELD_DEG",
-    "PUBLISHED_FIELD_DEG",
-    "double_gauss",
-]
-
 PUBLISHED_FIELD_DEG = 21.53463888888889
 """Of all published simulations and of the published catalogue."""
 

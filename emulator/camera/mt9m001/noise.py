@@ -11,17 +11,6 @@ from dataclasses import dataclass
 
 from cubestack.emulator.camera.common.imager import doubled
 
-__all__ = [
-    "BACKGROUND_ELECTRONS_PER_S",
-    "BLACK_LEVEL",
-    "FULL_SCALE",
-    "FULL_WELL_ELECTRONS",
-    "HOT_SHARE",
-    "READ_NOISE_ELECTRONS",
-    "NoiseTerms",
-    "dark_electrons_per_s",
-]
-
 FULL_WELL_ELECTRONS = 10 ** (45 / 10)
 READ_NOISE_ELECTRONS = FULL_WELL_ELECTRONS / 10 ** (68.2 / 20)
 

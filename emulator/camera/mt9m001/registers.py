@@ -18,8 +18,6 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import (
     gain,
 )
 
-__all__ = ["SensorSettings", "read_settings", "write_word"]
-
 GAINS = ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")
 
 

@@ -34,8 +34,6 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import (
     ROWS,
 )
 
-__all__ = ["Mt9m001"]
-
 IDLE_CLOCKS = 4_800_000
 """Length in which the endless blanking of the stopped sensor is handed out."""
 

@@ -20,17 +20,6 @@ from cubestack.emulator.scene.earth_sun import Target
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
-__all__ = [
-    "DISTORTION",
-    "FIELD_DEG",
-    "LENSES",
-    "PIXELS_PER_DEGREE",
-    "Fisheye",
-    "check_field",
-    "distorted",
-    "undistorted",
-]
-
 DISTORTION = (-2.5572e-6, 7.6076e-5, 0.9953, 0.1036)
 """Coefficients of equation 5.2.3, highest power first; radii in px."""
 

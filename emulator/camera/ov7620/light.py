@@ -22,8 +22,6 @@ from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 
-__all__ = ["USUAL_EXPOSURE", "scene_light"]
-
 USUAL_EXPOSURE = {Target.SUN: 1, Target.NADIR: 4}
 """Counts of the exposure register that the published levels belong to.
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
-__all__ = ["BLACK", "FULL_SCALE", "luminance", "stuck_pixels"]
-
 BLACK = 34
 """Level of no light (published, for both cameras)."""
 

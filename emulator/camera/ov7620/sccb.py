@@ -17,8 +17,6 @@ from collections.abc import Callable
 
 from cubestack.emulator.sim.virtual_time import PS_PER_US
 
-__all__ = ["SccbSlave"]
-
 logger = logging.getLogger(__name__)
 
 SHORTEST_LOW_PS = 1_300_000  # 400 kHz bus

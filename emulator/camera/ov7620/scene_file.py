@@ -40,8 +40,6 @@ from cubestack.emulator.scene.file import (
     whole,
 )
 
-__all__ = ["load_earth_sun_scene"]
-
 
 def load_earth_sun_scene(path: Path) -> EarthSunView:
     """What the TOML file ``path`` gives; SceneError names the key that is wrong."""

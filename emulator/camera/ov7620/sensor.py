@@ -42,8 +42,6 @@ from cubestack.firmware_model.interface.cameras.ov7620 import (
     window_row,
 )
 
-__all__ = ["Ov7620"]
-
 FRAME_CLOCKS = LINES_PER_FRAME * CLOCKS_PER_LINE
 LINES_BEFORE = LINES_PER_FRAME - ROWS
 """Blanking before the picture's first row: all of the frame's."""

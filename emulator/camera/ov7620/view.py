@@ -6,8 +6,6 @@ from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import refuse_negative, refuse_zero
 
-__all__ = ["EarthSunView", "FisheyeCondition"]
-
 
 @dataclass(frozen=True)
 class FisheyeCondition:

@@ -6,8 +6,6 @@ System V ABI, chapter 5: a program with an interpreter has a program header of t
 import struct
 from pathlib import Path
 
-__all__ = ["is_static"]
-
 PT_INTERP = 3
 CLASS_64 = 2
 LITTLE_ENDIAN = 1

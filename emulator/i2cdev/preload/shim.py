@@ -14,13 +14,7 @@ from pathlib import Path
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.rtl.cxxrtl.build import CompilerError, NoCompilerError, cache_folder
-from cubestack.firmware_model.formats.linux_i2c import (
-    MAX_MESSAGE_BYTES,
-    SMBUS_DATA_BYTES,
-    Call,
-)
-
-__all__ = ["find_c_compiler", "shim_library"]
+from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES, Call
 
 SOURCE = Path(__file__).with_name("shim.c")
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-Wall")

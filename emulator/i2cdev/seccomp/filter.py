@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 from cubestack.firmware_model.formats.linux_i2c import Ioctl
 
-__all__ = ["ABIS", "Abi", "make_filter", "native_abi"]
-
 AT_EMPTY_PATH = 0x1000
 F_DUPFD = 0
 F_DUPFD_CLOEXEC = 1030

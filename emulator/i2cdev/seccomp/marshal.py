@@ -24,8 +24,6 @@ from cubestack.firmware_model.formats.linux_i2c import (
     split_rdwr,
 )
 
-__all__ = ["Marshalled", "ioctl", "read", "readv", "write", "writev"]
-
 MAX_PARTS = 1024
 """Parts of a vector: UIO_MAXIOV."""
 

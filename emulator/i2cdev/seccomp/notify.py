@@ -13,8 +13,6 @@ from typing import NamedTuple
 
 from cubestack.emulator.i2cdev.pacing import has_priority
 
-__all__ = ["Listener", "Notification", "read_memory", "read_text", "write_memory"]
-
 _RECEIVE = 0xC050_2100
 _SEND = 0xC018_2101
 _VALID = 0x4008_2102

@@ -30,8 +30,6 @@ from cubestack.emulator.i2cdev.seccomp.notify import (
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
-__all__ = ["Files", "OpenFile", "Supervisor", "descriptor_range"]
-
 DESCRIPTORS = 64
 """Device files that one process can have open."""
 

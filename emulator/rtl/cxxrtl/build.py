@@ -28,17 +28,6 @@ from cubestack.emulator.rtl.cxxrtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import cxxrtl_headers, cxxrtl_text, design_hash, rtlil_text
 
-__all__ = [
-    "Compiler",
-    "CompilerError",
-    "NoCompilerError",
-    "cache_folder",
-    "cached_library",
-    "compile_driver",
-    "find_compiler",
-    "library_for",
-]
-
 SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py", "clock_steps.py", "variants.py")
 FLAGS = ("-std=c++17", "-O2", "-DNDEBUG", "-fPIC", "-fno-semantic-interposition", "-shared")
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass, field
 
 from cubestack.emulator.rtl.wiring import MEMORY_PINS, CameraPins, Wiring
 
-__all__ = ["clock_steps", "port"]
-
 _NAME = re.compile(r"\b[pi]_\w+")
 _LOCAL = re.compile(r"\t(value<\d+>) (\w+);")
 _ASSIGNMENT = re.compile(r"\t(\w+) = (.*);")
@@ -123,11 +121,7 @@ def _block(lines: Iterable[str]) -> list[str]:
 
 
 def _steps(
-    wiring: Wiring,
-    camera: CameraPins,
-    tag: str,
-    evaluation: _Evaluation,
-    members: dict[str, str],
+    wiring: Wiring, camera: CameraPins, tag: str, evaluation: _Evaluation, members: dict[str, str]
 ) -> _Steps | None:
     """None where an edge does more than its share."""
     clock = port(camera.clock)

@@ -24,8 +24,6 @@ from cubestack.emulator.rtl.stepping import BurstEnd, SteppingEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import STEPS, Transactions
 
-__all__ = ["CompiledEngine"]
-
 _KINDS = tuple(RULES)
 _BURST_ENDS = tuple(BurstEnd)  # declared in the driver's order
 

@@ -7,8 +7,6 @@ from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps, port
 from cubestack.emulator.rtl.cxxrtl.variants import held, members
 from cubestack.emulator.rtl.wiring import MEMORY_PINS, BusPins, CameraPins, MemoryPins, Wiring
 
-__all__ = ["pins_header"]
-
 _ESCAPE = re.compile("__|_([0-9a-f]{2})_")
 
 

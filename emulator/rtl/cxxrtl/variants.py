@@ -14,8 +14,6 @@ import sys
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
-__all__ = ["held", "members", "variant_text"]
-
 _FLATTEN = """
 hierarchy -top top
 proc

@@ -5,11 +5,7 @@ from typing import Any
 
 from i2c_bench import STANDBY, I2cBench, read, store
 
-from cubesense_fpga_i2c.register_table import (
-    ADDRESSES,
-    GROUP_ADDRESS,
-    Register,
-)
+from cubesense_fpga_i2c.register_table import ADDRESSES, GROUP_ADDRESS, Register
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions
 from tests.hdl.cubesense.pair import OTHER, frame
 from tests.hdl.cubesense.reference import NOT_FOUND, SIDES

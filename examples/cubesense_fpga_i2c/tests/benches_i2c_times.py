@@ -9,11 +9,7 @@ import i2c_times
 from i2c_bench import STANDBY, I2cBench, read
 from i2c_bus import SPEEDS
 
-from cubesense_fpga_i2c.register_table import (
-    ADDRESSES,
-    Register,
-    pointer_bytes,
-)
+from cubesense_fpga_i2c.register_table import ADDRESSES, Register, pointer_bytes
 from tests.hdl.cubesense.reference import SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.geometry import GEOMETRY

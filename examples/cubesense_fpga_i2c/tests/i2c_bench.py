@@ -10,12 +10,7 @@ from cocotb.triggers import Timer
 from i2c_bus import SPEEDS, I2cMcu
 from i2c_model import FpgaModel
 
-from cubesense_fpga_i2c.register_table import (
-    RESET_COMMAND,
-    Register,
-    StatusBits,
-    command_of,
-)
+from cubesense_fpga_i2c.register_table import RESET_COMMAND, Register, StatusBits, command_of
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, Actions
 from tests.hdl.cubesense.pair import OTHER, PREFIXES, frame
 from tests.hdl.cubesense.reference import SIDES, Controls, Half, behaviour

@@ -57,11 +57,7 @@ class I2cMcu:
         dut = self._dut
         self.speed = speed
         self.master = I2cMaster(
-            sda=dut.SDA,
-            sda_o=_Pin(dut.SDA_I),
-            scl=dut.SCL,
-            scl_o=_Pin(dut.SCL),
-            speed=2 * speed,
+            sda=dut.SDA, sda_o=_Pin(dut.SDA_I), scl=dut.SCL, scl_o=_Pin(dut.SCL), speed=2 * speed
         )
         self.master.log.setLevel("WARNING")
 

@@ -59,12 +59,7 @@ def test_commands_are_those_of_the_pins() -> None:
         bits = CommandBits(byte & 0xF)
         levels = [
             int(bit in bits)
-            for bit in (
-                CommandBits.SHIFT,
-                CommandBits.RNW,
-                CommandBits.SUNEN,
-                CommandBits.NADEN,
-            )
+            for bit in (CommandBits.SHIFT, CommandBits.RNW, CommandBits.SUNEN, CommandBits.NADEN)
         ]
         wanted = actions(levels[0], 0, *levels[1:])
         if levels == [0, 1, 0, 0]:

@@ -16,8 +16,6 @@ from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from linear_sun_sensor.interface import PITCH_MM, PIXELS, SLIT_MM
 from linear_sun_sensor.scene import SlitScene
 
-__all__ = ["LinearArray"]
-
 CLOCK_HZ = 500_000
 SLIT_WIDTH_MM = 0.2
 SUN_RADIUS = radians(0.2665)

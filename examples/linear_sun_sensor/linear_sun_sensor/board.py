@@ -18,8 +18,6 @@ from linear_sun_sensor.program import SunSlitProgram
 from linear_sun_sensor.scene import SlitScene
 from linear_sun_sensor.top import SunSlitTop
 
-__all__ = ["SunSlitBoard", "wiring"]
-
 
 @cache
 def wiring() -> Wiring:

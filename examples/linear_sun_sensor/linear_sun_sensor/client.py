@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from cubestack.host.clients.contract import DeviceClient
 from linear_sun_sensor.interface import Outcome
 
-__all__ = ["SunAngle", "SunSlit"]
-
 
 @dataclass(frozen=True)
 class SunAngle:

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from linear_sun_sensor.board import SunSlitBoard
     from linear_sun_sensor.client import SunSlit
 
-__all__ = ["DEVICE"]
-
 DEVICE: Device[SunSlitBoard, SunSlit] = Device(
     name="sunslit",
     title="SunSlit",

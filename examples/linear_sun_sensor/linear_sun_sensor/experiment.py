@@ -25,8 +25,6 @@ from linear_sun_sensor.scene import SlitScene
 if TYPE_CHECKING:
     from linear_sun_sensor.board import SunSlitBoard
 
-__all__ = ["EXPERIMENT"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class SunOptions(MeasureOptions):

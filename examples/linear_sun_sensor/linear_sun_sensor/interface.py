@@ -10,8 +10,6 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.codec.node_messages import NODE_TELECOMMANDS, node_telemetry
 
-__all__ = ["INTERFACE", "PITCH_MM", "PIXELS", "SLIT_MM", "Outcome"]
-
 PIXELS = 128
 PITCH_MM = 0.0635
 """TSL1401CL data sheet: 400 pixels an inch."""

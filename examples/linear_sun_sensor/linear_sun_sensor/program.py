@@ -23,8 +23,6 @@ from cubestack.firmware_model.node.program import Action, NodeProgram, Source
 from linear_sun_sensor.interface import INTERFACE, PITCH_MM, PIXELS, SLIT_MM, Outcome
 from linear_sun_sensor.pins import ACK, ENABLE, EXPOSE, RNW
 
-__all__ = ["SunSlitProgram", "find_sun"]
-
 READOUT_US = 2_000
 """A readout takes 256 us after the end of the exposure."""
 

@@ -14,8 +14,6 @@ from cubestack.hdl.proofs.prover import Fault, Proof
 from linear_sun_sensor.pins import CLK, PINS
 from linear_sun_sensor.top import SunSlitTop
 
-__all__ = ["PROOFS"]
-
 
 def _make(_small: bool) -> tuple[SunSlitTop, None]:
     return SunSlitTop(), None

@@ -6,8 +6,6 @@ from pathlib import Path
 from cubestack.emulator.scene import file
 from cubestack.emulator.scene.file import SceneError
 
-__all__ = ["SlitScene", "load_scene"]
-
 
 @dataclass(frozen=True)
 class SlitScene:
@@ -34,12 +32,7 @@ class SlitScene:
                 raise SceneError(f"{name} must be 0 or more, not {getattr(self, name):g}")
 
 
-_KEYS = {
-    "sun_deg": file.number,
-    "brightness": file.number,
-    "noise": file.flag,
-    "seed": file.whole,
-}
+_KEYS = {"sun_deg": file.number, "brightness": file.number, "noise": file.flag, "seed": file.whole}
 
 
 def load_scene(path: Path) -> SlitScene:

@@ -19,8 +19,6 @@ from cubestack.hdl.flow.top import Clock, Top
 from linear_sun_sensor.interface import PIXELS
 from linear_sun_sensor.pins import PINS
 
-__all__ = ["READOUTS", "TOPS", "SunSlitTop"]
-
 READOUTS = 2
 
 

@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.catalogue.geodesic import GeodesicSphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
 
-__all__ = ["Database", "DatabaseError"]
-
 MAGIC = b"ARAM"
 VERSION = 1
 

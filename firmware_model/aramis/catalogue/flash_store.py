@@ -25,8 +25,6 @@ from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, Cata
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
 
-__all__ = ["CatalogueStore", "flash_image"]
-
 HEADER = struct.Struct("<4sI")
 MAGIC = b"AFLS"
 

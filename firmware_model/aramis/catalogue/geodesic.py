@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["NO_FACE", "SPLITS", "GeodesicSphere", "geodesic_sphere"]
-
 SPLITS = 2
 MOST_NEIGHBOURS = 12
 NO_FACE = 0xFFFF

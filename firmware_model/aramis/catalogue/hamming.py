@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["CODED_BYTES", "DATA_BYTES", "Decoded", "coded_size", "decode", "encode"]
-
 DATA_BYTES = 8
 CODED_BYTES = 9
 

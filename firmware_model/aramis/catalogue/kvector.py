@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["VALUES_PER_BIN", "KVector", "Range"]
-
 VALUES_PER_BIN = 4
 """Mean occupation of a bin: more saves memory, and costs comparisons (assumed)."""
 

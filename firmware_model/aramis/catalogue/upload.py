@@ -17,8 +17,6 @@ from cubestack.firmware_model.interface.aramis import BLOCK_BYTES
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
-__all__ = ["CatalogueUpload"]
-
 
 class CatalogueUpload:
     """The catalogue that is being loaded."""

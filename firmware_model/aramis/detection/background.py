@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["FRAMES", "Background"]
-
 FRAMES = 5
 
 

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["MOST_RUNS", "Regions", "find_regions", "locate_stars"]
-
 MOST_RUNS = 20_000
 """Runs of pixels that the list in RAM holds (assumed); a picture of stars has some hundred."""
 

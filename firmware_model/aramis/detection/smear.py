@@ -17,8 +17,6 @@ from cubestack.firmware_model.aramis.detection.regions import Regions
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["is_drawn_out", "smear_px"]
-
 LARGEST = 10
 """Regions looked at."""
 

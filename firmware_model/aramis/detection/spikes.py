@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["HALF", "WINDOW", "SpikeRemoval", "remove_spikes"]
-
 WINDOW = 5
 HALF = 13
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["Assignment", "assign"]
-
 #: Corner opposite to side a (1-2), b (2-3) and c (1-3).
 OPPOSITE = np.array([2, 0, 1])
 

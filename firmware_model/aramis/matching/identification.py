@@ -30,8 +30,6 @@ from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["identify"]
-
 
 def identify(
     measured: StarList,
@@ -287,10 +285,5 @@ class _Search:
         stars = np.full(len(self.measured), NONE, dtype=np.int32)
         stars[measured] = identities
         return Solution(
-            MeasurementOutcome.CONCLUSIVE,
-            reason,
-            quaternion,
-            stars,
-            self.measured,
-            **counts,
+            MeasurementOutcome.CONCLUSIVE, reason, quaternion, stars, self.measured, **counts
         )

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["FEWEST", "at_middle_row"]
-
 FEWEST = 5
 """Stars: ten components across the line of sight for six unknowns."""
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["Triangle", "measure_triangle"]
-
 _HALF, _FOUR = np.float32(0.5), np.float32(4)
 _EIGHTEEN, _THIRTY_SIX = np.float32(18), np.float32(36)
 

@@ -21,8 +21,6 @@ from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["BOUND_SIGMAS", "Match", "find_triangles", "match_triple"]
-
 BOUND_SIGMAS = np.float32(3)
 
 #: Which two stars of the main triangle each pivot keeps.

@@ -20,8 +20,6 @@ from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["Confirmation", "confirm", "sides_agree"]
-
 
 @dataclass(frozen=True, eq=False)
 class Confirmation:
@@ -43,10 +41,7 @@ class Confirmation:
 
 
 def sides_agree(
-    vectors: NDArray[np.float32],
-    catalogue: NDArray[np.float32],
-    tolerance: float,
-    meter: Meter,
+    vectors: NDArray[np.float32], catalogue: NDArray[np.float32], tolerance: float, meter: Meter
 ) -> bool:
     """Whether two triangles of unit vectors (3, 3) agree within `tolerance`.
 

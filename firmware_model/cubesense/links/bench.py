@@ -24,8 +24,6 @@ from cubestack.firmware_model.interface.cubesense.service_port import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
-__all__ = ["CHUNK_BYTES", "LETTERS", "BenchLink"]
-
 LETTERS = 4
 """Letters that wait."""
 

@@ -30,8 +30,6 @@ from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
 
-__all__ = ["SEND_BYTES", "NodeLink"]
-
 SEND_BYTES = len(encode_frame(b"")) + 2 * FRAME_BYTES
 """What the UART may still have to send: the longest answer, every byte of it doubled."""
 

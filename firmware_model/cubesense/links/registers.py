@@ -29,8 +29,6 @@ from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Routine
 
-__all__ = ["READ_AHEAD_BYTES", "ImageStream", "RegisterLink"]
-
 READ_AHEAD_BYTES = 32
 """Bytes of the picture that wait for the host; new ones are fetched when half of them are left."""
 

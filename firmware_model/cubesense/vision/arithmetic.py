@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HUNDREDTHS", "sequential_sum", "to_int16"]
-
 HUNDREDTHS = np.float32(100)
 """Results are carried as int of 1/100 px (section 6.5.3.1)."""
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubesense.vision.arithmetic import sequential_sum
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["Circle", "LeastSquaresCircle", "three_point_circle"]
-
 Values = NDArray[np.float32]
 
 FEWEST = 3

@@ -27,17 +27,6 @@ from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = [
-    "FOCAL_PX",
-    "RIM_PX",
-    "TABLE_ENTRIES",
-    "DistortionError",
-    "Projection",
-    "RadiusTable",
-    "byte_table",
-    "fine_table",
-]
-
 RIM_PX = 226
 """Radius in the picture where the field of view ends (table 5.1)."""
 

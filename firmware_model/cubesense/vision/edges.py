@@ -26,16 +26,6 @@ from cubestack.firmware_model.interface.cubesense.codes import EDGE_UNIT, EDGES_
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = [
-    "MAX_EDGES",
-    "Crossing",
-    "EdgeConfig",
-    "EdgeList",
-    "NadirLines",
-    "answered",
-    "bisect",
-]
-
 MAX_EDGES = 2 * EDGES_PER_FRAME
 """Edges that the part keeps: assumed. The widest Earth has 28, the rest is for false ones."""
 

@@ -12,14 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cubestack.firmware_model.cubesense.vision.distortion import (
-    FOCAL_PX,
-    NEWTON_END_PX,
-    RIM_PX,
-)
+from cubestack.firmware_model.cubesense.vision.distortion import FOCAL_PX, NEWTON_END_PX, RIM_PX
 from cubestack.firmware_model.mcu.costs import Meter
-
-__all__ = ["invertible"]
 
 STEP_PX = 32
 """Distance of the radii that are tried."""

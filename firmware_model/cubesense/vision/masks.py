@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["Mask", "masked"]
-
 
 class Mask(NamedTuple):
     """One area in px, ends included; all 0 is no area."""

@@ -36,8 +36,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["NadirConfig", "NadirResult", "angle_of", "find_nadir"]
-
 DROPPED_SHARE = 4
 """One edge in so many may be dropped."""
 

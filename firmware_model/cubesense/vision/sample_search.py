@@ -16,8 +16,6 @@ from cubestack.firmware_model.cubesense.vision.edges import Crossing, EdgeConfig
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["Between", "around_samples"]
-
 Pixel = tuple[int, int]
 
 

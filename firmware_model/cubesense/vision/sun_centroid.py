@@ -34,8 +34,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["COORDINATE_BYTES", "SunConfig", "SunResult", "find_sun", "window_bytes"]
-
 COORDINATE_BYTES = 4
 """x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
 

@@ -124,12 +124,7 @@ class _Entries:
     """
 
     def __init__(
-        self,
-        pairs: CentroidPairs,
-        listed: PairList,
-        stars: int,
-        margin_rad: float,
-        meter: Meter,
+        self, pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float, meter: Meter
     ) -> None:
         margin = np.float32(margin_rad)
         start = _search(listed.angle, pairs.angle - margin, meter)

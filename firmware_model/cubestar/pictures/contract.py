@@ -12,8 +12,6 @@ from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Routine
 
-__all__ = ["ITERATION_US", "Pictures", "test_pattern"]
-
 ITERATION_US = 1_000_000
 
 

@@ -13,8 +13,6 @@ from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
 from cubestack.firmware_model.interface.cubestar.pins import ACK, BANK, ENABLE, RNW
 from cubestack.firmware_model.mcu.requests import Pay, Routine, SetPin, StrobeRead
 
-__all__ = ["CopiedPictures"]
-
 
 class CopiedPictures(Pictures):
     """Pictures at the start of the processor's own external RAM."""

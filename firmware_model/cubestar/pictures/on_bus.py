@@ -17,11 +17,7 @@ from cubestack.firmware_model.cubestar.detection import (
     search_stars,
 )
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.cubestar.pictures.contract import (
-    ITERATION_US,
-    Pictures,
-    test_pattern,
-)
+from cubestack.firmware_model.cubestar.pictures.contract import ITERATION_US, Pictures, test_pattern
 from cubestack.firmware_model.cubestar.pictures.copied import CopiedPictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
@@ -38,8 +34,6 @@ from cubestack.firmware_model.interface.cubestar.pins import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import BusAccess, Routine, SetPin
-
-__all__ = ["pictures_of"]
 
 FAST_ITERATION_US = 500_000
 

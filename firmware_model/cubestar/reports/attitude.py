@@ -12,8 +12,6 @@ from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = ["AttitudeReports"]
-
 PROCESSING_LIMIT_MS = 500
 """CubeStar thesis, section 5.3.6."""
 

@@ -7,8 +7,6 @@ import numpy as np
 
 from cubestack.firmware_model.cubestar.processing import Processing, Results
 
-__all__ = ["StarReports"]
-
 NOT_IDENTIFIED = 0xFFFF
 NO_STAR = 0xFF
 

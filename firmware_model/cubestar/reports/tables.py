@@ -1,7 +1,5 @@
 """Telemetry that only shows settings or durations: which field shows what."""
 
-__all__ = ["SETTINGS_SHOWN", "TIMES_SHOWN"]
-
 #: Telemetry that shows a setting: (telemetry field, setting telecommand, its field).
 SETTINGS_SHOWN: dict[str, tuple[tuple[str, str, str], ...]] = {
     "Exposure": (("exposure", "Exposure", "exposure"),),

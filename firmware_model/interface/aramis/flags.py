@@ -2,8 +2,6 @@
 
 from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
-__all__ = ["FLAG_NAMES", "flag_fields"]
-
 #: Name to bit and cause.
 _FLAGS = {
     "UartProtocolError": (0, "byte outside of a frame, or an unknown escape"),

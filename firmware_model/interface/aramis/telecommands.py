@@ -23,14 +23,6 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import (
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 
-__all__ = [
-    "BLOCK_BYTES",
-    "IMAGE_BYTES",
-    "MOST_CATALOGUE_BYTES",
-    "MS_PER_DAY",
-    "TELECOMMANDS",
-]
-
 #: Bytes of a picture: one for each pixel, row after row.
 IMAGE_BYTES = COLUMNS * ROWS
 
@@ -196,10 +188,7 @@ _EXTENSIONS = (
         116,
         "WriteCameraRegister",
         "write an image sensor register; a measurement sets up exposure and gain again",
-    ).of(
-        u8("Address", "register's address"),
-        u16("Value", "value to write"),
-    ),
+    ).of(u8("Address", "register's address"), u16("Value", "value to write")),
     Message(
         117, "SelectCameraRegister", "read an image sensor register into telemetry CameraRegister"
     ).of(u8("Address", "register's address")),

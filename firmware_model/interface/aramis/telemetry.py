@@ -21,8 +21,6 @@ from cubestack.firmware_model.interface.aramis.telecommands import BLOCK_BYTES, 
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 
-__all__ = ["PHASES", "SETTINGS_SHOWN", "TELEMETRY"]
-
 #: Steps of a measurement, in the order of telemetry PhaseTimes, with their meanings.
 PHASES = {
     "Setup": "setting the camera up",
@@ -90,8 +88,7 @@ _NODE = (
         u8("TimeSet", "1: the clock was set"),
     ),
     Message(133, "SystemTime", "the clock").of(
-        *_time("now"),
-        u32("Uptime", "since power-up, wraps", "ms"),
+        *_time("now"), u32("Uptime", "since power-up, wraps", "ms")
     ),
 )
 
@@ -183,8 +180,7 @@ _REPORTS = (
     Message(
         209, "SupplyStatus", "the camera unit's supply; whoever asks decides what a latch-up is"
     ).of(
-        enum8("Switch", "switch", choices=OnOff),
-        u16("Current", "present current", "mA", scale=10),
+        enum8("Switch", "switch", choices=OnOff), u16("Current", "present current", "mA", scale=10)
     ),
 )
 

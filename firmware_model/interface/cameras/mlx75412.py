@@ -15,17 +15,6 @@ from cubestack.firmware_model.interface.cameras.registers import (
     CameraRegisterMap,
 )
 
-__all__ = [
-    "COLUMNS",
-    "CRYSTAL_HZ",
-    "LINE_CLOCKS",
-    "LONGEST_EXPOSURE",
-    "PIXEL_PITCH_MM",
-    "REGISTERS",
-    "ROWS",
-    "SYNC_APPLY",
-]
-
 #: Pixels of a picture, and the distance of their centres (table 3.3).
 COLUMNS = 1024
 ROWS = 512

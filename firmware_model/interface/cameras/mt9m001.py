@@ -15,24 +15,6 @@ from cubestack.firmware_model.interface.cameras.registers import (
     RegisterAccess,
 )
 
-__all__ = [
-    "ARRAY_COLUMN",
-    "ARRAY_ROW",
-    "CHIP_VERSION",
-    "COLUMNS",
-    "FEWEST_BLANK_CLOCKS",
-    "FEWEST_BLANK_ROWS",
-    "FRAME_END_CLOCKS",
-    "FRAME_START_CLOCKS",
-    "HIGHEST_GAIN",
-    "PIXEL_CLOCK_HZ",
-    "PIXEL_PITCH_MM",
-    "REGISTERS",
-    "ROWS",
-    "gain",
-    "gain_register",
-]
-
 #: Active pixels, and the distance of their centres.
 COLUMNS = 1280
 ROWS = 1024
@@ -192,8 +174,5 @@ _REGISTERS = (
 )
 
 REGISTERS = CameraRegisterMap(
-    camera="MT9M001",
-    i2c_address=0x5D,
-    address_bytes=1,
-    registers=_REGISTERS,
+    camera="MT9M001", i2c_address=0x5D, address_bytes=1, registers=_REGISTERS
 )

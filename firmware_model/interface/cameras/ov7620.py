@@ -13,18 +13,6 @@ from cubestack.firmware_model.interface.cameras.registers import (
     CameraRegisterMap,
 )
 
-__all__ = [
-    "CLOCKS_PER_LINE",
-    "COLUMNS",
-    "EXPOSURE_LINES",
-    "LINES_PER_FRAME",
-    "PIXEL_CLOCK_HZ",
-    "REGISTERS",
-    "ROWS",
-    "window_column",
-    "window_row",
-]
-
 #: Pixels that are sent, of 664 x 492.
 COLUMNS = 640
 ROWS = 480

@@ -9,14 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 
-__all__ = [
-    "BitField",
-    "CameraRegister",
-    "CameraRegisterMap",
-    "RegisterAccess",
-    "UnknownRegisterError",
-]
-
 
 class UnknownRegisterError(ValueError):
     """No register or bit field has that name."""

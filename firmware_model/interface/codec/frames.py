@@ -6,8 +6,6 @@ the ID byte and its data; in the node dialect an answer is data alone, or one er
 
 from enum import Enum, auto
 
-__all__ = ["END", "ESCAPE", "START", "FrameDecoder", "FrameEvent", "encode_frame"]
-
 ESCAPE = 0x1F
 START = 0x7F
 END = 0xFF

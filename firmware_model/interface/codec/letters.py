@@ -6,8 +6,6 @@ is no letter of the protocol gets no answer.
 
 from dataclasses import dataclass
 
-__all__ = ["Letter", "LetterProtocol"]
-
 
 @dataclass(frozen=True)
 class Letter:

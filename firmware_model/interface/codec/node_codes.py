@@ -2,8 +2,6 @@
 
 from enum import IntEnum
 
-__all__ = ["AckError"]
-
 
 class AckError(IntEnum):
     """Error byte of a telecommand's acknowledge."""

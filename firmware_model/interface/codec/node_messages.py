@@ -9,8 +9,6 @@ from cubestack.firmware_model.interface.codec.field import enum8, flags_at, u8, 
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 
-__all__ = ["NODE_FLAGS", "NODE_TELECOMMANDS", "node_telemetry"]
-
 #: Error flags of its link to the host, with their causes.
 NODE_FLAGS = {
     "UartError": "byte outside of a frame, or a frame that never ended",

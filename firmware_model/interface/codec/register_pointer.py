@@ -19,8 +19,6 @@ from dataclasses import dataclass
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value, suggestion
 
-__all__ = ["FILL", "PointerMap", "PointerRegister"]
-
 #: What a read gives where there is nothing.
 FILL = 0xFF
 

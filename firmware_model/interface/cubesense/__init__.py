@@ -13,8 +13,6 @@ from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PO
 from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
 from cubestack.firmware_model.interface.cubesense.telemetry import TELEMETRIES
 
-__all__ = ["INTERFACE"]
-
 INTERFACE = Interface(
     name="CubeSense",
     version=2,

@@ -12,8 +12,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     Sram,
 )
 
-__all__ = ["EXTENSIONS"]
-
 _extension = partial(Message, extension=True)
 
 
@@ -66,10 +64,7 @@ def _edges(part: int) -> Message:
         225 + part,
         f"NadirEdges{part + 1}",
         f"edges {first} to {last} that the latest search in the nadir picture found",
-    ).of(
-        u8("Count", "edges found in all, false ones left out"),
-        *coordinates,
-    )
+    ).of(u8("Count", "edges found in all, false ones left out"), *coordinates)
 
 
 EXTENSIONS = (

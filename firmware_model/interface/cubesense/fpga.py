@@ -10,23 +10,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-__all__ = [
-    "ADDRESSING_COMMANDS",
-    "ADDRESS_BYTES",
-    "COMMANDS",
-    "FULL_SIZE",
-    "SUN_NOT_FOUND",
-    "SUN_RUN",
-    "SUN_THRESHOLD",
-    "Action",
-    "Actions",
-    "FpgaCommand",
-    "ReadOut",
-    "actions",
-    "address_bytes",
-    "link_shows_enables",
-]
-
 
 class Action(Enum):
     """What one of the two FPGAs does. "Other" is the other FPGA, its camera or its sensor."""

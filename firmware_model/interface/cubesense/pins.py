@@ -16,40 +16,6 @@ from enum import StrEnum
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.interface.pins import Direction, Pin, sram_pins
 
-__all__ = [
-    "ACKNOWLEDGE",
-    "ADC_FULL_SCALE",
-    "ADDRESSING",
-    "CAMERA_PINS",
-    "CAMERA_POWER",
-    "CAMERA_SCL",
-    "CAMERA_SDA",
-    "CLK",
-    "COMMON_PINS",
-    "CONTENTION",
-    "CONTROLS",
-    "DATA",
-    "DATA_I",
-    "EDGE",
-    "ENABLE",
-    "FPGA",
-    "HREF",
-    "LINK_C",
-    "LINK_D",
-    "MA_PER_COUNT",
-    "OWN_PINS",
-    "PCLK",
-    "PREFIXES",
-    "RNW",
-    "SHIFT",
-    "SRAM_PINS",
-    "SRAM_POWER",
-    "Monitor",
-    "Y",
-    "halves",
-    "pair_pins",
-]
-
 Y = Pin("Y", "input", "pixel data from the camera", 8)
 HREF = Pin("HREF", "input", "high while a row's pixels are sent")
 PCLK = Pin("PCLK", "input", "pixel clock")

@@ -23,8 +23,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
 
-__all__ = ["REGISTERS"]
-
 _RW = RegisterAccess.READ_WRITE
 _RO = RegisterAccess.READ_ONLY
 _WO = RegisterAccess.WRITE_ONLY

@@ -7,8 +7,6 @@ fails is not answered, and the download reads the memory of the camera's own.
 from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.cubesense.codes import IMAGE_BYTES, Camera, Sram
 
-__all__ = ["CAPTURES", "DOWNLOADS", "SERVICE_PORT"]
-
 _STORED = b"Y"
 
 

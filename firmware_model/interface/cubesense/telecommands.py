@@ -25,8 +25,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     split_coefficient,
 )
 
-__all__ = ["DISTORTION", "DISTORTION_TERMS", "TELECOMMANDS"]
-
 #: r_d = sum of DISTORTION[k] r_u^k, both radii in px from the boresight.
 DISTORTION = (0.1036, 0.9953, 7.6076e-5, -2.5572e-6, 0.0)
 
@@ -131,14 +129,9 @@ _COMMON = (
     ).of(u8("Selection", "which memories", choices=SramSelection)),
     _high(
         20, "CaptureAndDetect", "take a picture and measure in it; results become pending at once"
-    ).of(
-        _camera(),
-        _sram("memory that stores it"),
-    ),
+    ).of(_camera(), _sram("memory that stores it")),
     _medium(21, "CaptureOnly", "take a picture; the capture result becomes pending at once").of(
-        _camera(),
-        _sram("memory that stores it"),
-        _location(),
+        _camera(), _sram("memory that stores it"), _location()
     ),
     _high(64, "StartImageDownload", "select a picture and its size, and prepare frame 0").of(
         _sram("memory that is read"),

@@ -25,8 +25,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.interface.cubesense.extensions import EXTENSIONS
 
-__all__ = ["RESULTS", "SCHEDULES", "TELEMETRIES"]
-
 _high = partial(Message, confidence=Confidence.HIGH)
 _medium = partial(Message, confidence=Confidence.MEDIUM)
 _low = partial(Message, confidence=Confidence.LOW)

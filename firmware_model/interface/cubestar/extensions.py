@@ -12,8 +12,6 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode
 from cubestack.firmware_model.interface.cubestar.telecommands import IMAGE_BYTES
 
-__all__ = ["EXTENSION_TELECOMMANDS", "EXTENSION_TELEMETRY", "UPLOAD_BLOCK_BYTES"]
-
 #: Bytes that one UploadBlock carries.
 UPLOAD_BLOCK_BYTES = 128
 
@@ -39,12 +37,9 @@ _TELECOMMANDS = (
         ).within(6, _LARGEST_FRAME_RATE, "ConfigChangeError")
     ),
     Message(103, "SetDiscardDelay", "wait between enabling the image sensor and storing").of(
-        u16(
-            "Delay",
-            "less than a read-out (67.7 ms) splits the picture",
-            "ms",
-            reset=70,
-        ).within(None, 1000, "DelayTimeSetToLong")
+        u16("Delay", "less than a read-out (67.7 ms) splits the picture", "ms", reset=70).within(
+            None, 1000, "DelayTimeSetToLong"
+        )
     ),
     Message(
         104,
@@ -52,23 +47,16 @@ _TELECOMMANDS = (
         "page of the image sensor's registers for telecommands 13 and 14",
     ).of(u8("Page", "high byte of the register's address", reset=0x85)),
     Message(105, "WriteCameraRegister", "write an image sensor register").of(
-        u16("Address", "register's address"),
-        u8("Value", "value to write"),
+        u16("Address", "register's address"), u8("Value", "value to write")
     ),
     Message(
-        106,
-        "SelectCameraRegister",
-        "read an image sensor register into telemetry CameraRegister",
+        106, "SelectCameraRegister", "read an image sensor register into telemetry CameraRegister"
     ).of(u16("Address", "register's address")),
     Message(107, "StopLoop", "end the 1 s loop after its present iteration"),
 )
 
 _TELEMETRY = (
-    Message(
-        200,
-        "AttitudeQuaternion",
-        "latest attitude in full precision, inertial to camera",
-    ).of(
+    Message(200, "AttitudeQuaternion", "latest attitude in full precision, inertial to camera").of(
         f32("Q0", "vector part, x"),
         f32("Q1", "vector part, y"),
         f32("Q2", "vector part, z"),
@@ -89,12 +77,7 @@ _TELEMETRY = (
         u32("Attitude", "attitude estimate", "us"),
         u32("LoopTotal", "whole iteration without the wait for the next", "us"),
     ),
-    Message(
-        202,
-        "HipparcosNumber",
-        "next identified star's Hipparcos number",
-        steps=True,
-    ).of(
+    Message(202, "HipparcosNumber", "next identified star's Hipparcos number", steps=True).of(
         u8("StarNumber", "number of the detected star, from 0; 255: none"),
         u32("Hipparcos", "Hipparcos number"),
         f32("X", "measured column", "px"),
@@ -110,20 +93,12 @@ _TELEMETRY = (
         u16("LatchUps", "over-currents that opened the switch"),
         u16("PowerCycles", "times that the switch was closed again"),
     ),
-    Message(
-        205,
-        "CameraRegister",
-        "image sensor register that SelectCameraRegister read",
-    ).of(
+    Message(205, "CameraRegister", "image sensor register that SelectCameraRegister read").of(
         u16("Address", "register's address"),
         u8("Value", "value"),
         u8("Valid", "1: the sensor acknowledged"),
     ),
-    Message(
-        206,
-        "LoopStatus",
-        "state of the main loop and of the settings that are ours",
-    ).of(
+    Message(206, "LoopStatus", "state of the main loop and of the settings that are ours").of(
         u32("Iterations", "iterations since power-up"),
         u8("ModeFlag", "mode for the next picture", choices=MatchMode),
         u16("FrameRate", "the sensor's frame-rate register"),

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
-__all__ = ["NEVER_RAISED", "ErrorFlag", "flag_fields"]
-
 
 @dataclass(frozen=True)
 class ErrorFlag:

@@ -6,8 +6,6 @@ CubeStar thesis, options 1 to 3 of section 3.3, and section 7.2.
 from enum import Enum
 from typing import Never
 
-__all__ = ["Layout"]
-
 
 class Layout(Enum):
     """A layout; its value is its name on the command line. ValueError for another name."""

@@ -8,34 +8,6 @@ still serve. So is BANK: the published board has the memory for two images but n
 
 from cubestack.firmware_model.interface.pins import Pin, sram_pins
 
-__all__ = [
-    "ACK",
-    "AD_HIGH",
-    "AD_LOW",
-    "ALE",
-    "BANK",
-    "BOARD_PREFIXES",
-    "CONTENTION",
-    "CS_N",
-    "DATA",
-    "DCLK",
-    "DOUBLE",
-    "ENABLE",
-    "HEADER",
-    "HSYNC",
-    "INTO",
-    "OWN_PINS",
-    "PIXCLK",
-    "PIXDATA",
-    "PUBLISHED",
-    "RE_N",
-    "RNW",
-    "SHARED",
-    "TWO_BOARDS",
-    "VSYNC",
-    "WE_N",
-]
-
 PIXCLK = Pin("PIXCLK", "input", "pixel clock")
 PIXDATA = Pin("PIXDATA", "input", "pixel data from the image sensor", 8)
 HSYNC = Pin("HSYNC", "input", "low between rows")

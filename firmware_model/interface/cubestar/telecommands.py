@@ -17,8 +17,6 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     TestPattern,
 )
 
-__all__ = ["IMAGE_BYTES", "PUBLISHED_TELECOMMANDS"]
-
 #: Bytes of a picture: one for each pixel, row after row.
 IMAGE_BYTES = COLUMNS * ROWS
 

@@ -31,8 +31,6 @@ from cubestack.firmware_model.interface.cubestar.codes import (
 )
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 
-__all__ = ["PUBLISHED_TELEMETRY"]
-
 _UNIT_VECTOR_SCALE = 10_000
 
 
@@ -134,8 +132,7 @@ _NODE = (
         u8("TestResult", "latest result", choices=MemoryTest)
     ),
     Message(135, "PowerStatus", "switched supply of imager and frame buffer").of(
-        _switch("Status"),
-        *_currents(),
+        _switch("Status"), *_currents()
     ),
 )
 
@@ -167,8 +164,7 @@ _CAMERA = (
         f32("Fy", "of the distortion model, along the columns", "px"),
     ),
     Message(140, "PrincipalPoint", "principal point that is set").of(
-        f32("Cx", "column", "px"),
-        f32("Cy", "row", "px"),
+        f32("Cx", "column", "px"), f32("Cy", "row", "px")
     ),
     Message(
         141, "DistortionCoef", "distortion coefficients that are set, distorted to undistorted"
@@ -179,8 +175,7 @@ _CAMERA = (
         f32("P2", "tangential, along the rows"),
     ),
     Message(142, "IS_Register", "image sensor register that ReadFrom_IS_Register selected").of(
-        u8("DataH", "always 0: this sensor's registers have 8 bits"),
-        u8("DataL", "value"),
+        u8("DataH", "always 0: this sensor's registers have 8 bits"), u8("DataL", "value")
     ),
     Message(143, "ImageBlock", "block that ImageBlockSet selected").of(
         Field("bytes128", "Block", "pixels, row after row; zero behind a shorter block")
@@ -208,8 +203,7 @@ _DETECTION = (
         u8("StarThreshold", "for a neighbour while growing", "DN"),
     ),
     Message(147, "StarPixels", "number of pixels of a star").of(
-        u8("MinPixels", "fewer are noise", "px"),
-        u8("MaxPixels", "more are an invalid star", "px"),
+        u8("MinPixels", "fewer are noise", "px"), u8("MaxPixels", "more are an invalid star", "px")
     ),
     Message(148, "StarGrid", "centroiding window").of(u8("GridSize", "side of the window", "px")),
     Message(149, "MaxStars", "when the search stops").of(
@@ -233,8 +227,7 @@ _DETECTION = (
         u16("Intensity", "sum over the centroiding window", "DN"),
     ),
     Message(152, "BodyUnitVectors", "next detected star's direction in the camera", steps=True).of(
-        *_scaled("camera unit vector", "VbX", "VbY", "VbZ"),
-        _star_number(),
+        *_scaled("camera unit vector", "VbX", "VbY", "VbZ"), _star_number()
     ),
     Message(
         153, "DetectionTimingOne", "longest times of the detection's steps since the last reset"

@@ -11,8 +11,6 @@ from cubestack.hdl.proofs.cubesense.made import column_row, fpga
 from cubestack.hdl.proofs.properties import domain, starts_in, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-__all__ = ["edge_proofs"]
-
 # The scan visits exactly the declared addresses in order.
 
 _SCAN = {

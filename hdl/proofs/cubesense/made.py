@@ -10,8 +10,6 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
-__all__ = ["SMALL", "Make", "column_row", "fpga", "made"]
-
 #: What makes a design, and its size; small when asked for.
 Make = Callable[[bool], tuple[Component, ReadOut]]
 

@@ -30,8 +30,6 @@ from cubestack.hdl.proofs.properties import (
 )
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-__all__ = ["PROOFS"]
-
 # The address never leaves the picture.
 
 _POSITIONS = {

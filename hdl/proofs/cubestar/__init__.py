@@ -2,7 +2,5 @@
 
 from cubestack.hdl.proofs.cubestar import published, successors
 
-__all__ = ["PROOFS"]
-
 #: By name.
 PROOFS = published.PROOFS | successors.PROOFS

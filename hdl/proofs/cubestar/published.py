@@ -24,18 +24,6 @@ from cubestack.hdl.proofs.properties import (
 )
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-__all__ = [
-    "BANK_RESTS",
-    "LAST_COLUMN",
-    "LAST_ROW",
-    "PROOFS",
-    "ack_is_right",
-    "bank_rests",
-    "full",
-    "gapped",
-    "inside",
-]
-
 Make = Callable[[bool], tuple[Component, SimpleNamespace]]
 
 

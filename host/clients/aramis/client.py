@@ -29,8 +29,6 @@ from cubestack.host.clients.contract import DeviceClient, Progress
 from cubestack.host.clients.quaternions import unit_quaternion
 from cubestack.host.errors import StepFailedError, TargetError
 
-__all__ = ["Aramis", "Attitude", "Star"]
-
 PROGRAM_TIMEOUT_S = 300.0
 """Longer than erasing and writing all of the catalogue's flash."""
 

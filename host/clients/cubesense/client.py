@@ -38,14 +38,7 @@ from cubestack.host.clients.cubesense.values import (
 )
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
-__all__ = [
-    "CameraSettings",
-    "CubeSense",
-    "Mask",
-    "Measurement",
-    "Power",
-    "direction",
-]
+__all__ = ["CameraSettings", "CubeSense", "Mask", "Measurement", "Power", "direction"]
 
 #: Time between two polls of a result.
 POLL_PERIOD_S = 0.04

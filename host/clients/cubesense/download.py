@@ -22,8 +22,6 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.host.clients.contract import Client, Progress
 from cubestack.host.errors import BadAnswerError, HostError, NoAnswerError
 
-__all__ = ["download_image", "picture_of"]
-
 POLL_PERIOD_S = 0.04
 FRAME_TIMEOUT_S = 2.0
 

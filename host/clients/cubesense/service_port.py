@@ -10,8 +10,6 @@ from cubestack.host.clients.contract import Progress
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.transport.streams import Transport
 
-__all__ = ["ServicePortClient"]
-
 READ_BYTES = 4096
 
 

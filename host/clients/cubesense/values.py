@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
 
-__all__ = ["CameraSettings", "Mask", "Measurement", "Power", "direction"]
-
 
 def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:
     """Unit vector (3,) in camera axes of a measurement's two angles.

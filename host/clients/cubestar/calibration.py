@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.host.errors import CameraFileError
 
-__all__ = ["Calibration", "Camera", "calibrate", "load_camera"]
-
 GRID_STEP_PX = 8
 INVERSION_STEPS = 100
 INVERSION_TOLERANCE_PX = 1e-6

@@ -24,8 +24,6 @@ from cubestack.host.clients.contract import DeviceClient, Progress
 from cubestack.host.clients.quaternions import unit_quaternion
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
-__all__ = ["Attitude", "CubeStar", "Star"]
-
 
 @dataclass(frozen=True)
 class Attitude:

@@ -6,8 +6,6 @@ one. Only telecommands and telemetry are used.
 
 from cubestack.host.clients.cubestar.client import CubeStar
 
-__all__ = ["find_threshold"]
-
 #: Thresholds in DN that are tried, about a quarter apart where that is more than one.
 LADDER = (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160, 200)
 

@@ -15,8 +15,6 @@ from cubestack.host.experiments.benchmark import LOOP_S, best_ms, simulated_rati
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
 
-__all__ = ["BENCHMARK"]
-
 HIGHEST_GAIN = 15.0
 
 

@@ -20,8 +20,6 @@ from cubestack.host.options import NUMBER, PATH, Options, option, whole
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 
-__all__ = ["EXPERIMENT", "CatalogueOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueOptions(Options):

@@ -18,8 +18,6 @@ from cubestack.host.terminal import console
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
 
-__all__ = ["show"]
-
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion
 ROUGHLY_OFF_DEG = 2.0
 

@@ -45,21 +45,11 @@ from cubestack.host.experiments.attitude import (
     rough_boresight,
 )
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import (
-    ANGLE,
-    CORNER,
-    NUMBER,
-    POSITIVE,
-    Kind,
-    between,
-    option,
-)
+from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
     from cubestack.emulator.camera.common.view import SkyCondition, SkyView
-
-__all__ = ["EXPERIMENT", "NOISE_TERMS", "AramisOptions", "AramisResult"]
 
 _Opener: TypeAlias = "Opener[AramisBoard, Aramis]"
 
@@ -87,9 +77,7 @@ class AramisOptions(SkyOptions):
     """Options of `cubestack measure aramis`."""
 
     mode: str = option(
-        "lis",
-        "lost in space (default), or near a rough direction",
-        choices=("lis", "assisted"),
+        "lis", "lost in space (default), or near a rough direction", choices=("lis", "assisted")
     )
     published: bool = option(
         False, "believe a unique triangle, as the thesis does, without verification"

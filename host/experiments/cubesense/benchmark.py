@@ -13,8 +13,6 @@ from cubestack.host.experiments.benchmark import LOOP_S, simulated_ratio
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-__all__ = ["BENCHMARK"]
-
 
 def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:
     from cubestack.emulator.boards.cubesense.benchmark import (

@@ -22,8 +22,6 @@ from cubestack.host.transport.streams import open_transport
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-__all__ = ["show"]
-
 SUN_DEG = (20.0, 10.0)
 NADIR_DEG = (-8.0, 12.0)
 PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}

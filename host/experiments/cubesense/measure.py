@@ -26,21 +26,12 @@ from cubestack.host.clients.cubesense.client import CubeSense, Measurement, dire
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.devices.experiment import Experiment, Result, Summary
 from cubestack.host.experiments.opener import MeasureOptions, Opener
-from cubestack.host.options import (
-    ANGLE,
-    POSITIVE,
-    SCENE,
-    flag,
-    option,
-    whole,
-)
+from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
     from cubestack.emulator.camera.ov7620.view import EarthSunView
     from cubestack.emulator.scene.earth_sun import SensorTruth
-
-__all__ = ["EXPERIMENT", "CubeSenseOptions", "SensorResult", "SensorSummary"]
 
 _Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 

@@ -15,8 +15,6 @@ from cubestack.host.devices.experiment import Summary
 from cubestack.host.experiments.facts import Facts, Lookup
 from cubestack.host.options import Options
 
-__all__ = ["EXPERIMENT"]
-
 
 class _Table(Summary):
     def lines(self, wall_s: float) -> Iterator[str]:

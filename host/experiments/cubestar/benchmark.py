@@ -15,8 +15,6 @@ from cubestack.host.experiments.benchmark import LOOP_S, ROUNDS, simulated_ratio
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
-__all__ = ["BENCHMARK"]
-
 I2C_HZ = 400_000
 I2C_CLIENT = """
 import time, smbus2

@@ -15,8 +15,6 @@ from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.options import NUMBER, Options, option
 
-__all__ = ["EXPERIMENT", "CatalogueOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueOptions(Options):

@@ -22,8 +22,6 @@ from cubestack.host.terminal import console
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
-__all__ = ["RENDERED", "show"]
-
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius
 RENDERED = Path(__file__).parent / "rendered-sky.png"
 PUBLISHED_PHASES = ("discard", "capture", "transfer", "detect", "match", "attitude")

@@ -32,8 +32,6 @@ from cubestack.host.options import SCENE, Options, option, whole
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
-__all__ = ["EXPERIMENT", "LayoutOptions", "LayoutResult", "LayoutSummary"]
-
 _Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 SETTLING = 2

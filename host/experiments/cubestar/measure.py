@@ -50,8 +50,6 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.scene.sky import Scene
 
-__all__ = ["EXPERIMENT", "CubeStarOptions"]
-
 _Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 #: Names of --mode for the firmware's modes.

@@ -20,9 +20,6 @@ from cubestack.emulator.rtl.wiring import MEMORY_PINS
 from cubestack.hdl.flow.generate import verilog_text
 from tests.benchmarks.engines.workloads import Workload
 
-__all__ = ["CocotbError", "missing_for_cocotb", "run_cocotb"]
-
-
 #: The project's folder, from which this module has its name.
 ROOT = Path(__file__).parents[3]
 
@@ -88,10 +85,7 @@ def _main(folder: Path) -> None:
 
     runner = get_runner("icarus")
     runner.build(
-        sources=[folder / "top.v"],
-        hdl_toplevel="top",
-        build_dir=folder,
-        timescale=("1ps", "1ps"),
+        sources=[folder / "top.v"], hdl_toplevel="top", build_dir=folder, timescale=("1ps", "1ps")
     )
     runner.test(
         hdl_toplevel="top",

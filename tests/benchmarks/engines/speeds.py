@@ -22,8 +22,6 @@ from tests.benchmarks.engines.icarus import missing_for_cocotb, run_cocotb
 from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
 from tests.benchmarks.engines.workloads import WORKLOADS, Workload
 
-__all__ = ["ENGINES", "Speed", "absent", "measure", "prepare"]
-
 _NO_COMPILER = 'a C++ compiler (apt-get install g++, or pip install "cubestack[compiler]")'
 
 

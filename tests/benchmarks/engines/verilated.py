@@ -25,8 +25,6 @@ from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import verilog_text
 
-__all__ = ["VerilatedEngine", "verilator_root"]
-
 _OPTIONS = ("-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "-Wno-fatal")
 
 _DESIGN = """\

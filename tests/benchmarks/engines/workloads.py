@@ -27,8 +27,6 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE
 from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 
-__all__ = ["WORKLOADS", "Workload", "WrongPictureError"]
-
 
 class WrongPictureError(RuntimeError):
     """An engine did not store what the camera sent."""
@@ -95,12 +93,7 @@ class Workload:
 
 
 _STAR = partial(
-    Workload,
-    columns=1024,
-    rows=512,
-    line_clocks=LINE_CLOCKS,
-    blank_clocks=8,
-    clock_hz=CRYSTAL_HZ,
+    Workload, columns=1024, rows=512, line_clocks=LINE_CLOCKS, blank_clocks=8, clock_hz=CRYSTAL_HZ
 )
 _PAIR = partial(
     Workload,

@@ -60,10 +60,7 @@ Change = Callable[[tuple[float, int]], list[tuple[float, int]]]
 
 @pytest.mark.parametrize(
     ("fault", "change"),
-    [
-        (UartDrop, lambda _clock: []),
-        (UartCorrupt, lambda clock: [(clock[0], clock[1] ^ 0x21)]),
-    ],
+    [(UartDrop, lambda _clock: []), (UartCorrupt, lambda clock: [(clock[0], clock[1] ^ 0x21)])],
 )
 @pytest.mark.parametrize("direction", ["both", "to-device", "to-host"])
 def test_bytes_that_begin_in_time_are_hit(fault: Any, change: Change, direction: str) -> None:

@@ -2,11 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.scene.earth_sun import (
-    EarthSunScene,
-    Mounting,
-    Target,
-)
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Target
 
 SUN, NADIR = Target.SUN, Target.NADIR
 S = 10**12

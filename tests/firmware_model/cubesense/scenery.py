@@ -5,11 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    FULL_SIZE,
-    SUN_NOT_FOUND,
-    ReadOut,
-)
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, SUN_NOT_FOUND, ReadOut
 
 COLUMNS, ROWS = FULL_SIZE.columns, FULL_SIZE.rows
 NADIR_BORESIGHT, SUN_BORESIGHT = (371.0, 236.0), (369.0, 250.0)

@@ -8,12 +8,7 @@ import pytest
 from cubestack.firmware_model.cubesense.thumbnail import thumbnail
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    DetectResult,
-    ImageSize,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult, ImageSize, Sram
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
 from .harness import Harness

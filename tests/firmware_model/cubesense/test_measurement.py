@@ -27,16 +27,7 @@ from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
-from .scenery import (
-    SUN_BORESIGHT,
-    chequered,
-    earth,
-    error_deg,
-    place,
-    scan,
-    sun,
-    window,
-)
+from .scenery import SUN_BORESIGHT, chequered, earth, error_deg, place, scan, sun, window
 
 TICK_US = 51.2
 

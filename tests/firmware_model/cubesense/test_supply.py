@@ -2,11 +2,7 @@
 
 import pytest
 
-from cubestack.firmware_model.cubesense.supply import (
-    OFF_TIME_US,
-    OVER_CURRENT_MA,
-    SAMPLE_US,
-)
+from cubestack.firmware_model.cubesense.supply import OFF_TIME_US, OVER_CURRENT_MA, SAMPLE_US
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,

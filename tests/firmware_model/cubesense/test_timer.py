@@ -2,12 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.cubesense.timer import (
-    microseconds,
-    read_ticks,
-    ticks_of,
-    ticks_since,
-)
+from cubestack.firmware_model.cubesense.timer import microseconds, read_ticks, ticks_of, ticks_since
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
 

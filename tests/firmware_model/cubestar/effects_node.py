@@ -3,11 +3,7 @@
 import pytest
 
 from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
-from cubestack.firmware_model.interface.cubestar import (
-    MemoryTest,
-    ResetCause,
-    TaskStatus,
-)
+from cubestack.firmware_model.interface.cubestar import MemoryTest, ResetCause, TaskStatus
 from cubestack.firmware_model.mcu.requests import Pay, Request, SetPin
 
 from .effects import shown, telecommand

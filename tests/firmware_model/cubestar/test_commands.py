@@ -3,10 +3,7 @@
 import pytest
 
 from cubestack.firmware_model.cubestar.commands import STREAM_BACKLOG_BYTES
-from cubestack.firmware_model.interface.cubestar import (
-    INTERFACE,
-    ResetCause,
-)
+from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause
 from cubestack.firmware_model.mcu.requests import Sleep
 
 from . import effects_node, effects_picture

@@ -26,10 +26,7 @@ def exchanges(page: str) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(
     ("page", "power_on", "pause_us"),
-    [
-        ("protocols.md", CubeStar, None),
-        ("protocols-cubesense.md", lambda _: CubeSense(), NEXT_US),
-    ],
+    [("protocols.md", CubeStar, None), ("protocols-cubesense.md", lambda _: CubeSense(), NEXT_US)],
 )
 def test_examples_of_the_page(
     page: str,

@@ -177,11 +177,7 @@ GROUPS = {
     ),
     "cubestar store": Group(
         "a store, what it was at when it was left, and by which pin",
-        {
-            "top": CUBESTAR.values(),
-            "left_in": STORE_STATES,
-            "left_by": ("ENABLE", "RNW", "both"),
-        },
+        {"top": CUBESTAR.values(), "left_in": STORE_STATES, "left_by": ("ENABLE", "RNW", "both")},
         lambda top, left_in, left_by: (
             _can_leave(top, left_in, left_by) and (left_by != "both" or top == "published")
         ),
@@ -219,12 +215,7 @@ GROUPS = {
     ),
     "pair state": Group(
         "an action of an FPGA, and what it was at when it was left",
-        {
-            "top": PAIRS.values(),
-            "side": SIDES,
-            "action": tuple(Action),
-            "state": ALL_STATES,
-        },
+        {"top": PAIRS.values(), "side": SIDES, "action": tuple(Action), "state": ALL_STATES},
         lambda top, side, action, state: (
             _takes(side, action, state)
             and state != "before a line"  # a gap has ended, so that is a line

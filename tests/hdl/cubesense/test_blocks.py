@@ -28,10 +28,7 @@ class AsynchronousReset(Component):
         m = Module()
         m.submodules.block = self._block
         m.domains.pix = ClockDomain(async_reset=True)
-        m.d.comb += [
-            ClockSignal("pix").eq(self.pix_clk),
-            ResetSignal("pix").eq(self.pix_rst),
-        ]
+        m.d.comb += [ClockSignal("pix").eq(self.pix_clk), ResetSignal("pix").eq(self.pix_rst)]
         for name, member in self._block.signature.members.items():
             inside, outside = getattr(self._block, name), getattr(self, name)
             m.d.comb += inside.eq(outside) if member.flow is In else outside.eq(inside)

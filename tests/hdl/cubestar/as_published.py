@@ -10,8 +10,6 @@ from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.top import CubeStarTop
 
-__all__ = ["AsPublished", "DoubleAsPublished", "SharedAsPublished"]
-
 _BUS_RESTS = {
     **dict.fromkeys(("AD_HIGH", "AD_LOW_I"), Const(0, 8)),
     "ALE": Const(0),

@@ -21,8 +21,6 @@ from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, sel
 from tests.hdl.mutants.suites import Stage, Suite
 from tests.hdl.regression import build, simulate
 
-__all__ = ["Result", "Score", "Scoring"]
-
 #: A simulation hangs after so many times its duration without a mutant, and at least so many s.
 PATIENCE, SHORTEST = 20, 120
 
@@ -69,14 +67,7 @@ class Scoring:
     """
 
     def __init__(
-        self,
-        name: str,
-        suite: Suite,
-        folder: Path,
-        *,
-        count: int | None,
-        seed: int,
-        proofs: bool,
+        self, name: str, suite: Suite, folder: Path, *, count: int | None, seed: int, proofs: bool
     ) -> None:
         self._suite = suite
         self._proofs = proofs

@@ -11,8 +11,6 @@ from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
 from tests.hdl.regression import ANY_TOP, PAIR, STAR, TIERS, frame_environment, modules
 
-__all__ = ["SUITES", "Stage", "Suite"]
-
 
 @dataclass(frozen=True)
 class Stage:

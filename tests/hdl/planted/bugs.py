@@ -164,13 +164,7 @@ _BY_KIND = {
         ),
     ),
     "wrong bank": (
-        (
-            "BANK is inverted",
-            "cubestar.top",
-            "bank.eq(self.BANK)",
-            "bank.eq(~self.BANK)",
-            (STAR,),
-        ),
+        ("BANK is inverted", "cubestar.top", "bank.eq(self.BANK)", "bank.eq(~self.BANK)", (STAR,)),
         (
             "BANK is not latched",
             "cubestar.top",
@@ -283,7 +277,11 @@ def planted(bug: Bug) -> Iterator[dict[str, object]]:
     copy = ModuleType(module.__name__)
     copy.__file__ = module.__file__
     exec(compile(text.replace(bug.old, bug.new), str(module.__file__), "exec"), vars(copy))
-    replaced = {name: (vars(module)[name], vars(copy)[name]) for name in vars(module)["__all__"]}
+    replaced = {
+        name: (value, vars(copy)[name])
+        for name, value in vars(module).items()
+        if getattr(value, "__module__", None) == module.__name__
+    }
     with pytest.MonkeyPatch.context() as patch:
         for other in list(sys.modules.values()):
             name = getattr(other, "__name__", "")

@@ -84,10 +84,7 @@ def test_options_that_make_no_sense(name: str, options: dict[str, object], messa
 
 
 def test_devices_beside_each_other_share_time_and_bus() -> None:
-    with (
-        open_device("aramis", seed=1) as first,
-        open_device("aramis", seed=1) as alone,
-    ):
+    with open_device("aramis", seed=1) as first, open_device("aramis", seed=1) as alone:
         with pytest.raises(ValueError, match="address"):
             open_device("aramis", beside=first)  # both would be at the same I2C address
         alone.wait(0.5)

@@ -84,10 +84,7 @@ def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
 
 @pytest.mark.parametrize("camera", Camera)
 def test_picture_in_the_other_memory_is_what_the_camera_sent(
-    session: AnyEmulated,
-    memory: Callable[..., Any],
-    sent: Callable[..., Any],
-    camera: Camera,
+    session: AnyEmulated, memory: Callable[..., Any], sent: Callable[..., Any], camera: Camera
 ) -> None:
     other = Sram(1 - camera)
     session.client.capture(camera, other)

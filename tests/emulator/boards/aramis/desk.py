@@ -12,9 +12,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.catalogue.hamming import CODED_BYTES
-from cubestack.firmware_model.interface.aramis import (
-    INTERFACE,
-)
+from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.clients.node import NodeClient
 

@@ -9,11 +9,7 @@ from scipy.special import ndtr
 from cubestack.emulator.camera.common.exposure import FAINTEST_V, star_light, star_pixels
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.mlx75412.imager import (
-    DN12_PER_DN8,
-    ELECTRONS_PER_DN12,
-    ideal_counts,
-)
+from cubestack.emulator.camera.mlx75412.imager import DN12_PER_DN8, ELECTRONS_PER_DN12, ideal_counts
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import Pose, SkyScene

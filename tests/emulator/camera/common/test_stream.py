@@ -20,11 +20,7 @@ def test_grid_does_not_drift() -> None:
     assert clock.edge_ps(11_000_000 * 3600) == 3600 * 10**12
 
 
-@given(
-    hz=st.integers(1, 60_000_000),
-    origin=st.integers(0, 10**15),
-    time=st.integers(0, 10**16),
-)
+@given(hz=st.integers(1, 60_000_000), origin=st.integers(0, 10**15), time=st.integers(0, 10**16))
 def test_first_edge_is_the_first(hz: int, origin: int, time: int) -> None:
     clock = PixelClock(hz, origin)
     edge = clock.first_edge(time)

@@ -32,9 +32,7 @@ def shutter(readout_ps: int) -> RollingShutter:
 
 def test_a_window_s_rows_have_their_own_times() -> None:
     scene = SkyScene(
-        quaternion_from_pointing(84.0, -1.0, 0.0),
-        rate_deg_s=(0.0, 5.0, 0.0),
-        mag_limit=5.0,
+        quaternion_from_pointing(84.0, -1.0, 0.0), rate_deg_s=(0.0, 5.0, 0.0), mag_limit=5.0
     )
     quiet = replace(CONDITION, noise=False)
     imager = Mt9m001Imager()

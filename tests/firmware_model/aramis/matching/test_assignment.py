@@ -42,11 +42,7 @@ def test_both_criteria_find_the_order(seed: int, order: tuple[int, ...]) -> None
     """Measured star i is the catalogue's star order[i]."""
     catalogue, picked = corners(seed), list(order)
     found = assign(
-        brightness(MAGNITUDES)[picked],
-        sides(catalogue[picked]),
-        MAGNITUDES,
-        catalogue,
-        meter(),
+        brightness(MAGNITUDES)[picked], sides(catalogue[picked]), MAGNITUDES, catalogue, meter()
     )
     assert found.order.tolist() == found.other.tolist() == picked
     assert (found.scores > 0).sum() == 3

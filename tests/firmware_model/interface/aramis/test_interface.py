@@ -21,11 +21,7 @@ USE_CASES = {
     "activateStarSensor": ["Activate"],
     "deactivateStarSensor": ["Deactivate"],
     "sendSystemTime": ["SetSystemTime"],
-    "getStarAttitudeQuaternion": [
-        "GetAttitude",
-        "GetAttitudeNearVector",
-        "GetAttitudeNearPoint",
-    ],
+    "getStarAttitudeQuaternion": ["GetAttitude", "GetAttitudeNearVector", "GetAttitudeNearPoint"],
     "SELaction": ["LatchUpAction"],
     "inputStarcatalogue": ["BeginCatalogue", "CatalogueBlock", "CommitCatalogue"],
     "inputAOCSparameters": ["SetBodyRotation"],

@@ -14,11 +14,7 @@ from cubestack.firmware_model.interface.codec.register_pointer import PointerMap
 from cubestack.firmware_model.interface.cubestar.codes import AckError
 
 MIXED = Message(200, "Mixed", "").of(
-    u8("a", ""),
-    bool1("b", ""),
-    bool1("c", "", gap=6),
-    i16("d", "", scale=100),
-    u32("e", ""),
+    u8("a", ""), bool1("b", ""), bool1("c", "", gap=6), i16("d", "", scale=100), u32("e", "")
 )
 
 WINDOW = Message(20, "Window", "").of(

@@ -8,11 +8,7 @@ from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 
-_RW, _RO, _WO = (
-    RegisterAccess.READ_WRITE,
-    RegisterAccess.READ_ONLY,
-    RegisterAccess.WRITE_ONLY,
-)
+_RW, _RO, _WO = (RegisterAccess.READ_WRITE, RegisterAccess.READ_ONLY, RegisterAccess.WRITE_ONLY)
 LEVEL = PointerRegister(0x10, _RW, Field("u8", "LEVEL", "", maximum=9))
 CENTRE = PointerRegister(0x20, _RO, Field("i16", "CENTRE", "", "px", 100))
 START = PointerRegister(0x30, _WO, Field("u8", "START", ""))

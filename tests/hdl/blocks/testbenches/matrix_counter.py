@@ -22,11 +22,7 @@ async def clock(dut: Any, **pins: int) -> tuple[int, int, int]:
 
 def outputs(position: int) -> tuple[int, int, int]:
     row, column = divmod(position, GEOMETRY.columns)
-    return (
-        GEOMETRY.address(column, row),
-        column == GEOMETRY.columns - 1,
-        row == GEOMETRY.rows - 1,
-    )
+    return (GEOMETRY.address(column, row), column == GEOMETRY.columns - 1, row == GEOMETRY.rows - 1)
 
 
 @cocotb.test()

@@ -10,10 +10,7 @@ from tests.hdl.cubesense.settings import READ_OUT, clock
 from tests.hdl.harness.geometry import GEOMETRY
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
-NOT_FOUND = (
-    (1 << (COLUMNS - 1).bit_length()) - 1,
-    (1 << (ROWS - 1).bit_length()) - 1,
-)
+NOT_FOUND = ((1 << (COLUMNS - 1).bit_length()) - 1, (1 << (ROWS - 1).bit_length()) - 1)
 BRIGHT, DARK = (200, 201, 255), (0, 199, 128)
 
 

@@ -66,21 +66,9 @@ NEXT_FRAME = ("1F7F 41 1F1F 00 1FFF", "1F7F 00 1FFF")
     ("exchanges", "call", "expected"),
     [
         ([IDENTIFICATION], lambda c: c.uptime_s(), 16.1),
-        (
-            [CAPTURE_AND_DETECT, RESULT],
-            lambda c: c.capture_and_detect(Camera.SUN).detected,
-            True,
-        ),
-        (
-            [RESULT_THEN_SRAM1],
-            lambda c: c.result_then_schedule(Camera.SUN).beta_deg,
-            -5.67,
-        ),
-        (
-            [SETTINGS],
-            lambda c: c.set_camera(Camera.NADIR, CameraSettings(0x1F1F, 0x1F)),
-            None,
-        ),
+        ([CAPTURE_AND_DETECT, RESULT], lambda c: c.capture_and_detect(Camera.SUN).detected, True),
+        ([RESULT_THEN_SRAM1], lambda c: c.result_then_schedule(Camera.SUN).beta_deg, -5.67),
+        ([SETTINGS], lambda c: c.set_camera(Camera.NADIR, CameraSettings(0x1F1F, 0x1F)), None),
         ([NEXT_FRAME], lambda c: c.client.command("NextImageFrame", Frame=31), None),
     ],
 )
