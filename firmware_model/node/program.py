@@ -19,8 +19,6 @@ from cubestack.firmware_model.node.queue import BoundedQueue
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
 
-__all__ = ["POWER_ON", "Action", "NodeProgram", "PlainLink", "Source"]
-
 POWER_ON, TELECOMMAND = 1, 2
 """Causes of a reset."""
 

@@ -40,7 +40,7 @@ stub of constraints as comments. Icarus Verilog, Yosys and Verilator take it
 without a warning.
 
 examples:
-  cubestack hdl verilog TOP --out top.v     any other word for TOP lists all of them
+  cubestack hdl verilog TOP --out top.v     a wrong name of TOP lists all
   cubestack hdl verilog TOP | yosys -f verilog -p 'synth_ice40' -"""
 
 PROVE = """Prove, by induction, what the designs promise: for every length of time,

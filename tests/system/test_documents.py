@@ -120,11 +120,12 @@ def test_make_has_the_targets_that_are_promised(root: Path) -> None:
 
 def test_commands_of_the_readme_exist(root: Path) -> None:
     from cubestack.host.cli.main import COMMANDS
+    from cubestack.host.devices.registry import devices
 
+    reports = [report.name for device in devices() for report in device.reports]
     readme = (root / "README.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", readme, re.MULTILINE)) <= set(
-        COMMANDS
-    )
+    named = re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", readme, re.MULTILINE)
+    assert set(named) <= {*COMMANDS, *reports}
 
 
 def test_commands_of_the_fidelity_page_exist(root: Path) -> None:
