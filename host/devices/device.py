@@ -166,6 +166,13 @@ class Device(Generic[BoardT_co, ClientT_co]):
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
 
+    def __post_init__(self) -> None:
+        """Refuse a name that can not be everywhere: ValueError."""
+        if not self.name.isidentifier() or not self.name.islower():
+            raise ValueError(f"a device's name is an identifier of small letters, not {self.name}")
+        if self.interface.name.lower() != self.name:
+            raise ValueError(f"the interface of {self.name} is called {self.interface.name}")
+
     def scene(self, given: Any) -> Any:
         """The scene that ``given`` means: None the default, text or a path a file, else itself."""
         if given is None:

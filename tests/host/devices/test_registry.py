@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -37,6 +38,19 @@ def test_listing_them_loads_no_emulator() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("sun-slit", "a device's name is an identifier of small letters, not sun-slit"),
+        ("Sun", "a device's name is an identifier of small letters, not Sun"),
+        ("other", "the interface of other is called CubeStar"),
+    ],
+)
+def test_a_name_that_can_not_be_everywhere_is_refused(name: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(device("cubestar"), name=name)
 
 
 def test_a_name_in_any_case_is_found_and_an_unknown_one_told() -> None:
