@@ -22,7 +22,7 @@ LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
-    "hdl": ("blocks", "flow", "cubestar cubesense mutants", "proofs"),
+    "hdl": ("blocks", "flow", "cubestar cubesense", "proofs"),
     "firmware_model": ("interface", "formats mcu", "attitude node", "cubestar cubesense aramis"),
     "host": (
         "errors options terminal",

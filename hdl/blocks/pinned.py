@@ -35,13 +35,3 @@ def connect_ports(
     for inside, outside in names:
         port, pin = getattr(inner, inside), getattr(outer, outside)
         m.d.comb += port.eq(pin) if members[inside].flow is In else pin.eq(port)
-
-
-def pins_of(component: Component) -> tuple[Pin, ...]:
-    """Its table of pins; of a block, which has none, each port as a pin of its own."""
-    if isinstance(component, PinnedComponent):
-        return component.pins
-    return tuple(
-        Pin(name, "input" if member.flow is In else "output", "", len(getattr(component, name)))
-        for name, member in component.signature.members.items()
-    )

@@ -14,10 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from cubestack.hdl.blocks.pinned import pins_of
 from cubestack.hdl.flow.generate import verilog_text
-from cubestack.hdl.mutants.equivalence import Equivalence
-from cubestack.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
+from tests.hdl.mutants.equivalence import Equivalence
+from tests.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
 from tests.hdl.mutants.suites import Stage, Suite
 from tests.hdl.regression import build, simulate
 
@@ -105,8 +104,7 @@ class Scoring:
 
     @cached_property
     def _equivalence(self) -> Equivalence:
-        pins = pins_of(self._design)
-        return Equivalence(self._netlist, pins, self._suite.standby)
+        return Equivalence(self._netlist, self._design, self._suite.standby)
 
     def _done(self) -> dict[str, Result]:
         if not self._file.exists():

@@ -55,13 +55,12 @@ _OPTION = re.compile(r" -(\S+) (\S+)")
 
 @dataclass(frozen=True)
 class Netlist:
-    """A design as RTLIL; its top module is ``dut``. ``kept`` are submodules that are not dissolved.
+    """A design as RTLIL; its top module is ``dut``.
 
     Registers have no initial value: the part's have none.
     """
 
     text: str
-    kept: tuple[str, ...] = ()
 
     @property
     def digest(self) -> str:
@@ -113,7 +112,7 @@ def netlist(component: Component, kept: Sequence[str] = ()) -> Netlist:
     keep = "".join(f"setattr -mod -set keep_hierarchy 1 dut.{name}\n" for name in kept)
     script = _SIMPLIFY.format(keep=keep)
     _, simplified = yosys_files(script, {"design.il": text}, "netlist.il")
-    return Netlist(re.sub(r"^# Generated.*\n", "", simplified), tuple(kept))
+    return Netlist(re.sub(r"^# Generated.*\n", "", simplified))
 
 
 def mutants(

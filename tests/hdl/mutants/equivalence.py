@@ -15,13 +15,16 @@ kept ones hold. Where the pins' equality is not among them a counterexample is l
 import json
 import re
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations, product
 from typing import NamedTuple
 
+from amaranth.lib.wiring import Component, In
+
 from cubestack.firmware_model.interface.pins import Pin
+from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.flow.tools import yosys_files
-from cubestack.hdl.mutants.netlist import Mutant, Netlist
+from tests.hdl.mutants.netlist import Mutant, Netlist
 
 _EXPOSE = """
 hierarchy -top dut
@@ -80,13 +83,13 @@ class Verdict(NamedTuple):
 class Equivalence:
     """Compares mutants of one design."""
 
-    def __init__(self, design: Netlist, pins: Iterable[Pin], standby: Mapping[str, int]) -> None:
-        """Take a design with these ``pins`` and these levels of inputs in ``standby``.
+    def __init__(self, netlist: Netlist, design: Component, standby: Mapping[str, int]) -> None:
+        """Take a design as a ``netlist`` too, and the levels of its inputs in ``standby``.
 
         ToolMissingError without a Yosys.
         """
-        self._netlist = design
-        files = {"netlist.il": design.text}
+        self._netlist = netlist
+        files = {"netlist.il": netlist.text}
         _, self._gold, flat = yosys_files(_GOLD, files, "gold.il", "flat.json")
         module = json.loads(flat)["modules"]["dut"]
         ports = {name: (p["direction"], p["bits"]) for name, p in module["ports"].items()}
@@ -95,7 +98,7 @@ class Equivalence:
         self._wires = {name: len(bits) for name, bits in outputs.items()}
         self._index = {name: number for number, name in enumerate(self._wires)}
         self._standby = " & ".join(f"\\{n} == {level}" for n, level in standby.items())
-        self._pins = " & ".join(self._pin_is_same(pin) for pin in pins if pin.level_out)
+        self._pins = " & ".join(self._pin_is_same(pin) for pin in _pins(design) if pin.level_out)
         registers: dict[int, bool] = {
             bit: cell["type"] not in _RESET
             for cell in module["cells"].values()
@@ -253,6 +256,16 @@ class Equivalence:
         for name, values in vectors.items():
             lines += [f"  assign {name}[{n}] = {value};" for n, value in enumerate(values)]
         return "\n".join([*lines, "endmodule\n"])
+
+
+def _pins(design: Component) -> tuple[Pin, ...]:
+    """Its table of pins; of a block, which has none, each port as a pin of its own."""
+    if isinstance(design, PinnedComponent):
+        return design.pins
+    return tuple(
+        Pin(name, "input" if member.flow is In else "output", "", len(getattr(design, name)))
+        for name, member in design.signature.members.items()
+    )
 
 
 def _block_of(mutant: Mutant) -> str:
