@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.host.devices.registry import BUILT_IN
+
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("hdl", "firmware_model", "emulator", "host")
 
@@ -22,6 +24,7 @@ LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
+    "emulator": ("sim", "bus rtl scene", "camera ports", "i2cdev recording faults", "boards"),
     "hdl": ("blocks", "flow", "cubestar cubesense", "proofs"),
     "firmware_model": ("interface", "formats mcu", "attitude node", "cubestar cubesense aramis"),
     "host": (
@@ -152,6 +155,18 @@ def test_only_declared_distributions_are_imported(path: Path) -> None:
             tops = {name.split(".")[0] for name, _ in imported(path)}
             assert tops <= allowed, f"{name_of(path)} imports {tops - allowed}"
             return
+
+
+#: Where sensors are listed: the registry, and what `import cubestack` gives a type checker.
+LISTS = {"host.devices.registry", "host.api"}
+
+
+@pytest.mark.parametrize("path", sources(), ids=name_of)
+def test_shared_code_names_no_sensor(path: Path) -> None:
+    sensors = set(BUILT_IN)
+    if not sensors & {part.removesuffix(".py") for part in path.parts}:
+        named = {sensor for sensor in sensors if sensor in path.read_text(encoding="utf-8")}
+        assert not named or name_of(path) in LISTS
 
 
 def test_every_package_is_declared() -> None:
