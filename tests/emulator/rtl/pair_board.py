@@ -1,24 +1,17 @@
 """CubeSense's cameras and microcontroller, for tests of its pair of FPGAs."""
 
-import subprocess
-from collections.abc import Sequence
 from fractions import Fraction
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
-from cubestack.hdl.cubesense.pair import CubeSensePair
-from cubestack.hdl.flow.generate import verilog_text
 
+from .commanded import Command
 from .conftest import ListCamera
 
 SIDES = ("sun", "nadir")
 ENABLES = ("SUNEN", "NADEN")
 CONTROLS = ("SHIFT", "EDGE", "RNW", *ENABLES)
-COMMANDS = (*CONTROLS, "power sun", "power nadir", "strobe")
 
 #: A small picture, and one whose sides are powers of two.
 SIZES = (
@@ -27,11 +20,8 @@ SIZES = (
 )
 
 STROBE_PERIOD = 100_000
-TIMEOUT_S = 300
 SETTLED = 50_000
 """From an enable to the first data clock: the SRAM's access time, and more."""
-
-Command = tuple[int, str, int]
 
 
 def pair_camera(rng: np.random.Generator, size: ReadOut, frames: int = 3) -> ListCamera:
@@ -118,98 +108,3 @@ def readings(memory: str, size: ReadOut) -> list[tuple[tuple[int, ...], int]]:
         ((0, 1, 1, *enables(memory)), own),
         ((1, 1, int(memory == "sun"), 0, 0), other),
     ]
-
-
-class Outcome(NamedTuple):
-    sun: bytes
-    nadir: bytes
-    data: bytes
-    acks: list[int]
-    """Times at which the acknowledge that was watched rose."""
-
-
-def run_engine(
-    engine: RtlEngine, cameras: dict[str, ListCamera], commands: Sequence[Command], watched: str
-) -> Outcome:
-    """Play ``commands``; the engine stops whenever ``watched`` rises."""
-    for name, camera in cameras.items():
-        engine.attach(camera, name)
-    data, acks = b"", []
-
-    def advance(until_ps: int) -> None:
-        if not engine.get_pin(watched):
-            engine.run(until_ps, (watched, 1))
-            if engine.get_pin(watched):
-                acks.append(engine.now_ps)
-        engine.run(until_ps)
-
-    for time_ps, name, value in commands:
-        advance(time_ps)
-        if name == "strobe":
-            out = np.zeros(value, np.uint8)
-            made = engine.strobe_read(out, Fraction(STROBE_PERIOD), time_ps + value * STROBE_PERIOD)
-            assert made == value
-            data += out.tobytes()
-        elif name.startswith("power"):
-            engine.power_memory(name.split()[1], bool(value))
-        else:
-            engine.set_pin(name, value)
-    memories = [engine.memories[side].tobytes() for side in SIDES]
-    return Outcome(memories[0], memories[1], data, acks)
-
-
-class IcarusPair:
-    """pair_bench.v around a pair, compiled once."""
-
-    def __init__(self, folder: Path, pair: CubeSensePair, pixels: int) -> None:
-        self._folder = folder
-        self._pixels = pixels
-        (folder / "top.v").write_text(verilog_text(pair))
-        parameters = {
-            "ADDRESS_WIDTH": len(pair.SUN_SRAM_A),
-            "PIXELS": pixels,
-            "STROBE_HALF": STROBE_PERIOD // 2,
-        }
-        command = ["iverilog", "-g2005", "-s", "pair_bench", "-o", "bench.vvp"]
-        command += [f"-Ppair_bench.{name}={value}" for name, value in parameters.items()]
-        command += [str(Path(__file__).with_name("pair_bench.v")), "top.v"]
-        subprocess.run(command, cwd=folder, check=True, timeout=TIMEOUT_S)
-
-    def run(
-        self, cameras: dict[str, ListCamera], commands: Sequence[Command]
-    ) -> dict[str, Outcome]:
-        """The outcome for each acknowledge; a camera that is not there has no clock."""
-        folder = self._folder
-        for side in SIDES:
-            camera = cameras.get(side) or ListCamera(Fraction(2), 1, 1)
-            period = camera.period
-            head = (period.numerator, period.denominator, camera.line_clocks, camera.active_columns)
-            segments = [(s.start_ps, s.clocks, s.rows) for s in camera.segments]
-            lines = [" ".join(map(str, line)) for line in (head, *segments)]
-            (folder / f"{side}.txt").write_text("\n".join(lines))
-            pixels = b"".join(image.tobytes() for image in camera.images)
-            assert len(pixels) <= self._pixels
-            (folder / f"{side}.hex").write_text(pixels.ljust(self._pixels, b"\0").hex("\n"))
-        (folder / "commands.txt").write_text(
-            "".join(f"{time} {COMMANDS.index(name)} {value}\n" for time, name, value in commands)
-        )
-        subprocess.run(
-            ["vvp", "-n", "bench.vvp"],
-            cwd=folder,
-            check=True,
-            capture_output=True,
-            timeout=TIMEOUT_S,
-        )
-        sun, nadir, data = (
-            read_hex(folder / name) for name in ("sun_memory.hex", "nadir_memory.hex", "data.hex")
-        )
-        acks = [line.split() for line in (folder / "ack.txt").read_text().splitlines()]
-        return {
-            pin: Outcome(sun, nadir, data, [int(time) for time, number in acks if number == str(n)])
-            for n, pin in enumerate(("SUNACK", "NADACK"))
-        }
-
-
-def read_hex(path: Path) -> bytes:
-    lines = (line.partition("//")[0] for line in path.read_text().splitlines())
-    return bytes.fromhex("".join(lines))

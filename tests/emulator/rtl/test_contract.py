@@ -28,6 +28,19 @@ def engine(request):
     engine.close()
 
 
+@pytest.fixture
+def camera(make_camera):
+    return make_camera()
+
+
+@pytest.fixture
+def storing(engine, camera):
+    """The engine, told to store from the camera's first clock on."""
+    engine.attach(camera)
+    engine.set_pin("ENABLE", 1)
+    return engine
+
+
 def read(engine: RtlEngine, count: int) -> np.ndarray:
     """Switch to reading, and read ``count`` bytes at 1 MB/s."""
     engine.set_pin("RNW", 1)
@@ -46,15 +59,12 @@ def test_reset_state(engine):
     assert engine.sram.shape == (2 * ROWS * COLUMNS,)
 
 
-def test_frame_is_stored_and_acknowledged_at_the_last_pixel(engine, make_camera):
-    camera = make_camera()
-    engine.attach(camera)
-    engine.set_pin("ENABLE", 1)
-    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
-    assert engine.now_ps == FIRST_ACK
-    assert engine.get_pin("ACK") == 1
-    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
-    assert not engine.violations
+def test_frame_is_stored_and_acknowledged_at_the_last_pixel(storing, camera):
+    assert storing.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
+    assert storing.now_ps == FIRST_ACK
+    assert storing.get_pin("ACK") == 1
+    assert (storing.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+    assert not storing.violations
 
 
 def test_second_bank(engine, make_camera):
@@ -89,51 +99,39 @@ def test_pixel_clock_comes_first_at_one_instant(engine, make_camera, early_ps, f
     assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + frame * FRAME
 
 
-def test_pixel_clock_level_while_blank(engine, make_camera):
-    engine.attach(make_camera())
-    engine.set_pin("ENABLE", 1)
+def test_pixel_clock_level_while_blank(storing):
     for offset_ps, level in [(-1, 0), (0, 1), (PERIOD // 2 - 1, 1), (PERIOD // 2, 0)]:
-        engine.run(25 * PERIOD + offset_ps)
-        assert engine.get_pin("PIXCLK") == level
+        storing.run(25 * PERIOD + offset_ps)
+        assert storing.get_pin("PIXCLK") == level
 
 
-def test_run_that_meets_no_stop_ends_on_time(engine, make_camera):
-    engine.attach(make_camera())
-    engine.set_pin("ENABLE", 1)
-    assert engine.run(FIRST_ACK - 1, ("ACK", 1)) == FIRST_ACK - 1
-    assert engine.get_pin("ACK") == 0
-    assert engine.run(FIRST_ACK) == FIRST_ACK
-    assert engine.get_pin("ACK") == 1
-    assert engine.run(2 * FRAME, ("ACK", 1)) == FIRST_ACK
+def test_run_that_meets_no_stop_ends_on_time(storing):
+    assert storing.run(FIRST_ACK - 1, ("ACK", 1)) == FIRST_ACK - 1
+    assert storing.get_pin("ACK") == 0
+    assert storing.run(FIRST_ACK) == FIRST_ACK
+    assert storing.get_pin("ACK") == 1
+    assert storing.run(2 * FRAME, ("ACK", 1)) == FIRST_ACK
 
 
-def test_reading_wraps_and_needs_no_pixel_clock(engine, make_camera):
-    camera = make_camera()
-    engine.attach(camera)
-    engine.set_pin("ENABLE", 1)
-    engine.run(10 * FRAME, ("ACK", 1))
-    engine.attach(None)
+def test_reading_wraps_and_needs_no_pixel_clock(storing, camera):
+    storing.run(10 * FRAME, ("ACK", 1))
+    storing.attach(None)
     expected = np.resize(camera.images[0], 3 * ROWS * COLUMNS)
-    assert (read(engine, 3 * ROWS * COLUMNS) == expected).all()
-    assert not engine.violations
+    assert (read(storing, 3 * ROWS * COLUMNS) == expected).all()
+    assert not storing.violations
 
 
-def test_dead_camera_never_acknowledges(engine, make_camera):
-    engine.attach(make_camera())
-    engine.set_pin("ENABLE", 1)
-    engine.run((BLANK + 2 * LINE) * PERIOD)
-    engine.attach(None)
-    assert [engine.get_pin(pin) for pin in ("PIXCLK", "HSYNC", "VSYNC", "PIXDATA")] == [0] * 4
-    assert engine.run(100 * FRAME, ("ACK", 1)) == 100 * FRAME
-    assert engine.get_pin("ACK") == 0
+def test_dead_camera_never_acknowledges(storing):
+    storing.run((BLANK + 2 * LINE) * PERIOD)
+    storing.attach(None)
+    assert [storing.get_pin(pin) for pin in ("PIXCLK", "HSYNC", "VSYNC", "PIXDATA")] == [0] * 4
+    assert storing.run(100 * FRAME, ("ACK", 1)) == 100 * FRAME
+    assert storing.get_pin("ACK") == 0
 
 
-def test_stored_frame_is_kept_while_the_camera_goes_on(engine, make_camera):
-    camera = make_camera()
-    engine.attach(camera)
-    engine.set_pin("ENABLE", 1)
-    engine.run(3 * FRAME)
-    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+def test_stored_frame_is_kept_while_the_camera_goes_on(storing, camera):
+    storing.run(3 * FRAME)
+    assert (storing.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
 
 
 def test_pixels_are_rendered_only_while_they_may_be_stored(engine, make_camera):
@@ -165,15 +163,12 @@ def test_changed_stream_is_followed_from_now_on(engine, make_camera):
 
 
 @pytest.mark.parametrize("offset_ps", [-1, 0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD // 2 + 1])
-def test_asking_the_source_again_makes_no_clock_more_or_less(engine, make_camera, offset_ps):
-    camera = make_camera()
-    engine.attach(camera)
-    engine.set_pin("ENABLE", 1)
-    engine.run((BLANK + LINE + 3) * PERIOD + offset_ps)
-    engine.stream_changed()
-    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
-    assert (engine.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
-    assert not engine.violations
+def test_asking_the_source_again_makes_no_clock_more_or_less(storing, camera, offset_ps):
+    storing.run((BLANK + LINE + 3) * PERIOD + offset_ps)
+    storing.stream_changed()
+    assert storing.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
+    assert (storing.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
+    assert not storing.violations
 
 
 def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine, make_camera):
@@ -244,13 +239,11 @@ def test_reading_faster_than_the_memory_is_a_violation(engine):
     assert len(engine.violations) == 64
 
 
-def test_write_pulse_cut_short_by_enable(engine, make_camera):
-    engine.attach(make_camera())
-    engine.set_pin("ENABLE", 1)
+def test_write_pulse_cut_short_by_enable(storing):
     fall = BLANK * PERIOD + PERIOD // 2
-    engine.run(fall + 3_000)
-    engine.set_pin("ENABLE", 0)
-    assert [(v.kind, v.time_ps, v.address) for v in engine.violations] == [
+    storing.run(fall + 3_000)
+    storing.set_pin("ENABLE", 0)
+    assert [(v.kind, v.time_ps, v.address) for v in storing.violations] == [
         ("short-write-pulse", fall + 3_000, 0)
     ]
 

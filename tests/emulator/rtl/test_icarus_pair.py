@@ -10,22 +10,13 @@ import pytest
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.factory import make_engine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
+from .commanded import Command, CommandedIcarus, Outcome, run_engine
 from .conftest import ListCamera
-from .pair_board import (
-    SIDES,
-    SIZES,
-    Command,
-    IcarusPair,
-    Outcome,
-    Script,
-    pair_camera,
-    readings,
-    run_engine,
-    stores,
-)
+from .pair_board import SIDES, SIZES, STROBE_PERIOD, Script, pair_camera, readings, stores
 
 pytestmark = [
     pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed"),
@@ -35,19 +26,19 @@ pytestmark = [
 PINS = ("SUNACK", "NADACK")
 
 
-PAIRS = {size: CubeSensePair(size) for size in SIZES}
+WIRINGS = {size: cubesense_wiring(CubeSensePair(size)) for size in SIZES}
 
 
 @pytest.fixture(scope="module", params=SIZES, ids=lambda size: f"{size.columns}x{size.rows}")
-def board(request, tmp_path_factory) -> tuple[ReadOut, IcarusPair]:
+def board(request, tmp_path_factory) -> tuple[ReadOut, CommandedIcarus]:
     size = request.param
     folder = tmp_path_factory.mktemp("pair")
-    return size, IcarusPair(folder, PAIRS[size], 8 * size.pixels)
+    return size, CommandedIcarus(folder, WIRINGS[size], STROBE_PERIOD)
 
 
-def run(kind: str, pair: CubeSensePair, cameras, commands: list[Command], watched: str) -> Outcome:
-    engine = make_engine(cubesense_wiring(pair), kind)
-    outcome = run_engine(engine, cameras, commands, watched)
+def run(kind: str, wiring: Wiring, cameras, commands: list[Command], watched: str) -> Outcome:
+    engine = make_engine(wiring, kind)
+    outcome = run_engine(engine, cameras, commands, STROBE_PERIOD, watched)
     assert not engine.violations
     engine.close()
     return outcome
@@ -92,9 +83,9 @@ def test_random_lives(board, seed):
     cameras, commands = random_life(rng, size)
     expected = icarus.run(cameras, commands)
     for watched in PINS:
-        assert run("compiled", PAIRS[size], cameras, commands, watched) == expected[watched]
+        assert run("compiled", WIRINGS[size], cameras, commands, watched) == expected[watched]
     watched = PINS[seed % 2]
-    assert run("python", PAIRS[size], cameras, commands, watched) == expected[watched]
+    assert run("python", WIRINGS[size], cameras, commands, watched) == expected[watched]
 
 
 def test_random_lives_are_worth_it():
@@ -105,7 +96,7 @@ def test_random_lives_are_worth_it():
             rng = np.random.default_rng([seed, size.columns])
             cameras, commands = random_life(rng, size)
             for watched in PINS:
-                outcome = run("compiled", PAIRS[size], cameras, commands, watched)
+                outcome = run("compiled", WIRINGS[size], cameras, commands, watched)
                 seen[watched] += len(outcome.acks)
             seen["bytes"] += len(set(outcome.data))
             linked = ("SHIFT", 1) in {command[1:] for command in commands}
@@ -135,11 +126,11 @@ def test_one_full_frame(tmp_path):
         script.command(*levels)
         script.read(count)
     script.standby()
-    pair = CubeSensePair()
-    compiled = run("compiled", pair, {"sun": camera}, script.commands, "NADACK")
-    icarus = IcarusPair(tmp_path, pair, image.size)
+    wiring = cubesense_wiring(CubeSensePair())
+    compiled = run("compiled", wiring, {"sun": camera}, script.commands, "NADACK")
+    icarus = CommandedIcarus(tmp_path, wiring, STROBE_PERIOD)
     assert compiled == icarus.run({"sun": camera}, script.commands)["NADACK"]
-    stored = np.frombuffer(compiled.nadir, np.uint8).reshape(512, 1024)
+    stored = np.frombuffer(compiled.memories["nadir"], np.uint8).reshape(512, 1024)
     assert (stored[: FULL_SIZE.rows, : FULL_SIZE.columns] == image).all()
     assert len(compiled.acks) == 1
     window = compiled.data[-4 - FULL_SIZE.window**2 :]

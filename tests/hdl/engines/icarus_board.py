@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.rtl.contract import PinEvent
 from cubestack.emulator.rtl.wiring import MEMORY_PINS, MemoryPins, Wiring
 
-LIMIT_S = 120
+LIMIT_S = 300
 
 _BENCH = """\
 `timescale 1ps / 1ps
@@ -38,14 +38,14 @@ module bench;
     events = $fopen("events.txt", "r");
     outputs = $fopen("outputs.txt", "w");
     while ($fscanf(events, "%d %d %d", at, code, level) == 3) begin
-      #(at - $time);
+      if (at > $time) #(at - $time);
       case (code)
 {cases}
       endcase
       #1;
 {follow}
       #1;
-      $fwrite(outputs, "{format}\\n", {watched});
+      $fdisplay(outputs, "{format}", {watched});
     end
 {dumps}
     $finish;
@@ -58,55 +58,73 @@ _MEMORY = """\
   reg [{width}-1:0] a_{n} = 0;
   reg [7:0] data_{n} = 0;
   reg writes_{n} = 0;
+  reg powered_{n} = 1;
   task follow_{n};
     begin
       // A pulse ends, or its address leaves: what was there is written.
-      if (writes_{n} && (a_{n} != {A} || {CE_N} || {WE_N})) bytes_{n}[a_{n}] = data_{n};
+      if (powered_{n} && writes_{n} && (a_{n} != {A} || {CE_N} || {WE_N}))
+        bytes_{n}[a_{n}] = data_{n};
       a_{n} = {A};
       data_{n} = {D_OE} ? {D_O} : 8'h00;
       writes_{n} = !{CE_N} && !{WE_N};
       {D_I} = !{CE_N} && !{OE_N} && {WE_N} ? bytes_{n}[a_{n}] : data_{n};
+      if (!powered_{n}) {D_I} = 8'h00;
     end
   endtask
 """
 
 
 class Played(NamedTuple):
-    """Settled levels of the output pins after each event, shape (events, pins); the memories."""
+    """Settled levels of the watched pins after each event, shape (events, pins); the memories."""
 
     outputs: NDArray[np.int64]
     memories: dict[str, bytes]
 
 
 class IcarusBoard:
-    """A top's Verilog between its memories, compiled once."""
+    """A top's Verilog between its memories, compiled once.
 
-    def __init__(self, folder: Path, wiring: Wiring, verilog: str) -> None:
+    Args:
+        folder: for the files that it makes.
+        wiring: of the top.
+        verilog: of the top.
+        watched: outputs that :meth:`play` tells; all of them when not given.
+    """
+
+    def __init__(
+        self, folder: Path, wiring: Wiring, verilog: str, watched: Sequence[str] = ()
+    ) -> None:
         self._folder = folder
         self._wiring = wiring
+        self._watched = watched or wiring.output_pins
         (folder / "top.v").write_text(verilog)
-        (folder / "bench.v").write_text(_bench(wiring))
+        (folder / "bench.v").write_text(_bench(wiring, self._watched))
         command = ["iverilog", "-g2005", "-s", "bench", "-o", "bench.vvp", "bench.v", "top.v"]
         subprocess.run(command, cwd=folder, check=True, timeout=LIMIT_S)
 
     def play(self, events: Sequence[PinEvent]) -> Played:
-        """Drive the pins."""
-        names = [*self._wiring.initial]
-        lines = [f"{time_ps} {names.index(pin)} {level}\n" for time_ps, pin, level in events]
-        (self._folder / "events.txt").write_text("".join(lines))
+        """Drive the pins; a memory's supply is the pin "power" and its name."""
+        codes = {name: code for code, name in enumerate(_driven(self._wiring))}
+        with (self._folder / "events.txt").open("w") as file:
+            file.writelines(f"{time_ps} {codes[pin]} {level:d}\n" for time_ps, pin, level in events)
         program = str(shutil.which("vvp"))
         command = [program, "-n", "bench.vvp"]
         subprocess.run(command, cwd=self._folder, check=True, capture_output=True, timeout=LIMIT_S)
-        text = (self._folder / "outputs.txt").read_text()
-        rows = [[int(level, 16) for level in line.split()] for line in text.splitlines()]
+        levels = np.fromfile(self._folder / "outputs.txt", np.int64, sep=" ")
         memories = {
             memory.name: _read_hex(self._folder / f"memory_{n}.hex")
             for n, memory in enumerate(self._wiring.memories)
         }
-        return Played(np.array(rows, np.int64), memories)
+        return Played(levels.reshape(len(events), len(self._watched)), memories)
 
 
-def _bench(wiring: Wiring) -> str:
+def _driven(wiring: Wiring) -> dict[str, str]:
+    """What events drive, and its variable in Verilog."""
+    supplies = {f"power {m.name}": f"powered_{n}" for n, m in enumerate(wiring.memories)}
+    return {name: name for name in wiring.initial} | supplies
+
+
+def _bench(wiring: Wiring, watched: Sequence[str]) -> str:
     pins = wiring.widths
     kinds = {name: "reg" if name in wiring.initial else "wire" for name in pins}
     memories = [_memory(n, memory, wiring) for n, memory in enumerate(wiring.memories)]
@@ -120,9 +138,11 @@ def _bench(wiring: Wiring) -> str:
         depth=depth,
         cleared="\n".join(f"      bytes_{n}[n] = 0;" for n in numbers),
         follow="\n".join(f"    follow_{n};" for n in numbers),
-        cases="\n".join(f"        {n}: {name} = level;" for n, name in enumerate(wiring.initial)),
-        format=" ".join("%h" for _ in wiring.output_pins),
-        watched=", ".join(wiring.output_pins),
+        cases="\n".join(
+            f"        {code}: {name} = level;" for code, name in enumerate(_driven(wiring).values())
+        ),
+        format=" ".join("%0d" for _ in watched),
+        watched=", ".join(watched),
         dumps="\n".join(f'    $writememh("memory_{n}.hex", bytes_{n});' for n in numbers),
     )
 
