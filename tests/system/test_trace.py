@@ -4,14 +4,12 @@ The files are those of ``--trace``, made from recordings by a replay as well.
 """
 
 import argparse
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from vcd.reader import TokenKind, tokenize
 
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.message import Interface
@@ -22,36 +20,15 @@ from cubestack.host.clients.contract import Client
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.recording.setups import emulated_setup
+from tests.emulator.recording import vcd
+from tests.emulator.recording.vcd import Changes
 
 PS_PER_NS = 1000
 
-Changes = dict[str, list[tuple[int, Any]]]
-
 
 def read(path: Path) -> Changes:
-    """Changes (ns, value) of each variable by its name without the device's."""
-    names: dict[str, str] = {}
-    scope: list[str] = []
-    time_ns = 0
-    changes: Changes = defaultdict(list)
     with path.open("rb") as stream:
-        for token in tokenize(stream):
-            match token.kind:
-                case TokenKind.SCOPE:
-                    scope.append(token.scope.ident)
-                case TokenKind.UPSCOPE:
-                    scope.pop()
-                case TokenKind.VAR:
-                    names[token.var.id_code] = ".".join([*scope[1:], token.var.reference])
-                case TokenKind.CHANGE_TIME:
-                    assert token.time_change >= time_ns
-                    time_ns = token.time_change
-                case TokenKind.CHANGE_SCALAR | TokenKind.CHANGE_VECTOR | TokenKind.CHANGE_STRING:
-                    change: Any = token.data
-                    value = change.value
-                    plain = int(value) if isinstance(value, str) and value in ("0", "1") else value
-                    changes[names[change.id_code]].append((time_ns, plain))
-    return changes
+        return vcd.read(stream)
 
 
 def when(changes: Changes, name: str, value: object, after_ns: int = 0) -> int:

@@ -7,30 +7,9 @@ import pytest
 from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
 from cubestack.emulator.sim.virtual_time import Kernel
 
+from .ends import Memory
+
 BIT_PS = {100_000: 10_000_000, 400_000: 2_500_000}
-
-
-class Memory:
-    """A target that answers 0, 1, 2 ... and writes down its calls."""
-
-    def __init__(self, refuse: int | None = None) -> None:
-        self.calls: list[object] = []
-        self.refuse = refuse
-        self._next = 0
-
-    def i2c_start(self, read: bool) -> None:
-        self.calls.append("read" if read else "write")
-
-    def i2c_write(self, byte: int) -> bool:
-        self.calls.append(byte)
-        return byte != self.refuse
-
-    def i2c_read(self) -> int:
-        self._next += 1
-        return self._next - 1
-
-    def i2c_stop(self) -> None:
-        self.calls.append("stop")
 
 
 def make(hz: int = 100_000, **targets: Memory) -> tuple[Kernel, I2cBus]:
@@ -63,24 +42,23 @@ def test_time_on_the_wire(hz, messages, bits):
 
 
 def test_repeated_start_joins_a_write_and_a_read():
-    target = Memory()
-    kernel, bus = make(x1A=target)
+    kernel, bus = make(x1A=(target := Memory()))
     reading = I2cMessage(0x1A, read=3)
     perform(kernel, bus, I2cMessage(0x1A, bytearray([0x83])), reading)
     assert target.calls == ["write", 0x83, "read", "stop"]
     assert reading.data == bytes([0, 1, 2])
 
 
-def test_probe_only_addresses():
-    target = Memory()
-    kernel, bus = make(x1A=target)
-    perform(kernel, bus, I2cMessage(0x1A))
-    assert target.calls == ["write", "stop"]
+@pytest.mark.parametrize(("probe_read", "direction"), [(False, "write"), (True, "read")])
+def test_probe_only_addresses(probe_read, direction):
+    kernel, bus = make(x1A=(target := Memory()))
+    perform(kernel, bus, I2cMessage(0x1A, probe_read=probe_read))
+    assert target.calls == [direction, "stop"]
+    assert kernel.now == (1 + 9 + 1) * BIT_PS[100_000]
 
 
 def test_each_target_is_called_for_its_own_address():
-    first, second = Memory(), Memory()
-    kernel, bus = make(x1A=first, x1B=second)
+    kernel, bus = make(x1A=(first := Memory()), x1B=(second := Memory()))
     perform(kernel, bus, I2cMessage(0x1B, bytearray([1])))
     assert first.calls == []
     assert second.calls == ["write", 1, "stop"]
@@ -106,8 +84,7 @@ def test_nobody_at_the_address():
 
 
 def test_refused_byte_ends_the_transfer():
-    target = Memory(refuse=2)
-    kernel, bus = make(x1A=target)
+    kernel, bus = make(x1A=(target := Memory(refuse=2)))
     with pytest.raises(I2cError, match="0x1a refused byte 0x02") as raised:
         perform(kernel, bus, I2cMessage(0x1A, bytearray([1, 2, 3])), I2cMessage(0x1A, read=1))
     assert raised.value.errno == errno.EIO
@@ -116,16 +93,14 @@ def test_refused_byte_ends_the_transfer():
 
 
 def test_open_target_is_stopped_when_the_next_address_is_not_acknowledged():
-    target = Memory()
-    kernel, bus = make(x1A=target)
+    kernel, bus = make(x1A=(target := Memory()))
     with pytest.raises(I2cError):
         perform(kernel, bus, I2cMessage(0x1A, bytearray([1])), I2cMessage(0x30))
     assert target.calls == ["write", 1, "stop"]
 
 
 def test_bus_is_free_after_a_failure():
-    target = Memory()
-    kernel, bus = make(x1A=target)
+    kernel, bus = make(x1A=(target := Memory()))
     for _ in range(3):
         with pytest.raises(I2cError):
             perform(kernel, bus, I2cMessage(0x30))
@@ -134,8 +109,7 @@ def test_bus_is_free_after_a_failure():
 
 
 def test_concurrent_transfers_wait_for_each_other():
-    target = Memory()
-    kernel, bus = make(x1A=target)
+    kernel, bus = make(x1A=(target := Memory()))
     for byte in (1, 2):
         kernel.process(bus.transfer([I2cMessage(0x1A, bytearray([byte]))]))
     kernel.run()
@@ -145,8 +119,7 @@ def test_concurrent_transfers_wait_for_each_other():
 
 @pytest.mark.parametrize("granted", [False, True])
 def test_who_gives_up_waiting_holds_up_nobody(granted):
-    target = Memory()
-    kernel, bus = make(x1A=target)
+    kernel, bus = make(x1A=(target := Memory()))
     first = bus.transfer([I2cMessage(0x1A, bytearray([1]))])
     kernel.process(first)
     kernel.step()
@@ -210,16 +183,10 @@ def test_clock_held_low_for_ever_ends_the_transfer():
     assert target.calls[-1] == "stop"
 
 
-def test_probe_for_reading_addresses_only():
-    target = Memory()
-    kernel, bus = make(x1A=target)
-    perform(kernel, bus, I2cMessage(0x1A, probe_read=True))
-    assert target.calls == ["read", "stop"]
-    assert kernel.now == (1 + 9 + 1) * BIT_PS[100_000]
-
-
 def test_general_call_reaches_those_that_listen():
     kernel, bus = make(x1A=(deaf := Memory()))
+    with pytest.raises(I2cError, match="no I2C device answers at 0x00"):
+        perform(kernel, bus, I2cMessage(0, bytearray([6])))
     listeners = [Memory(refuse=6), Memory(refuse=7)]
     for address, target in enumerate(listeners, 0x20):
         bus.attach(address, target, general_call=True)
@@ -228,12 +195,6 @@ def test_general_call_reaches_those_that_listen():
     assert [target.calls for target in listeners] == [["write", 6, 7, "stop"]] * 2
     with pytest.raises(I2cError, match="no I2C device answers at 0x00"):
         perform(kernel, bus, I2cMessage(0, read=1))
-
-
-def test_general_call_without_listeners():
-    kernel, bus = make(x1A=Memory())
-    with pytest.raises(I2cError, match="no I2C device answers at 0x00"):
-        perform(kernel, bus, I2cMessage(0, bytearray([6])))
 
 
 @pytest.mark.parametrize("length", [1, 32])

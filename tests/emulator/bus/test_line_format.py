@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.emulator.bus.line_format import LineFormat, LineSampler
-from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+
+from .ends import Desk
 
 FORMATS = st.builds(
     LineFormat,
@@ -118,42 +119,33 @@ def test_settings_that_can_not_be(settings, text):
 # --- at the device -----------------------------------------------------------------------------
 
 
-class Desk:
-    def __init__(self, host: LineFormat) -> None:
-        self.kernel = Kernel()
-        self.received: list[tuple[int, int]] = []
-        self.silences: list[int] = []
-        self.uart = Uart(
-            self.kernel,
-            57_600,
-            lambda byte: self.received.append((self.kernel.now, byte)),
-            lambda: self.silences.append(self.kernel.now),
-            silence_bytes=5,
-        )
-        self.uart.host_form = host
+def desk_of(host: LineFormat) -> Desk:
+    desk = Desk(57_600)
+    desk.uart.host_form = host
+    return desk
 
 
 @given(st.binary(max_size=12), FORMATS, st.lists(st.integers(0, 10**9), max_size=4))
 def test_device_hears_what_its_receiver_makes_of_it(data, form, pauses):
     """In one piece; and, when only a bit too slow, whatever the pauses of the writer."""
-    desk = Desk(form)
+    desk = desk_of(form)
     desk.uart.host_writes(data)
     desk.kernel.run()
     found = heard(data, form, LineFormat(57_600))
-    assert [byte for _, byte in desk.received] == [value for value, bad, _ in found if not bad]
+    assert desk.data == bytes(value for value, bad, _ in found if not bad)
     assert desk.uart.framing_errors == sum(bad for _, bad, _ in found)
     assert not desk.uart.busy
 
-    desk = Desk(LineFormat(57_000))
+    desk = desk_of(LineFormat(57_000))
     for byte, pause_ps in zip(data, pauses, strict=False):
         desk.uart.host_writes(bytes([byte]))
         desk.kernel.advance_to(desk.kernel.now + pause_ps)
     desk.kernel.run()
-    assert [byte for _, byte in desk.received] == list(data[: len(pauses)])
+    assert desk.data == data[: len(pauses)]
 
 
 def test_rate_of_a_slow_host_is_its_own():
-    desk = Desk(LineFormat(300))
+    desk = desk_of(LineFormat(300))
     desk.uart.host_writes(bytes(10))
     desk.kernel.advance_to(PS_PER_S // 3)
     assert desk.uart.host_backlog == 0
@@ -164,16 +156,16 @@ def test_rate_of_a_slow_host_is_its_own():
 
 
 def test_break_is_a_framing_error():
-    desk = Desk(LineFormat(57_600))
+    desk = desk_of(LineFormat(57_600))
     desk.uart.host_breaks()
     desk.kernel.run()
     assert (desk.uart.framing_errors, desk.received) == (1, [])
 
 
 def test_what_is_not_on_the_wire_can_be_taken_back():
-    desk = Desk(LineFormat(57_600))
+    desk = desk_of(LineFormat(57_600))
     desk.uart.host_writes(b"abc")
     desk.kernel.advance_to(desk.uart.byte_ps // 2)
     desk.uart.host_drops()
     desk.kernel.run()
-    assert [byte for _, byte in desk.received] == [ord("a")]
+    assert desk.data == b"a"

@@ -4,32 +4,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.sim.virtual_time import Kernel
+from .ends import Desk
 
-BYTE = 1_000_000_000  # 10 bits at 10 000 baud
+BAUD = 10_000
+BYTE = 1_000_000_000  # 10 bits
 SILENCE = 5
 
 
-class Desk:
-    """A UART with everything that happens on it on record, times in ps."""
-
-    def __init__(self, baud: int = 10_000) -> None:
-        self.kernel = Kernel()
-        self.received: list[tuple[int, int]] = []
-        self.silences: list[int] = []
-        self.delivered: list[tuple[int, int]] = []
-        self.uart = Uart(
-            self.kernel,
-            baud,
-            lambda byte: self.received.append((self.kernel.now, byte)),
-            lambda: self.silences.append(self.kernel.now),
-            silence_bytes=SILENCE,
-        )
-        self.uart.line = self._record
-
-    def _record(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        self.delivered += [(first_ps + i * byte_ps, byte) for i, byte in enumerate(data)]
+@pytest.fixture
+def desk() -> Desk:
+    return Desk(BAUD, SILENCE)
 
 
 @pytest.mark.parametrize(("baud", "byte_ps"), [(9600, 1_041_666_666), (57600, 173_611_111)])
@@ -49,8 +33,7 @@ def test_baud_rate_is_limited(baud):
         Desk(baud)
 
 
-def test_bytes_from_the_host_arrive_one_by_one():
-    desk = Desk()
+def test_bytes_from_the_host_arrive_one_by_one(desk):
     desk.uart.host_writes(b"abc")
     desk.kernel.advance_to(2 * BYTE + 1)
     assert desk.received == [(BYTE, ord("a")), (2 * BYTE, ord("b"))]
@@ -60,7 +43,7 @@ def test_bytes_from_the_host_arrive_one_by_one():
 @given(st.lists(st.tuples(st.integers(0, 8 * BYTE), st.binary(max_size=5)), max_size=8))
 def test_blocks_queue_up_behind_each_other_in_both_directions(writes):
     """Oracle: a byte starts when it was written or when the line is free, whichever is later."""
-    desk = Desk()
+    desk = Desk(BAUD, SILENCE)
     expected, free = [], 0
     for gap, data in writes:
         desk.kernel.advance_to(desk.kernel.now + gap)
@@ -74,8 +57,7 @@ def test_blocks_queue_up_behind_each_other_in_both_directions(writes):
     assert desk.delivered == expected
 
 
-def test_device_sends_while_it_receives():
-    desk = Desk()
+def test_device_sends_while_it_receives(desk):
     desk.uart.on_byte = lambda byte: desk.uart.send(bytes([byte, byte]))
     desk.uart.host_writes(b"xy")
     desk.kernel.run()
@@ -84,30 +66,26 @@ def test_device_sends_while_it_receives():
     assert bytes(byte for _, byte in desk.delivered) == b"xxyy"
 
 
-def test_silence_is_told_once():
-    desk = Desk()
+def test_silence_is_told_once(desk):
     desk.uart.host_writes(b"ab")
     desk.kernel.advance_to(1000 * BYTE)
     assert desk.silences == [(2 + SILENCE) * BYTE]
 
 
-def test_nothing_heard_is_no_silence():
-    desk = Desk()
+def test_nothing_heard_is_no_silence(desk):
     desk.uart.send(b"only the device talks")
     desk.kernel.advance_to(1000 * BYTE)
     assert desk.silences == []
 
 
-def test_every_pause_is_told():
-    desk = Desk()
+def test_every_pause_is_told(desk):
     for _ in range(3):
         desk.uart.host_writes(b"a")
         desk.kernel.advance_to(desk.kernel.now + 20 * BYTE)
     assert desk.silences == [(20 * i + 1 + SILENCE) * BYTE for i in range(3)]
 
 
-def test_pause_that_is_too_short_is_no_silence():
-    desk = Desk()
+def test_pause_that_is_too_short_is_no_silence(desk):
     for _ in range(10):
         desk.uart.host_writes(b"a")
         desk.kernel.advance_to(desk.kernel.now + (1 + SILENCE) * BYTE - 1)
@@ -115,18 +93,16 @@ def test_pause_that_is_too_short_is_no_silence():
     assert len(desk.received) == 10
 
 
-def test_byte_written_at_the_end_of_a_silence_is_received():
-    desk = Desk()
+def test_byte_written_at_the_end_of_a_silence_is_received(desk):
     desk.uart.host_writes(b"a")
     desk.kernel.advance_to((1 + SILENCE) * BYTE)
     desk.uart.host_writes(b"b")
     desk.kernel.run()
-    assert [byte for _, byte in desk.received] == list(b"ab")
+    assert desk.data == b"ab"
     assert desk.silences[-1] == desk.received[-1][0] + SILENCE * BYTE
 
 
-def test_backlog_counts_the_byte_on_the_line():
-    desk = Desk()
+def test_backlog_counts_the_byte_on_the_line(desk):
     assert (desk.uart.backlog, desk.uart.busy) == (0, False)
     desk.uart.send(b"abc")
     counts = []
@@ -136,8 +112,7 @@ def test_backlog_counts_the_byte_on_the_line():
     assert counts == [(3, True), (3, True), (2, True), (2, True), (1, True), (0, False)]
 
 
-def test_busy_while_the_host_sends():
-    desk = Desk()
+def test_busy_while_the_host_sends(desk):
     desk.uart.host_writes(b"ab")
     desk.kernel.advance_to(2 * BYTE - 1)
     assert desk.uart.busy
@@ -145,8 +120,7 @@ def test_busy_while_the_host_sends():
     assert not desk.uart.busy
 
 
-def test_empty_blocks_change_nothing():
-    desk = Desk()
+def test_empty_blocks_change_nothing(desk):
     blocks = []
     desk.uart.line = lambda *block: blocks.append(block)
     desk.uart.send(b"")

@@ -1,6 +1,6 @@
 """Recordings of small devices: an echo on a line, a memory on the bus."""
 
-import io
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,34 +16,23 @@ from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
 from cubestack.firmware_model.formats.recording import Control, Recording, load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 
+from ..bus.ends import Memory
 
-class Memory:
-    """Answers reads with bytes from its pointer on."""
 
-    def __init__(self, first: int) -> None:
-        self.next = first
-
-    def i2c_start(self, read: bool) -> None:
-        pass
+class Pointed(Memory):
+    """Answers reads with the numbers after the last byte that was written."""
 
     def i2c_write(self, byte: int) -> bool:
-        self.next = byte
-        return byte != 0xEE
-
-    def i2c_read(self) -> int:
-        self.next = (self.next + 1) % 256
-        return self.next
-
-    def i2c_stop(self) -> None:
-        pass
+        self.next = byte + 1
+        return super().i2c_write(byte)
 
 
 class Device:
-    def __init__(self, answer: int = 1, first: int = 7) -> None:
+    def __init__(self, answer: int = 1) -> None:
         self.kernel = Kernel()
         self.uart = Uart(self.kernel, 57_600, self._on_byte, lambda: None, silence_bytes=10)
         self.bus = I2cBus(self.kernel)
-        self.bus.attach(0x1B, Memory(first))
+        self.bus.attach(0x1B, Pointed(refuse=0xEE))
         self._answer = answer
 
     def _on_byte(self, byte: int) -> None:
@@ -53,24 +42,31 @@ class Device:
         return Replay(recording, self.kernel, {"uart": self.uart}, self.bus).run(INTERFACE)
 
 
-def record(path: Path, writes: list[tuple[int, bytes]], transfers: int = 2) -> Recording:
-    device, stream = Device(), io.StringIO()
-    with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
+def recorded(path: Path, device: Device, live: Callable[[Recorder], None]) -> Recording:
+    """What came on record while a device lived."""
+    with path.open("w") as stream, Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
         recorder.listen(device.bus)
+        live(recorder)
+    return load_recording(path)
 
-        def talk():
-            for _ in range(transfers):
-                messages = [I2cMessage(0x1B, bytearray(b"\x80")), I2cMessage(0x1B, read=3)]
-                yield device.kernel.process(device.bus.transfer(messages))
-                yield device.kernel.timeout(PS_PER_MS)
 
+def record(path: Path, writes: list[tuple[int, bytes]], transfers: int = 2) -> Recording:
+    device = Device()
+
+    def talk():
+        for _ in range(transfers):
+            messages = [I2cMessage(0x1B, bytearray(b"\x80")), I2cMessage(0x1B, read=3)]
+            yield device.kernel.process(device.bus.transfer(messages))
+            yield device.kernel.timeout(PS_PER_MS)
+
+    def live(_recorder: Recorder) -> None:
         device.kernel.process(talk())
         for pause_ps, data in writes:
             device.kernel.advance_to(device.kernel.now + pause_ps)
             device.uart.host_writes(data)
         device.kernel.run()
-    path.write_text(stream.getvalue())
-    return load_recording(path)
+
+    return recorded(path, device, live)
 
 
 WRITES = st.lists(st.tuples(st.integers(0, 10**10), st.binary(max_size=300)), max_size=4)
@@ -122,26 +118,16 @@ def test_delay_is_named(tmp_path):
 
 
 def test_failed_transfer_is_on_record(tmp_path):
-    device, stream = Device(), io.StringIO()
-    with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
-        recorder.listen(device.bus)
+    device = Device()
+
+    def live(_recorder: Recorder) -> None:
+        transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
         with pytest.raises(I2cError):
-            device.kernel.run(
-                device.kernel.process(device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))]))
-            )
-    (tmp_path / "a.rec").write_text(stream.getvalue())
-    recording = load_recording(tmp_path / "a.rec")
+            device.kernel.run(device.kernel.process(transfer))
+
+    recording = recorded(tmp_path / "a.rec", device, live)
     assert recording.transfers[0].errno == 5
     assert Device().replay(recording) == []
-
-
-def test_framing_errors_are_on_record(tmp_path):
-    device, stream = Device(), io.StringIO()
-    with Recorder(stream, "cubesense", {"uart": device.uart}):
-        device.uart.host_form = LineFormat(57_600, parity="S")
-        device.uart.host_writes(b"a")
-        device.kernel.run()
-    assert '"error":"framing"' in stream.getvalue()
 
 
 def test_recording_of_other_ports(tmp_path):
@@ -151,17 +137,20 @@ def test_recording_of_other_ports(tmp_path):
         device.replay(recording)
 
 
-def test_dropped_characters_are_dropped_again(tmp_path):
-    device, stream = Device(), io.StringIO()
-    with Recorder(stream, "cubesense", {"uart": device.uart}):
+def test_framing_errors_are_on_record_and_their_characters_dropped_again(tmp_path):
+    device = Device()
+
+    def live(_recorder: Recorder) -> None:
         device.uart.host_writes(b"a")
         device.kernel.run()
         device.uart.host_form = LineFormat(57_600, parity="S")
         device.uart.host_writes(b"bc")
         device.kernel.run()
-    (tmp_path / "a.rec").write_text(stream.getvalue())
+
+    recording = recorded(tmp_path / "a.rec", device, live)
+    assert '"error":"framing"' in (tmp_path / "a.rec").read_text()
     again = Device()
-    assert again.replay(load_recording(tmp_path / "a.rec")) == []
+    assert again.replay(recording) == []
     assert again.uart.framing_errors == device.uart.framing_errors == 2
 
 
@@ -181,13 +170,14 @@ class Losing:
 
 
 def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
-    device, stream = Device(), io.StringIO()
+    device = Device()
     device.uart.fault_hook = Losing()
-    with Recorder(stream, "cubesense", {"uart": device.uart}):
+
+    def live(_recorder: Recorder) -> None:
         device.uart.host_writes(b"abcd")
         device.kernel.run()
-    (tmp_path / "a.rec").write_text(stream.getvalue())
-    recording = load_recording(tmp_path / "a.rec")
+
+    recording = recorded(tmp_path / "a.rec", device, live)
     assert recording.sent("uart", "host")[0] == b"abcd"
     assert recording.sent("uart", "device")[0] == b"bd"
     again = Device()
@@ -197,12 +187,13 @@ def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
 
 
 def test_what_was_done_meanwhile_is_done_again(tmp_path):
-    device, stream = Device(), io.StringIO()
-    with Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
+    device = Device()
+
+    def live(recorder: Recorder) -> None:
         device.kernel.advance_to(PS_PER_MS)
         recorder.control(device.kernel.now, ("scene", "x.toml"), "text")
-    (tmp_path / "a.rec").write_text(stream.getvalue())
-    recording = load_recording(tmp_path / "a.rec")
+
+    recording = recorded(tmp_path / "a.rec", device, live)
     again, done = Device(), []
 
     def act(control: Control) -> None:
