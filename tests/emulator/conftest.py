@@ -113,19 +113,33 @@ class Program:
 
 
 class Desk:
-    """A processor, ready to run the bodies given: one a start, then one that sleeps."""
+    """A processor, ready to run the bodies given: one a start, then one that sleeps.
 
-    def __init__(self, *bodies: Body, hz: int = 1_000_000) -> None:
-        costs = {"work": Cost(1, "assumed", "a test"), "port_write": Cost(2, "assumed", "a test")}
-        costs["port_read"] = Cost(3, "assumed", "a test")
+    Args:
+        bodies: what it runs.
+        hz: its clock, with costs of a test.
+        table: other costs and another clock.
+        engine: its FPGA; a fake one unless given.
+    """
+
+    def __init__(
+        self,
+        *bodies: Body,
+        hz: int = 1_000_000,
+        table: CostTable | None = None,
+        engine: Any = None,
+    ) -> None:
+        cycles = {"work": 1, "port_write": 2, "port_read": 3}
+        costs = {name: Cost(number, "assumed", "a test") for name, number in cycles.items()}
         self.kernel = Kernel()
-        self.meter = Meter(CostTable("test", hz, costs))
-        self.engine = FakeEngine()
+        self.meter = Meter(table or CostTable("test", hz, costs))
+        self.engine = engine or FakeEngine()
         self.camera_bus = FakeCameraBus()
         self.causes: list[int] = []
         self.log: list[tuple[int, Any]] = []
         self.activity: list[tuple[int, bool]] = []
         self.pins_told: list[tuple[str, int]] = []
+        self.accessing: list[bool] = []
         self._bodies = list(bodies)
         self.processor = Processor(
             self.kernel,
@@ -138,6 +152,7 @@ class Desk:
             other_pins=FakePins(),
             on_pin=lambda pin, level: self.pins_told.append((pin, level)),
             on_activity=lambda busy: self.activity.append((self.us, busy)),
+            on_access=self.accessing.append,
         )
 
     @property
@@ -155,9 +170,9 @@ class Desk:
     def note(self, what: object = None) -> None:
         self.log.append((self.us, what))
 
-    def at(self, us: int, action: Callable[[], object]) -> None:
+    def at(self, us: float, action: Callable[[], object]) -> None:
         """Let ``action`` happen ``us`` after the first start of main."""
-        delay = (us + BOOT_US) * PS_PER_US - self.kernel.now
+        delay = round((us + BOOT_US) * PS_PER_US) - self.kernel.now
         self.kernel.timeout(delay).callbacks.append(lambda _event: action())
 
     def ack_at(self, *us: int) -> None:

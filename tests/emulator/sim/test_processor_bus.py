@@ -12,12 +12,11 @@ import pytest
 from cubestack.emulator.boards.cubestar.wiring import cubestar_double_wiring
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.factory import make_engine
-from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import AwaitPin, BusAccess, Pay, SetPin, Sleep
+from cubestack.firmware_model.mcu.requests import AwaitPin, BusAccess, Pay, SetPin
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
+
+from ..conftest import Desk
 
 COLUMNS, ROWS = 8, 4
 PIXELS = COLUMNS * ROWS
@@ -28,52 +27,26 @@ SECOND = np.arange(PIXELS, 2 * PIXELS, dtype=np.int32)
 """Places in the second memory."""
 
 
-class Program:
-    def __init__(self, body: Body) -> None:
-        self._body = body
+def desk_with(body: Callable[[Desk], Body], tick_ns: int | None = None) -> Desk:
+    """Runs one body; ``tick_ns`` puts events of others on the way."""
+    kind = "python" if find_compiler() is None else "compiled"
+    engine = make_engine(cubestar_double_wiring(CubeStarDouble(COLUMNS, ROWS)), kind)
+    engine.memories["SRAM2"][:] = np.arange(PIXELS) + 100
 
-    def main(self) -> Body:
+    def enabled(desk: Desk) -> Body:
         yield SetPin("RNW", 1)
         yield SetPin("ENABLE", 1)
-        yield from self._body
-        yield Sleep(None)
+        yield from body(desk)
 
+    desk = Desk(enabled, table=CORTEX_M3, engine=engine)
 
-class Desk:
-    """Runs one body; ``tick_ns`` puts events of others on the way."""
-
-    def __init__(self, body: Callable[["Desk"], Body], tick_ns: int | None = None) -> None:
-        kind = "python" if find_compiler() is None else "compiled"
-        self.engine = make_engine(cubestar_double_wiring(CubeStarDouble(COLUMNS, ROWS)), kind)
-        self.engine.memories["SRAM2"][:] = np.arange(PIXELS) + 100
-        self.kernel = Kernel()
-        self.meter = Meter(CORTEX_M3)
-        self.accessing: list[bool] = []
-        self.processor = Processor(
-            self.kernel,
-            self.meter,
-            self.engine,
-            None,
-            lambda _cause: Program(body(self)),
-            power_on_cause=1,
-            boot_us=1,
-            on_access=self.accessing.append,
-        )
-        if tick_ns is not None:
-            self.kernel.process(self._tick(1000 * tick_ns))
-
-    def _tick(self, period_ps: int) -> Generator[Any, Any, None]:
+    def tick(period_ps: int) -> Body:
         while True:
-            yield self.kernel.timeout(period_ps)
+            yield desk.kernel.timeout(period_ps)
 
-    def at(self, ns: int, action: Callable[[], object]) -> None:
-        event = self.kernel.timeout(1000 * ns)
-        assert event.callbacks is not None
-        event.callbacks.append(lambda _event: action())
-
-    def run(self, us: int = 1000) -> "Desk":
-        self.kernel.advance_to(us * PS_PER_US)
-        return self
+    if tick_ns is not None:
+        desk.kernel.process(tick(1000 * tick_ns))
+    return desk
 
 
 def read(count: int = PIXELS, above: int = 255) -> tuple[BusAccess, np.ndarray]:
@@ -92,7 +65,7 @@ def test_accesses_take_their_cycles_whoever_interrupts(tick_ns: int | None) -> N
         assert (yield request) == PIXELS
         times.append(desk.kernel.now)
 
-    desk = Desk(body, tick_ns).run()
+    desk = desk_with(body, tick_ns).run(1000)
     assert np.array_equal(data, np.arange(PIXELS) + 100)
     took_ps = times[1] - times[0]
     # What is rounded off at an interruption is less than a picosecond each.
@@ -107,7 +80,7 @@ def test_a_search_stops_where_the_byte_is() -> None:
     def body(_desk: Desk) -> Body:
         made.append((yield request))
 
-    Desk(body, 130).run()
+    desk_with(body, 130).run(1000)
     assert made == [11]
     assert data[10] == 110
     assert not data[11:].any()
@@ -119,7 +92,7 @@ def test_writes_are_in_memory() -> None:
     def body(_desk: Desk) -> Body:
         yield BusAccess(SECOND.copy(), values, True, CYCLES)
 
-    assert np.array_equal(Desk(body, 333).run().engine.memories["SRAM2"], values)
+    assert np.array_equal(desk_with(body, 333).run(1000).engine.memories["SRAM2"], values)
 
 
 def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
@@ -136,11 +109,11 @@ def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
         loaded.append(desk.processor.load(0, PIXELS + 4, 6, CYCLES))
         desk.meter.charge(ebi_read=6)
 
-    plain = Desk(body).run()
-    disturbed = Desk(body)
-    for ns in (2100, 4000, 4001):
-        disturbed.at(ns, lambda: interrupt(disturbed))
-    disturbed.run()
+    plain = desk_with(body).run(1000)
+    disturbed = desk_with(body)
+    for ns in (1100, 3000, 3001):
+        disturbed.at(ns / 1000, lambda: interrupt(disturbed))
+    disturbed.run(1000)
     assert loaded == [bytes(range(104, 110))] * 3
     assert np.array_equal(data, np.arange(PIXELS) + 100)
     cost_ps = 3 * 6 * CYCLES * 10**12 / 48e6
@@ -158,15 +131,15 @@ def test_an_interrupt_reads_while_the_program_waits_for_the_fpga() -> None:
         yield SetPin("RNW", 0)
         waited.append((yield AwaitPin("ACK", 1, 100, 8)))
 
-    desk = Desk(body, 50)
+    desk = desk_with(body, 50)
 
     def interrupt() -> None:
         loaded.append(desk.processor.load(0, 2 * PIXELS - 3, 3, CYCLES))
         desk.meter.charge(ebi_read=3)
 
-    for ns in range(3000, 90_000, 977):
-        desk.at(ns, interrupt)
-    desk.run()
+    for ns in range(2000, 90_000, 977):
+        desk.at(ns / 1000, interrupt)
+    desk.run(1000)
     assert waited == [False]  # no camera
     assert set(loaded) == {bytes([129, 130, 131])}
 
@@ -178,4 +151,4 @@ def test_use_of_the_bus_is_told_once() -> None:
         yield Pay()
         yield read(4)[0]
 
-    assert Desk(body).run().accessing == [True, False, True, False]
+    assert desk_with(body).run(1000).accessing == [True, False, True, False]

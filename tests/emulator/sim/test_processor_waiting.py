@@ -24,14 +24,42 @@ def sleeping(deadline_us: int | None, *, wakeable: bool = True, then: int = 0):
     return body
 
 
-def test_sleep_ends_at_its_deadline(desk_of):
-    assert desk_of(sleeping(500)).run().log == [(500, False)]
-
-
-def test_wake_ends_a_sleep(desk_of):
-    desk = desk_of(sleeping(500))
-    desk.at(200, desk.processor.wake)
-    assert desk.run().log == [(200, True)]
+@pytest.mark.parametrize(
+    ("sleep", "wakes_us", "log"),
+    [
+        pytest.param(sleeping(500), [], [(500, False)], id="ends at its deadline"),
+        pytest.param(sleeping(500), [200], [(200, True)], id="a wake ends it"),
+        pytest.param(
+            sleeping(500, wakeable=False, then=900),
+            [200],
+            [(500, False), (500, True)],
+            id="goes on when it is not wakeable, and the wake is kept",
+        ),
+        pytest.param(
+            sleeping(500, then=900),
+            [-BOOT_US],
+            [(0, True), (900, False)],
+            id="a wake before it is not lost",
+        ),
+        pytest.param(
+            sleeping(500, then=900),
+            [100, 100],
+            [(100, True), (900, False)],
+            id="two wakes end one",
+        ),
+        pytest.param(
+            sleeping(0, then=900),
+            [-BOOT_US],
+            [(0, False), (0, True)],
+            id="a wake survives one whose deadline has passed",
+        ),
+    ],
+)
+def test_sleep_and_wakes(desk_of, sleep, wakes_us, log):
+    desk = desk_of(sleep)
+    for us in wakes_us:
+        desk.at(us, desk.processor.wake)
+    assert desk.run().log == log
 
 
 def test_sleep_without_deadline_waits_for_a_wake(desk_of):
@@ -41,31 +69,6 @@ def test_sleep_without_deadline_waits_for_a_wake(desk_of):
     assert desk.processor.waiting
     desk.at(2000, desk.processor.wake)
     assert desk.run().log == [(2000, True)]
-
-
-def test_sleep_that_is_not_wakeable_goes_on_and_the_wake_is_kept(desk_of):
-    desk = desk_of(sleeping(500, wakeable=False, then=900))
-    desk.at(200, desk.processor.wake)
-    assert desk.run().log == [(500, False), (500, True)]
-
-
-def test_wake_before_the_sleep_is_not_lost(desk_of):
-    desk = desk_of(sleeping(500, then=900))
-    desk.processor.wake()
-    assert desk.run().log == [(0, True), (900, False)]
-
-
-def test_two_wakes_end_one_sleep(desk_of):
-    desk = desk_of(sleeping(500, then=900))
-    desk.at(100, desk.processor.wake)
-    desk.at(100, desk.processor.wake)
-    assert desk.run().log == [(100, True), (900, False)]
-
-
-def test_wake_survives_a_sleep_whose_deadline_has_passed(desk_of):
-    desk = desk_of(sleeping(0, then=900))
-    desk.processor.wake()
-    assert desk.run().log == [(0, False), (0, True)]
 
 
 def test_wake_at_the_deadline_is_told_once(desk_of):

@@ -31,14 +31,22 @@ def scene(**changes: Any) -> SkyScene:
 class Desk:
     """A board, and a client on its serial line."""
 
-    def __init__(self, sky: SkyScene | None = None, stars: Database | None = None) -> None:
-        self.board = AramisBoard(sky or scene(), stars or catalogue())
+    def __init__(
+        self, sky: SkyScene | None = None, *, with_catalogue: bool = True, seed: int = 0
+    ) -> None:
+        stars = catalogue() if with_catalogue else None
+        self.board = AramisBoard(sky or scene(), stars, seed=seed)
         self.client = NodeClient(self.board.serial(), INTERFACE)
         self.aramis = Aramis(self.client)
 
     @property
     def now_s(self) -> float:
         return self.board.kernel.now / PS_PER_S
+
+    def command(self, name: str, **values: Any) -> None:
+        """A telecommand, and time for it to be processed."""
+        self.client.command(name, **values)
+        self.client.wait_processed(5)
 
     def flags(self) -> set[str]:
         return {name for name, up in self.client.telemetry("ErrorFlags").items() if up}

@@ -2,18 +2,14 @@
 
 import pytest
 
-from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.firmware_model.interface.aramis import (
-    INTERFACE,
     CatalogueState,
     MeasurementOutcome,
     Reason,
 )
-from cubestack.host.clients.aramis.client import Aramis
-from cubestack.host.clients.node import NodeClient
 
-from .desk import ORION, Desk, catalogue, scene
+from .desk import ORION, Desk
 
 
 def test_flipped_bits_are_corrected_on_activation(desk: Desk) -> None:
@@ -60,8 +56,7 @@ def test_the_catalogue_is_reloaded_periodically_and_the_flash_can_be_refreshed(
     active.client.command("SetReloadPeriod", Period=0)
     active.client.command("RefreshCatalogue")
     active.client.wait_processed(100)
-    active.client.command("ReloadCatalogue")
-    active.client.wait_processed(5)
+    active.command("ReloadCatalogue")
     assert active.client.telemetry("CatalogueStatus")["Corrected"] == 0
     assert active.aramis.measure().valid
 
@@ -69,11 +64,10 @@ def test_the_catalogue_is_reloaded_periodically_and_the_flash_can_be_refreshed(
 @pytest.mark.parametrize("seed", range(6))
 def test_no_wrong_attitude_comes_of_heavy_radiation(seed: int) -> None:
     """At a rate that breaks words, a measurement is right or says why there is none."""
-    board = AramisBoard(scene(), catalogue(), seed=seed)
-    aramis = Aramis(NodeClient(board.serial(), INTERFACE))
-    board.irradiate("flash", [3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2][seed])
-    state = aramis.activate()
-    found = aramis.measure()
+    desk = Desk(seed=seed)
+    desk.board.irradiate("flash", [3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2][seed])
+    state = desk.aramis.activate()
+    found = desk.aramis.measure()
     if state is CatalogueState.GOOD:
         assert found.valid
         assert found.quaternion is not None

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.boards.aramis.board import ARAMIS_POWER, AramisBoard
+from cubestack.emulator.boards.aramis.board import ARAMIS_POWER
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
 from cubestack.firmware_model.interface.aramis import (
@@ -19,7 +19,7 @@ from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import CommandRefusedError
 
-from .desk import Desk, catalogue, scene
+from .desk import Desk, scene
 
 
 def test_a_dead_camera_is_reported(active: Desk) -> None:
@@ -52,15 +52,12 @@ def test_exposure_and_gain_reach_the_sensor_and_registers_can_be_read(active: De
     active.aramis.measure()
     assert active.board.ppi.stored is not None
     assert active.board.ppi.stored.exposure_lines == 2000
-    active.client.command("SelectCameraRegister", Address=0x35)
-    active.client.wait_processed(1)
+    active.command("SelectCameraRegister", Address=0x35)
     register = active.client.telemetry("CameraRegister")
     assert register == {"Address": 0x35, "Value": 0x60, "Valid": 1}
-    active.client.command("WriteCameraRegister", Address=0x35, Value=8)
-    active.client.wait_processed(1)
+    active.command("WriteCameraRegister", Address=0x35, Value=8)
     active.aramis.measure()
-    active.client.command("SelectCameraRegister", Address=0x35)
-    active.client.wait_processed(1)
+    active.command("SelectCameraRegister", Address=0x35)
     assert active.client.telemetry("CameraRegister")["Value"] == 0x60
 
 
@@ -68,13 +65,11 @@ def test_pictures_come_down_as_the_camera_took_them(active: Desk) -> None:
     active.aramis.measure()
     star = active.aramis.stars()[0]
     number, column = divmod(1280 * round(star.y_px) + round(star.x_px), 128)
-    active.client.command("ImageBlockSet", BlockNumber=number)
-    active.client.wait_processed(1)
+    active.command("ImageBlockSet", BlockNumber=number)
     block = active.client.telemetry("ImageBlock")["Block"]
     assert isinstance(block, bytes)
     assert block[column] > 100
-    active.client.command("ImageBlockSet", BlockNumber=9)
-    active.client.wait_processed(1)
+    active.command("ImageBlockSet", BlockNumber=9)
     tenth = active.client.telemetry("ImageBlock")["Block"]
     streamed = list(active.client.stream("StreamDownImage", 20))
     assert streamed[9] == tenth
@@ -122,8 +117,7 @@ def test_a_turning_satellite_s_attitude_is_that_of_its_image_time() -> None:
 
 
 def test_the_same_node_answers_on_i2c() -> None:
-    board = AramisBoard(scene(), catalogue())
-    bus = board.i2c()
+    bus = Desk().board.i2c()
     client = I2cClient(bus, INTERFACE, wait=bus.wait)
     aramis = Aramis(client)
     assert aramis.activate() is CatalogueState.GOOD
@@ -176,16 +170,15 @@ def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
         active.client.pause(0.3)
         kept = active.client.telemetry("Exposure")["Rows"] == 1234
         assert kept is save
-    active.client.command("ClearConfig")
-    active.client.wait_processed(1)
+    active.command("ClearConfig")
     assert active.client.telemetry("Exposure")["Rows"] == 6299
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_that_a_host_sends_stops_the_node(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    board = AramisBoard(scene(mag_limit=3.0), None, seed=seed)
-    line = board.serial()
+    desk = Desk(scene(mag_limit=3.0), with_catalogue=False, seed=seed)
+    line = desk.board.serial()
     commands = [m for m in INTERFACE.telecommands if m.name != "StreamDownImage"]
     for _ in range(60):
         message = commands[int(rng.integers(len(commands)))]

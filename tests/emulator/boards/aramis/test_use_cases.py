@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.aramis import (
-    INTERFACE,
     MS_PER_DAY,
     CatalogueState,
     LatchUpStep,
@@ -17,10 +15,8 @@ from cubestack.firmware_model.interface.aramis import (
     Reason,
     SensorState,
 )
-from cubestack.host.clients.aramis.client import Aramis
-from cubestack.host.clients.node import NodeClient
 
-from .desk import Desk, scene
+from .desk import Desk
 
 
 def test_activate_measure_deactivate(desk: Desk) -> None:
@@ -47,8 +43,7 @@ def test_a_measurement_without_activation_says_so(desk: Desk) -> None:
     found = desk.aramis.measure()
     assert (found.valid, found.reason, found.quaternion) == (False, Reason.NOT_ACTIVE, None)
     assert desk.flags() == {"NotActive"}
-    desk.client.command("StartLoop", Period=1000, Mode=0)
-    desk.client.wait_processed(1)
+    desk.command("StartLoop", Period=1000, Mode=0)
     assert desk.client.telemetry("LoopStatus")["Running"] == 0
 
 
@@ -110,8 +105,7 @@ def test_latch_up_action(active: Desk) -> None:
     assert active.client.telemetry("SupplyStatus") == {"Switch": 0, "Current": 0.0}
     found = active.aramis.measure()
     assert (found.valid, found.reason) == (False, Reason.CAMERA_OFF)
-    active.client.command("LatchUpAction", Step=LatchUpStep.ON)
-    active.client.wait_processed(1)
+    active.command("LatchUpAction", Step=LatchUpStep.ON)
     assert active.client.telemetry("SupplyStatus") == {"Switch": 1, "Current": 110.0}
     assert active.aramis.measure().valid
 
@@ -130,10 +124,7 @@ def test_the_supply_is_cut_at_once_even_in_the_middle_of_a_measurement(active: D
 
 def test_a_catalogue_is_loaded_by_telecommand() -> None:
     small = build_database(CatalogueParameters(step_deg=10, stars_per_field=3, mag_limit=3.0))
-    desk = Desk()
-    board = AramisBoard(scene(), None)
-    desk.board, desk.client = board, NodeClient(board.serial(), INTERFACE)
-    desk.aramis = Aramis(desk.client)
+    desk = Desk(with_catalogue=False)
     assert desk.aramis.activate() is CatalogueState.MISSING
     assert desk.aramis.measure().reason is Reason.NO_CATALOGUE
     assert "CatalogueMissing" in desk.flags()
@@ -157,17 +148,14 @@ def test_a_bad_upload_leaves_the_catalogue_alone(active: Desk) -> None:
         active.client.command("ClearErrorFlags")
         active.client.command("BeginCatalogue", Length=len(image), Checksum=checksum)
         for number in numbers:
-            active.client.command("CatalogueBlock", BlockNumber=number, Data=bytes(128))
-        active.client.wait_processed(5)
-        active.client.command("CommitCatalogue")
-        active.client.wait_processed(5)
+            active.command("CatalogueBlock", BlockNumber=number, Data=bytes(128))
+        active.command("CommitCatalogue")
         return active.flags()
 
     zeros = 0xD8EF_0F4A  # any checksum
     assert try_to_load(bytes(300), zeros, range(3)) == {"UploadError"}  # checksum
     assert try_to_load(bytes(300), 0x6B86_8B3A, range(2)) == {"UploadError"}  # a block is missing
     assert try_to_load(bytes(300), zeros, range(2, 4)) == {"UploadError"}  # a stray block
-    active.client.command("CommitCatalogue")
-    active.client.wait_processed(5)
+    active.command("CommitCatalogue")
     assert active.client.telemetry("UploadStatus")["Blocks"] == 3
     assert active.aramis.measure().valid
