@@ -123,11 +123,7 @@ class Desk:
     """
 
     def __init__(
-        self,
-        *bodies: Body,
-        hz: int = 1_000_000,
-        table: CostTable | None = None,
-        engine: Any = None,
+        self, *bodies: Body, hz: int = 1_000_000, table: CostTable | None = None, engine: Any = None
     ) -> None:
         cycles = {"work": 1, "port_write": 2, "port_read": 3}
         costs = {name: Cost(number, "assumed", "a test") for name, number in cycles.items()}

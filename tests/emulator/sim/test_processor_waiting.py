@@ -42,10 +42,7 @@ def sleeping(deadline_us: int | None, *, wakeable: bool = True, then: int = 0):
             id="a wake before it is not lost",
         ),
         pytest.param(
-            sleeping(500, then=900),
-            [100, 100],
-            [(100, True), (900, False)],
-            id="two wakes end one",
+            sleeping(500, then=900), [100, 100], [(100, True), (900, False)], id="two wakes end one"
         ),
         pytest.param(
             sleeping(0, then=900),

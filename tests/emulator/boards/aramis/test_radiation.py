@@ -3,11 +3,7 @@
 import pytest
 
 from cubestack.emulator.scene.attitude import attitude_error_deg
-from cubestack.firmware_model.interface.aramis import (
-    CatalogueState,
-    MeasurementOutcome,
-    Reason,
-)
+from cubestack.firmware_model.interface.aramis import CatalogueState, MeasurementOutcome, Reason
 
 from .desk import ORION, Desk
 
