@@ -12,6 +12,8 @@ from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameE
 from cubestack.firmware_model.interface.codec.message import Interface, Kind
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE, AckError
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
 
 
 class FakeNode:
@@ -245,6 +247,13 @@ class I2cLink:
                 message.buf[index] = bytes([byte])
 
 
+def over_i2c(node: FakeNode) -> I2cClient:
+    """A client of ``node`` on its bus, which does not wait."""
+    return I2cClient(
+        I2cLink(node, node.interface.i2c_address), node.interface, wait=lambda _s: None
+    )
+
+
 @pytest.fixture
 def node() -> FakeCubeStar:
     return FakeCubeStar()
@@ -260,6 +269,14 @@ def i2c(node: FakeNode) -> I2cLink:
     return I2cLink(node, node.interface.i2c_address)
 
 
+@pytest.fixture(params=["uart", "i2c"])
+def either_client(request: pytest.FixtureRequest, node: FakeNode) -> NodeClient | I2cClient:
+    """A client of the node on each of its ports."""
+    if request.param == "i2c":
+        return over_i2c(node)
+    return NodeClient(request.getfixturevalue("uart"), node.interface)
+
+
 @pytest.fixture
 def sense() -> FakeCubeSense:
     return FakeCubeSense()
@@ -268,8 +285,3 @@ def sense() -> FakeCubeSense:
 @pytest.fixture
 def sense_uart(sense: FakeCubeSense) -> UartLink:
     return UartLink(sense)
-
-
-@pytest.fixture
-def sense_i2c(sense: FakeCubeSense) -> I2cLink:
-    return I2cLink(sense, sense.interface.i2c_address)

@@ -14,11 +14,12 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, redirect_stderr, redirect_stdout
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.host.cli.main import main
 from cubestack.host.devices.emulated import AnyEmulated, open_device
@@ -28,6 +29,10 @@ COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
 START_TIMEOUT_S = 120
 
 Frames = list[dict[str, Any]]
+Measure = Callable[..., Frames]
+Open = Callable[..., AnyEmulated]
+Emulate = Callable[..., AbstractContextManager["Served"]]
+Wire = list[tuple[bytes, int, int]]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -52,77 +57,108 @@ def photographs() -> Path:
 
 
 @pytest.fixture(scope="session")
-def measure_device() -> Callable[..., Frames]:
-    """`cubestack measure DEVICE --json` with more arguments; the results that it prints."""
+def device_name() -> str:
+    """The device of this folder's tests, as the command line has it."""
+    return "cubestar"
 
-    def run(device: str, *arguments: object) -> Frames:
+
+@pytest.fixture(scope="session")
+def measure(device_name: str) -> Measure:
+    """`cubestack measure` this device `--json` with more arguments; the results that it prints."""
+
+    def run(*arguments: object) -> Frames:
         out, err = io.StringIO(), io.StringIO()
         with redirect_stdout(out), redirect_stderr(err):
-            code = main(["measure", device, "--json", *map(str, arguments)])
+            code = main(["measure", device_name, "--json", *map(str, arguments)])
         assert (code, err.getvalue()) == (0, "")
         return [json.loads(line) for line in out.getvalue().splitlines()]
 
     return run
 
 
-@pytest.fixture(scope="session")
-def measure(measure_device: Callable[..., Frames]) -> Callable[..., Frames]:
-    """The same of this folder's device."""
-    return partial(measure_device, "cubestar")
+@pytest.fixture
+def session(device_name: str) -> Open:
+    """Opens this device, looking at a scene."""
+    return partial(open_device, device_name)
 
 
 @pytest.fixture
-def session() -> Callable[..., AnyEmulated]:
-    """Opens the device of this folder, looking at a scene."""
-    return partial(open_device, "cubestar")
-
-
-@pytest.fixture
-def emulate(tmp_path: Path) -> Callable[..., AbstractContextManager["Served"]]:
-    """Runs `cubestack emulate cubestar` with more arguments as a process of its own."""
+def emulate(device_name: str, tmp_path: Path) -> Emulate:
+    """Runs `cubestack emulate` this device with more arguments as a process of its own."""
 
     @contextmanager
-    def run(*arguments: object, folder: Path = tmp_path) -> Iterator[Served]:
-        served = Served([*COMMAND, "emulate", "cubestar", *map(str, arguments)], folder)
-        try:
+    def run(*arguments: object) -> Iterator[Served]:
+        with Served([device_name, *map(str, arguments)], tmp_path) as served:
             yield served
-        finally:
-            served.end()
 
     return run
 
 
 class Served:
-    """An emulator process that serves.
+    """A process of `cubestack emulate` that serves, to be used in a ``with`` block.
 
     Attributes:
         process: the process.
-        port: what it says that it serves on.
+        said: what it said until it served.
     """
 
-    def __init__(self, command: list[str], folder: Path) -> None:
+    def __init__(self, arguments: list[str], folder: Path, *, last: str = " serves on ") -> None:
+        """Start it in ``folder``, and wait until it says ``last``."""
         self.process = subprocess.Popen(
-            command,
+            [*COMMAND, "emulate", *arguments],
             cwd=folder,
             stderr=subprocess.PIPE,
             text=True,
             env=os.environ | {"COLUMNS": "200"},  # its message on one line
         )
         assert self.process.stderr is not None
+        self.said = ""
+        self._rest = threading.Thread(target=self.process.stderr.read)
         watch = threading.Timer(START_TIMEOUT_S, self.process.kill)
         watch.start()
-        line = self.process.stderr.readline()
+        for line in self.process.stderr:
+            self.said += line
+            if last in line:
+                break
         watch.cancel()
-        if " serves on " not in line:
-            self.end()
-        assert " serves on " in line, line
-        self.port = line.split(" serves on ")[1].split()[0]
+        self._rest.start()
+        if last not in self.said:
+            self.__exit__()
+        assert last in self.said, self.said
 
-    def end(self) -> int:
-        """Terminate it if it still runs; its exit code."""
+    @property
+    def port(self) -> str:
+        """What it serves on first."""
+        return self.said.split(" serves on ")[1].split()[0]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Terminate it if it still runs."""
         self.process.terminate()
-        self.process.communicate(timeout=START_TIMEOUT_S)
-        return self.process.returncode
+        self._rest.join()
+        with self.process:
+            self.process.wait(START_TIMEOUT_S)
+
+
+class Ear:
+    """Hears what a device sends on a line.
+
+    Attributes:
+        wire: bytes, time of the first one, and of each, in ps.
+    """
+
+    def __init__(self, uart: Uart) -> None:
+        self.wire: Wire = []
+        uart.taps.append(self)
+
+    def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
+        self.wire.append((bytes(data), first_ps, byte_ps))
+
+    def device_heard(self, byte: int, start_ps: int) -> None: ...
+
+    def framing_error(self, time_ps: int) -> None: ...
 
 
 @pytest.fixture

@@ -7,10 +7,8 @@ runs the transports that the short test leaves out; -s shows what was measured.
 import os
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -27,13 +25,14 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.registry import device_names
 from cubestack.host.transport.smbus import CubeSMBus
 from cubestack.host.transport.streams import open_transport
+from tests.system.conftest import Served
 
 LONG = "CUBESTACK_BAD_CLIENTS_S" in os.environ
 LENGTH_S = float(os.environ.get("CUBESTACK_BAD_CLIENTS_S", "1.5"))
 BUS = 16 + os.getpid() % 200
-COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
 BAD_CLIENT = (sys.executable, "-I", "-S", str(Path(__file__).with_name("bad_client.py")))
 SLOWEST_ANSWER_S = 5.0  # on a machine with work of its own
 GROWTH_BYTES = 4 << 20
@@ -43,27 +42,7 @@ RDWR = request(0, Call.RDWR, pack_rdwr([RdwrMessage(CUBESENSE.i2c_address, 1, 8)
 READ_BUS = LENGTH.pack(len(RDWR)) + RDWR
 
 
-@contextmanager
-def emulation(folder: Path, *options: str) -> Iterator[tuple[subprocess.Popen[bytes], list[str]]]:
-    """All devices in one process, and the names of its serial ports in the order of its lines."""
-    command = [*COMMAND, "emulate", "cubestar", "cubesense", "aramis", "--i2c", str(BUS), *options]
-    with ExitStack() as stack:
-        process = stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, cwd=folder))
-        assert process.stderr is not None
-        words: list[str] = []
-        for line in process.stderr:
-            words += line.decode().split()
-            if "--bus" in words:
-                break
-        assert "--bus" in words, " ".join(words)
-        rest = threading.Thread(target=process.stderr.read)
-        rest.start()
-        stack.callback(rest.join)
-        stack.callback(process.terminate)
-        yield process, [words[i - 1] for i, word in enumerate(words) if word == "at"]
-
-
-def memory_bytes(process: subprocess.Popen[bytes]) -> int:
+def memory_bytes(process: subprocess.Popen[str]) -> int:
     """Resident memory."""
     pages = Path(f"/proc/{process.pid}/statm").read_text().split()[1]
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
@@ -79,7 +58,10 @@ def test_others_are_served_and_memory_stays_flat(
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     options = [f"--{transport}", "./tty" if transport == "pty" else "0"]
     with ExitStack() as stack:
-        emulator, ports = stack.enter_context(emulation(tmp_path, *options))
+        arguments = [*device_names(), "--i2c", str(BUS), *options]
+        emulator = stack.enter_context(Served(arguments, tmp_path, last="--bus"))
+        words = emulator.said.split()
+        ports = [words[i - 1] for i, word in enumerate(words) if word == "at"]
         cubestar, node, bench, aramis = (
             str(tmp_path / port) if transport == "pty" else port for port in ports
         )
@@ -108,8 +90,8 @@ def test_others_are_served_and_memory_stays_flat(
                 slowest_s[name] = max(slowest_s[name], time.monotonic() - asked_s)
                 answers[name] += 1
             if now_s > LENGTH_S / 3:
-                memory.append(memory_bytes(emulator))
-        assert emulator.poll() is None
+                memory.append(memory_bytes(emulator.process))
+        assert emulator.process.poll() is None
     grown = memory[-1] - memory[0]
     print(
         f"\n{transport}, {LENGTH_S:g} s: {answers} answers, the slowest after {slowest_s} s, "

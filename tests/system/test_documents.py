@@ -7,12 +7,19 @@ from typing import Any
 
 import pytest
 
+from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
 from cubestack.emulator.camera.common.scene_file import load_scene
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SceneError, SkyScene
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.cubesense.memory import Memory, budget, used
+from cubestack.firmware_model.interface.aramis import Reason
+from cubestack.host.cli.main import COMMANDS, make_parser
+from cubestack.host.cli.reports import reports
 
 BLOCK = re.compile(r"```toml\n(.*?)```", re.DOTALL)
 EARTH = 'kind = "earth-sun"\n'
@@ -119,44 +126,54 @@ def test_make_has_the_targets_that_are_promised(root: Path) -> None:
 
 
 def test_commands_of_the_readme_exist(root: Path) -> None:
-    from cubestack.host.cli.main import COMMANDS
-    from cubestack.host.devices.registry import devices
-
-    reports = [report.name for device in devices() for report in device.reports]
     readme = (root / "README.md").read_text(encoding="utf-8")
-    named = re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", readme, re.MULTILINE)
-    assert set(named) <= {*COMMANDS, *reports}
+    named = set(re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", readme, re.MULTILINE))
+    assert named <= {*COMMANDS, *reports()}
 
 
-def test_commands_of_the_fidelity_page_exist(root: Path) -> None:
-    from cubestack.host.cli.main import make_parser
+@pytest.mark.parametrize(
+    ("name", "device", "measured", "others"),
+    [
+        ("fidelity", "cubestar", 5, 0),
+        ("fidelity-cubesense", "cubesense", 7, 0),
+        ("fidelity-aramis", "aramis", 7, 2),
+    ],
+)
+def test_commands_and_files_of_the_fidelity_pages_exist(
+    root: Path, name: str, device: str, measured: int, others: int
+) -> None:
+    page = (root / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    commands = re.findall(r"`measure (--[^`]+)`", page)
+    assert len(commands) >= measured
+    for command in commands:
+        make_parser().parse_args(["measure", device, "--json", *command.split()])
+    commands = re.findall(r"`\.venv/bin/cubestack ((?!measure)\w[^`]*)`", page)
+    assert len(commands) >= others
+    for command in commands:
+        make_parser().parse_args(command.split())
+    files = re.findall(r"`(\w+/[\w/]+\.py)`", page)
+    files += [
+        f"{module.replace('.', '/')}.py" for module in re.findall(r"`python -m ([\w.]+)", page)
+    ]
+    for file in files:
+        assert (root / file).is_file(), file
 
+
+def test_experiments_of_the_fidelity_page_are_those_there_are(root: Path) -> None:
     page = (root / "docs" / "fidelity.md").read_text(encoding="utf-8")
     experiments = (root / "tests" / "system" / "experiments.py").read_text(encoding="utf-8")
     named = set(re.findall(r"`experiments\.py (\w+)", page))
     assert named == set(re.findall(r"experiments\.py (\w+) ", experiments))
-    commands = re.findall(r"`measure (--[^`]+)`", page)
-    assert len(commands) >= 5
-    for command in commands:
-        make_parser().parse_args(["measure", "cubestar", "--json", *command.split()])
-    for file in re.findall(r"`(\w+/[\w/]+\.py)`", page):
-        assert (root / file).is_file(), file
 
 
-def test_commands_and_figures_of_cubesense_s_page(root: Path) -> None:
-    from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
-    from cubestack.emulator.sim.power import PowerModel
-    from cubestack.emulator.sim.virtual_time import Kernel
-    from cubestack.firmware_model.cubesense.memory import Memory, budget, used
-    from cubestack.host.cli.main import make_parser
+def test_reasons_of_aramis_page_are_those_of_the_interface(root: Path) -> None:
+    page = (root / "docs" / "fidelity-aramis.md").read_text(encoding="utf-8")
+    for name in re.findall(r"`([A-Z_]{5,})`", page):
+        assert name in Reason.__members__, name
 
+
+def test_figures_of_cubesense_s_page(root: Path) -> None:
     page = (root / "docs" / "fidelity-cubesense.md").read_text(encoding="utf-8")
-    commands = re.findall(r"`measure (--[^`]+)`", page)
-    assert len(commands) >= 7
-    for command in commands:
-        make_parser().parse_args(["measure", "cubesense", "--json", *command.split()])
-    for file in re.findall(r"`(\w+/[\w/]+\.py)`", page):
-        assert (root / file).is_file(), file
     assert f"{used(budget())[Memory.RAM]} of 1536 bytes" in page
     rows = section(page, "Power (table 7.1)").splitlines()
     states = [[cell.strip() for cell in row.split("|")[1:8]] for row in rows if row.endswith("% |")]

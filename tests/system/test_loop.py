@@ -3,7 +3,8 @@
 CubeStar thesis, sections 5.3.6, 6.2 and 6.3.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 from cubestack.host.clients.cubestar.client import Attitude
+from tests.system.conftest import Open
 
 ITERATIONS = 6
 
@@ -50,13 +52,11 @@ def run_loop(opened: Any, scene: SkyScene, iterations: int) -> list[Turn]:
 
 
 @pytest.fixture
-def looping(session: Callable[..., Any]) -> Any:
+def looping(session: Open) -> Iterator[Any]:
     """Starts the loop on a scene: lost in space first, tracking from then on."""
 
     def start(scene: SkyScene) -> Any:
-        context = session(scene, seed=1)
-        opened = context.__enter__()
-        contexts.append(context)
+        opened: Any = stack.enter_context(session(scene, seed=1))
         client = opened.client.client
         opened.client.capture_and_process()
         client.command("setIDMode", IdMode=IdMode.TRACKING)
@@ -64,10 +64,8 @@ def looping(session: Callable[..., Any]) -> Any:
         client.pause(2.9)  # the second iteration ends, the first picture of the loop is solved
         return opened
 
-    contexts: list[Any] = []
-    yield start
-    for context in contexts:
-        context.__exit__(None, None, None)
+    with ExitStack() as stack:
+        yield start
 
 
 def test_an_iteration_takes_one_second(looping: Any) -> None:

@@ -6,16 +6,14 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.system.conftest import Emulate
+
 POINTING_RAD = (1.4661, -0.0175)  # right ascension 84, declination -1 degrees: what emulate shows
 TOLERANCE_RAD = 3e-4  # telemetry counts in steps of 1e-4
-
-Emulate = Callable[..., Any]
 
 
 def run_script(script: str | Path, *arguments: str, folder: Path) -> str:
@@ -32,26 +30,18 @@ def run_script(script: str | Path, *arguments: str, folder: Path) -> str:
     return result.stdout
 
 
-def check_plain_pyserial(output: str) -> None:
-    found = re.search(r"right ascension (\S+) rad, declination (\S+) rad", output)
-    assert found is not None, output
-    assert [float(angle) for angle in found.groups()] == pytest.approx(
-        POINTING_RAD, abs=TOLERANCE_RAD
-    )
-
-
-def test_plain_pyserial_on_a_pseudo_terminal(emulate: Emulate, root: Path, tmp_path: Path) -> None:
-    with emulate("--pty", "port", "--pace", "fast") as served:
-        output = run_script(root / "examples" / "plain_pyserial.py", "./port", folder=tmp_path)
-    check_plain_pyserial(output)
-    assert served.process.returncode == 0
-
-
-def test_plain_pyserial_over_tcp(emulate: Emulate, root: Path, tmp_path: Path) -> None:
-    with emulate("--tcp", 0, "--pace", "fast") as served:
+@pytest.mark.parametrize("options", [("--pty", "./port"), ("--tcp", "0")])
+def test_plain_pyserial_on_a_pseudo_terminal_and_over_tcp(
+    emulate: Emulate, root: Path, tmp_path: Path, options: tuple[str, str]
+) -> None:
+    with emulate(*options, "--pace", "fast") as served:
         target = served.port.replace("tcp://", "socket://")
         output = run_script(root / "examples" / "plain_pyserial.py", target, folder=tmp_path)
-    check_plain_pyserial(output)
+    found = re.search(r"right ascension (\S+) rad, declination (\S+) rad", output)
+    assert found is not None, output
+    angles = [float(angle) for angle in found.groups()]
+    assert angles == pytest.approx(POINTING_RAD, abs=TOLERANCE_RAD)
+    assert served.process.returncode == 0
 
 
 def test_the_example_is_short_and_knows_only_the_protocol(root: Path) -> None:

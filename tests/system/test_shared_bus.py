@@ -3,22 +3,17 @@
 import os
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.devices.registry import devices
+from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.devices.targets import open_target
+from tests.system.conftest import COMMAND, Served
 
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-
-START_TIMEOUT_S = 120
-COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")
 BUS = 16 + os.getpid() % 200
 ADDRESSES = [device.interface.i2c_address for device in devices()]
 READ_ALL = (
@@ -35,29 +30,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
         patch.delenv("CUBESTACK_I2C_SOCKET", raising=False)
-        process = subprocess.Popen(
-            [*COMMAND, "emulate", "cubestar", "cubesense", "aramis", "--i2c", str(BUS)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            cwd=folder,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        )
-        assert process.stdout is not None
-        lines = []
-        watch = threading.Timer(START_TIMEOUT_S, process.kill)
-        watch.start()
-        for line in process.stdout:
-            lines.append(line)
-            if socket_path(BUS).exists():
-                break
-        watch.cancel()
-        try:
-            assert socket_path(BUS).exists(), "".join(lines)
+        with Served([*device_names(), "--i2c", str(BUS)], folder, last="--bus"):
+            assert socket_path(BUS).exists()
             yield
-        finally:
-            process.terminate()
-            process.communicate(timeout=30)
 
 
 @pytest.mark.parametrize("route", ["seccomp", "preload"])

@@ -16,21 +16,14 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.quaternions import unit_quaternion
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, TargetError
 
-from ..conftest import FakeNode, I2cLink, UartLink
+from ..conftest import FakeNode, UartLink, over_i2c
 
 
-def over_i2c(node: FakeNode) -> I2cClient:
-    link = I2cLink(node, node.interface.i2c_address)
-    return I2cClient(link, node.interface, wait=link.waits.append)
-
-
-@pytest.mark.parametrize("bus", ["uart", "i2c"])
 @pytest.mark.parametrize("message", CUBESTAR.telecommands, ids=lambda m: m.name)
 def test_every_telecommand_arrives_with_its_parameters(
-    node: FakeNode, bus: str, message: Message
+    node: FakeNode, either_client: NodeClient | I2cClient, message: Message
 ) -> None:
-    client = NodeClient(UartLink(node), CUBESTAR) if bus == "uart" else over_i2c(node)
-    client.command(message.name, **message.reset_values())
+    either_client.command(message.name, **message.reset_values())
     assert node.log == [(message.name, message.reset_values())]
 
 

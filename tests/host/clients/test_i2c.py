@@ -3,14 +3,15 @@ from typing import Any
 import pytest
 
 from cubestack.firmware_model.interface.codec.message import InterfaceError
-from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
 
+from ..conftest import I2cLink, over_i2c
+
 
 @pytest.fixture
-def client(i2c: Any) -> I2cClient:
+def client(i2c: I2cLink) -> I2cClient:
     return I2cClient(i2c, INTERFACE, wait=i2c.waits.append)
 
 
@@ -42,8 +43,8 @@ def test_what_the_node_could_not_refuse_visibly_is_not_sent(client: I2cClient, n
     assert node.log == []
 
 
-def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any, sense_i2c: Any) -> None:
-    client = I2cClient(sense_i2c, CUBESENSE, wait=sense_i2c.waits.append)
+def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any) -> None:
+    client = over_i2c(sense)
     client.command("CaptureAndDetect", Camera=0, Sram=0)
     for code, text in ((4, r"BUFFER_FULL \(4\)"), (99, r"unknown code \(99\)")):
         sense.values["TcmdProcessed"] = {"Error": code}

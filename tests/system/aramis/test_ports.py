@@ -16,24 +16,22 @@ from cubestack.firmware_model.interface.aramis import INTERFACE, CatalogueState
 from cubestack.host.cli.main import main
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.clients.i2c import I2cClient
-from cubestack.host.devices.emulated import open_device
-from tests.system.conftest import COMMAND, Served
+from tests.system.conftest import Emulate, Open
 
 POINTING_DEG = (84.0, -1.0, 20.0)
 TRUTH = quaternion_from_pointing(*POINTING_DEG)
 
 
 @pytest.fixture
-def served(tmp_path: Path) -> Iterator[Path]:
+def served(emulate: Emulate, tmp_path: Path) -> Iterator[Path]:
     """An emulator process of its own; the path of its port."""
     ra, dec, roll = POINTING_DEG
     (tmp_path / "sky.toml").write_text(
         f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\n'
     )
-    command = [*COMMAND, "emulate", "aramis", "--scene", "sky.toml", "--pty", "ttyARAMIS"]
-    emulator = Served([*command, "--pace", "fast"], tmp_path)
-    yield tmp_path / "ttyARAMIS"
-    assert emulator.end() == 0
+    with emulate("--scene", "sky.toml", "--pty", "port", "--pace", "fast") as emulator:
+        yield tmp_path / "port"
+    assert emulator.process.returncode == 0
 
 
 def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
@@ -61,9 +59,9 @@ def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
     assert abs(roll) < 0.05
 
 
-def test_the_same_over_i2c() -> None:
-    with open_device("aramis", SkyScene(TRUTH)) as session:
-        bus = session.board.i2c()
+def test_the_same_over_i2c(session: Open) -> None:
+    with session(SkyScene(TRUTH)) as opened:
+        bus = opened.board.i2c()
         bus.wait(0.1)
         client = I2cClient(bus, INTERFACE, 0x1D, wait=bus.wait)
         aramis = Aramis(client)

@@ -1,6 +1,5 @@
 """False lights beside the Sun and the Earth, and what the published search makes of them."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +12,7 @@ from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angl
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import Measurement
+from tests.system.conftest import Open
 
 from .conftest import NADIR_DEG, SUN_DEG
 
@@ -25,10 +25,9 @@ def seen_by(scene: EarthSunScene, camera: Camera, alpha: float, beta: float) -> 
     return mounting.matrix.T @ vector_from_angles(alpha, beta)
 
 
-def measure(opened: Callable[..., Any], scene: Any, camera: Camera) -> Measurement:
-    with opened(scene) as session:
-        session.client.client.pause(0.3)
-        found: Measurement = session.client.capture_and_detect(camera)
+def measure(ready: Open, scene: Any, camera: Camera) -> Measurement:
+    with ready(scene) as opened:
+        found: Measurement = opened.client.capture_and_detect(camera)
     return found
 
 
@@ -39,32 +38,31 @@ def check(found: Measurement, expected: tuple[float, float]) -> None:
 
 @pytest.mark.parametrize(("alpha", "beta"), [(30.0, -40.0), (17.0, 9.0), (-80.0, 20.0)])
 def test_the_moon_is_too_faint_for_the_sun_sensor(
-    opened: Callable[..., Any], scene: EarthSunScene, alpha: float, beta: float
+    ready: Open, scene: EarthSunScene, alpha: float, beta: float
 ) -> None:
     moon = seen_by(scene, Camera.SUN, alpha, beta)
-    check(measure(opened, replace(scene, moon=moon), Camera.SUN), SUN_DEG)
+    check(measure(ready, replace(scene, moon=moon), Camera.SUN), SUN_DEG)
 
 
 @pytest.mark.parametrize("camera", Camera)
 def test_hot_pixels_do_not_move_a_direction(
-    opened: Callable[..., Any], scene: EarthSunScene, camera: Camera
+    ready: Open, scene: EarthSunScene, camera: Camera
 ) -> None:
     view = EarthSunView(scene, FisheyeCondition(hot_pixels=200, hot_pairs=50))
-    found = measure(opened, view, camera)
+    found = measure(ready, view, camera)
     check(found, TRUTH[camera])
 
 
 def test_a_light_beside_the_earth_is_dropped_from_its_limb(
-    opened: Callable[..., Any], scene: EarthSunScene
+    ready: Open, scene: EarthSunScene
 ) -> None:
     """A disc on a sample of a scanned row: two edges more, which the fit leaves out."""
     (sample,) = LENSES[Target.NADIR].unproject([(511, 79)])
     light = Reflection(Target.NADIR, *angles_from_vector(sample), radius_px=9.0, level=200.0)
-    with opened(replace(scene, reflections=(light,))) as session:
-        session.client.client.pause(0.3)
-        found = session.client.capture_and_detect(Camera.NADIR)
-        edges = session.client.edges()
-        used = int(session.client.details(Camera.NADIR)["Points"])
+    with ready(replace(scene, reflections=(light,))) as opened:
+        found = opened.client.capture_and_detect(Camera.NADIR)
+        edges = opened.client.edges()
+        used = int(opened.client.details(Camera.NADIR)["Points"])
     check(found, NADIR_DEG)
     assert used == len(edges) - 2
 
@@ -78,12 +76,8 @@ def test_a_light_beside_the_earth_is_dropped_from_its_limb(
     ],
 )
 def test_the_first_bright_light_of_the_picture_is_the_sun(
-    opened: Callable[..., Any],
-    scene: EarthSunScene,
-    beta: float,
-    level: float,
-    expected: tuple[float, float],
+    ready: Open, scene: EarthSunScene, beta: float, level: float, expected: tuple[float, float]
 ) -> None:
     light = Reflection(Target.SUN, 0.0, beta, radius_px=5.0, level=level)
-    found = measure(opened, replace(scene, reflections=(light,)), Camera.SUN)
+    found = measure(ready, replace(scene, reflections=(light,)), Camera.SUN)
     check(found, expected)

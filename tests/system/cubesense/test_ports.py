@@ -19,23 +19,21 @@ from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
-from tests.system.conftest import COMMAND, Served
+from tests.system.conftest import Emulate, Open
 
 from .conftest import NADIR_DEG, SUN_DEG
 
 
 @pytest.fixture
-def served(tmp_path: Path) -> Iterator[Path]:
+def served(emulate: Emulate, tmp_path: Path) -> Iterator[Path]:
     """An emulator process of its own; the path of its node port."""
     scene = tmp_path / "scene.toml"
     scene.write_text(
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
     )
-    port = tmp_path / "ttyCUBESENSE"
-    command = [*COMMAND, "emulate", "cubesense", "--scene", "scene.toml", "--pty", "ttyCUBESENSE"]
-    emulator = Served([*command, "--pace", "fast"], tmp_path)
-    yield port
-    assert emulator.end() == 0
+    with emulate("--scene", "scene.toml", "--pty", "ttyCUBESENSE", "--pace", "fast") as emulator:
+        yield tmp_path / "ttyCUBESENSE"
+    assert emulator.process.returncode == 0
 
 
 def test_the_bench_client_of_the_document_gets_the_nadir_picture(
@@ -87,20 +85,18 @@ def test_examples_of_escapes_are_answered(served: Path) -> None:
 
 
 def test_pictures_over_the_bench_are_what_the_camera_sent(
-    opened: Callable[..., Any], scene: EarthSunScene, sent: Callable[..., Any]
+    ready: Open, scene: EarthSunScene, sent: Callable[..., Any]
 ) -> None:
-    with opened(scene) as session:
-        session.client.client.pause(0.3)
-        bench = ServicePortClient(session.board.serial("bench_uart"))
+    with ready(scene) as opened:
+        bench = ServicePortClient(opened.board.serial("bench_uart"))
         for camera in Camera:
             bench.take(camera)
-            np.testing.assert_array_equal(bench.download(camera), sent(session, camera))
+            np.testing.assert_array_equal(bench.download(camera), sent(opened, camera))
 
 
-def test_both_i2c_protocols_measure(opened: Callable[..., Any], scene: EarthSunScene) -> None:
-    with opened(scene) as session:
-        bus = session.board.i2c()
-        bus.wait(0.3)
+def test_both_i2c_protocols_measure(ready: Open, scene: EarthSunScene) -> None:
+    with ready(scene) as opened:
+        bus = opened.board.i2c()
         node = CubeSense(I2cClient(bus, INTERFACE, wait=bus.wait))
         assert node.capture_and_detect(Camera.SUN).detected
         registers = RegisterClient(bus, REGISTERS, wait=bus.wait)
@@ -116,30 +112,26 @@ def test_both_i2c_protocols_measure(opened: Callable[..., Any], scene: EarthSunS
 
 
 def test_image_register_streams_the_picture(
-    opened: Callable[..., Any], scene: EarthSunScene, sent: Callable[..., Any]
+    ready: Open, scene: EarthSunScene, sent: Callable[..., Any]
 ) -> None:
-    with opened(scene) as session:
-        bus = session.board.i2c()
-        bus.wait(0.3)
+    with ready(scene) as opened:
+        bus = opened.board.i2c()
         registers = RegisterClient(bus, REGISTERS, wait=bus.wait)
         registers.write("CAPTURE", "NADIR_SRAM2")
         bus.wait(0.2)
         registers.write("IMAGE_SRAM", "SRAM2")
         head = i2c_msg.read(0x1C, 4 * 640)
         bus.i2c_rdwr(i2c_msg.write(0x1C, [REGISTERS["IMAGE"].address]), head)
-        expected = sent(session, Camera.NADIR)[:4].reshape(-1)
+        expected = sent(opened, Camera.NADIR)[:4].reshape(-1)
         np.testing.assert_array_equal(np.frombuffer(bytes(head), np.uint8), expected)
 
 
-def test_reading_a_result_schedules_the_next_one(
-    opened: Callable[..., Any], scene: EarthSunScene
-) -> None:
-    with opened(scene) as session:
-        cubesense = session.client
-        cubesense.client.pause(0.3)
+def test_reading_a_result_schedules_the_next_one(ready: Open, scene: EarthSunScene) -> None:
+    with ready(scene) as opened:
+        cubesense = opened.client
         cubesense.result_then_schedule(Camera.NADIR)
         for turned in (0.0, 5.0, 10.0):
-            session.board.scene = EarthSunScene.facing(nadir_deg=(turned, 0.0))
+            opened.board.scene = EarthSunScene.facing(nadir_deg=(turned, 0.0))
             cubesense.result_then_schedule(Camera.NADIR)
             cubesense.client.pause(1.0)
             found = cubesense.result(Camera.NADIR)

@@ -24,18 +24,18 @@ def lines(board):
 
 
 @pytest.fixture
-def recorded(opened, scene, tmp_path) -> Recording:
+def recorded(session, scene, tmp_path) -> Recording:
     """A measurement, a picture over the bench, telemetry and registers over I2C."""
     path = tmp_path / "a.rec"
     with (
-        opened(scene, seed=1) as session,
+        session(scene, seed=1) as opened,
         path.open("w") as stream,
-        Recorder(stream, "cubesense", lines(session.board)) as recorder,
+        Recorder(stream, "cubesense", lines(opened.board)) as recorder,
     ):
-        board = session.board
+        board = opened.board
         recorder.listen(board.i2c_bus)
-        session.client.capture_and_detect(Camera.SUN)
-        session.client.client.telemetry("Configuration")
+        opened.client.capture_and_detect(Camera.SUN)
+        opened.client.client.telemetry("Configuration")
         ServicePortClient(board.serial("bench_uart")).take(Camera.NADIR)
         bus = board.i2c()
         I2cClient(bus, INTERFACE, wait=bus.wait).telemetry("Power")
@@ -43,17 +43,17 @@ def recorded(opened, scene, tmp_path) -> Recording:
     return load_recording(path)
 
 
-def replay(recording: Recording, opened, scene, seed: int = 1) -> list[str]:
-    with opened(scene, seed=seed) as session:
-        board = session.board
+def replay(recording: Recording, session, scene, seed: int = 1) -> list[str]:
+    with session(scene, seed=seed) as opened:
+        board = opened.board
         return Replay(recording, board.kernel, lines(board), board.i2c_bus).run(INTERFACE)
 
 
-def test_same_version_says_the_same(recorded, opened, scene):
-    assert replay(recorded, opened, scene) == []
+def test_same_version_says_the_same(recorded, session, scene):
+    assert replay(recorded, session, scene) == []
 
 
-def test_changed_default_is_named(recorded, opened, scene, monkeypatch):
+def test_changed_default_is_named(recorded, session, scene, monkeypatch):
     reset = CameraSettings.at_reset
 
     def changed(camera: Camera) -> CameraSettings:
@@ -62,7 +62,7 @@ def test_changed_default_is_named(recorded, opened, scene, monkeypatch):
         return settings
 
     monkeypatch.setattr(CameraSettings, "at_reset", changed)
-    differences = replay(recorded, opened, scene)
+    differences = replay(recorded, session, scene)
     assert len(differences) == 1
     assert "telemetry Configuration, field BlueGain1: 0x81, recorded 0x80" in differences[0]
 
@@ -75,14 +75,14 @@ def test_host_programs_run_on_the_recording(recorded):
     assert 0 < power["Current5V"] < 200
 
 
-def test_trace_shows_the_measurement(opened, scene):
+def test_trace_shows_the_measurement(session, scene):
     stream = io.StringIO()
-    with opened(scene, seed=1) as session:
-        board = session.board
+    with session(scene, seed=1) as opened:
+        board = opened.board
         trace = VcdTrace(
             stream, "cubesense", board.kernel, lines(board), board.engine, board.probes
         )
-        session.client.capture_and_detect(Camera.SUN)
+        opened.client.capture_and_detect(Camera.SUN)
         trace.close()
     text = stream.getvalue()
     assert "sPENDING " in text
@@ -91,13 +91,13 @@ def test_trace_shows_the_measurement(opened, scene):
         assert f" {name} $end" in text
 
 
-def test_recording_does_not_change_the_run(recorded, opened, scene, tmp_path):
+def test_recording_does_not_change_the_run(recorded, session, scene, tmp_path):
     path = tmp_path / "b.rec"
-    with opened(scene, seed=1) as session:
+    with session(scene, seed=1) as opened:
         stream = io.StringIO()
-        trace = VcdTrace(stream, "x", session.board.kernel, lines(session.board))
-        with path.open("w") as file, Recorder(file, "cubesense", lines(session.board)):
-            session.client.capture_and_detect(Camera.SUN)
+        trace = VcdTrace(stream, "x", opened.board.kernel, lines(opened.board))
+        with path.open("w") as file, Recorder(file, "cubesense", lines(opened.board)):
+            opened.client.capture_and_detect(Camera.SUN)
         trace.close()
     again = load_recording(path)
     assert (

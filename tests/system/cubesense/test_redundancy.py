@@ -4,7 +4,7 @@ CubeSense thesis, section 3.3 and figures 3.10 and 3.11: one memory failed; one 
 opposite memory failed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.clients.cubesense.download import download_image, picture_of
 from cubestack.host.devices.emulated import AnyEmulated
+from tests.system.conftest import Open
 
 from .conftest import NADIR_DEG, SUN_DEG
 
@@ -37,66 +38,65 @@ def check(measured: Measurement, capture: CaptureResult) -> None:
 
 
 @pytest.fixture
-def session(opened: Callable[..., Any], scene: EarthSunScene) -> Any:
-    with opened(scene, seed=2) as made:
-        made.client.client.pause(0.3)
+def opened(ready: Open, scene: EarthSunScene) -> Iterator[AnyEmulated]:
+    with ready(scene, seed=2) as made:
         yield made
 
 
-def latch_up(session: AnyEmulated, memory: Sram) -> None:
+def latch_up(opened: AnyEmulated, memory: Sram) -> None:
     """For good."""
-    session.board.faults.inject("latch-up", target=memory.name, lasting=True)
+    opened.board.faults.inject("latch-up", target=memory.name, lasting=True)
 
 
 @pytest.mark.parametrize("failed", Sram)
 def test_with_one_memory_failed_both_cameras_measure_in_the_other(
-    session: AnyEmulated, failed: Sram
+    opened: AnyEmulated, failed: Sram
 ) -> None:
-    latch_up(session, failed)
-    session.client.client.pause(0.1)
-    assert session.client.power().over_current[failed]
+    latch_up(opened, failed)
+    opened.client.client.pause(0.1)
+    assert opened.client.power().over_current[failed]
     good = Sram(1 - failed)
     for camera in Camera:
         own = Sram(camera) is good
         check(
-            session.client.capture_and_detect(camera, good),
+            opened.client.capture_and_detect(camera, good),
             CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM,
         )
-        lost = session.client.capture_and_detect(camera, failed)
+        lost = opened.client.capture_and_detect(camera, failed)
         assert lost.capture is CaptureResult.SRAM_OVER_CURRENT
         assert lost.detect is DetectResult.NONE_SCHEDULED
 
 
 @pytest.mark.parametrize("dead", Camera)
 def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
-    session: AnyEmulated, dead: Camera
+    opened: AnyEmulated, dead: Camera
 ) -> None:
     """The dead camera gives no clock, yet its half's memory is written and read."""
     alive = Camera(1 - dead)
-    session.board.faults.inject("camera-dead", target=HALVES[dead])
-    latch_up(session, Sram(alive))
-    session.client.client.pause(0.1)
-    check(session.client.capture_and_detect(alive, Sram(dead)), CaptureResult.STORED_OTHER_SRAM)
-    gone = session.client.capture_and_detect(dead, Sram(dead))
+    opened.board.faults.inject("camera-dead", target=HALVES[dead])
+    latch_up(opened, Sram(alive))
+    opened.client.client.pause(0.1)
+    check(opened.client.capture_and_detect(alive, Sram(dead)), CaptureResult.STORED_OTHER_SRAM)
+    gone = opened.client.capture_and_detect(dead, Sram(dead))
     assert gone.capture is CaptureResult.CAMERA_TIMEOUT
     assert gone.detect is DetectResult.NONE_SCHEDULED
 
 
 @pytest.mark.parametrize("camera", Camera)
 def test_picture_in_the_other_memory_is_what_the_camera_sent(
-    session: AnyEmulated, memory: Callable[..., Any], sent: Callable[..., Any], camera: Camera
+    opened: AnyEmulated, memory: Callable[..., Any], sent: Callable[..., Any], camera: Camera
 ) -> None:
     other = Sram(1 - camera)
-    session.client.capture(camera, other)
-    stored = memory(session, Camera(other))
-    np.testing.assert_array_equal(stored, sent(session, camera))
-    seen = picture_of(download_image(session.client.client, other, ImageSize.SIDE_128))
+    opened.client.capture(camera, other)
+    stored = memory(opened, Camera(other))
+    np.testing.assert_array_equal(stored, sent(opened, camera))
+    seen = picture_of(download_image(opened.client.client, other, ImageSize.SIDE_128))
     np.testing.assert_array_equal(seen, stored[::8, ::8])
 
 
-def test_latch_up_is_cut_off_and_cleared_by_command(session: AnyEmulated) -> None:
-    cubesense = session.client
-    session.board.power.latch_up("SRAM1")
+def test_latch_up_is_cut_off_and_cleared_by_command(opened: AnyEmulated) -> None:
+    cubesense = opened.client
+    opened.board.power.latch_up("SRAM1")
     cubesense.client.pause(0.05)
     power = cubesense.power()
     assert power.over_current == (True, False)
@@ -109,10 +109,10 @@ def test_latch_up_is_cut_off_and_cleared_by_command(session: AnyEmulated) -> Non
     check(cubesense.capture_and_detect(Camera.SUN), CaptureResult.STORED_OWN_SRAM)
 
 
-def test_memory_that_stays_latched_is_cut_off_again(session: AnyEmulated) -> None:
-    latch_up(session, Sram.SRAM2)
+def test_memory_that_stays_latched_is_cut_off_again(opened: AnyEmulated) -> None:
+    latch_up(opened, Sram.SRAM2)
     for _ in range(3):
-        session.client.client.pause(0.1)
-        assert session.client.power().over_current == (False, True)
-        assert session.board.power.current_ma("SRAM2") == 0
-        session.client.clear_over_current(SramSelection.BOTH)
+        opened.client.client.pause(0.1)
+        assert opened.client.power().over_current == (False, True)
+        assert opened.board.power.current_ma("SRAM2") == 0
+        opened.client.clear_over_current(SramSelection.BOTH)

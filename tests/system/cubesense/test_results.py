@@ -1,8 +1,5 @@
 """Every result code, each from a scene or a fault that causes it, read over the serial line."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -16,107 +13,96 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     DetectResult,
     Sram,
 )
+from tests.system.conftest import Open
 
 NOON = EarthSunScene()
 START_UP = (CaptureResult.START_UP, DetectResult.START_UP)
 
 
-def detect(
-    opened: Callable[..., Any], scene: EarthSunScene | EarthSunView, camera: Camera
-) -> DetectResult:
-    with opened(scene) as session:
-        session.client.client.pause(0.3)
-        return session.client.capture_and_detect(camera).detect
+def detect(ready: Open, scene: EarthSunScene | EarthSunView, camera: Camera) -> DetectResult:
+    with ready(scene) as opened:
+        return opened.client.capture_and_detect(camera).detect
 
 
-def test_before_the_first_measurement(opened: Callable[..., Any]) -> None:
-    with opened(NOON) as session:
-        session.client.client.pause(0.3)
+def test_before_the_first_measurement(ready: Open) -> None:
+    with ready(NOON) as opened:
         for camera in Camera:
-            found = session.client.result(camera)
+            found = opened.client.result(camera)
             assert (found.capture, found.detect) == START_UP
 
 
-def test_pending_from_the_acknowledge_on(opened: Callable[..., Any]) -> None:
-    with opened(NOON) as session:
-        cubesense = session.client
-        cubesense.client.pause(0.3)
+def test_pending_from_the_acknowledge_on(ready: Open) -> None:
+    with ready(NOON) as opened:
+        cubesense = opened.client
         cubesense.client.command("CaptureAndDetect", Camera=Camera.SUN, Sram=Sram.SRAM1)
         found = cubesense.result(Camera.SUN)
         assert (found.capture, found.detect) == (CaptureResult.PENDING, DetectResult.PENDING)
         assert cubesense.wait_measured(Camera.SUN).detected
 
 
-def test_captured_only(opened: Callable[..., Any]) -> None:
-    with opened(NOON) as session:
-        session.client.client.pause(0.3)
-        assert session.client.capture(Camera.NADIR) is CaptureResult.STORED_OWN_SRAM
-        assert session.client.result(Camera.NADIR).detect is DetectResult.NONE_SCHEDULED
+def test_captured_only(ready: Open) -> None:
+    with ready(NOON) as opened:
+        assert opened.client.capture(Camera.NADIR) is CaptureResult.STORED_OWN_SRAM
+        assert opened.client.result(Camera.NADIR).detect is DetectResult.NONE_SCHEDULED
 
 
-def test_no_earth_in_view_is_too_few_edges(opened: Callable[..., Any]) -> None:
-    scene = EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0))
-    assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_FEW_EDGES
-
-
-def test_night_side_is_too_few_edges(opened: Callable[..., Any]) -> None:
-    scene = EarthSunScene(sun=(0, 0, 1), glow_km=0)
-    assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_FEW_EDGES
-
-
-def test_many_lights_are_too_many_edges(opened: Callable[..., Any]) -> None:
+def many_lights() -> EarthSunScene:
     """Discs around every other sample of rows and columns, four edges each."""
     lens = LENSES[Target.NADIR]
     samples = [(x, y) for x in (191, 319, 447) for y in (79, 207, 335)]
     samples += [(x, y) for x in (255, 383, 511) for y in (143, 271, 399)]
     samples = [(x, y) for x, y in samples if np.hypot(x - lens.cx, y - lens.cy) < 200]
-    lights = []
-    for vector in lens.unproject(samples):
-        alpha, beta = angles_from_vector(vector)
-        lights.append(Reflection(Target.NADIR, alpha, beta, radius_px=18.0, level=200.0))
-    scene = EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(lights))
-    assert detect(opened, scene, Camera.NADIR) is DetectResult.TOO_MANY_EDGES
+    lights = (
+        Reflection(Target.NADIR, *angles_from_vector(vector), radius_px=18.0, level=200.0)
+        for vector in lens.unproject(samples)
+    )
+    return EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(lights))
 
 
-def test_terminator_is_a_bad_fit(opened: Callable[..., Any]) -> None:
-    scene = EarthSunScene(sun=(1, 0, -0.3))
-    assert detect(opened, scene, Camera.NADIR) is DetectResult.BAD_FIT
+UNDETECTED = {
+    "no Earth in view": (
+        EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0)),
+        DetectResult.TOO_FEW_EDGES,
+    ),
+    "night side": (EarthSunScene(sun=(0, 0, 1), glow_km=0), DetectResult.TOO_FEW_EDGES),
+    "many lights": (many_lights(), DetectResult.TOO_MANY_EDGES),
+    "terminator": (EarthSunScene(sun=(1, 0, -0.3)), DetectResult.BAD_FIT),
+    "Sun behind": (EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1)), DetectResult.SUN_NOT_FOUND),
+    "Sun beside": (EarthSunScene(nadir=(1, 0, 0), sun=(0.3, 0, 1)), DetectResult.SUN_NOT_FOUND),
+}
 
 
-@pytest.mark.parametrize("sun", [(0, 0, 1), (0.3, 0, 1)])
-def test_sun_behind_the_camera_is_not_found(
-    opened: Callable[..., Any], sun: tuple[float, float, float]
-) -> None:
-    scene = EarthSunScene(nadir=(1, 0, 0), sun=sun)
-    assert detect(opened, scene, Camera.SUN) is DetectResult.SUN_NOT_FOUND
+@pytest.mark.parametrize("name", UNDETECTED)
+def test_nothing_to_detect(ready: Open, name: str) -> None:
+    scene, expected = UNDETECTED[name]
+    camera = Camera.SUN if expected is DetectResult.SUN_NOT_FOUND else Camera.NADIR
+    assert detect(ready, scene, camera) is expected
 
 
-def test_hot_pixels_are_no_sun(opened: Callable[..., Any]) -> None:
+def test_hot_pixels_are_no_sun(ready: Open) -> None:
     dark = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
     many, few = (FisheyeCondition(hot_pixels=n, hot_pairs=m) for n, m in ((50, 20), (20, 5)))
-    assert detect(opened, EarthSunView(dark, many), Camera.SUN) is DetectResult.SUN_NOT_FOUND
-    assert detect(opened, EarthSunView(NOON, few), Camera.SUN) is DetectResult.SUCCESS
+    assert detect(ready, EarthSunView(dark, many), Camera.SUN) is DetectResult.SUN_NOT_FOUND
+    assert detect(ready, EarthSunView(NOON, few), Camera.SUN) is DetectResult.SUCCESS
 
 
-def test_dead_camera_times_out_and_the_node_goes_on(opened: Callable[..., Any]) -> None:
-    with opened(NOON) as session:
-        session.client.client.pause(0.3)
-        session.board.faults.inject("camera-dead", target="sun")
-        found = session.client.capture_and_detect(Camera.SUN)
+def test_dead_camera_times_out_and_the_node_goes_on(ready: Open) -> None:
+    with ready(NOON) as opened:
+        opened.board.faults.inject("camera-dead", target="sun")
+        found = opened.client.capture_and_detect(Camera.SUN)
         assert found.capture is CaptureResult.CAMERA_TIMEOUT
         assert found.detect is DetectResult.NONE_SCHEDULED
-        assert session.client.capture_and_detect(Camera.NADIR).detected
+        assert opened.client.capture_and_detect(Camera.NADIR).detected
 
 
 @pytest.mark.parametrize("after_ms", [5, 45, 100])
-def test_latch_up_during_a_measurement(opened: Callable[..., Any], after_ms: float) -> None:
+def test_latch_up_during_a_measurement(ready: Open, after_ms: float) -> None:
     """While the picture is awaited or stored, and while lines are searched."""
-    with opened(NOON) as session:
-        cubesense = session.client
-        cubesense.client.pause(0.3)
+    with ready(NOON) as opened:
+        cubesense = opened.client
         cubesense.client.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)
         cubesense.client.pause(after_ms / 1000)
-        session.board.power.latch_up("SRAM2")
+        opened.board.power.latch_up("SRAM2")
         found = cubesense.wait_measured(Camera.NADIR)
         assert found.capture is CaptureResult.SRAM_OVER_CURRENT
         assert not found.detected

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 from smbus2 import i2c_msg
 
-from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injection import Injection
@@ -15,14 +14,10 @@ from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.host.clients.aramis.client import Aramis
-from cubestack.host.clients.cubesense.client import CubeSense
-from cubestack.host.clients.cubesense.service_port import ServicePortClient
-from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.devices.emulated import AnyEmulated, power_up
+from cubestack.host.devices.registry import device
 
 SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
 ORION_DEG = (84.0, -1.0)
@@ -100,12 +95,12 @@ class Bench:
         faults: the board's.
     """
 
-    def __init__(self, name: str, board: Any, kind: type[Any], client: NodeClient) -> None:
-        self.name = name
-        self.board = board
-        self.faults = board.faults
-        self.interface = client.interface
-        self.device: Any = kind(client)
+    def __init__(self, opened: AnyEmulated) -> None:
+        self.name = opened.device.name
+        self.board: Any = opened.board
+        self.faults = opened.faults
+        self.interface = opened.device.interface
+        self.device: Any = opened.client
 
     @property
     def client(self) -> NodeClient:
@@ -181,35 +176,25 @@ class Bench:
         return {flag for flag, up in values.items() if up and not flag.endswith("Count")} - ALWAYS
 
 
-@contextmanager
-def cubestar(scene: SkyScene | None = None) -> Iterator[Bench]:
-    """A CubeStar that looks at Orion."""
-    with open_device("cubestar", scene or SkyScene.pointing(*ORION_DEG), seed=4) as session:
-        yield Bench("cubestar", session.board, CubeStar, session.client.client)
-
-
-@contextmanager
-def cubesense(scene: EarthSunScene | None = None) -> Iterator[Bench]:
-    """A CubeSense that sees Sun and Earth."""
-    seen = scene or EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
-    with open_device("cubesense", seen, seed=4) as session:
-        bench = Bench("cubesense", session.board, CubeSense, session.client.client)
-        bench.bench_client = ServicePortClient(session.board.serial("bench_uart"))
-        yield bench
-
-
 @lru_cache(maxsize=1)
 def small_catalogue() -> Database:
     """Stars and triangles of which the test's sky has enough."""
     return build_database(CatalogueParameters(step_deg=10, stars_per_field=5))
 
 
+SCENES = {
+    "cubestar": SkyScene.pointing(*ORION_DEG),
+    "cubesense": EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG),
+    "aramis": SkyScene.pointing(*ORION_DEG, 20.0),
+}
+
+
 @contextmanager
-def aramis() -> Iterator[Bench]:
-    """An AraMiS star tracker that looks at Orion."""
-    scene = SkyScene.pointing(*ORION_DEG, 20.0)
-    board = AramisBoard(scene, small_catalogue(), seed=4)
-    yield Bench("aramis", board, Aramis, NodeClient(board.serial(), ARAMIS))
+def powered(name: str) -> Iterator[Bench]:
+    """A device that sees what it is made for."""
+    own = {"catalogue": small_catalogue()} if name == "aramis" else {}
+    with power_up(device(name), SCENES[name], seed=4, **own) as opened:
+        yield Bench(opened)
 
 
-BENCHES = {"cubestar": cubestar, "cubesense": cubesense, "aramis": aramis}
+BENCHES = {name: partial(powered, name) for name in SCENES}

@@ -11,7 +11,10 @@ from contextlib import AbstractContextManager
 import numpy as np
 import pytest
 
-from .bench import BENCHES, Bench
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+
+from .bench import BENCHES, NADIR_DEG, Bench
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -53,7 +56,18 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     yield from _powered(request, BENCHES[request.param])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
+def quiet(sense: Bench) -> Bench:
+    """A sensor without noise, so that all pictures of the nadir camera are the same."""
+    still = EarthSunScene.facing(nadir_deg=NADIR_DEG)
+    sense.board.scene = EarthSunView(still, FisheyeCondition(noise=False))
+    from .cubesense_bench import check_right, measure
+
+    check_right(measure(sense))
+    return sense
+
+
+@pytest.fixture(scope="session")
 def good() -> np.ndarray:
     """CubeStar's picture without faults, (512, 1024)."""
     from .cubestar_bench import stored

@@ -10,6 +10,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import (
     FRAME_BYTES,
     Camera,
+    CaptureResult,
     DetectResult,
     ImageLocation,
     ImageSize,
@@ -19,6 +20,8 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.host.clients.cubesense.client import Measurement
 
 from .bench import NADIR_DEG, SUN_DEG, Bench
+
+FAILED = (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
 
 TRUTH_DEG = {Camera.SUN: SUN_DEG, Camera.NADIR: NADIR_DEG}
 TARGETS = {Camera.SUN: "sun", Camera.NADIR: "nadir"}

@@ -8,6 +8,10 @@ from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize
 
 from .bench import Bench
 
+FAILED = ("CAPTURE_FAILED", {"ImageCaptureError"})
+GOOD = ("CALCULATED", set[str]())
+"""Of a capture: how far it and its processing came, and the flags."""
+
 ROWS, COLUMNS = 512, 1024
 STORING_S, READING_S = 0.42, 0.6
 """Within the first capture after power-up, which stores one frame."""

@@ -20,6 +20,12 @@ def current_ma(bench: Bench) -> float:
     return float(bench.telemetry("SupplyStatus")["Current"])
 
 
+def switch(bench: Bench, step: LatchUpStep) -> None:
+    """Switch the camera unit."""
+    bench.client.command("LatchUpAction", Step=step)
+    bench.client.wait_processed(1)
+
+
 @pytest.fixture
 def active(tracker: Bench) -> Bench:
     assert tracker.device.activate() is CatalogueState.GOOD
@@ -127,12 +133,10 @@ def test_a_latched_camera_draws_on_until_the_host_acts(active: Bench) -> None:
     assert current_ma(active) == pytest.approx(usual_ma + LATCHED_MA, abs=1)
     check_right(active)
     assert active.flags() == set()  # whoever watches the current decides
-    active.client.command("LatchUpAction", Step=LatchUpStep.OFF)
-    active.client.wait_processed(1)
+    switch(active, LatchUpStep.OFF)
     assert current_ma(active) == 0
     assert active.device.measure().reason is Reason.CAMERA_OFF
-    active.client.command("LatchUpAction", Step=LatchUpStep.ON)
-    active.client.wait_processed(1)
+    switch(active, LatchUpStep.ON)
     assert current_ma(active) == pytest.approx(usual_ma, abs=1)
     check_right(active)
 
@@ -142,8 +146,7 @@ def test_a_lasting_latch_up_comes_back_with_each_switching_on(active: Bench) -> 
     usual_ma = current_ma(active)
     active.inject("latch-up", lasting=True, extra_ma=LATCHED_MA)
     for step in (LatchUpStep.OFF, LatchUpStep.ON):
-        active.client.command("LatchUpAction", Step=step)
-        active.client.wait_processed(1)
+        switch(active, step)
     assert current_ma(active) == pytest.approx(usual_ma + LATCHED_MA, abs=1)
 
 

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
@@ -14,6 +12,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 
 from .bench import NADIR_DEG, Bench
 from .cubesense_bench import (
+    FAILED,
     TARGETS,
     check_next,
     check_right,
@@ -23,17 +22,7 @@ from .cubesense_bench import (
     picture,
 )
 
-FAILED = (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
 X, Y = 20, 100
-
-
-@pytest.fixture
-def quiet(sense: Bench) -> Bench:
-    """A sensor without noise, so that all pictures of the nadir camera are the same."""
-    still = EarthSunScene.facing(nadir_deg=NADIR_DEG)
-    sense.board.scene = EarthSunView(still, FisheyeCondition(noise=False))
-    check_right(measure(sense))
-    return sense
 
 
 @pytest.mark.parametrize(("kind", "moved"), [("clock-lost", 1), ("clock-extra", -1)])

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
@@ -17,7 +15,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.errors import NoAnswerError
 
-from .bench import NADIR_DEG, Bench
+from .bench import Bench
 from .cubesense_bench import (
     await_frame,
     check_next,
@@ -41,15 +39,6 @@ MONITOR_MA = 200.0
 """The current monitors' full scale."""
 
 CUT = (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
-
-
-@pytest.fixture
-def quiet(sense: Bench) -> Bench:
-    """A sensor without noise, so that all pictures of the nadir camera are the same."""
-    still = EarthSunScene.facing(nadir_deg=NADIR_DEG)
-    sense.board.scene = EarthSunView(still, FisheyeCondition(noise=False))
-    check_right(measure(sense))
-    return sense
 
 
 @pytest.mark.fault("memory-flip")

@@ -10,6 +10,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureRe
 
 from .bench import SUN_DEG, Bench
 from .cubesense_bench import (
+    FAILED,
     await_frame,
     check_next,
     check_right,
@@ -28,8 +29,6 @@ SEARCHING_S = {Camera.SUN: 0.0005, Camera.NADIR: 0.05}
 """From the command on: the middle of the edge data."""
 
 OTHER_DEG = (5.0, 5.0)
-
-FAILED = (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE
 
 from .bench import Bench
 from .cubestar_bench import (
+    GOOD,
     ONE_FRAME_MS,
     READING_S,
     STORING_S,
@@ -18,7 +19,6 @@ from .cubestar_bench import (
     transferred,
 )
 
-GOOD = ("CALCULATED", set[str]())
 ADDRESS = 70_000
 STORED_S = 0.47
 """Between the FPGA's last write and the processor's first read of the first capture."""

@@ -16,7 +16,12 @@ from .bench import BENCHES
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parents[2] / "docs" / "faults.md"
 
-FIXTURES = {"star": ("cubestar",), "sense": ("cubesense",), "tracker": ("aramis",)}
+FIXTURES = {
+    "star": ("cubestar",),
+    "sense": ("cubesense",),
+    "quiet": ("cubesense",),
+    "tracker": ("aramis",),
+}
 ANY = "bench"
 
 HEAD = ("kind", "CubeStar", "CubeSense", "AraMiS")

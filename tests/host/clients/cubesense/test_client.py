@@ -26,12 +26,9 @@ from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerE
 FOUND = {"Alpha": 12.34, "Beta": -5.67, "Capture": 2, "Detect": 7}
 
 
-@pytest.fixture(params=["sense_uart", "sense_i2c"])
-def cubesense(request: pytest.FixtureRequest) -> CubeSense:
-    link = request.getfixturevalue(request.param)
-    if request.param == "sense_uart":
-        return CubeSense(NodeClient(link, INTERFACE))
-    return CubeSense(I2cClient(link, INTERFACE, wait=link.waits.append))
+@pytest.fixture
+def cubesense(either_client: NodeClient | I2cClient) -> CubeSense:
+    return CubeSense(either_client)
 
 
 class Script:
@@ -97,12 +94,12 @@ def test_alpha_points_right_and_beta_down(alpha: float, beta: float, expected: l
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", [None, *Sram])
-def test_a_measurement(cubesense: CubeSense, sense: Any, camera: Camera, sram: Sram | None) -> None:
-    sense.outcomes[camera] = FOUND
-    sense.capturing, sense.detecting = 3, 5
+def test_a_measurement(cubesense: CubeSense, node: Any, camera: Camera, sram: Sram | None) -> None:
+    node.outcomes[camera] = FOUND
+    node.capturing, node.detecting = 3, 5
     found = cubesense.capture_and_detect(camera, sram)
     expected = camera.value if sram is None else sram.value
-    assert sense.log == [("CaptureAndDetect", {"Camera": camera, "Sram": expected})]
+    assert node.log == [("CaptureAndDetect", {"Camera": camera, "Sram": expected})]
     assert (found.camera, found.alpha_deg, found.beta_deg) == (camera, 12.34, -5.67)
     assert found.capture is CaptureResult.STORED_OWN_SRAM
     assert found.detected
@@ -110,61 +107,61 @@ def test_a_measurement(cubesense: CubeSense, sense: Any, camera: Camera, sram: S
 
 
 @pytest.mark.parametrize("detect", [3, 4, 5, 6])
-def test_a_failed_detection_is_a_result(cubesense: CubeSense, sense: Any, detect: int) -> None:
-    sense.outcomes[Camera.NADIR] = {"Capture": 3, "Detect": detect}
+def test_a_failed_detection_is_a_result(cubesense: CubeSense, node: Any, detect: int) -> None:
+    node.outcomes[Camera.NADIR] = {"Capture": 3, "Detect": detect}
     found = cubesense.capture_and_detect(Camera.NADIR, Sram.SRAM1)
     assert found.detect is DetectResult(detect)
     assert not found.detected
     assert found.capture.stored
 
 
-def test_a_capture_alone(cubesense: CubeSense, sense: Any) -> None:
-    sense.outcomes[Camera.SUN] = {"Capture": 4, "Detect": 1}
-    sense.capturing = 2
+def test_a_capture_alone(cubesense: CubeSense, node: Any) -> None:
+    node.outcomes[Camera.SUN] = {"Capture": 4, "Detect": 1}
+    node.capturing = 2
     assert cubesense.capture(Camera.SUN, Sram.SRAM2) is CaptureResult.CAMERA_TIMEOUT
-    assert sense.log == [("CaptureOnly", {"Camera": 0, "Sram": 1, "Location": 0})]
+    assert node.log == [("CaptureOnly", {"Camera": 0, "Sram": 1, "Location": 0})]
 
 
-def test_what_stays_pending_is_told(sense_uart: Any, sense: Any) -> None:
-    cubesense = CubeSense(NodeClient(sense_uart, INTERFACE))
-    sense.outcomes[Camera.SUN] = {"Capture": 1, "Detect": 2}
+def test_what_stays_pending_is_told(uart: Any, node: Any) -> None:
+    cubesense = CubeSense(NodeClient(uart, INTERFACE))
+    node.outcomes[Camera.SUN] = {"Capture": 1, "Detect": 2}
     with pytest.raises(NoAnswerError, match="capture of the SUN camera still pending after 1 s"):
         cubesense.capture_and_detect(Camera.SUN)
-    assert sense_uart.silences.count(0.04) == 25
-    sense_uart.silences.clear()
-    sense.outcomes[Camera.SUN] = {"Capture": 2, "Detect": 2}
+    assert uart.silences.count(0.04) == 25
+    uart.silences.clear()
+    node.outcomes[Camera.SUN] = {"Capture": 2, "Detect": 2}
     with pytest.raises(NoAnswerError, match="detection of the SUN camera still pending after 3 s"):
         cubesense.capture_and_detect(Camera.SUN)
-    assert sense_uart.silences.count(0.04) == 75
+    assert uart.silences.count(0.04) == 75
 
 
 @pytest.mark.parametrize("target", SCHEDULES.values())
 def test_a_result_schedules_the_next_measurement(
-    cubesense: CubeSense, sense: Any, target: tuple[Camera, Sram]
+    cubesense: CubeSense, node: Any, target: tuple[Camera, Sram]
 ) -> None:
     camera, sram = target
-    sense.outcomes[camera] = FOUND
+    node.outcomes[camera] = FOUND
     assert cubesense.result_then_schedule(camera, sram).capture is CaptureResult.START_UP
     assert cubesense.wait_measured(camera).alpha_deg == 12.34
-    [(name, _)] = sense.log
+    [(name, _)] = node.log
     assert name == f"Result{camera + 1}ThenSram{sram + 1}"
 
 
-def test_an_unknown_result_is_told(cubesense: CubeSense, sense: Any) -> None:
-    sense.outcomes[Camera.SUN] = {"Capture": 9}
+def test_an_unknown_result_is_told(cubesense: CubeSense, node: Any) -> None:
+    node.outcomes[Camera.SUN] = {"Capture": 9}
     with pytest.raises(BadAnswerError, match="telemetry Result1: 9 is not a valid CaptureResult"):
         cubesense.capture_and_detect(Camera.SUN)
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_settings_go_to_their_camera(cubesense: CubeSense, sense: Any, camera: Camera) -> None:
+def test_settings_go_to_their_camera(cubesense: CubeSense, node: Any, camera: Camera) -> None:
     number = camera + 1
     cubesense.set_threshold(camera, 99)
     cubesense.set_auto_adjust(camera, True)
     cubesense.set_camera(camera, CameraSettings(300, 4, 5, 6))
     cubesense.set_boresight(camera, 370.25, 240.5)
     settings = {"Exposure": 300, "Gain": 4, "BlueGain": 5, "RedGain": 6}
-    assert sense.log == [
+    assert node.log == [
         (f"DetectionThreshold{number}", {"Threshold": 99}),
         (f"AutoAdjust{number}", {"Enabled": 1}),
         (f"CameraSettings{number}", settings),
@@ -173,9 +170,9 @@ def test_settings_go_to_their_camera(cubesense: CubeSense, sense: Any, camera: C
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_settings_are_read_back(cubesense: CubeSense, sense: Any, camera: Camera) -> None:
+def test_settings_are_read_back(cubesense: CubeSense, node: Any, camera: Camera) -> None:
     number = camera + 1
-    sense.values["Configuration"] = {
+    node.values["Configuration"] = {
         f"Threshold{number}": 70,
         f"AutoAdjust{number}": 1,
         f"Exposure{number}": 0x1F1F,
@@ -189,10 +186,10 @@ def test_settings_are_read_back(cubesense: CubeSense, sense: Any, camera: Camera
     assert cubesense.threshold(Camera(1 - camera)) == 0
 
 
-def test_distortion(cubesense: CubeSense, sense: Any) -> None:
+def test_distortion(cubesense: CubeSense, node: Any) -> None:
     factors = [0.1, 0.99, -7.5e-5, 2.5e-6, 0.0]
     cubesense.set_distortion(Camera.NADIR, factors)
-    [(name, values)] = sense.log
+    [(name, values)] = node.log
     assert name == "Distortion2"
     sent = [coefficient(values[f"Mantissa{k}"], values[f"Exponent{k}"]) for k in range(5)]
     assert sent == pytest.approx(factors, rel=1.6e-4)
@@ -200,23 +197,23 @@ def test_distortion(cubesense: CubeSense, sense: Any) -> None:
         cubesense.set_distortion(Camera.SUN, factors[:4])
 
 
-def test_masks(cubesense: CubeSense, sense: Any) -> None:
+def test_masks(cubesense: CubeSense, node: Any) -> None:
     cubesense.set_mask(Camera.SUN, 3, Mask(10, 639, 20, 479))
     cubesense.set_mask(Camera.SUN, 3, None)
     limits = {"XMin": 10, "XMax": 639, "YMin": 20, "YMax": 479}
-    assert sense.log == [
+    assert node.log == [
         ("Mask1", {"Area": 3} | limits),
         ("Mask1", {"Area": 3} | dict.fromkeys(limits, 0)),
     ]
-    sense.values["Masks1"] = {"XMin2": 1, "XMax2": 2, "YMin2": 3, "YMax2": 4}
+    node.values["Masks1"] = {"XMin2": 1, "XMax2": 2, "YMin2": 3, "YMax2": 4}
     assert cubesense.masks(Camera.SUN) == [None, Mask(1, 2, 3, 4), None, None, None]
     for area in (0, 6):
         with pytest.raises(CommandRefusedError, match="Mask1 refused: BAD_PARAMETER"):
             cubesense.set_mask(Camera.SUN, area, None)
 
 
-def test_power(cubesense: CubeSense, sense: Any) -> None:
-    sense.values["Power"] = {
+def test_power(cubesense: CubeSense, node: Any) -> None:
+    node.values["Power"] = {
         "Current3V3": 12.1,
         "CurrentSram1": 7.3,
         "CurrentSram2": 9.4,
@@ -230,40 +227,40 @@ def test_power(cubesense: CubeSense, sense: Any) -> None:
     cubesense.clear_over_current(SramSelection.SRAM2)
     cubesense.clear_over_current()
     cubesense.reset(ResetTarget.CAMERAS)
-    assert sense.log == [
+    assert node.log == [
         ("ClearOverCurrent", {"Selection": 1}),
         ("ClearOverCurrent", {"Selection": 2}),
         ("Reset", {"Target": 2}),
     ]
 
 
-def test_who_it_is(cubesense: CubeSense, sense: Any) -> None:
-    sense.values["SerialNumber"] = {"SerialNumber": b"CS01\0\0"}
+def test_who_it_is(cubesense: CubeSense, node: Any) -> None:
+    node.values["SerialNumber"] = {"SerialNumber": b"CS01\0\0"}
     assert cubesense.serial_number() == "CS01"
-    sense.values["SerialNumber"] = {"SerialNumber": b"\xff" * 6}
+    node.values["SerialNumber"] = {"SerialNumber": b"\xff" * 6}
     with pytest.raises(BadAnswerError, match="SerialNumber: ffffffffffff is no ASCII text"):
         cubesense.serial_number()
-    sense.values["Identification"] = {"RuntimeSeconds": 7, "RuntimeMilliseconds": 250}
+    node.values["Identification"] = {"RuntimeSeconds": 7, "RuntimeMilliseconds": 250}
     assert cubesense.uptime_s() == 7.25
 
 
-def test_times_and_details(cubesense: CubeSense, sense: Any) -> None:
-    sense.values["PhaseTimes2"] = {"Store": 33_367, "Total": 245_000}
+def test_times_and_details(cubesense: CubeSense, node: Any) -> None:
+    node.values["PhaseTimes2"] = {"Store": 33_367, "Total": 245_000}
     times = cubesense.phase_times(Camera.NADIR)
     assert list(times) == ["wait", "store", "search", "centroid", "total"]
     assert (times["store"], times["total"]) == (33.367, 245.0)
-    sense.values["Details1"] = {"X": -1.25, "Points": 49}
+    node.values["Details1"] = {"X": -1.25, "Points": 49}
     details = cubesense.details(Camera.SUN)
     assert (details["X"], details["Points"]) == (-1.25, 49)
 
 
-def test_edges_are_columns_and_rows_from_both_frames(cubesense: CubeSense, sense: Any) -> None:
+def test_edges_are_columns_and_rows_from_both_frames(cubesense: CubeSense, node: Any) -> None:
     assert cubesense.edges().shape == (0, 2)
-    sense.values["NadirEdges1"] = {"Count": 21, "X1": 12.5, "Y1": 47.0, "X20": 3.25}
-    sense.values["NadirEdges2"] = {"Count": 21, "X21": 639.0, "Y21": 15.0, "X22": 1.0}
+    node.values["NadirEdges1"] = {"Count": 21, "X1": 12.5, "Y1": 47.0, "X20": 3.25}
+    node.values["NadirEdges2"] = {"Count": 21, "X21": 639.0, "Y21": 15.0, "X22": 1.0}
     edges = cubesense.edges()
     assert edges.shape == (21, 2)
     assert edges[[0, 19, 20]].tolist() == [[12.5, 47], [3.25, 0], [639, 15]]
-    sense.values["NadirEdges1"] = {"Count": 41}
+    node.values["NadirEdges1"] = {"Count": 41}
     with pytest.raises(BadAnswerError, match="41 edges, where 40 have room"):
         cubesense.edges()

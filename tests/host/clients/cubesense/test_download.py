@@ -11,82 +11,80 @@ from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerE
 
 
 @pytest.fixture
-def client(sense_uart: Any) -> NodeClient:
-    return NodeClient(sense_uart, INTERFACE)
+def client(uart: Any) -> NodeClient:
+    return NodeClient(uart, INTERFACE)
 
 
 @pytest.fixture(autouse=True)
-def pictures(sense: Any) -> None:
-    sense.pictures[:] = np.random.default_rng(9).integers(0, 256, sense.pictures.shape)
+def pictures(node: Any) -> None:
+    node.pictures[:] = np.random.default_rng(9).integers(0, 256, node.pictures.shape)
 
 
 @pytest.mark.parametrize("size", ImageSize)
 def test_every_size_gives_the_pixels_that_it_has(
-    client: NodeClient, sense: Any, size: ImageSize
+    client: NodeClient, node: Any, size: ImageSize
 ) -> None:
     seen: list[tuple[int, int]] = []
     square = download_image(client, Sram.SRAM2, size, lambda *done: seen.append(done))
     assert (square.shape, square.dtype) == ((size.side, size.side), np.uint8)
     step = 1024 // size.side
-    np.testing.assert_array_equal(picture_of(square), sense.pictures[1, ::step, ::step])
+    np.testing.assert_array_equal(picture_of(square), node.pictures[1, ::step, ::step])
     margins = square.copy()
     picture_of(margins)[:] = 0
     assert not margins.any()
     assert seen == [(number, size.frames) for number in range(1, size.frames + 1)]
-    assert len(sense.log) == size.frames
+    assert len(node.log) == size.frames
 
 
 def test_a_frame_is_polled_every_40_ms_for_at_most_2_s(
-    client: NodeClient, sense: Any, sense_uart: Any
+    client: NodeClient, node: Any, uart: Any
 ) -> None:
-    sense.preparing = 3
+    node.preparing = 3
     download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
-    assert sense_uart.silences.count(0.04) == 3 * 32
-    sense_uart.silences.clear()
-    sense.preparing = 49
+    assert uart.silences.count(0.04) == 3 * 32
+    uart.silences.clear()
+    node.preparing = 49
     download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
-    sense_uart.silences.clear()
-    sense.preparing = 50
+    uart.silences.clear()
+    node.preparing = 50
     with pytest.raises(NoAnswerError, match="image frame 0 not ready within 2 s"):
         download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
-    assert sense_uart.silences.count(0.04) == 50
+    assert uart.silences.count(0.04) == 50
 
 
-def test_a_damaged_frame_is_read_again(client: NodeClient, sense: Any) -> None:
-    sense.damaged = 2
+def test_a_damaged_frame_is_read_again(client: NodeClient, node: Any) -> None:
+    node.damaged = 2
     square = download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
-    np.testing.assert_array_equal(picture_of(square), sense.pictures[0, ::16, ::16])
-    sense.damaged = 3
+    np.testing.assert_array_equal(picture_of(square), node.pictures[0, ::16, ::16])
+    node.damaged = 3
     with pytest.raises(BadAnswerError, match=r"image frame 0: checksum 0x40, not 0x00, in 3 reads"):
         download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
 
 
 def test_a_lost_acknowledge_asks_for_the_frame_again(
-    client: NodeClient, sense: Any, sense_uart: Any
+    client: NodeClient, node: Any, uart: Any
 ) -> None:
     requests = iter(range(10_000))
 
     def lose_two(data: bytes) -> bytes:
         return b"" if next(requests) in (3, 4) else data  # of the second frame's acknowledge
 
-    sense_uart.mangle = lose_two
+    uart.mangle = lose_two
     square = download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
-    np.testing.assert_array_equal(picture_of(square), sense.pictures[0, ::16, ::16])
-    assert [values.get("Frame", 0) for _, values in sense.log] == [0, 1, 1, *range(1, 32)]
+    np.testing.assert_array_equal(picture_of(square), node.pictures[0, ::16, ::16])
+    assert [values.get("Frame", 0) for _, values in node.log] == [0, 1, 1, *range(1, 32)]
 
 
-def test_acknowledges_that_stay_away_are_told(
-    client: NodeClient, sense: Any, sense_uart: Any
-) -> None:
+def test_acknowledges_that_stay_away_are_told(client: NodeClient, node: Any, uart: Any) -> None:
     requests = iter(range(10_000))
-    sense_uart.mangle = lambda data: data if next(requests) < 3 else b""
+    uart.mangle = lambda data: data if next(requests) < 3 else b""
     with pytest.raises(NoAnswerError, match="no acknowledge of telecommand NextImageFrame"):
         download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
-    assert [name for name, _ in sense.log].count("NextImageFrame") == 3
+    assert [name for name, _ in node.log].count("NextImageFrame") == 3
 
 
-def test_a_refusal_is_not_repeated(client: NodeClient, sense: Any) -> None:
-    sense.refusals.append(4)
+def test_a_refusal_is_not_repeated(client: NodeClient, node: Any) -> None:
+    node.refusals.append(4)
     with pytest.raises(CommandRefusedError, match="StartImageDownload refused: BUFFER_FULL"):
         download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
 

@@ -13,12 +13,9 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
 
 
-@pytest.fixture(params=["uart", "i2c"])
-def cubestar(request: pytest.FixtureRequest) -> CubeStar:
-    link = request.getfixturevalue(request.param)
-    if request.param == "uart":
-        return CubeStar(NodeClient(link, INTERFACE))
-    return CubeStar(I2cClient(link, INTERFACE, wait=link.waits.append))
+@pytest.fixture
+def cubestar(either_client: NodeClient | I2cClient) -> CubeStar:
+    return CubeStar(either_client)
 
 
 @given(st.integers(0, 2**32 - 1))

@@ -1,0 +1,8 @@
+import pytest
+
+from ...conftest import FakeCubeSense
+
+
+@pytest.fixture
+def node() -> FakeCubeSense:
+    return FakeCubeSense()
