@@ -22,6 +22,7 @@ from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.emulated import AnyEmulated, open_device
+from tests.system.conftest import Ear
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
@@ -48,18 +49,15 @@ REFUSED = {"CubeStar": (), "CubeSense": (), "AraMiS": ("memory-stuck",)}
 UPSETS = {"memory-upsets": 1e-7, "register-upsets": 0.05}
 
 
-class Ear:
-    """Hears what a device sends on a line, and when to the picosecond."""
+class Hashed(Ear):
+    """Hears what a device sends on a line, and when to the picosecond; into a hash."""
 
     def __init__(self, trace: Any, uart: Any) -> None:
+        super().__init__(uart)
         self.trace = trace
-        uart.taps.append(self)
 
     def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         self.trace.update(b"%d %d " % (first_ps, byte_ps) + data)
-
-    def device_heard(self, byte: int, start_ps: int) -> None:
-        pass
 
     def framing_error(self, time_ps: int) -> None:
         self.trace.update(b"framing %d " % time_ps)
@@ -90,7 +88,7 @@ class Fuzzer:
         if interface.registers is not None:
             self.addresses.append(interface.registers.i2c_address)
         self.trace = hashlib.sha256()
-        self.ears = [Ear(self.trace, uart) for uart in uarts]
+        self.ears = [Hashed(self.trace, uart) for uart in uarts]
         self.events = 0
         self.board.faults.seed = seed
         self.kinds = [

@@ -158,17 +158,3 @@ def test_a_latch_up_is_cut_off_and_healed(looping: Any, channel: str, after_s: f
     (turn,) = run_loop(opened, scene, 1)
     assert turn.attitude.valid
     assert turn.cross < 0.01
-
-
-def test_a_latch_up_while_idle(session: Any) -> None:
-    with session(SkyScene.pointing(84, -1)) as opened:
-        client = opened.client.client
-        assert opened.client.capture_and_process().name == "CALCULATED"
-        opened.board.power.latch_up("imager")
-        client.pause(1.0)
-        assert client.telemetry("ErrorFlags")["OverCurrent"]
-        assert opened.client.capture_and_process().name == "CALCULATED"
-        attitude = opened.client.attitude()
-        cross, _ = attitude_error_deg(attitude.quaternion, opened.board.truth())
-        assert attitude.valid
-        assert cross < 0.01

@@ -5,14 +5,13 @@ Samples are seeded, and their limits leave room: of 40 frames with the expected 
 more are right in all but one of several thousand samples.
 """
 
-from collections.abc import Callable
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-Measure = Callable[..., list[dict[str, Any]]]
+from tests.system.conftest import Frames, Measure
 
 KEYS = {
     "solved",
@@ -34,15 +33,15 @@ PHASES = {"idle", "discard", "capture", "transfer", "detect", "match", "attitude
 SAMPLE = ("--frames", 40, "--mag-limit", 3.8)
 
 
-def percent_right(frames: list[dict[str, Any]]) -> float:
+def percent_right(frames: Frames) -> float:
     return 100 * sum(frame["right"] for frame in frames) / len(frames)
 
 
-def wrong_attitudes(frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def wrong_attitudes(frames: Frames) -> Frames:
     return [frame for frame in frames if frame["solved"] and not frame["right"]]
 
 
-def p95(frames: list[dict[str, Any]], key: str) -> float:
+def p95(frames: Frames, key: str) -> float:
     return float(np.percentile([abs(frame[key]) for frame in frames if frame["right"]], 95))
 
 
@@ -111,7 +110,7 @@ def test_errors_are_those_of_the_quaternions(measure: Measure) -> None:
 
 @pytest.mark.parametrize("more", [(), ("--mode", "assisted", "--hint-error", 5)])
 def test_a_seed_repeats_everything_but_wall_time(measure: Measure, more: tuple[object]) -> None:
-    def run(seed: int) -> list[dict[str, Any]]:
+    def run(seed: int) -> Frames:
         frames = measure("--frames", 4, "--mag-limit", 3.8, "--seed", seed, *more)
         for frame in frames:
             del frame["wall_ms"]
@@ -121,7 +120,7 @@ def test_a_seed_repeats_everything_but_wall_time(measure: Measure, more: tuple[o
     assert run(5) != run(6)
 
 
-def test_photographs(measure: Measure, photographs: Any) -> None:
+def test_photographs(measure: Measure, photographs: Path) -> None:
     pictures = sorted(photographs.glob("*.jpg"))
     assert len(pictures) == 8
     for picture in pictures:

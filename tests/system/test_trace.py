@@ -85,6 +85,7 @@ def test_a_cubesense_measures_the_sun(tmp_path: Path) -> None:
         client.pause(0.5)
     changes = read(tmp_path / "run.vcd")
     command = first_byte_ns(tmp_path, interface_of("cubesense").telecommand("CaptureAndDetect").id)
+    assert {"fpga.SUN_SRAM_A", "uart.rx_byte", "firmware.awake"} <= changes.keys()
     pending = when(changes, "firmware.sun_detect", "PENDING", command)
     store = when(changes, "fpga.SUNEN", 0, pending)  # active low
     stored = when(changes, "fpga.SUNACK", 1, store)

@@ -50,6 +50,12 @@ def check_one_line(outcome: Outcome, *words: str) -> None:
         assert word in message
 
 
+def dark_picture(path: Path, size: tuple[int, int] = (1024, 512)) -> Path:
+    """A picture file, columns x rows."""
+    Image.fromarray(np.zeros(size[::-1], np.uint8)).save(path)
+    return path
+
+
 @pytest.mark.parametrize("command", [None, *COMMANDS, *reports()])
 def test_help(run: Run, command: str | None) -> None:
     outcome = run(*([command] if command else []), "--help")
@@ -133,14 +139,12 @@ def test_wrong_scenes(
 def test_wrong_pictures(
     run: Run, tmp_path: Path, size: tuple[int, int], crop: str, words: tuple[str, ...]
 ) -> None:
-    picture = tmp_path / "sky.png"
-    Image.fromarray(np.zeros(size[::-1], np.uint8)).save(picture)
+    picture = dark_picture(tmp_path / "sky.png", size)
     check_one_line(run("measure", "cubestar", "--image", picture, "--crop", crop), *words)
 
 
 def test_a_wrong_picture_format(run: Run, tmp_path: Path) -> None:
-    picture = tmp_path / "sky.gif"
-    Image.fromarray(np.zeros((512, 1024), np.uint8)).save(picture)
+    picture = dark_picture(tmp_path / "sky.gif")
     check_one_line(run("measure", "cubestar", "--image", picture), "GIF", "PNG, JPEG, TIFF")
     picture.write_text("stars")
     check_one_line(run("measure", "cubestar", "--image", picture), "no picture", "PNG, JPEG, TIFF")
@@ -160,8 +164,7 @@ def test_a_wrong_picture_format(run: Run, tmp_path: Path) -> None:
     ],
 )
 def test_wrong_cameras(run: Run, tmp_path: Path, text: str, words: tuple[str, ...]) -> None:
-    picture, camera = tmp_path / "sky.png", tmp_path / "camera.json"
-    Image.fromarray(np.zeros((512, 1024), np.uint8)).save(picture)
+    picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
     camera.write_text(text, encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera)
     check_one_line(outcome, "camera.json", *words)
@@ -169,8 +172,7 @@ def test_wrong_cameras(run: Run, tmp_path: Path, text: str, words: tuple[str, ..
 
 @pytest.mark.parametrize("images", ["[]", "{}", '{"sky.png": 1}', '{"other.png": {}}'])
 def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, images: str) -> None:
-    picture, camera = tmp_path / "sky.png", tmp_path / "camera.json"
-    Image.fromarray(np.zeros((512, 1024), np.uint8)).save(picture)
+    picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
     camera.write_text(
         f'{{"f_px": 1071, "cx_px": 512, "cy_px": 256, "images": {images}}}', encoding="utf-8"
     )

@@ -1,25 +1,20 @@
 """`cubestack measure aramis` with the whole catalogue: rates, accuracy, motion, upsets."""
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 
-Frames = list[dict[str, Any]]
+from tests.system.conftest import Measure
 
 GOAL_DEG = 200 / 3600
 """AraMiS thesis, section 2.1: hundreds of seconds of arc."""
 
 
-def test_lost_in_space_among_false_stars(measure: Callable[..., Frames]) -> None:
+def test_lost_in_space_among_false_stars(measure: Measure) -> None:
     for frame in measure("--frames", 8, "--seed", 21, "--false-stars", 5):
         assert (frame["right"], frame["reason"], frame["wrong"]) == (True, "confirmed", 0)
         assert frame["error_cross_deg"] < GOAL_DEG
 
 
-def test_near_a_rough_direction_as_published_nothing_is_wrong(
-    measure: Callable[..., Frames],
-) -> None:
+def test_near_a_rough_direction_as_published_nothing_is_wrong(measure: Measure) -> None:
     frames = measure(
         "--frames", 8, "--seed", 22, "--published", "--mode", "assisted", "--hint-error", 2
     )
@@ -30,7 +25,7 @@ def test_near_a_rough_direction_as_published_nothing_is_wrong(
             assert frame["error_cross_deg"] < GOAL_DEG
 
 
-def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Callable[..., Frames]) -> None:
+def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Measure) -> None:
     for frame in measure("--frames", 2, "--seed", 23, "--roll-rate", 10):
         assert frame["right"]
         assert frame["error_cross_deg"] < 0.1
@@ -39,7 +34,7 @@ def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Callable[..., Fr
         assert (frame["solved"], frame["outcome"], frame["reason"]) == (False, "none", "smear")
 
 
-def test_upsets_in_flash_are_corrected(measure: Callable[..., Frames]) -> None:
+def test_upsets_in_flash_are_corrected(measure: Measure) -> None:
     for frame in measure("--frames", 3, "--seed", 25, "--bit-flips", 1e-6):
         assert frame["right"]
         assert frame["corrected"] <= frame["flips"]
@@ -49,7 +44,7 @@ def test_upsets_in_flash_are_corrected(measure: Callable[..., Frames]) -> None:
 
 
 @pytest.mark.parametrize("field", [18.0])
-def test_the_likely_lens(measure: Callable[..., Frames], field: float) -> None:
+def test_the_likely_lens(measure: Measure, field: float) -> None:
     for frame in measure("--frames", 3, "--seed", 27, "--field", field):
         assert frame["right"]
         assert frame["error_cross_deg"] < GOAL_DEG

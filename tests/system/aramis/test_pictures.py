@@ -5,16 +5,15 @@ square pixels, as the lens with a field of 18 deg would have; what it sees beyon
 """
 
 import json
-from collections.abc import Callable
 from math import radians, tan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from cubestack.emulator.scene.attitude import attitude_error_deg
+from tests.system.conftest import Measure
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "sky_narrow"
 PICTURES = sorted(FOLDER.glob("*.png"))
@@ -40,7 +39,7 @@ def drawn_anew(path: Path, folder: Path) -> Path:
     return folder / path.name
 
 
-def test_each_is_solved(measure: Callable[..., list[dict[str, Any]]], tmp_path: Path) -> None:
+def test_each_is_solved(measure: Measure, tmp_path: Path) -> None:
     truths = json.loads((FOLDER / "truth.json").read_text())["images"]
     for path in PICTURES:
         picture = drawn_anew(path, tmp_path)

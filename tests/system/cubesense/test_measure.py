@@ -3,14 +3,13 @@
 CubeSense thesis, sections 5.8, 7.1, 7.2, 7.4 and 8.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-Frames = list[dict[str, Any]]
+from tests.system.conftest import Frames, Measure
+
 KEYS = {
     "sensor", "detected", "alpha_deg", "beta_deg", "truth_alpha_deg", "truth_beta_deg",
     "error_deg", "edges", "phase_ms", "wall_ms",
@@ -22,16 +21,16 @@ def offsets(frames: Frames, axis: str) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def nadir(measure: Callable[..., Frames]) -> Frames:
+def nadir(measure: Measure) -> Frames:
     return measure("--sensor", "nadir", "--frames", 60, "--seed", 3)
 
 
 @pytest.fixture(scope="module")
-def sun(measure: Callable[..., Frames]) -> Frames:
+def sun(measure: Measure) -> Frames:
     return measure("--sensor", "sun", "--frames", 60, "--seed", 3)
 
 
-def test_a_frame_gives_one_result_of_each_sensor(measure: Callable[..., Frames]) -> None:
+def test_a_frame_gives_one_result_of_each_sensor(measure: Measure) -> None:
     frames = measure("--frames", 2)
     assert [frame["sensor"] for frame in frames] == ["sun", "nadir"] * 2
     assert all(frame.keys() >= KEYS for frame in frames)
@@ -61,9 +60,7 @@ def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
 
 
 @pytest.mark.parametrize(("bloom", "limit"), [(3, 0.2), (5, 0.2), (7, 0.2)])
-def test_sun_sensor_with_other_blooms(
-    measure: Callable[..., Frames], bloom: float, limit: float
-) -> None:
+def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float, limit: float) -> None:
     frames = measure(
         "--sensor", "sun", "--bloom", bloom, "--sun-angle", 45, "--frames", 12, "--seed", 5
     )
@@ -83,14 +80,14 @@ def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
     assert all(frame["phase_ms"]["store"] == pytest.approx(30.5, abs=0.1) for frame in nadir)
 
 
-def test_the_same_seed_gives_the_same_results(measure: Callable[..., Frames]) -> None:
+def test_the_same_seed_gives_the_same_results(measure: Measure) -> None:
     first, second = (measure("--frames", 1, "--seed", 8) for _ in range(2))
     for frame in (*first, *second):
         del frame["wall_ms"]
     assert first == second
 
 
-def test_memory_of_the_other_half_gives_the_same_directions(measure: Callable[..., Frames]) -> None:
+def test_memory_of_the_other_half_gives_the_same_directions(measure: Measure) -> None:
     own, other = (measure("--memory", memory, "--seed", 4) for memory in ("own", "other"))
     for one, another in zip(own, other, strict=True):
         assert another["capture"] == "stored_other_sram"
@@ -98,7 +95,7 @@ def test_memory_of_the_other_half_gives_the_same_directions(measure: Callable[..
         assert another["error_deg"] == pytest.approx(one["error_deg"], abs=0.04)
 
 
-def test_search_around_samples_looks_at_far_fewer_pixels(measure: Callable[..., Frames]) -> None:
+def test_search_around_samples_looks_at_far_fewer_pixels(measure: Measure) -> None:
     lines, halves, stepping = (
         measure("--sensor", "nadir", "--frames", 3, "--search", way)
         for way in ("lines", "samples", "stepping")
@@ -112,7 +109,7 @@ def test_search_around_samples_looks_at_far_fewer_pixels(measure: Callable[..., 
         assert half["error_deg"] < 0.2
 
 
-def test_scene_file(measure: Callable[..., Frames], tmp_path: Path) -> None:
+def test_scene_file(measure: Measure, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text('kind = "earth-sun"\nsun_deg = [20, 10]\nnadir_deg = [-8, 12]\n')
     sun, nadir = measure("--scene", scene)

@@ -7,7 +7,6 @@ import pytest
 from cubestack.emulator.recording.recorder import Recorder
 from cubestack.emulator.recording.replay import Replay
 from cubestack.emulator.recording.trace import VcdTrace
-from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera
@@ -53,42 +52,12 @@ def test_same_version_says_the_same(recorded, session, scene):
     assert replay(recorded, session, scene) == []
 
 
-def test_changed_default_is_named(recorded, session, scene, monkeypatch):
-    reset = CameraSettings.at_reset
-
-    def changed(camera: Camera) -> CameraSettings:
-        settings = reset(camera)
-        settings.blue_gain += 1
-        return settings
-
-    monkeypatch.setattr(CameraSettings, "at_reset", changed)
-    differences = replay(recorded, session, scene)
-    assert len(differences) == 1
-    assert "telemetry Configuration, field BlueGain1: 0x81, recorded 0x80" in differences[0]
-
-
 def test_host_programs_run_on_the_recording(recorded):
     cubesense = CubeSense(NodeClient(RecordedTransport(recorded, INTERFACE), INTERFACE))
     assert cubesense.capture_and_detect(Camera.SUN).detected
     ServicePortClient(RecordedTransport(recorded, INTERFACE, "bench_uart")).take(Camera.NADIR)
     power = I2cClient(RecordedI2c(recorded, INTERFACE), INTERFACE).telemetry("Power")
     assert 0 < power["Current5V"] < 200
-
-
-def test_trace_shows_the_measurement(session, scene):
-    stream = io.StringIO()
-    with session(scene, seed=1) as opened:
-        board = opened.board
-        trace = VcdTrace(
-            stream, "cubesense", board.kernel, lines(board), board.engine, board.probes
-        )
-        opened.client.capture_and_detect(Camera.SUN)
-        trace.close()
-    text = stream.getvalue()
-    assert "sPENDING " in text
-    assert "sSUCCESS " in text
-    for name in ("SUNACK", "SUN_SRAM_A", "rx_byte", "awake", "sun_detect"):
-        assert f" {name} $end" in text
 
 
 def test_recording_does_not_change_the_run(recorded, session, scene, tmp_path):

@@ -107,12 +107,3 @@ def test_latch_up_is_cut_off_and_cleared_by_command(opened: AnyEmulated) -> None
     assert power.over_current == (False, False)
     assert power.current_sram_ma[0] == pytest.approx(4.6, abs=0.3)
     check(cubesense.capture_and_detect(Camera.SUN), CaptureResult.STORED_OWN_SRAM)
-
-
-def test_memory_that_stays_latched_is_cut_off_again(opened: AnyEmulated) -> None:
-    latch_up(opened, Sram.SRAM2)
-    for _ in range(3):
-        opened.client.client.pause(0.1)
-        assert opened.client.power().over_current == (False, True)
-        assert opened.board.power.current_ma("SRAM2") == 0
-        opened.client.clear_over_current(SramSelection.BOTH)

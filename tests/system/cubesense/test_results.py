@@ -86,15 +86,6 @@ def test_hot_pixels_are_no_sun(ready: Open) -> None:
     assert detect(ready, EarthSunView(NOON, few), Camera.SUN) is DetectResult.SUCCESS
 
 
-def test_dead_camera_times_out_and_the_node_goes_on(ready: Open) -> None:
-    with ready(NOON) as opened:
-        opened.board.faults.inject("camera-dead", target="sun")
-        found = opened.client.capture_and_detect(Camera.SUN)
-        assert found.capture is CaptureResult.CAMERA_TIMEOUT
-        assert found.detect is DetectResult.NONE_SCHEDULED
-        assert opened.client.capture_and_detect(Camera.NADIR).detected
-
-
 @pytest.mark.parametrize("after_ms", [5, 45, 100])
 def test_latch_up_during_a_measurement(ready: Open, after_ms: float) -> None:
     """While the picture is awaited or stored, and while lines are searched."""

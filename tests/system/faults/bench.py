@@ -18,6 +18,7 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device
+from tests.system.conftest import Ear
 
 SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
 ORION_DEG = (84.0, -1.0)
@@ -26,7 +27,7 @@ ORION_DEG = (84.0, -1.0)
 ALWAYS = {"MaxStarsDetection"}
 
 
-class Wire:
+class Wire(Ear):
     """A serial line between a host and a device's end, which is watched.
 
     Attributes:
@@ -36,8 +37,8 @@ class Wire:
 
     def __init__(self, line: Any, uart: Uart) -> None:
         self._line = line
+        super().__init__(uart)
         self.heard = self.said = b""
-        uart.taps.append(self)
 
     def ask(self, payload: bytes, timeout_s: float = 0.1) -> bytes:
         """Send a frame with ``payload``; all bytes that come back before a silence."""
@@ -53,8 +54,6 @@ class Wire:
 
     def device_heard(self, byte: int, start_ps: int) -> None:
         self.heard += bytes([byte])
-
-    def framing_error(self, time_ps: int) -> None: ...
 
 
 class Spy:

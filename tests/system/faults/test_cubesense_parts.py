@@ -161,6 +161,7 @@ def test_a_lasting_latch_up_is_cut_again_each_time(sense: Bench) -> None:
     for _ in range(2):
         sense.client.pause(0.006)
         assert sense.device.power().over_current == (False, True)
+        assert sense.board.power.current_ma("SRAM2") == 0
         sense.device.clear_over_current()
         sense.client.pause(0.3)
     assert sense.device.power().over_current == (False, True)

@@ -15,6 +15,7 @@ from cubestack.host.cli.main import main
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.targets import open_target
 from cubestack.host.shell.language import Shell
+from tests.system.conftest import Ear
 
 from .bench import BENCHES, Bench
 
@@ -151,7 +152,7 @@ def played(
     """All bytes with their times, the log, and the kinds of the plan."""
     trace: list[Any] = []
 
-    class Tap:
+    class Tap(Ear):
         def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
             trace.append((bytes(data), first_ps))
 
@@ -166,7 +167,7 @@ def played(
         bench.faults.load(parse_plan(f"seed = {seed}\n{text}"))
         uarts = {"cubesense": (bench.board.uart, getattr(bench.board, "bench_uart", None))}
         for uart in uarts.get(device, (bench.board.uart,)):
-            uart.taps.append(Tap())
+            Tap(uart)
         bench.plug_in(timeout_s=0.2, retries=1)
         picture = {
             "cubestar": lambda: bench.device.capture_and_process(),
