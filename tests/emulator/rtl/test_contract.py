@@ -34,6 +34,13 @@ def camera(make_camera):
 
 
 @pytest.fixture
+def reading(engine):
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    return engine
+
+
+@pytest.fixture
 def storing(engine, camera):
     """The engine, told to store from the camera's first clock on."""
     engine.attach(camera)
@@ -67,8 +74,7 @@ def test_frame_is_stored_and_acknowledged_at_the_last_pixel(storing, camera):
     assert not storing.violations
 
 
-def test_second_bank(engine, make_camera):
-    camera = make_camera()
+def test_second_bank(engine, camera):
     engine.attach(camera)
     engine.set_pin("BANK", 1)
     engine.set_pin("ENABLE", 1)
@@ -80,8 +86,7 @@ def test_second_bank(engine, make_camera):
     assert not read(engine, ROWS * COLUMNS).any()
 
 
-def test_enabled_in_mid_frame_stores_the_next_whole_frame(engine, make_camera):
-    camera = make_camera()
+def test_enabled_in_mid_frame_stores_the_next_whole_frame(engine, camera):
     engine.attach(camera)
     engine.run((BLANK + 2 * LINE + 3) * PERIOD)
     engine.set_pin("ENABLE", 1)
@@ -90,9 +95,8 @@ def test_enabled_in_mid_frame_stores_the_next_whole_frame(engine, make_camera):
 
 
 @pytest.mark.parametrize(("early_ps", "frame"), [(0, 1), (1, 0)])
-def test_pixel_clock_comes_first_at_one_instant(engine, make_camera, early_ps, frame):
+def test_pixel_clock_comes_first_at_one_instant(engine, camera, early_ps, frame):
     """Two edges release the reset, a third must see HSYNC low: this one comes just too late."""
-    camera = make_camera()
     engine.run((BLANK - 3) * PERIOD - early_ps)
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
@@ -180,8 +184,7 @@ def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine, make_camera
     assert engine.get_pin("PIXCLK") == 1
 
 
-def test_stream_that_stops_and_comes_back(engine, make_camera):
-    camera = make_camera()
+def test_stream_that_stops_and_comes_back(engine, camera):
     segments, camera.segments = camera.segments, []
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
@@ -200,14 +203,12 @@ def test_strobes_keep_their_rate_over_bursts(engine):
     assert engine.now_ps == int(77 * period)
 
 
-def test_every_rising_data_clock_is_on_the_grid(engine):
+def test_every_rising_data_clock_is_on_the_grid(reading):
     """Told by the violations of reading too fast."""
-    engine.set_pin("RNW", 1)
-    engine.set_pin("ENABLE", 1)
     period = Fraction(22_001, 3)
     for count in (3, 1, 2, 5, 4):
-        engine.strobe_read(np.zeros(count, np.uint8), period, 10**9)
-    assert [v.time_ps for v in engine.violations] == [int(i * period) for i in range(15)]
+        reading.strobe_read(np.zeros(count, np.uint8), period, 10**9)
+    assert [v.time_ps for v in reading.violations] == [int(i * period) for i in range(15)]
 
 
 def test_burst_after_a_pause_starts_its_own_count(engine):
@@ -228,15 +229,13 @@ def test_only_cycles_that_end_in_time_are_made(engine, reach, cycles):
     assert engine.now_ps == 10_000 + 1000 * cycles
 
 
-def test_reading_faster_than_the_memory_is_a_violation(engine):
-    engine.set_pin("RNW", 1)
-    engine.set_pin("ENABLE", 1)
+def test_reading_faster_than_the_memory_is_a_violation(reading):
     out = np.zeros(100, np.uint8)
-    engine.strobe_read(out, Fraction(11_000), 10**12)
-    assert engine.violation_counts == {"read-access": 100}
-    assert engine.violations[1].time_ps == 11_000
-    assert engine.violations[1].address == 1
-    assert len(engine.violations) == 64
+    reading.strobe_read(out, Fraction(11_000), 10**12)
+    assert reading.violation_counts == {"read-access": 100}
+    assert reading.violations[1].time_ps == 11_000
+    assert reading.violations[1].address == 1
+    assert len(reading.violations) == 64
 
 
 def test_write_pulse_cut_short_by_enable(storing):
@@ -276,29 +275,18 @@ def test_wrong_calls_name_the_offender(engine, make_camera):
 
 
 @pytest.mark.parametrize(
-    ("image", "found"),
+    ("field", "wrong", "found"),
     [
-        (np.zeros((4, 7), np.uint8), "shape .4, 7."),
-        (np.zeros((4, 8), np.int16), "int16"),
-        (np.zeros((8, 4), np.uint8).T, "C-contiguous"),
+        ("pixels", lambda: np.zeros((4, 7), np.uint8), "shape .4, 7."),
+        ("pixels", lambda: np.zeros((4, 8), np.int16), "int16"),
+        ("pixels", lambda: np.zeros((8, 4), np.uint8).T, "C-contiguous"),
+        ("clocks", ROWS * LINE + 1, "48 clocks, not 49"),
     ],
 )
-def test_frames_that_do_not_fit_are_refused(engine, make_camera, image, found):
-    camera = make_camera()
-    camera.segments[1].pixels = lambda: image
-    engine.attach(camera)
-    engine.set_pin("ENABLE", 1)
+def test_segments_that_do_not_fit_are_refused(storing, camera, field, wrong, found):
+    setattr(camera.segments[1], field, wrong)
     with pytest.raises(ValueError, match=found):
-        engine.run(FRAME)
-
-
-def test_segments_that_do_not_fit_are_refused(engine, make_camera):
-    camera = make_camera()
-    camera.segments[1].clocks += 1
-    engine.attach(camera)
-    engine.set_pin("ENABLE", 1)
-    with pytest.raises(ValueError, match="48 clocks, not 49"):
-        engine.run(FRAME)
+        storing.run(FRAME)
 
 
 def test_closed_compiled_engine_says_so():

@@ -18,8 +18,12 @@ T = SramTiming()
 START = 1_000_000
 
 
-def make() -> Sram:
-    return Sram(np.arange(64, dtype=np.uint8))
+def make(*driven: tuple[int, SramPins]) -> Sram:
+    """Its pins driven at these times."""
+    sram = Sram(np.arange(64, dtype=np.uint8))
+    for time_ps, pins in driven:
+        sram.drive(time_ps, pins)
+    return sram
 
 
 def idle(address: int = 0, data: int | None = None) -> SramPins:
@@ -39,9 +43,7 @@ def found(sram: Sram) -> list[tuple[str, int, int]]:
 
 
 def test_write_takes_effect_at_the_end_of_the_pulse():
-    sram = make()
-    sram.drive(START, writing(5))
-    sram.drive(START + T.write_pulse_ps - 1, writing(5))
+    sram = make((START, writing(5)), (START + T.write_pulse_ps - 1, writing(5)))
     assert sram.memory[5] == 5
     sram.drive(START + T.write_pulse_ps, idle(5))
     assert sram.memory[5] == 0xA5
@@ -50,9 +52,7 @@ def test_write_takes_effect_at_the_end_of_the_pulse():
 
 def test_hold_times_are_zero():
     """What changes together with the pulse's end came too late to be written."""
-    sram = make()
-    sram.drive(START, writing(5, 0xA5))
-    sram.drive(START + T.write_pulse_ps, idle(6, 0x11))
+    sram = make((START, writing(5, 0xA5)), (START + T.write_pulse_ps, idle(6, 0x11)))
     assert sram.memory[5] == 0xA5
     assert sram.memory[6] == 6
     assert not found(sram)
@@ -60,8 +60,7 @@ def test_hold_times_are_zero():
 
 @pytest.mark.parametrize("ends", [idle(5, 0xA5), SramPins(5, ce_n=1, we_n=0, data=0xA5)])
 def test_short_write_pulse(ends):
-    sram = make()
-    sram.drive(START, writing(5))
+    sram = make((START, writing(5)))
     end = START + T.write_pulse_ps - 1
     sram.drive(end, ends)
     assert found(sram) == [("short-write-pulse", end, 5)]
@@ -69,28 +68,24 @@ def test_short_write_pulse(ends):
 
 
 def test_address_moving_inside_a_pulse_writes_both():
-    sram = make()
-    sram.drive(START, writing(5))
-    sram.drive(START + 10_000, writing(6))
-    sram.drive(START + 20_000, idle(6))
+    sram = make((START, writing(5)), (START + 10_000, writing(6)), (START + 20_000, idle(6)))
     assert found(sram) == [("address-changed-during-write", START + 10_000, 5)]
     assert sram.memory[5] == sram.memory[6] == 0xA5
 
 
 @pytest.mark.parametrize(("early", "broken"), [(T.data_setup_ps, False), (5_999, True)])
 def test_data_setup(early, broken):
-    sram = make()
-    sram.drive(START, writing(5, 0x11))
-    sram.drive(START + 50_000 - early, writing(5, 0x22))
-    sram.drive(START + 50_000, idle(5))
+    sram = make(
+        (START, writing(5, 0x11)),
+        (START + 50_000 - early, writing(5, 0x22)),
+        (START + 50_000, idle(5)),
+    )
     assert found(sram) == [("data-setup", START + 50_000, 5)] * broken
     assert sram.memory[5] == 0x22
 
 
 def test_writing_a_floating_bus():
-    sram = make()
-    sram.drive(START, writing(5, None))
-    sram.drive(START + 50_000, idle(5))
+    sram = make((START, writing(5, None)), (START + 50_000, idle(5)))
     assert found(sram) == [("data-setup", START + 50_000, 5)]
 
 
@@ -105,16 +100,13 @@ def test_writing_a_floating_bus():
 )
 @pytest.mark.parametrize("late", [0, 1])
 def test_read_access(before, limit, late):
-    sram = make()
-    sram.drive(0, before)
-    sram.drive(START, reading(7))
+    sram = make((0, before), (START, reading(7)))
     assert sram.sample(START + limit - late) == 7
     assert found(sram) == [("read-access", START + limit - 1, 7)] * late
 
 
 def test_nothing_is_expected_of_a_memory_that_does_not_drive():
-    sram = make()
-    sram.drive(START, idle(7, 0x33))
+    sram = make((START, idle(7, 0x33)))
     assert sram.sample(START) == 0x33
     sram.drive(START + 1, idle(8))
     assert sram.sample(START + 1) == 0
@@ -123,19 +115,13 @@ def test_nothing_is_expected_of_a_memory_that_does_not_drive():
 
 @pytest.mark.parametrize("first", [reading(7), idle(7, 0x33)])
 def test_bus_contention_is_reported_once(first):
-    sram = make()
-    sram.drive(0, first)
-    sram.drive(START, reading(7, 0x33))
-    sram.drive(START + 1, reading(8, 0x34))
+    sram = make((0, first), (START, reading(7, 0x33)), (START + 1, reading(8, 0x34)))
     assert found(sram) == [("bus-contention", START, 7)]
 
 
 @pytest.mark.parametrize(("pause", "broken"), [(T.output_disable_ps, False), (5_999, True)])
 def test_turnaround(pause, broken):
-    sram = make()
-    sram.drive(0, reading(7))
-    sram.drive(START, idle(7))
-    sram.drive(START + pause, idle(7, 0x33))
+    sram = make((0, reading(7)), (START, idle(7)), (START + pause, idle(7, 0x33)))
     assert found(sram) == [("turnaround", START + pause, 7)] * broken
 
 
@@ -148,8 +134,7 @@ def test_memory_is_a_live_view():
 
 
 def test_violations_are_all_counted_and_the_first_are_kept_and_logged(caplog):
-    sram = make()
-    sram.drive(0, reading(7))
+    sram = make((0, reading(7)))
     with caplog.at_level(logging.WARNING):
         for _ in range(MAX_VIOLATIONS + 10):
             sram.sample(5)
@@ -162,8 +147,7 @@ def test_violations_are_all_counted_and_the_first_are_kept_and_logged(caplog):
 
 
 def test_memory_without_supply_keeps_its_bytes_offers_0_and_breaks_no_rule():
-    sram = make()
-    sram.drive(START, writing(5))
+    sram = make((START, writing(5)))
     sram.power(False)
     for offset, pins in enumerate([writing(6), reading(6), writing(7, None), idle(7), reading(9)]):
         sram.drive(START + offset, pins)

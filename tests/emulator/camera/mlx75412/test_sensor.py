@@ -2,6 +2,7 @@ import itertools
 import logging
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,10 +41,22 @@ def enable(camera: Mlx75412, now_ps: int, on: bool = True) -> None:
     write(camera, "MODE_SELECT", 0x20 | on, now_ps)
 
 
+def configured(scene: SkyScene | PictureScene | None = None, **options: Any) -> Mlx75412:
+    made = Mlx75412(scene or SkyScene.pointing(80.0, 0.0), **options)
+    configure(made)
+    return made
+
+
 @pytest.fixture
 def camera() -> Mlx75412:
-    made = Mlx75412(SkyScene.pointing(80.0, 0.0), seed=3)
-    configure(made)
+    return configured(seed=3)
+
+
+@pytest.fixture
+def photographing(striped: PictureScene) -> Mlx75412:
+    """Enabled from time 0 on, in front of a picture."""
+    made = configured(striped, seed=5)
+    enable(made, 0)
     return made
 
 
@@ -114,8 +127,7 @@ def test_sequence_after_enable(camera: Mlx75412) -> None:
 
 
 def test_vsync_before_the_first_good_frame_is_a_parameter() -> None:
-    camera = Mlx75412(SkyScene.pointing(80.0, 0.0), vsync_before_first_frame=True)
-    configure(camera)
+    camera = configured(vsync_before_first_frame=True)
     enable(camera, 0)
     assert [s.vsync for s in segments(camera, 0, 4)] == [1, 0, 1, 0]
 
@@ -169,8 +181,7 @@ def test_exposure_register_is_limited_by_the_frame(camera: Mlx75412) -> None:
 
 def test_first_exposure_is_undefined_but_repeatable() -> None:
     def exposures(seed: int) -> list[int]:
-        camera = Mlx75412(SkyScene.pointing(80.0, 0.0), seed=seed)
-        configure(camera)
+        camera = configured(seed=seed)
         found = []
         for n in range(6):
             now = n * 1000 * MS
@@ -230,8 +241,7 @@ def test_change_after_the_output_was_looked_up_too_far(camera: Mlx75412) -> None
 
 
 def test_odd_crystal_keeps_its_grid() -> None:
-    camera = Mlx75412(SkyScene.pointing(80.0, 0.0), crystal_hz=11_000_000)
-    configure(camera)
+    camera = configured(crystal_hz=11_000_000)
     enable(camera, 1)
     assert camera.period == Fraction(10**12, 11 * 10**6)
     for segment in segments(camera, 1, 20):
@@ -258,14 +268,12 @@ def stored(camera: Mlx75412, fpga_enable_ps: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("wait_ms", [0, 10, 40, 67])
-def test_capturing_too_early_splits_the_picture(striped: PictureScene, wait_ms: int) -> None:
-    camera = Mlx75412(striped, seed=5)
-    configure(camera)
-    enable(camera, 0)
-    shutter = camera.frame_from(0)
-    scale = shutter.relative_exposure
+def test_capturing_too_early_splits_the_picture(
+    photographing: Mlx75412, striped: PictureScene, wait_ms: int
+) -> None:
+    scale = photographing.frame_from(0).relative_exposure
     assert abs(scale - 1) > 0.05  # else the two exposures could not be told apart
-    picture = stored(camera, wait_ms * MS)
+    picture = stored(photographing, wait_ms * MS)
     split = 512 - -(-wait_ms * MS // LINE_PS)  # rows of the undefined frame still to come
     assert 0 < split <= 512
     undefined = np.minimum(striped.pixels[512 - split :] * scale, 255)
@@ -273,23 +281,14 @@ def test_capturing_too_early_splits_the_picture(striped: PictureScene, wait_ms: 
     np.testing.assert_array_equal(picture[split:], striped.pixels[: 512 - split])
 
 
-def test_waiting_70_ms_gives_the_second_frame(striped: PictureScene) -> None:
-    camera = Mlx75412(striped, seed=5)
-    configure(camera)
-    enable(camera, 0)
-    np.testing.assert_array_equal(stored(camera, 70 * MS), striped.pixels)
+@pytest.mark.parametrize("wait_ms", [70, 400], ids=["second frame", "a partial one is dropped"])
+def test_waiting_gives_a_whole_frame(
+    photographing: Mlx75412, striped: PictureScene, wait_ms: int
+) -> None:
+    np.testing.assert_array_equal(stored(photographing, wait_ms * MS), striped.pixels)
 
 
-def test_joining_in_mid_frame_later_drops_the_partial_frame(striped: PictureScene) -> None:
-    camera = Mlx75412(striped, seed=5)
-    configure(camera)
-    enable(camera, 0)
-    np.testing.assert_array_equal(stored(camera, 400 * MS), striped.pixels)
-
-
-def test_frame_lookup() -> None:
-    camera = Mlx75412(SkyScene.pointing(80.0, 0.0))
-    configure(camera)
+def test_frame_lookup(camera: Mlx75412) -> None:
     assert camera.frame_from(0) is None
     enable(camera, 10 * MS)
     segments(camera, 10 * MS, 5)
@@ -317,8 +316,7 @@ def test_pixels_are_rendered_on_demand_and_once(camera: Mlx75412) -> None:
 
 def test_features_reach_the_pixels() -> None:
     warm = replace(CONDITION, temperature_c=45)
-    camera = Mlx75412(SkyScene([0, 0, 0, 1], mag_limit=-5), condition=warm, seed=1)
-    configure(camera)
+    camera = configured(SkyScene([0, 0, 0, 1], mag_limit=-5), condition=warm, seed=1)
 
     def mean(features: int, now_ps: int) -> float:
         write(camera, "HARDWARE_FEATURES", features, now_ps)

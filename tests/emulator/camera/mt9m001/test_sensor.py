@@ -32,6 +32,11 @@ def scene(**changes: object) -> SkyScene:
     return replace(SkyScene.pointing(84.0, -1.0), **changes)
 
 
+@pytest.fixture
+def camera() -> Mt9m001:
+    return Mt9m001(scene())
+
+
 def put(camera: Mt9m001, name: str, *words: int, now_ps: int = 0) -> None:
     data = b"".join(word.to_bytes(2, "big") for word in words)
     assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]) + data, now_ps)
@@ -41,6 +46,11 @@ def get(camera: Mt9m001, name: str) -> int:
     assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]), 0)
     answer = camera.i2c_read(ADDRESS, 2, 0)
     return int.from_bytes(answer, "big")
+
+
+def frame_starts(camera: Mt9m001, start_ps: int, until_ps: int) -> list[int]:
+    """When FRAME_VALID rises."""
+    return [s[0] for s in stream(camera, start_ps, until_ps) if s[1] == 242]
 
 
 def stream(camera: Mt9m001, start_ps: int, until_ps: int) -> list[tuple[int, int, int, int]]:
@@ -65,8 +75,7 @@ def frame(camera: Mt9m001, after_ps: int) -> np.ndarray:
     return np.concatenate(pieces)
 
 
-def test_default_frames_follow_the_data_sheet() -> None:
-    camera = Mt9m001(scene())
+def test_default_frames_follow_the_data_sheet(camera: Mt9m001) -> None:
     segments = stream(camera, 0, 100 * PS_PER_MS)
     first_frame = next(i for i, s in enumerate(segments) if s[2])
     assert segments[first_frame : first_frame + 4] == [
@@ -80,8 +89,7 @@ def test_default_frames_follow_the_data_sheet() -> None:
     assert starts[0] == pytest.approx(1050 * ROW_S * PS_PER_S)  # one exposure and a row
 
 
-def test_segments_leave_no_gap_and_no_overlap() -> None:
-    camera = Mt9m001(scene())
+def test_segments_leave_no_gap_and_no_overlap(camera: Mt9m001) -> None:
     put(camera, "SHUTTER_WIDTH", 1500)
     segments = stream(camera, 0, 300 * PS_PER_MS)
     for (start, clocks, *_), (following, *_) in pairwise(segments):
@@ -91,18 +99,16 @@ def test_segments_leave_no_gap_and_no_overlap() -> None:
 @pytest.mark.parametrize(
     ("shutter", "rows"), [(100, 1050), (1049, 1050), (1050, 1051), (6299, 6300)]
 )
-def test_a_long_exposure_makes_the_frame_longer(shutter: int, rows: int) -> None:
-    camera = Mt9m001(scene())
+def test_a_long_exposure_makes_the_frame_longer(camera: Mt9m001, shutter: int, rows: int) -> None:
     put(camera, "SHUTTER_WIDTH", shutter)
-    starts = [s[0] for s in stream(camera, 0, PS_PER_S) if s[1] == 242]
+    starts = frame_starts(camera, 0, PS_PER_S)
     assert np.diff(starts) == pytest.approx(rows * ROW_S * PS_PER_S)
     exposure = camera.frame_from(starts[-1])
     assert exposure.exposure_s == pytest.approx(shutter * ROW_S)
     assert exposure.readout_ps == pytest.approx(starts[-1] + 242 / PIXEL_CLOCK_HZ * PS_PER_S, abs=1)
 
 
-def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure() -> None:
-    camera = Mt9m001(scene())
+def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(camera: Mt9m001) -> None:
     stream(camera, 0, 40 * PS_PER_MS)
     change = 50 * PS_PER_MS  # in the read-out of the first frame, which lasts to 67.5 ms
     put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
@@ -114,17 +120,15 @@ def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure() -> None:
     assert starts[0] / PS_PER_S == pytest.approx(end_of_old + 3001 * ROW_S, abs=1e-7)
 
 
-def test_a_change_between_frames_counts_from_its_own_time() -> None:
-    camera = Mt9m001(scene())
+def test_a_change_between_frames_counts_from_its_own_time(camera: Mt9m001) -> None:
     change = 662 * PS_PER_MS // 10  # the first frame ended at 65.85 ms, the next is due at 66.68
     stream(camera, 0, change)
     put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
-    starts = [s[0] for s in stream(camera, change, PS_PER_S) if s[1] == 242]
+    starts = frame_starts(camera, change, PS_PER_S)
     assert starts[0] / PS_PER_S == pytest.approx(0.0662 + 3001 * ROW_S, abs=1e-7)
 
 
-def test_changes_wait_while_they_are_held() -> None:
-    camera = Mt9m001(scene())
+def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:
     put(camera, "OUTPUT_CONTROL", 0b11)
     put(camera, "SHUTTER_WIDTH", 2000)
     put(camera, "GLOBAL_GAIN", 0x20)
@@ -133,8 +137,7 @@ def test_changes_wait_while_they_are_held() -> None:
     assert camera.frame_from(0).exposure_lines == 2000
 
 
-def test_registers_answer_as_declared() -> None:
-    camera = Mt9m001(scene())
+def test_registers_answer_as_declared(camera: Mt9m001) -> None:
     for register in REGISTERS:
         assert get(camera, register.name) == register.reset, register.name
     put(camera, "GLOBAL_GAIN", 0x51)
@@ -155,8 +158,7 @@ def test_registers_answer_as_declared() -> None:
     assert camera.enabled
 
 
-def test_consecutive_registers_half_words_and_strangers() -> None:
-    camera = Mt9m001(scene())
+def test_consecutive_registers_half_words_and_strangers(camera: Mt9m001) -> None:
     put(camera, "ROW_START", 20, 40, 255, 639)
     assert [get(camera, n) for n in ("ROW_START", "COLUMN_START", "ROW_SIZE", "COLUMN_SIZE")] == [
         20,
@@ -171,8 +173,7 @@ def test_consecutive_registers_half_words_and_strangers() -> None:
     assert camera.i2c_read(0x2C, 2, 0) is None
 
 
-def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs() -> None:
-    camera = Mt9m001(scene())
+def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs(camera: Mt9m001) -> None:
     put(camera, "SHUTTER_WIDTH", 77)
     for off, on in ((camera.power, camera.power), (camera.set_reset_pin, camera.set_reset_pin)):
         off(False, 10)
@@ -183,8 +184,7 @@ def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs() -> None:
         assert get(camera, "SHUTTER_WIDTH") == 0x0419
 
 
-def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure() -> None:
-    camera = Mt9m001(scene())
+def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure(camera: Mt9m001) -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     stop, start = 40 * PS_PER_MS, 90 * PS_PER_MS
@@ -193,10 +193,10 @@ def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure() -> None:
     assert changes
     assert all(s[2:] == (0, 0) for s in stream(camera, stop, start))
     put(camera, "OUTPUT_CONTROL", 2, now_ps=start)
-    frames = [s[0] for s in stream(camera, start, 200 * PS_PER_MS) if s[1] == 242]
+    frames = frame_starts(camera, start, 200 * PS_PER_MS)
     assert frames[0] == pytest.approx(start + 1050 * ROW_S * PS_PER_S, rel=1e-6)
     put(camera, "RESTART", 1, now_ps=250 * PS_PER_MS)
-    frames = [s[0] for s in stream(camera, 250 * PS_PER_MS, 350 * PS_PER_MS) if s[1] == 242]
+    frames = frame_starts(camera, 250 * PS_PER_MS, 350 * PS_PER_MS)
     assert frames[0] == pytest.approx(250 * PS_PER_MS + 1050 * ROW_S * PS_PER_S, rel=1e-6)
 
 

@@ -50,8 +50,12 @@ def scene() -> EarthSunScene:
     return EarthSunScene(seed=4)
 
 
-def test_published_frame_timing(scene: EarthSunScene) -> None:
-    camera = make(scene)
+@pytest.fixture
+def camera(scene: EarthSunScene) -> Ov7620:
+    return make(scene)
+
+
+def test_published_frame_timing(camera: Ov7620) -> None:
     assert float(camera.period) == pytest.approx(74_074, abs=0.1)  # "74 ns"
     assert (camera.line_clocks, camera.active_columns) == (858, 640)
     found = segments(camera, 0, 9)
@@ -67,8 +71,7 @@ def test_published_frame_timing(scene: EarthSunScene) -> None:
     assert all(s.clocks > 858 for s in found if not s.rows)
 
 
-def test_segments_join_without_a_gap_on_one_grid(scene: EarthSunScene) -> None:
-    camera = make(scene)
+def test_segments_join_without_a_gap_on_one_grid(camera: Ov7620) -> None:
     found = segments(camera, 0, 60)
     for before, after in itertools.pairwise(found):
         end = before.start_ps + int(before.clocks * camera.period)
@@ -77,8 +80,7 @@ def test_segments_join_without_a_gap_on_one_grid(scene: EarthSunScene) -> None:
     assert [s.start_ps for s in found] == [int(k) * 10**12 // 13_500_000 for k in clocks]
 
 
-def test_segment_at_any_time_contains_it(scene: EarthSunScene) -> None:
-    camera = make(scene)
+def test_segment_at_any_time_contains_it(camera: Ov7620) -> None:
     for time_ps in np.random.default_rng(1).integers(0, 10**13, 300).tolist():
         segment = camera.segment_at(time_ps)
         end = segment.start_ps + int(segment.clocks * camera.period)
@@ -112,8 +114,7 @@ def test_one_count_of_exposure_is_127_us(scene: EarthSunScene) -> None:
     assert shutter.exposure_s == pytest.approx(127e-6, abs=0.2e-6)
 
 
-def test_values_wait_for_the_next_frame_and_exposure_one_longer(scene: EarthSunScene) -> None:
-    camera = make(scene)
+def test_values_wait_for_the_next_frame_and_exposure_one_longer(camera: Ov7620) -> None:
     usual = picture(camera, 3)
     write(camera, {"EXPOSURE": 2, "GAIN": 0x10}, int(Fraction(7, 2) * FRAME_PS))
     np.testing.assert_array_equal(picture(camera, 3), usual)
@@ -124,8 +125,7 @@ def test_values_wait_for_the_next_frame_and_exposure_one_longer(scene: EarthSunS
     assert [frame.exposure_lines for frame in frames] == [8, 8, 4]
 
 
-def test_change_is_announced_to_who_has_looked_ahead(scene: EarthSunScene) -> None:
-    camera = make(scene)
+def test_change_is_announced_to_who_has_looked_ahead(camera: Ov7620) -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     camera.segment_at(5 * MS)
@@ -214,9 +214,8 @@ def test_reset_bit_restores_the_registers_and_itself(scene: EarthSunScene) -> No
 
 
 def test_unimplemented_addresses_are_ignored_and_logged(
-    scene: EarthSunScene, caplog: pytest.LogCaptureFixture
+    camera: Ov7620, caplog: pytest.LogCaptureFixture
 ) -> None:
-    camera = make(scene)
     before = picture(camera)
     with caplog.at_level(logging.INFO):
         caplog.clear()
@@ -247,8 +246,7 @@ def test_without_power_there_is_nothing(scene: EarthSunScene) -> None:
     np.testing.assert_array_equal(lines.pixels(), picture(quiet(scene), 0))
 
 
-def test_frame_lookup(scene: EarthSunScene) -> None:
-    camera = make(scene)
+def test_frame_lookup(camera: Ov7620) -> None:
     first_row = int(45 * LINE_PS)
     for frame in (0, 1, 7):
         readout = int(frame * FRAME_PS) + first_row
