@@ -20,15 +20,16 @@ from pathlib import Path
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.board_options import (
+from cubestack.host.cli.device_options import (
     add_board_arguments,
-    add_engine_arguments,
+    add_record_arguments,
+    add_start_arguments,
     chosen_options,
+    inject_plan,
+    record,
     tell_notices,
 )
-from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
 from cubestack.host.cli.ports import add_port_arguments, open_ports
-from cubestack.host.cli.records import add_record_arguments, record
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.recording.setups import emulated_setup
@@ -55,11 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--i2c", type=whole(0, 255), metavar="BUS", help="I2C bus, for cubestack run --attach"
     )
     parser.add_argument("--baud", type=whole(1), help="of the node protocol; default 57600")
-    parser.add_argument(
-        "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
-    )
-    add_faults_argument(parser)
-    add_engine_arguments(parser)
+    add_start_arguments(parser)
     add_board_arguments(parser)
     parser.add_argument(
         "--pace",
@@ -88,15 +85,13 @@ def run(args: argparse.Namespace) -> int:
             found = device(name)
             options = chosen_options(args, found)
             found.prepare(progress)
-            first = opened[0].board if opened else None
             emulated = power_up(
                 found,
                 args.scene,
                 seed=args.seed,
                 engine=args.engine,
                 baud=args.baud,
-                kernel=None if first is None else first.kernel,
-                i2c_bus=None if first is None else first.i2c_bus,
+                beside=opened[0] if opened else None,
                 **options,
             )
             stack.callback(emulated.close)

@@ -21,7 +21,7 @@ from typing import Any
 from rich.table import Table
 
 from cubestack.host.cli.arguments import add_options, chosen
-from cubestack.host.cli.board_options import add_engine_arguments, add_option, tell_notices
+from cubestack.host.cli.device_options import add_engine_arguments, add_option, tell_notices
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import devices

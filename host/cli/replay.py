@@ -22,10 +22,7 @@ from typing import Any
 
 from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.formats.setup import Setup
-from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.board_options import add_engine_arguments
-from cubestack.host.cli.fault_plan import add_faults_argument
-from cubestack.host.cli.records import add_record_arguments, record
+from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.device import Engine
 from cubestack.host.devices.emulated import AnyEmulated, power_up
@@ -38,9 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="another one than recorded")
-    parser.add_argument("--seed", type=whole(0), help="another one than recorded")
-    add_faults_argument(parser)
-    add_engine_arguments(parser)
+    add_start_arguments(parser, seed=None, seed_help="another one than recorded")
     add_record_arguments(parser)
     parser.add_argument("--json", action="store_true", help="one object with all differences")
 

@@ -24,8 +24,7 @@ from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.board_options import add_engine_arguments
-from cubestack.host.cli.fault_plan import add_faults_argument, inject_plan
+from cubestack.host.cli.device_options import add_start_arguments, inject_plan
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.terminal import say
@@ -71,11 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
     )
-    parser.add_argument(
-        "--seed", type=whole(0), default=0, help="seed of everything random (default 0)"
-    )
-    add_faults_argument(parser)
-    add_engine_arguments(parser)
+    add_start_arguments(parser)
     parser.add_argument(
         "--hz", type=whole(1), default=STANDARD_HZ, help="bits a second (default 100000)"
     )

@@ -130,7 +130,6 @@ class Device(Generic[BoardT_co, ClientT_co]):
         load_scene: reads a scene file; ValueError names the key that is wrong.
         default_scene: what it looks at when nothing is said.
         default_scene_title: that, for the help.
-        scene_types: classes of scenes that it takes.
         options: of its board alone.
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.

@@ -16,10 +16,9 @@ import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias
 
-from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.contract import Closable, DeviceClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
 from cubestack.host.devices.registry import device as registered
@@ -29,16 +28,14 @@ from cubestack.host.transport.smbus import CubeSMBus
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
-    from cubestack.emulator.bus.i2c import I2cBus
     from cubestack.emulator.faults.injector import Faults
     from cubestack.emulator.ports.realtime import RealtimeScheduler
-    from cubestack.emulator.sim.virtual_time import Kernel
 
 PORT = "{port}"
 """What ``run`` replaces in a command by the path of the serial port."""
 
 
-class EmulatedDevice(Generic[BoardT_co, ClientT_co]):
+class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     """A powered-up device.
 
     Attributes:
@@ -146,19 +143,6 @@ class EmulatedDevice(Generic[BoardT_co, ClientT_co]):
         """Power down."""
         self.board.close()
 
-    def __enter__(self) -> Self:
-        """Use it in a ``with`` block."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Power down."""
-        self.close()
-
 
 #: A powered-up device, whichever it is.
 AnyEmulated: TypeAlias = "EmulatedDevice[Board, DeviceClient]"
@@ -224,24 +208,13 @@ def power_up(
     *,
     seed: int = 0,
     engine: Engine = "auto",
-    baud: int | None = None,
-    kernel: Kernel | None = None,
-    i2c_bus: I2cBus | None = None,
+    beside: AnyEmulated | None = None,
     **options: Any,
 ) -> EmulatedDevice[BoardT_co, ClientT_co]:
-    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board.
-
-    ``kernel`` and ``i2c_bus`` are those of another board that it stands beside, if any.
-    """
-    board = device.open_board(
-        device.scene(scene),
-        seed=seed,
-        engine=engine,
-        baud=baud,
-        kernel=kernel,
-        i2c_bus=i2c_bus,
-        **options,
-    )
+    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board."""
+    if beside is not None:
+        options |= {"kernel": beside.board.kernel, "i2c_bus": beside.board.i2c_bus}
+    board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
     return EmulatedDevice(device, board, seed)
 
 
@@ -272,13 +245,4 @@ def open_device(
     """
     device = registered(name)
     check_options(device, options)
-    return power_up(
-        device,
-        scene,
-        seed=seed,
-        engine=engine,
-        baud=baud,
-        kernel=None if beside is None else beside.board.kernel,
-        i2c_bus=None if beside is None else beside.board.i2c_bus,
-        **options,
-    )
+    return power_up(device, scene, seed=seed, engine=engine, baud=baud, beside=beside, **options)

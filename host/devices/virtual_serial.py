@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from cubestack.host.clients.contract import Closable
+
 if TYPE_CHECKING:
     from cubestack.emulator.ports.direct import DirectSerial
 
@@ -13,7 +15,7 @@ LONGEST_S = 3600.0
 """What "for ever" is: nothing of a device takes as long."""
 
 
-class VirtualSerial:
+class VirtualSerial(Closable):
     """A serial port with the part of pyserial's interface that drivers use, in virtual time.
 
     Attributes:
@@ -71,11 +73,3 @@ class VirtualSerial:
         """Take the plug out."""
         self._line.close()
         self.is_open = False
-
-    def __enter__(self) -> VirtualSerial:
-        """Use it in a ``with`` block."""
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        """Close."""
-        self.close()

@@ -15,7 +15,7 @@ import socket
 import struct
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 from smbus2 import SMBus
 from smbus2.smbus2 import I2cFunc
@@ -88,14 +88,6 @@ class CubeSMBus(SMBus):
             self._link.close()
         self._link = self.fd = self.address = self._addressed = None
         self._pec = 0
-
-    def __enter__(self) -> Self:
-        """Close the bus at the end of a ``with`` block."""
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        """Close the bus."""
-        self.close()
 
     def enable_pec(self, enable: bool = True) -> None:
         """Let transactions carry a packet error code, or not."""

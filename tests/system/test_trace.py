@@ -14,8 +14,8 @@ import pytest
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
+from cubestack.host.cli.device_options import record
 from cubestack.host.cli.main import main
-from cubestack.host.cli.records import record
 from cubestack.host.clients.contract import Client
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.registry import device as registered

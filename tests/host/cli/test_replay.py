@@ -9,9 +9,8 @@ import pytest
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.host.cli import replay
-from cubestack.host.cli.fault_plan import inject_plan
+from cubestack.host.cli.device_options import inject_plan, record
 from cubestack.host.cli.main import main
-from cubestack.host.cli.records import record
 from cubestack.host.devices.emulated import open_device, power_up
 from cubestack.host.recording.setups import emulated_setup
 

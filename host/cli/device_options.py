@@ -1,0 +1,147 @@
+"""Options of commands that run an emulated device: how it is made, its faults, what is kept."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from cubestack.host.cli.arguments import whole
+from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
+from cubestack.host.devices.emulated import AnyEmulated
+from cubestack.host.devices.records import create_file, start_recorder, start_trace
+from cubestack.host.devices.registry import devices
+
+if TYPE_CHECKING:
+    from cubestack.emulator.faults.injector import Faults
+    from cubestack.emulator.recording.recorder import Recorder
+    from cubestack.firmware_model.formats.setup import Setup
+
+
+def add_start_arguments(
+    parser: argparse.ArgumentParser,
+    seed: int | None = 0,
+    seed_help: str = "seed of everything random (default 0)",
+) -> None:
+    """Declare the options for the seed, whose default is ``seed``, for faults and the engine."""
+    parser.add_argument("--seed", type=whole(0), default=seed, help=seed_help)
+    parser.add_argument(
+        "--faults",
+        type=Path,
+        metavar="FILE",
+        help="TOML plan of faults, with their seed (see docs/faults.md)",
+    )
+    add_engine_arguments(parser)
+
+
+def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the option that says how the FPGA is run."""
+    parser.add_argument(
+        "--engine",
+        choices=get_args(Engine),
+        default="auto",
+        help="how the FPGA is run (default: compiled where there is a compiler)",
+    )
+
+
+def add_board_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that one device's board alone has, of all registered devices."""
+    for device in devices():
+        for option in device.options:
+            add_option(parser, option, f"{device.name}: ")
+
+
+def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str = "") -> None:
+    """Declare one of them; ``prefix`` goes before its help."""
+    text = prefix + option.help
+    if option.choices:
+        parser.add_argument(
+            option.flag,
+            dest=option.name,
+            choices=option.choices,
+            metavar="|".join(option.choices),
+            help=text,
+        )
+    else:
+        parser.add_argument(
+            option.flag, dest=option.name, action="store_const", const=True, help=text
+        )
+
+
+def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any]:
+    """The board options that were given, but for defaults.
+
+    Raises ValueError for one that is of another device.
+    """
+    own = {option.name for option in device.options}
+    chosen = {}
+    for other in devices():
+        for option in other.options:
+            value = getattr(args, option.name, None)
+            if value is None or value == option.default:
+                continue
+            if option.name not in own:
+                raise ValueError(
+                    f"{option.flag} is an option of {other.name}, not of {device.name}"
+                )
+            chosen[option.name] = value
+    return chosen
+
+
+def tell_notices(
+    device: AnyDevice, options: Mapping[str, Any], tell: Callable[[str], None]
+) -> None:
+    """Tell what a user must know of the chosen ``options``."""
+    for option in device.options:
+        notice = option.notice(options[option.name]) if option.name in options else None
+        if notice is not None:
+            tell(notice)
+
+
+def inject_plan(
+    faults: Faults, path: Path | None, say: Callable[[str], None] | None = None
+) -> None:
+    """Inject the plan in ``path``, if one is given; ``say`` is told what each fault does.
+
+    Raises FaultError (a ValueError) for a plan that makes no sense.
+    """
+    from cubestack.emulator.faults.plan import load_plan
+
+    if path is None:
+        return
+    faults.load(load_plan(path))
+    if say is not None:
+        tell = say
+        faults.on_event = lambda event: tell(str(event))
+
+
+def add_record_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="every byte of all ports (docs/recording.md)"
+    )
+    parser.add_argument(
+        "--trace",
+        type=Path,
+        metavar="FILE.vcd",
+        help="lines, buses, FPGA pins and firmware for a waveform viewer",
+    )
+
+
+def record(
+    args: argparse.Namespace, emulated: AnyEmulated, stack: ExitStack, setup: Setup | None = None
+) -> Recorder | None:
+    """Start what the options ask for; ``stack`` ends it. Before any port is opened.
+
+    ``setup`` is for the recording's header. Returns what records, if anything. Raises ValueError
+    for a file that can not be written.
+    """
+    if args.trace is not None:
+        stack.callback(start_trace(emulated, create_file(args.trace, stack)).close)
+    if args.record is None:
+        return None
+    recorder = start_recorder(emulated, create_file(args.record, stack), setup)
+    stack.callback(recorder.close)
+    return recorder
