@@ -184,30 +184,30 @@ class AttitudeResult(Result):
 
 @dataclass(frozen=True)
 class AttitudeSummary(Summary):
-    """Rates in percent of all frames.
+    """Rates in percent of all frames; errors and times over the right ones.
 
-    Over the right ones: 95th percentiles of the errors in degrees, and the mean of the whole
-    measurement's virtual time in ms where the device tells it; None where there is none.
+    The times are of devices that tell that of the whole measurement.
     """
 
-    frames: int
-    solved_percent: float
-    right_percent: float
-    cross_p95_deg: float | None
-    roll_p95_deg: float | None
-    total_ms: float | None
+    results: Sequence[AttitudeResult]
 
     def lines(self, wall_s: float) -> Iterator[str]:
-        """Rates, then errors."""
+        """Rates, then 95th percentiles of the errors, and the mean of the virtual time."""
+        right = [result for result in self.results if result.right]
+        solved = sum(result.solved for result in self.results)
+        count = max(1, len(self.results))
         yield (
-            f"of {self.frames}: {self.solved_percent:.1f} % solved, "
-            f"{self.right_percent:.1f} % right, {wall_s:.1f} s wall time"
+            f"of {len(self.results)}: {100 * solved / count:.1f} % solved, "
+            f"{100 * len(right) / count:.1f} % right, {wall_s:.1f} s wall time"
         )
-        if self.cross_p95_deg is not None:
-            time = "" if self.total_ms is None else f"; mean time {self.total_ms:.0f} ms"
+        if right:
+            times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
+            time = f"; mean time {np.mean(times):.0f} ms" if times else ""
             yield (
-                f"95th percentile of the right ones: {arcsec(self.cross_p95_deg)} arcsec "
-                f"across, {arcsec(self.roll_p95_deg)} about the boresight{time}"
+                f"95th percentile of the right ones: "
+                f"{arcsec(percentile_95(result.error_cross_deg for result in right))} arcsec "
+                f"across, {arcsec(percentile_95(result.error_roll_deg for result in right))} "
+                f"about the boresight{time}"
             )
 
 
@@ -245,17 +245,7 @@ class AttitudeExperiment(
 
     def summarise(self, results: Sequence[AttitudeResultT]) -> AttitudeSummary:
         """Rates over all frames, errors and times over the right ones."""
-        right = [result for result in results if result.right]
-        count = max(1, len(results))
-        times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
-        return AttitudeSummary(
-            frames=len(results),
-            solved_percent=100 * sum(result.solved for result in results) / count,
-            right_percent=100 * len(right) / count,
-            cross_p95_deg=percentile_95(result.error_cross_deg for result in right),
-            roll_p95_deg=percentile_95(result.error_roll_deg for result in right),
-            total_ms=float(np.mean(times)) if times else None,
-        )
+        return AttitudeSummary(results)
 
 
 def percentile_95(values: Iterator[float | None]) -> float | None:

@@ -42,17 +42,13 @@ def field_json(field: Field) -> dict[str, object]:
     """Every attribute of a field."""
     choices = field.choices
     return {
-        "name": field.name,
-        "type": field.type,
-        "bit_offset": field.bit_offset,
-        "meaning": field.meaning,
-        "unit": field.unit,
-        "scale": field.scale,
+        **picked(field, "name", "type", "bit_offset", "meaning", "unit", "scale"),
         "choices": None if choices is None else {choice.name: int(choice) for choice in choices},
-        "minimum": field.minimum,
-        "maximum": field.maximum,
-        "maximum_by": field.maximum_by,
-        "range_flag": field.range_flag,
-        "flag": field.flag,
+        **picked(field, "minimum", "maximum", "maximum_by", "range_flag", "flag"),
         "reset": field.reset.hex() if isinstance(field.reset, bytes) else field.reset,
     }
+
+
+def picked(thing: object, *names: str) -> dict[str, object]:
+    """These attributes of ``thing``."""
+    return {name: getattr(thing, name) for name in names}

@@ -8,7 +8,13 @@ from collections.abc import Callable
 
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.host.export.c_header import c_header
-from cubestack.host.export.field_text import choice_rows, field_details, field_json, field_type
+from cubestack.host.export.field_text import (
+    choice_rows,
+    field_details,
+    field_json,
+    field_type,
+    picked,
+)
 from cubestack.host.export.side_protocols import side_json, side_markdown, side_table
 
 
@@ -67,22 +73,15 @@ def _markdown(interface: Interface) -> str:
 def _json(interface: Interface) -> str:
     """One JSON object, for other programs."""
     content = {
-        "name": interface.name,
-        "version": interface.version,
-        "i2c_address": interface.i2c_address,
-        "baud": interface.baud,
+        **picked(interface, "name", "version", "i2c_address", "baud"),
         "ack_errors": {error.name: int(error) for error in interface.ack_errors},
         "messages": [
             {
                 "id": message.id,
                 "kind": message.kind.value,
-                "name": message.name,
-                "length": message.length,
-                "meaning": message.meaning,
+                **picked(message, "name", "length", "meaning"),
                 "ours": message.extension,
-                "steps": message.steps,
-                "supported": message.supported,
-                "ordered": message.ordered,
+                **picked(message, "steps", "supported", "ordered"),
                 "confidence": message.confidence and message.confidence.name,
                 "fields": [field_json(field) for field in message.fields],
             }

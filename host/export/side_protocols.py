@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
-from cubestack.host.export.field_text import field_details, field_json, field_type
+from cubestack.host.export.field_text import field_details, field_json, field_type, picked
 
 
 def side_table(interface: Interface) -> Iterator[str]:
@@ -72,8 +72,7 @@ def side_json(interface: Interface) -> dict[str, object]:
     content: dict[str, object] = {}
     if interface.registers is not None:
         content["registers"] = {
-            "i2c_address": interface.registers.i2c_address,
-            "note": interface.registers.note,
+            **picked(interface.registers, "i2c_address", "note"),
             "registers": [
                 {
                     "address": register.address,
@@ -89,10 +88,7 @@ def side_json(interface: Interface) -> dict[str, object]:
             "baud": interface.service_port.baud,
             "letters": [
                 {
-                    "letter": letter.letter,
-                    "name": letter.name,
-                    "meaning": letter.meaning,
-                    "length": letter.length,
+                    **picked(letter, "letter", "name", "meaning", "length"),
                     "answer": None if letter.answer is None else letter.answer.hex(),
                 }
                 for letter in interface.service_port.letters

@@ -130,37 +130,30 @@ class SensorResult(Result):
 
 
 @dataclass(frozen=True)
-class SensorSummary:
-    """One sensor's results; over the detected ones errors in degrees, and the mean time in ms."""
-
-    results: int
-    detected: int
-    error_mean_deg: float | None
-    error_p95_deg: float | None
-    total_ms: float | None
-
-    def line(self, sensor: str) -> str:
-        """For a reader."""
-        text = f"{sensor}: {self.detected} of {self.results} detected"
-        if self.error_p95_deg is None:
-            return text
-        return (
-            f"{text}; error: mean {self.error_mean_deg:.3f}, "
-            f"95th percentile {self.error_p95_deg:.3f} deg; time {self.total_ms:.1f} ms"
-        )
-
-
-@dataclass(frozen=True)
 class DirectionSummary(Summary):
-    """Summaries of the sensors that measured, by name."""
+    """How many results detected their target; over those the errors, and the mean time."""
 
-    sensors: dict[str, SensorSummary]
+    results: Sequence[SensorResult]
 
     def lines(self, wall_s: float) -> Iterator[str]:
-        """One for each sensor."""
-        for name, summary in self.sensors.items():
-            yield summary.line(name)
+        """One for each sensor that measured."""
+        for sensor in ("sun", "nadir"):
+            own = [result for result in self.results if result.sensor == sensor]
+            if own:
+                yield f"{sensor}: {_told(own)}"
         yield f"{wall_s:.1f} s wall time"
+
+
+def _told(results: Sequence[SensorResult]) -> str:
+    errors = [result.error_deg for result in results if result.error_deg is not None]
+    times = [result.phase_ms["total"] for result in results if result.detected]
+    text = f"{len(times)} of {len(results)} detected"
+    if not errors:
+        return text
+    return (
+        f"{text}; error: mean {np.mean(errors):.3f}, "
+        f"95th percentile {np.percentile(errors, 95):.3f} deg; time {np.mean(times):.1f} ms"
+    )
 
 
 class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
@@ -207,27 +200,11 @@ class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
         )
 
     def summarise(self, results: Sequence[SensorResult]) -> DirectionSummary:
-        by_sensor = {
-            name: [result for result in results if result.sensor == name]
-            for name in ("sun", "nadir")
-        }
-        return DirectionSummary({name: _summarise(own) for name, own in by_sensor.items() if own})
+        return DirectionSummary(results)
 
 
 def _degrees(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
-
-
-def _summarise(results: Sequence[SensorResult]) -> SensorSummary:
-    errors = [result.error_deg for result in results if result.error_deg is not None]
-    times = [result.phase_ms["total"] for result in results if result.detected]
-    return SensorSummary(
-        results=len(results),
-        detected=sum(result.detected for result in results),
-        error_mean_deg=float(np.mean(errors)) if errors else None,
-        error_p95_deg=float(np.percentile(errors, 95)) if errors else None,
-        total_ms=float(np.mean(times)) if times else None,
-    )
 
 
 def _random_view(
