@@ -133,7 +133,7 @@ def test_two_degrees_a_second_smear_the_stars(session: Any, rng: np.random.Gener
 def test_tracking_is_lost_at_two_degrees_a_second(looping: Any) -> None:
     scene = SkyScene(SkyScene.pointing(84, -1).quaternion, rate_deg_s=(2.0, 0.0, 0.0))
     opened = looping(scene)
-    turns = run_loop(opened, scene, ITERATIONS)
+    turns = run_loop(opened, scene, ITERATIONS // 2)  # smeared stars take long to draw
     tracked = [t for t in turns if t.attitude.valid and t.attitude.mode is MatchMode.TRACKING]
     assert not tracked
     assert opened.client.client.telemetry("ErrorFlags")["RateExceeded"]
