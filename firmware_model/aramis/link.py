@@ -1,6 +1,6 @@
 """AraMiS' link to the host: commands that can not wait, and directions that must be unit vectors.
 
-An accepted telecommand of which something can not wait is acted upon at once, before it is queued.
+An accepted telecommand of which something can not wait is acted upon as soon as it is queued.
 """
 
 import math
@@ -9,11 +9,11 @@ from typing import Any
 
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.state import State
-from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, INTERFACE, AckError
+from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, INTERFACE
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
-from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
+from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
+from cubestack.firmware_model.node.queue import QueuedCommand
 
 SEND_BUFFER_BYTES = 8 * BLOCK_BYTES
 """What the UART may still have to send: assumed."""
@@ -27,6 +27,7 @@ _FLAGS = LinkFlags(
     read_without_id="I2cReadWithoutId",
     timeout="UartTimeout",
     unknown_command="TcmdIdError",
+    bad_parameter="ParameterError",
 )
 
 _LENGTHS = {
@@ -36,13 +37,8 @@ _LENGTHS = {
 """Shortest and longest vector that a telecommand may carry, and the flag that others raise."""
 
 
-class AramisLink(SatelliteLink):
-    """Decodes what the host sends and answers it.
-
-    Attributes:
-        queue: accepted telecommands for the main loop.
-        latest: ID and error code of the latest telecommand.
-    """
+class AramisLink(QueueingLink):
+    """Decodes what the host sends and answers it."""
 
     def __init__(
         self,
@@ -52,33 +48,17 @@ class AramisLink(SatelliteLink):
         telemetry: Callable[[Message], dict[str, Any]],
         urgent: Callable[[QueuedCommand], None],
     ) -> None:
-        """Serve.
-
-        Args:
-            hardware: the UART, and the main loop's sleep.
-            meter: charged.
-            state: flags and counters.
-            telemetry: gives the values of a message.
-            urgent: told of each accepted telecommand at once, before it is queued.
-        """
-        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES)
+        """Serve; ``urgent`` is told of each accepted telecommand at once."""
+        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry)
         self._state = state
-        self._telemetry = telemetry
         self._urgent = urgent
-        self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()
-        self.latest = (0, AckError.OK)
 
-    def _values(self, message: Message) -> dict[str, Any]:
+    def _values(self, message: Message) -> dict[str, Any] | None:
         self._state.telemetry += 1
-        return self._telemetry(message)
-
-    def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
-        error = super()._accept(identifier, parameters, bus)
-        self.latest = identifier, error
-        return error
+        return super()._values(message)
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
-        flags = {flag or "ParameterError" for flag in super()._refusals(message, values)}
+        flags = {*super()._refusals(message, values)}
         if message.name in _LENGTHS:
             shortest, longest, flag = _LENGTHS[message.name]
             length = math.hypot(*(float(value) for value in values.values()))
@@ -87,10 +67,8 @@ class AramisLink(SatelliteLink):
         return flags
 
     def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
-        if self.queue.full:
-            return False
-        command = QueuedCommand(message, values, self._hardware.uptime_us())
-        self._urgent(command)
-        self.queue.append(command)
-        self._state.telecommands += 1
-        return True
+        accepted = super()._enqueue(message, values)
+        if accepted:
+            self._urgent(self.queue[-1])
+            self._state.telecommands += 1
+        return accepted

@@ -65,12 +65,11 @@ class Telemetry:
         self._camera = camera
         self._catalogue = catalogue
         self._commands = commands
-        self._link = link
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
             "ExtendedIdentification": self._extended_identification,
             "ErrorFlags": state.flag_values,
-            "TcmdProcessed": self._processed,
+            "TcmdProcessed": lambda: link().processed(commands.running),
             "SensorStatus": self._sensor_status,
             "SystemTime": self._system_time,
             "Attitude": self._attitude,
@@ -102,16 +101,6 @@ class Telemetry:
             "ResetCause": self._hardware.reset_cause,
             "TcmdCount": self._state.telecommands & _U16,
             "TlmCount": self._state.telemetry & _U16,
-        }
-
-    def _processed(self) -> Values:
-        waiting = len(self._link().queue)
-        latest, error = self._link().latest
-        return {
-            "Processed": int(not waiting and not self._commands.running),
-            "Waiting": waiting,
-            "Latest": latest,
-            "Error": error,
         }
 
     def _sensor_status(self) -> Values:

@@ -8,8 +8,7 @@ from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
-from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
+from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
 
 SEND_BUFFER_BYTES = 2048
 """What the UART may still have to send: assumed, a third of a second at the default baud rate."""
@@ -27,12 +26,8 @@ _FLAGS = LinkFlags(
 )
 
 
-class CubeStarLink(SatelliteLink):
-    """Decodes what the host sends and answers it.
-
-    Attributes:
-        queue: accepted telecommands for the main loop.
-    """
+class CubeStarLink(QueueingLink):
+    """Decodes what the host sends and answers it."""
 
     def __init__(
         self,
@@ -42,10 +37,8 @@ class CubeStarLink(SatelliteLink):
         telemetry: Callable[[Message], dict[str, Any] | None],
     ) -> None:
         """Serve; ``telemetry`` gives a message's values, or None when it is not supported."""
-        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES)
+        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry)
         self._state = state
-        self._telemetry = telemetry
-        self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()
 
     @property
     def idle(self) -> bool:
@@ -53,11 +46,11 @@ class CubeStarLink(SatelliteLink):
         return not (self.receiving or self.queue or self._hardware.uart_backlog())
 
     def _values(self, message: Message) -> dict[str, Any] | None:
-        values = self._telemetry(message)
+        values = super()._values(message)
         self._state.retained.telemetry += values is not None
         return values
 
     def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
-        accepted = self.queue.put(QueuedCommand(message, values))
+        accepted = super()._enqueue(message, values)
         self._state.retained.telecommands += accepted
         return accepted

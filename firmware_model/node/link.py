@@ -10,7 +10,7 @@ fills it.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Inte
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.hardware import NodeHardware
+from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
 from cubestack.firmware_model.node.state import NodeState
 
 NO_DATA = 0xFF
@@ -58,6 +59,7 @@ class LinkFlags:
             as an empty answer.
         timeout: silence inside a frame.
         unknown_command: telecommand ID that the node does not know.
+        bad_parameter: parameter out of a range whose table names no flag.
     """
 
     uart: BusFlags
@@ -67,6 +69,7 @@ class LinkFlags:
     read_without_id: str
     timeout: str | None = None
     unknown_command: str | None = None
+    bad_parameter: str | None = None
 
 
 class SatelliteLink(ABC):
@@ -81,15 +84,9 @@ class SatelliteLink(ABC):
         flags: LinkFlags,
         send_buffer_bytes: int,
     ) -> None:
-        """Serve ``interface``.
+        """Serve ``interface``, and raise ``flags`` in ``state``.
 
-        Args:
-            hardware: the UART, and the main loop's sleep.
-            meter: charged.
-            state: where error flags are raised.
-            interface: telecommands and telemetry.
-            flags: their names.
-            send_buffer_bytes: what the UART may still have to send.
+        ``send_buffer_bytes`` is what the UART may still have to send.
         """
         self._hardware = hardware
         self._meter = meter
@@ -118,7 +115,7 @@ class SatelliteLink(ABC):
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
         """Why parameters are refused: error flags, None for one without; empty: they are good."""
-        return [flag or None for _, flag in message.violations(values)]
+        return [flag or self._flags.bad_parameter for _, flag in message.violations(values)]
 
     @property
     def receiving(self) -> bool:
@@ -257,3 +254,46 @@ class SatelliteLink(ABC):
             return AckError.BUFFER_FULL
         self._hardware.wake()
         return AckError.OK
+
+
+class QueueingLink(SatelliteLink):
+    """Queues telecommands for the main loop and answers telemetry at once.
+
+    Attributes:
+        queue: accepted telecommands.
+        latest: ID and error code of the latest telecommand.
+    """
+
+    def __init__(
+        self,
+        hardware: NodeHardware,
+        meter: Meter,
+        state: NodeState,
+        interface: Interface,
+        flags: LinkFlags,
+        send_buffer_bytes: int,
+        telemetry: Callable[[Message], dict[str, Any] | None],
+    ) -> None:
+        """Serve; ``telemetry`` gives a message's values, or None when it is not supported."""
+        super().__init__(hardware, meter, state, interface, flags, send_buffer_bytes)
+        self._telemetry = telemetry
+        self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()
+        self.latest = (0, AckError.OK)
+
+    def processed(self, running: bool) -> dict[str, int]:
+        """Values of telemetry TcmdProcessed; ``running``: whether a telecommand is executed."""
+        waiting = len(self.queue)
+        latest, error = self.latest
+        done = not waiting and not running
+        return {"Processed": int(done), "Waiting": waiting, "Latest": latest, "Error": error}
+
+    def _values(self, message: Message) -> dict[str, Any] | None:
+        return self._telemetry(message)
+
+    def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
+        return self.queue.put(QueuedCommand(message, values, self._hardware.uptime_us()))
+
+    def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
+        error = super()._accept(identifier, parameters, bus)
+        self.latest = identifier, error
+        return error

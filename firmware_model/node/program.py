@@ -5,17 +5,15 @@ A sensor adds what its telecommands do and what its telemetry says. Its tables b
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Reset, Routine, Sleep
 from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.identification import identification
-from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
-from cubestack.firmware_model.node.queue import BoundedQueue
+from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
 
@@ -32,6 +30,7 @@ _FLAGS = LinkFlags(
     incomplete="UartError",
     read_without_id="I2cReadWithoutId",
     unknown_command="TcmdRefused",
+    bad_parameter="TcmdRefused",
 )
 
 Action: TypeAlias = Callable[[dict[str, Any]], Routine[None]]
@@ -39,43 +38,6 @@ Action: TypeAlias = Callable[[dict[str, Any]], Routine[None]]
 
 Source: TypeAlias = Callable[[], dict[str, Any]]
 """Gives the values of a telemetry message, in interrupt context, so that nothing waits."""
-
-
-class PlainLink(SatelliteLink):
-    """Queues telecommands and answers telemetry at once.
-
-    Attributes:
-        queue: accepted telecommands, each with its parameters.
-        latest: ID and error code of the latest telecommand.
-    """
-
-    def __init__(
-        self,
-        hardware: NodeHardware,
-        meter: Meter,
-        state: NodeState,
-        interface: Interface,
-        telemetry: Callable[[Message], dict[str, Any]],
-    ) -> None:
-        """Serve ``interface``; ``telemetry`` gives the values of a message."""
-        super().__init__(hardware, meter, state, interface, _FLAGS, SEND_BUFFER_BYTES)
-        self._telemetry = telemetry
-        self.queue: BoundedQueue[tuple[Message, dict[str, Any]]] = BoundedQueue()
-        self.latest = (0, AckError.OK)
-
-    def _values(self, message: Message) -> dict[str, Any]:
-        return self._telemetry(message)
-
-    def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
-        return self.queue.put((message, values))
-
-    def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str]:
-        return [flag or "TcmdRefused" for flag in super()._refusals(message, values)]
-
-    def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
-        error = super()._accept(identifier, parameters, bus)
-        self.latest = identifier, error
-        return error
 
 
 class NodeProgram(ABC):
@@ -106,11 +68,17 @@ class NodeProgram(ABC):
         sources: Mapping[str, Source] = {
             "Identification": lambda: identification(interface, node_type, hardware.uptime_us()),
             "ErrorFlags": self.state.flag_values,
-            "TcmdProcessed": self._processed,
+            "TcmdProcessed": lambda: self.link.processed(self._busy),
             **self.sources(),
         }
-        self.link = PlainLink(
-            hardware, meter, self.state, interface, lambda message: sources[message.name]()
+        self.link = QueueingLink(
+            hardware,
+            meter,
+            self.state,
+            interface,
+            _FLAGS,
+            SEND_BUFFER_BYTES,
+            lambda message: sources[message.name](),
         )
         self._busy = False
 
@@ -128,12 +96,13 @@ class NodeProgram(ABC):
             if not self.link.queue:
                 yield Sleep(None)
                 continue
-            message, values = self.link.queue.popleft()
+            command = self.link.queue.popleft()
+            name = command.message.name
             self._busy = True
-            if message.name in self._actions:
-                yield from self._actions[message.name](values)
+            if name in self._actions:
+                yield from self._actions[name](command.values)
             else:
-                self.settings.put(message.name, values)
+                self.settings.put(name, command.values)
             yield Pay()
             self._busy = False
 
@@ -143,9 +112,3 @@ class NodeProgram(ABC):
     def _clear_flags(self, _values: dict[str, Any]) -> Routine[None]:
         self.state.flags.clear()
         yield Pay()
-
-    def _processed(self) -> dict[str, Any]:
-        waiting = len(self.link.queue)
-        latest, error = self.link.latest
-        done = not waiting and not self._busy
-        return {"Processed": int(done), "Waiting": waiting, "Latest": latest, "Error": error}
