@@ -79,7 +79,8 @@ class Camera:
         """Turn the supply on and wait until the sensor is ready, at its reset values."""
         self._hardware.switch_camera(True)
         self.off = False
-        yield from self._settle()
+        now_us: int = yield ReadTimer()
+        yield Sleep(now_us + SETTLE_US, wakeable=False)
 
     def start(self) -> Routine[Reason | None]:
         """Let the sensor send frames as the settings say; why it does not."""
@@ -91,7 +92,7 @@ class Camera:
             return None
         self._set_up = None
         self._give_up()
-        if (yield from self.read("CHIP_VERSION")) != CHIP_VERSION:
+        if (yield from self._read(REGISTERS["CHIP_VERSION"].address)) != CHIP_VERSION:
             return self._fail(Reason.CAMERA_SILENT, "CameraSilent")
         for name, value in (
             ("SHUTTER_WIDTH", rows),
@@ -109,10 +110,6 @@ class Camera:
         self._set_up = None
         if not self.off:
             yield from self.write(REGISTERS["OUTPUT_CONTROL"].address, 0)
-
-    def _settle(self) -> Routine[None]:
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + SETTLE_US, wakeable=False)
 
     def _fail(self, reason: Reason, flag: str) -> Reason:
         self._state.raise_flag(flag)
@@ -178,21 +175,17 @@ class Camera:
         data = bytes([address]) + value.to_bytes(2, "big")
         return (yield CameraTransfer(data)) is not None
 
-    def read(self, name: str) -> Routine[int | None]:
-        """Value of the register ``name``; None when the sensor does not answer."""
-        answer: bytes | None = yield CameraTransfer(bytes([REGISTERS[name].address]), read=2)
-        return None if answer is None else int.from_bytes(answer, "big")
-
     def forget_set_up(self) -> None:
         """Registers were written by other means: set the sensor up again before a picture."""
         self._set_up = None
 
     def select(self, address: int) -> Routine[None]:
         """Read any register into ``selected_register``."""
-        answer: bytes | None = yield CameraTransfer(bytes([address]), read=2)
-        self.selected_register = (
-            address,
-            None if answer is None else int.from_bytes(answer, "big"),
-        )
-        if answer is None:
+        value = yield from self._read(address)
+        self.selected_register = address, value
+        if value is None:
             self._state.raise_flag("CameraSilent")
+
+    def _read(self, address: int) -> Routine[int | None]:
+        answer: bytes | None = yield CameraTransfer(bytes([address]), read=2)
+        return None if answer is None else int.from_bytes(answer, "big")

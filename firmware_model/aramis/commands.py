@@ -12,6 +12,7 @@ from cubestack.firmware_model.aramis.catalogue.upload import CatalogueUpload
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.aramis.state import State
+from cubestack.firmware_model.attitude.geometry import direction_of
 from cubestack.firmware_model.interface.aramis import (
     BLOCK_BYTES,
     IMAGE_BYTES,
@@ -134,7 +135,7 @@ class Commands(CommandExecutor):
 
     def _measure_near_point(self, command: QueuedCommand) -> Routine[None]:
         values = command.values
-        hint = self._measuring.direction(values["RightAscension"], values["Declination"])
+        hint = direction_of(values["RightAscension"], values["Declination"], self._meter)
         yield from self._measuring.measure(hint)
 
     def _start_loop(self, _command: QueuedCommand) -> Routine[None]:

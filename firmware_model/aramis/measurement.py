@@ -13,23 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.camera import Camera
-from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.matching.identification import identify
-from cubestack.firmware_model.aramis.pipeline import (
-    VERIFIED,
-    Configuration,
-    Detection,
-    detect,
-    explain,
-)
+from cubestack.firmware_model.aramis.pipeline import VERIFIED, Configuration, Detection, solve
 from cubestack.firmware_model.aramis.settings import StoredSettings
-from cubestack.firmware_model.aramis.solution import Solution, StarList, unsolved
 from cubestack.firmware_model.aramis.state import Measurement, State
-from cubestack.firmware_model.attitude.geometry import direction_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface.aramis import (
     PHASES,
@@ -101,16 +91,10 @@ class Measuring:
         boresight: Direction = dcm(self._state.quaternion, self._meter)[2]
         return boresight
 
-    def direction(self, right_ascension: float, declination: float) -> Direction:
-        """Inertial unit vector (3,) of angles in rad."""
-        return direction_of(right_ascension, declination, self._meter)
-
     def measure(self, hint: Direction | None, *, overlap: bool = False) -> Routine[None]:
-        """Measure once; the result is in ``State.measurement``.
+        """Measure once, into ``State.measurement``; ``hint`` as for ``identify``.
 
-        Args:
-            hint: rough unit vector of the boresight; None: lost in space.
-            overlap: whether the next frame comes while this one is worked on.
+        With ``overlap``, the next frame comes while this one is worked on.
         """
         state = self._state
         mode = MeasurementMode.LOST_IN_SPACE if hint is None else MeasurementMode.AIDED
@@ -174,7 +158,13 @@ class Measuring:
         assert database is not None
         assert place is not None
         with self._phases(result):
-            solution = self._solve(result, self._camera.picture(place), database, hint)
+            settings = configuration(self._state.settings)
+            exposure = int(self._state.settings.get("SetExposure", "Rows"))
+            picture, past = self._camera.picture(place), self._background
+            solution = solve(picture, past, settings, database, self._meter, hint, exposure)
+            result.mean = past.mean(self._meter)
+            result.threshold = past.threshold(settings.detection.sigmas, self._meter)
+            result.pictures = len(past.sums)
         yield Pay()
         result.solution = solution
         result.outcome = solution.outcome
@@ -182,26 +172,6 @@ class Measuring:
         if solution.quaternion is not None:
             self._state.quaternion = solution.quaternion
             self._state.matched = int((solution.stars >= 0).sum())
-
-    def _solve(
-        self,
-        result: Measurement,
-        picture: NDArray[np.uint8],
-        database: Database,
-        hint: Direction | None,
-    ) -> Solution:
-        settings = configuration(self._state.settings)
-        stars = detect(picture, self._background, settings.field, settings.detection, self._meter)
-        result.mean = self._background.mean(self._meter)
-        result.threshold = self._background.threshold(settings.detection.sigmas, self._meter)
-        result.pictures = len(self._background.sums)
-        if stars is None:
-            nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
-            return unsolved(Reason.TOO_MANY_PIXELS, nothing)
-        exposure = int(self._state.settings.get("SetExposure", "Rows"))
-        stars = replace(stars, skew_px=stars.smear_px * settings.field.rows / exposure)
-        found = identify(stars, settings.field, settings.profile, database, self._meter, hint)
-        return explain(found, picture, settings, self._meter)
 
     @contextmanager
     def _phases(self, result: Measurement) -> Iterator[None]:

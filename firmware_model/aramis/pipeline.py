@@ -125,16 +125,13 @@ def solve(
     database: Database,
     meter: Meter,
     hint: NDArray[np.float32] | None = None,
+    exposure_rows: int | None = None,
 ) -> Solution:
-    """Attitude of a picture, or why there is none.
+    """Attitude of a picture (rows, columns), or why there is none.
 
-    Args:
-        picture: (rows, columns) grey levels.
-        background: the pictures before; this one is added.
-        configuration: settings.
-        database: stars and triangles.
-        meter: charged.
-        hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
+    The picture is added to ``background``. ``hint`` (3,) is a rough unit vector of the boresight in
+    inertial axes; None: lost in space. ``exposure_rows``: how long each row was exposed, in times
+    of a row; None: the rows were exposed all at once.
 
     Raises:
         ValueError: for a picture of another size than the configuration's.
@@ -143,6 +140,9 @@ def solve(
     if stars is None:
         nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
         return unsolved(Reason.TOO_MANY_PIXELS, nothing)
+    if exposure_rows is not None:
+        skew_px = stars.smear_px * configuration.field.rows / exposure_rows
+        stars = replace(stars, skew_px=skew_px)
     solution = identify(stars, configuration.field, configuration.profile, database, meter, hint)
     return explain(solution, picture, configuration, meter)
 

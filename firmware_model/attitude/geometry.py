@@ -101,3 +101,11 @@ def angles_of(direction: NDArray[np.float32], meter: Meter) -> tuple[float, floa
     x, y, z = direction.astype(np.float32)
     meter.charge(f32_atan2=2, f32_mul=2, f32_add=1, f32_sqrt=1)
     return float(np.arctan2(y, x)), float(np.arctan2(z, np.sqrt(x * x + y * y)))
+
+
+def turned(vectors: NDArray[np.float32], dcm: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Vectors (n, 3) in the axes that a direction cosine matrix (3, 3) leads to; not charged."""
+    product: NDArray[np.float32] = (
+        vectors[:, :1] * dcm[:, 0] + vectors[:, 1:2] * dcm[:, 1] + vectors[:, 2:] * dcm[:, 2]
+    )
+    return product

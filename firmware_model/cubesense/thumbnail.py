@@ -12,13 +12,7 @@ the memory nor the time.
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    FRAME_BYTES,
-    IMAGE_BYTES,
-    ROWS,
-    ImageSize,
-)
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, FRAME_BYTES, ROWS, ImageSize
 
 #: Number of a pixel that lies outside of the picture.
 OUTSIDE = -1
@@ -39,17 +33,3 @@ def frame_pixels(size: ImageSize, frame: int) -> NDArray[np.int32]:
     column = (position % size.side - size.left) * size.step
     inside = (row >= 0) & (row < ROWS) & (column >= 0) & (column < COLUMNS)
     return np.where(inside, row * COLUMNS + column, OUTSIDE).astype(np.int32)
-
-
-def thumbnail(picture: NDArray[np.uint8], size: ImageSize) -> NDArray[np.uint8]:
-    """The whole square (side, side) of ``picture`` (480, 640), as its frames carry it.
-
-    Raises ValueError for another shape.
-    """
-    if picture.shape != (ROWS, COLUMNS):
-        raise ValueError(f"a picture has the shape {(ROWS, COLUMNS)}, not {picture.shape}")
-    pixels = np.concatenate([frame_pixels(size, frame) for frame in range(size.frames)])
-    padded = np.zeros(IMAGE_BYTES + 1, np.uint8)  # OUTSIDE counts as its last element
-    padded[:IMAGE_BYTES] = picture.reshape(IMAGE_BYTES)
-    square: NDArray[np.uint8] = padded[pixels]
-    return square.reshape(size.side, size.side)

@@ -17,19 +17,9 @@ from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, 
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
+from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory
 from cubestack.firmware_model.node.link import longest_command
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH
-
-__all__ = [
-    "CAPACITY",
-    "EXTERNAL_RAM_BYTES",
-    "RETENTION_BYTES",
-    "Buffer",
-    "Memory",
-    "budget",
-    "used",
-]
 
 KB = 1024
 EXTERNAL_RAM_BYTES = 1024 * KB

@@ -13,7 +13,6 @@ from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.phases import Phases
-from cubestack.firmware_model.cubestar.pictures.contract import ITERATION_US
 from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
@@ -23,8 +22,6 @@ from cubestack.firmware_model.interface.cubestar.codes import ResetCause
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine
-
-__all__ = ["ITERATION_US", "RESET_LEAD_US", "CubeStarProgram"]
 
 RESET_LEAD_US = 10_000
 """From the reset to the next iteration: more than the few milliseconds that the reset takes."""

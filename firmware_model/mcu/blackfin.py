@@ -22,11 +22,7 @@ FLASH_READ_NS = 70
 
 
 def blackfin_bf533(*, clock_hz: int = CORE_HZ) -> CostTable:
-    """Costs in core cycles.
-
-    Args:
-        clock_hz: core clock in Hz; memory keeps its speed in bus clocks and nanoseconds.
-    """
+    """Costs in core cycles; at another clock memory keeps its speed in bus clocks and ns."""
     library = "single precision of the Blackfin's run-time library, measured on an ADSP-BF609"
     core = "Blackfin Programming Reference: most instructions take one cycle"
     line_fill = LINE_FILL_BUS_CLOCKS * BUS_DIVIDER

@@ -28,11 +28,7 @@ LIBRARY_FACTOR = 0.1852
 
 
 def pic18f45k20(library_factor: float = LIBRARY_FACTOR) -> CostTable:
-    """Costs in instruction cycles.
-
-    Args:
-        library_factor: floating-point routines relative to sdcc's, above 0.
-    """
+    """Costs in instruction cycles; ``library_factor``: above 0, see ``LIBRARY_FACTOR``."""
     survey = "routines on a PIC18 as compiled by sdcc"
     core = "PIC18 instruction set: bit set, bit clear and move, with their bank"
 

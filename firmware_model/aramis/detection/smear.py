@@ -78,12 +78,9 @@ def smear_px(picture: NDArray[np.uint8], regions: Regions, floor: int, meter: Me
 
 
 def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool:
-    """Whether there are streaks of some 60 px or more, if too faint for single pixels.
+    """Whether a picture (rows, columns) has streaks of some 60 px or more, however faint.
 
-    Args:
-        picture: (rows, columns) grey levels.
-        field: the camera; blocks near the edge of its field do not count.
-        meter: charged.
+    Blocks near the edge of the field do not count.
     """
     inside: NDArray[np.bool_] = np.all(_blocks(field.mask), axis=(1, 3))
     around = _box(inside.astype(np.float32))

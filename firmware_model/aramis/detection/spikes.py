@@ -31,13 +31,9 @@ class SpikeRemoval(IntEnum):
 def remove_spikes(
     mask: NDArray[np.bool_], method: SpikeRemoval, needed: int, meter: Meter
 ) -> NDArray[np.bool_]:
-    """Mask (rows, columns) of the pixels that are stars'.
+    """Which of the bright pixels of a mask (rows, columns) are stars'; phase `spikes`.
 
-    Args:
-        mask: bright pixels.
-        method: how.
-        needed: bright pixels that a window of 25 must have.
-        meter: charged; phase `spikes`.
+    ``needed``: bright pixels that a window of 25 must have.
     """
     with meter.phase("spikes"):
         if method is SpikeRemoval.CENTRE:

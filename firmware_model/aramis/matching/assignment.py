@@ -44,12 +44,8 @@ def assign(
 ) -> Assignment:
     """Score the stars of a measured triangle against those of the catalogue's.
 
-    Args:
-        brightness: (3,) of the measured stars, in any linear unit.
-        sides: (3,) a, b, c of the measured triangle.
-        v_mag: (3,) magnitudes of the catalogue's stars.
-        catalogue: (3, 3) their unit vectors.
-        meter: charged.
+    Measured are the ``brightness`` (3,), in any linear unit, and the ``sides`` (3,) a, b, c; of the
+    catalogue's stars the magnitudes (3,) and unit vectors (3, 3) are known.
     """
     first, second, third = catalogue.astype(np.float32)
     expected = np.array(

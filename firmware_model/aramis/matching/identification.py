@@ -39,44 +39,27 @@ def identify(
     meter: Meter,
     hint: NDArray[np.float32] | None = None,
 ) -> Solution:
-    """Identify measured stars and solve the attitude.
+    """Identify measured stars, the brightest first, and solve the attitude.
 
-    Args:
-        measured: stars of the picture in the field, the brightest first.
-        field: the camera.
-        profile: settings.
-        database: stars and triangles.
-        meter: charged; phases `faces`, `triangles`, `search`, `pivoting`, `identities`, `attitude`
-            and `verification`.
-        hint: (3,) rough unit vector of the boresight in inertial axes; None: lost in space.
+    ``hint`` (3,) is a rough unit vector of the boresight in inertial axes; None: lost in space.
+    Phases: `faces`, `triangles`, `search`, `pivoting`, `identities`, `attitude`, `verification`.
     """
     # As published, there is no such reason, and its spike removal cuts stars into long pieces.
     smeared = profile.verify and measured.smear_px > profile.smear_px
     if smeared and measured.skew_px > profile.skew_px:
         return unsolved(Reason.SMEAR, measured)
-    solution = _identify(measured, field, profile, database, meter, hint)
-    if smeared and solution.outcome is MeasurementOutcome.NONE:
-        return replace(solution, reason=Reason.SMEAR)
-    return solution
-
-
-def _identify(
-    measured: StarList,
-    field: Field,
-    profile: Profile,
-    database: Database,
-    meter: Meter,
-    hint: NDArray[np.float32] | None,
-) -> Solution:
     if len(measured) < 3:
-        return unsolved(Reason.TOO_FEW_STARS, measured)
+        return unsolved(Reason.SMEAR if smeared else Reason.TOO_FEW_STARS, measured)
     vectors = field.directions(measured.centroids, meter)
     faces = None
     if hint is not None:
         with meter.phase("faces"):
             faces = database.sphere.around(hint, meter)
     search = _Search(measured, vectors, field, profile, database, hint, faces, meter)
-    return search.verified() if profile.verify else search.published()
+    solution = search.verified() if profile.verify else search.published()
+    if smeared and solution.outcome is MeasurementOutcome.NONE:
+        return replace(solution, reason=Reason.SMEAR)
+    return solution
 
 
 @dataclass(frozen=True)
@@ -200,20 +183,20 @@ class _Search:
             )
 
     def _attitude(
-        self, measured: NDArray[np.intp], identities: NDArray[np.intp]
-    ) -> NDArray[np.float32] | None:
-        weights = np.ones(len(measured), dtype=np.float32)
-        return self._quest(self.vectors[measured], self.database.vectors[identities], weights)
-
-    def _quest(
         self,
-        vectors: NDArray[np.float32],
-        catalogue: NDArray[np.float32],
-        weights: NDArray[np.float32],
+        measured: NDArray[np.intp],
+        identities: NDArray[np.intp],
+        vectors: NDArray[np.float32] | None = None,
+        weights: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float32] | None:
+        """Of identified stars; by default their own vectors, all of the same weight."""
+        body = self.vectors[measured] if vectors is None else vectors
+        reference = self.database.vectors[identities]
+        if weights is None:
+            weights = np.ones(len(measured), dtype=np.float32)
         with self.meter.phase("attitude"):
             try:
-                return quest(vectors, catalogue, weights, self.meter, eigenvalue=largest_eigenvalue)
+                return quest(body, reference, weights, self.meter, eigenvalue=largest_eigenvalue)
             except AttitudeError:
                 return None
 
@@ -257,10 +240,9 @@ class _Search:
         still = self.measured.smear_px <= self.profile.smear_px or self.measured.skew_px <= 0
         if still or len(measured) < FEWEST:
             return quaternion
-        catalogue = self.database.vectors[stars]
         heights = self.measured.centroids[measured, 1] / np.float32(self.field.rows)
         with self.meter.phase("attitude"):
-            predicted = catalogue @ dcm(quaternion, self.meter).T
+            predicted = self.database.vectors[stars] @ dcm(quaternion, self.meter).T
             self.meter.charge(f32_mul=9 * len(stars), f32_add=6 * len(stars), loop=len(stars))
             straight, weights, sigma_rad = at_middle_row(
                 self.vectors[measured],
@@ -272,7 +254,7 @@ class _Search:
         moved = self.measured.skew_px > self.profile.moved_px
         if moved and sigma_rad > self.profile.motion_sigma_rad:
             return None
-        return self._quest(straight, catalogue, weights)
+        return self._attitude(measured, stars, straight, weights)
 
     def _solution(
         self,

@@ -41,10 +41,7 @@ def measure_triangle(
 ) -> Triangle | None:
     """Measure the triangle of three unit vectors (3, 3); None when they lie on a line.
 
-    Args:
-        vectors: directions in camera axes.
-        sigma_rad: standard deviation of each across the line of sight, in rad per axis.
-        meter: charged.
+    ``sigma_rad`` is the standard deviation of each across the line of sight, per axis.
     """
     b1, b2, b3 = vectors.astype(np.float32)
     edges = (b1 - b2, b2 - b3, b1 - b3)

@@ -55,11 +55,7 @@ def find_triangles(
 ) -> NDArray[np.uint32]:
     """Triangles of the database within the bounds of a measured one, in the moments' order.
 
-    Args:
-        triangle: the measured one.
-        database: where to look.
-        faces: (f,) which faces count; None: all.
-        meter: charged.
+    Only those of ``faces`` (f,) count; None: all.
     """
     reach = BOUND_SIGMAS * triangle.area_sigma
     areas = database.area_index.find(
@@ -93,14 +89,14 @@ def match_triple(
 ) -> Match:
     """Match the triangle of three stars, with pivots as long as too many candidates are left.
 
+    Phases: `triangles`, `search` and `pivoting`.
+
     Args:
         vectors: (n, 3) unit vectors of the stars in camera axes.
         main: the three stars of the main triangle, the brightest first.
         pivots: further stars, at most three are used.
         sigma_rad: noise of the directions per axis.
-        database: where to look.
         faces: (f,) which faces count; None: all.
-        meter: charged; phases `triangles`, `search` and `pivoting`.
         enough: no pivot is needed when so few candidates are left; 1 as published.
     """
     with meter.phase("triangles"):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -73,21 +74,18 @@ def confirm(
     hypotheses: int,
     meter: Meter,
 ) -> Confirmation:
-    """Find the catalogue stars that an attitude predicts among the measured ones.
+    """Find the catalogue stars that an attitude predicts among the measured; phase `verification`.
 
     Args:
         quaternion: (4,) inertial to camera, scalar last.
         vectors: (n, 3) unit vectors of all measured stars in camera axes.
-        database: its star list is used.
-        field: which directions the camera sees.
         tolerance_rad: largest distance of a star from its predicted place, below 0.1 rad.
         hypotheses: attitudes tried so far, this one included.
-        meter: charged; phase `verification`.
     """
     with meter.phase("verification"):
         turn = dcm(quaternion, meter)
         seen = _in_field(database.vectors, turn, field, meter)
-        predicted = _turned(database.vectors[seen], turn)
+        predicted = turned(database.vectors[seen], turn)
         compared = len(seen) * len(vectors)
         meter.charge(
             ram_read=6 * len(seen) + 3 * compared,
@@ -148,11 +146,4 @@ def _in_field(
         f32_compare=count,
         loop=count,
     )
-    return near[field.contains(_turned(stars[near], turn), meter)]
-
-
-def _turned(vectors: NDArray[np.float32], turn: NDArray[np.float32]) -> NDArray[np.float32]:
-    turned: NDArray[np.float32] = (
-        vectors[:, :1] * turn[:, 0] + vectors[:, 1:2] * turn[:, 1] + vectors[:, 2:] * turn[:, 2]
-    )
-    return turned
+    return near[field.contains(turned(stars[near], turn), meter)]

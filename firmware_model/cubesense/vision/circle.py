@@ -1,7 +1,6 @@
 """Circles through edges, in the part's single precision.
 
-CubeSense thesis, sections 4.4.1.2 (three points, equations 4.4.4 to 4.4.10; equation 4.4.7 prints
-x_2 - x_2 for x_3 - x_2), 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by the
+CubeSense thesis, sections 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by the
 inverse's first rows). Extensions are the radius, which needs the third row too, and leaving one
 point out of the sums again.
 """
@@ -99,33 +98,6 @@ class LeastSquaresCircle:
         if not square > 0:
             return None
         return Circle(x, y, np.sqrt(square))
-
-
-def three_point_circle(points: Values, meter: Meter) -> Circle | None:
-    """The circle through three points (3, 2); None when they lie on a line.
-
-    The gradients of both chords must be finite and one of them not 0, so the points are tried in
-    turn, as the text proposes.
-    """
-    for first in range(FEWEST):
-        (x1, y1), (x2, y2), (x3, y3) = np.roll(points.astype(np.float32), -first, axis=0)
-        meter.charge(f32_compare=2, loop=1)
-        if x1 == x2 or x2 == x3:
-            continue
-        slope_a, slope_b = (y2 - y1) / (x2 - x1), (y3 - y2) / (x3 - x2)
-        meter.charge(f32_add=5, f32_div=2, f32_compare=2)
-        if slope_a == slope_b:
-            return None
-        x = slope_a * slope_b * (y1 - y3) + slope_b * (x1 + x2) - slope_a * (x2 + x3)
-        x = x / (2 * (slope_b - slope_a))
-        # Equation 4.4.8 or 4.4.9, of the chord that is the steeper one.
-        steep_a = abs(slope_a) > abs(slope_b)
-        slope, xa, ya, xb, yb = (slope_a, x1, y1, x2, y2) if steep_a else (slope_b, x2, y2, x3, y3)
-        y = -(x - (xa + xb) / 2) / slope + (ya + yb) / 2
-        radius = np.sqrt((x1 - x) * (x1 - x) + (y1 - y) * (y1 - y))
-        meter.charge(f32_mul=10, f32_add=13, f32_div=2, f32_compare=1, f32_sqrt=1)
-        return Circle(x, y, radius)
-    return None
 
 
 def _cofactor(

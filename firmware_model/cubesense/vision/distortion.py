@@ -115,11 +115,7 @@ class RadiusTable:
 
 
 def byte_table(meter: Meter, coefficients: Sequence[float] = DISTORTION) -> RadiusTable:
-    """The published table: whole pixels, rounded up.
-
-    Args:
-        meter: charged for making the table.
-        coefficients: r_d in px is the sum of ``coefficients[k]`` r_u^k.
+    """The published table: whole pixels, rounded up; r_d in px is the sum of coefficients[k] r_u^k.
 
     Raises:
         DistortionError: when they have no inverse, or one more than 255 px away.

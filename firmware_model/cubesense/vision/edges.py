@@ -175,7 +175,7 @@ class _Piece:
 
 
 class NadirLines:
-    """Consumer of the nadir scan: feed it the byte of every clock, in pieces of any size.
+    """Consumer of the nadir scan: ``space`` takes the bytes of the next clocks, then ``filled``.
 
     The bytes' own cost (``scan_byte`` each) is left to whoever clocks them in.
 
@@ -200,49 +200,27 @@ class NadirLines:
         self._pieces = iter(_pieces(read_out))
         self._piece: _Piece | None = next(self._pieces)
         self._buffer = np.zeros(read_out.scan_step, np.uint8) if buffer is None else buffer
-        self._filled = 0
         self._previous = 0
 
     @property
     def wanted(self) -> int:
-        """Bytes until the buffer is full and the part looks into it; 0 after the last one."""
-        return 0 if self._piece is None else self._piece.size - self._filled
+        """Bytes until the part looks into the buffer; 0 after the last one."""
+        return 0 if self._piece is None else self._piece.size
 
     @property
     def space(self) -> NDArray[np.uint8]:
         """Where the next `wanted` bytes go; `filled` says that they are there."""
-        return self._buffer[self._filled : self._filled + self.wanted]
+        return self._buffer[: self.wanted]
 
     def filled(self) -> None:
         """`space` is full: look into it."""
-        self._take(self.wanted)
+        assert self._piece is not None
+        if self._piece.line is not None:
+            self._examine(self._piece, self._piece.line)
+        self._piece = next(self._pieces, None)
 
-    def feed(self, data: NDArray[np.uint8]) -> None:
-        """Take the next bytes (n,).
-
-        Raises:
-            ValueError: when there are more than the scan has.
-        """
-        while len(data):
-            wanted = self.wanted
-            if not wanted:
-                raise ValueError(f"the scan is through; {len(data)} bytes are too many")
-            taken, data = data[:wanted], data[wanted:]
-            self.space[: len(taken)] = taken
-            self._take(len(taken))
-
-    def _take(self, count: int) -> None:
-        self._filled += count
-        if not self.wanted:
-            self._examine()
-            self._piece, self._filled = next(self._pieces, None), 0
-
-    def _examine(self) -> None:
-        """The buffer is full: compare its last pixel, the sample, with the one before."""
-        piece = self._piece
-        assert piece is not None
-        if piece.line is None:
-            return
+    def _examine(self, piece: _Piece, line: int) -> None:
+        """Compare the buffer's last pixel, the sample, with the one before."""
         before = self._previous if piece.start else 0
         sample = int(self._buffer[piece.size - 1])
         self._previous = sample
@@ -260,7 +238,7 @@ class NadirLines:
             bisect(wide, self._threshold, self._meter),
             lambda position: int(self._buffer[position - start]),
         )
-        self.edges.add(piece.line, piece.vertical, found)
+        self.edges.add(line, piece.vertical, found)
 
 
 def _pieces(read_out: ReadOut) -> list[_Piece]:

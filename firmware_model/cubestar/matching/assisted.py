@@ -28,15 +28,10 @@ def identify_assisted(
     margin_rad: float = DEFAULT_MARGIN_RAD,
     radius_deg: float = CUT_RADIUS_DEG,
 ) -> Identification:
-    """Identify centroids near a known direction.
+    """Identify centroids of unit vectors (n, 3) within ``radius_deg`` of a known direction.
 
-    Args:
-        directions: (n, 3) unit vectors of the centroids in camera axes.
-        catalogue: star list and pair list.
-        boresight: (3,) rough unit vector of the boresight in inertial axes.
-        meter: charged; phases `reduction` and those of `voting.identify`.
-        margin_rad: largest difference between a measured and a catalogue angle, in rad.
-        radius_deg: radius of the cut in degrees.
+    ``boresight`` (3,) is a unit vector in inertial axes, ``margin_rad`` the largest difference
+    between a measured and a catalogue angle. Phases: `reduction` and those of `voting.identify`.
     """
     with meter.phase("reduction"):
         reduced = catalogue.reduced(boresight, radius_deg, meter)

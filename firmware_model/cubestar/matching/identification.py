@@ -110,16 +110,9 @@ def verify(
 ) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
     """Let every pair of centroids vote for its identities, and keep those that all agree.
 
-    Args:
-        pairs: the picture's pairs.
-        identities: (n,) star of each centroid or -1.
-        vectors: (stars, 3) the star list.
-        margin_rad: largest difference between a measured and a catalogue angle.
-        meter: charged with every step.
-
-    Returns:
-        Votes (n,) of the verification round, and the identities with -1 for what was not kept:
-        votes below one less than the maximum, or a contradiction with the other kept stars.
+    ``identities`` (n,) are indices into ``vectors`` (stars, 3) or -1. Returns the votes (n,) of the
+    verification round, and the identities with -1 for what was not kept: votes below one less than
+    the maximum, or a contradiction with the other kept stars.
     """
     named = (identities[pairs.first] != NONE) & (identities[pairs.second] != NONE)
     first, second = pairs.first[named], pairs.second[named]

@@ -12,6 +12,7 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.matching.identification import (
@@ -44,11 +45,11 @@ def track(
 ) -> Identification:
     """Identify centroids from the attitude of the iteration before.
 
+    Phases: `reduction`, `prediction`, `distances`, `verification`.
+
     Args:
         directions: (n, 3) unit vectors of the centroids in camera axes.
-        catalogue: its star list is used.
         attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
-        meter: charged; phases `reduction`, `prediction`, `distances`, `verification`.
         margin_rad: largest difference between a measured and a catalogue angle, in rad.
         reach_deg: largest angle between a centroid and the predicted direction of its star.
         radius_deg: radius around the last boresight in which stars are predicted.
@@ -94,10 +95,7 @@ def _nearest(
     )
     if candidates == 0:
         return np.full(count, NONE, dtype=np.int32)
-    inertial, turn = vectors[stars], attitude.astype(np.float32)
-    predicted = (
-        inertial[:, :1] * turn[:, 0] + inertial[:, 1:2] * turn[:, 1] + inertial[:, 2:] * turn[:, 2]
-    )
+    predicted = turned(vectors[stars], attitude.astype(np.float32))
     apart = directions[:, None, :] - predicted[None, :, :]
     chord2 = apart[..., 0] ** 2 + apart[..., 1] ** 2 + apart[..., 2] ** 2
     nearest = np.argmin(chord2, axis=1)

@@ -35,15 +35,6 @@ from cubestack.firmware_model.cubestar.matching.identification import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 
-__all__ = [
-    "DEFAULT_MARGIN_RAD",
-    "LARGEST_CHANCE",
-    "Identification",
-    "MatchOutcome",
-    "identify",
-    "identify_among",
-]
-
 #: Search tolerance of section 4.3.5, about one pixel.
 DEFAULT_MARGIN_RAD = 0.001
 
@@ -65,13 +56,10 @@ def identify(
     *,
     margin_rad: float = DEFAULT_MARGIN_RAD,
 ) -> Identification:
-    """Identify centroids with the whole catalogue: lost in space.
+    """Identify centroids of unit vectors (n, 3) with the whole catalogue: lost in space.
 
-    Args:
-        directions: (n, 3) unit vectors of the centroids in camera axes.
-        catalogue: star list and pair list.
-        meter: charged; phases `distances`, `votes`, `identities`, `verification`, `selection`.
-        margin_rad: largest difference between a measured and a catalogue angle, in rad.
+    `margin_rad` is the largest difference between a measured and a catalogue angle. Phases:
+    `distances`, `votes`, `identities`, `verification`, `selection`.
     """
     density = len(catalogue) / (4 * pi)
     return identify_among(

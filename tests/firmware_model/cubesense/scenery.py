@@ -5,6 +5,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.cubesense.thumbnail import frame_pixels
+from cubestack.firmware_model.cubesense.vision.edges import NadirLines
+from cubestack.firmware_model.interface.cubesense.codes import ImageSize
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, SUN_NOT_FOUND, ReadOut
 
 COLUMNS, ROWS = FULL_SIZE.columns, FULL_SIZE.rows
@@ -164,3 +167,18 @@ def window(picture: NDArray[np.uint8], threshold: int = 200) -> NDArray[np.uint8
     top = min(max(y - 3, 0), ROWS - 15)
     coordinates = np.array([x & 255, x >> 8, y & 255, y >> 8], np.uint8)
     return np.concatenate([coordinates, picture[top : top + 15, left : left + 15].reshape(-1)])
+
+
+def feed(lines: NadirLines, data: NDArray[np.uint8]) -> None:
+    """Let ``lines`` take all of a scan's bytes."""
+    for size in iter(lambda: lines.wanted, 0):
+        lines.space[:], data = data[:size], data[size:]
+        lines.filled()
+    assert not len(data)
+
+
+def thumbnail(picture: NDArray[np.uint8], size: ImageSize) -> NDArray[np.uint8]:
+    """The whole square (side, side) of ``picture`` (480, 640), as its frames carry it."""
+    pixels = np.concatenate([frame_pixels(size, frame) for frame in range(size.frames)])
+    padded = np.append(picture.ravel(), np.uint8(0))  # OUTSIDE counts as its last element
+    return padded[pixels].reshape(size.side, size.side)

@@ -29,7 +29,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions, a
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
-from .scenery import earth, scan, sun, window
+from .scenery import earth, feed, scan, sun, window
 
 
 class Rig:
@@ -141,7 +141,7 @@ def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
     lines = NadirLines(EdgeConfig(), rig.unit.meter, buffer=rig.acquisition.buffers[0])
     assert rig.run(rig.acquisition.scan(sram, lines)) is True
     expected = NadirLines(EdgeConfig(), rig.unit.meter)
-    expected.feed(scan(picture))
+    feed(expected, scan(picture))
     assert len(lines.edges) > 10
     assert np.array_equal(lines.edges.points, expected.edges.points)
     assert lines.wanted == 0
@@ -260,7 +260,7 @@ def test_single_pixels_by_address() -> None:
     assert isinstance(answer, tuple)
     edges, pixels = answer
     lines = NadirLines(EdgeConfig(), meter)
-    lines.feed(scan(picture))
+    feed(lines, scan(picture))
     assert {*map(tuple, edges.points)} == {*map(tuple, lines.edges.points)}
     assert pixels < 250
     latch_after(rig.unit, Sram.SRAM2, 10)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
-from cubestack.firmware_model.cubesense.thumbnail import thumbnail
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import (
     EMPTY_FRAME,
@@ -25,7 +24,7 @@ from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER
 from cubestack.firmware_model.mcu.requests import SetPin
 
 from .harness import Harness
-from .scenery import earth, place, sun
+from .scenery import earth, place, sun, thumbnail
 
 Effect = Callable[[Harness], None]
 EFFECTS: dict[str, Effect] = {}

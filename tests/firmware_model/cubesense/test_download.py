@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.thumbnail import thumbnail
 from cubestack.firmware_model.interface.cubesense.codes import (
     EMPTY_FRAME,
     IMAGE_BYTES,
@@ -13,6 +12,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.mcu.requests import Request
 
 from .links_harness import Links
+from .scenery import thumbnail
 
 
 @pytest.fixture

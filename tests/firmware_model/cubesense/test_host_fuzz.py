@@ -5,14 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.thumbnail import thumbnail
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult, ImageSize, Sram
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
 from .harness import Harness
-from .scenery import earth
+from .scenery import earth, thumbnail
 
 EARTH = earth(5.0, 3.0)
 IMAGE = REGISTERS["IMAGE"].address

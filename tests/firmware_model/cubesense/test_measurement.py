@@ -27,7 +27,7 @@ from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
-from .scenery import SUN_BORESIGHT, chequered, earth, error_deg, place, scan, sun, window
+from .scenery import SUN_BORESIGHT, chequered, earth, error_deg, feed, place, scan, sun, window
 
 TICK_US = 51.2
 
@@ -97,7 +97,7 @@ def test_the_earth_with_either_memory(
     factors = distortion_of(INTERFACE.telecommand("Distortion2").reset_values())
     meter = Meter(PIC18F45K20)
     lines = NadirLines(EdgeConfig(), meter)
-    lines.feed(scan(picture))
+    feed(lines, scan(picture))
     table = fine_table(meter, Projection.STEREOGRAPHIC, factors)
     expected = find_nadir(lines.edges, NadirConfig(table), meter)
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)

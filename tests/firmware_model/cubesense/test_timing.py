@@ -16,7 +16,7 @@ from cubestack.firmware_model.mcu.pic18 import (
     pic18f45k20,
 )
 
-from .scenery import SUN_BORESIGHT, earth, scan, sun, window
+from .scenery import SUN_BORESIGHT, earth, feed, scan, sun, window
 
 IMAGING_S = 0.048
 
@@ -39,7 +39,7 @@ def nadir_seconds(table: CostTable, config: NadirConfig, edges: EdgeConfig) -> f
         data = scan(earth(alpha, beta))
         meter.charge(scan_byte=len(data))
         lines = NadirLines(edges, meter)
-        lines.feed(data)
+        feed(lines, data)
         assert find_nadir(lines.edges, config, meter).detect is DetectResult.SUCCESS
         times.append(table.seconds(meter.total))
     return float(np.mean(times))

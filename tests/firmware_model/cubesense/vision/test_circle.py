@@ -2,11 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from cubestack.firmware_model.cubesense.vision.circle import (
-    Circle,
-    LeastSquaresCircle,
-    three_point_circle,
-)
+from cubestack.firmware_model.cubesense.vision.circle import Circle, LeastSquaresCircle
 from cubestack.firmware_model.mcu.costs import Meter
 
 
@@ -64,8 +60,8 @@ def test_points_on_a_line(meter: Meter) -> None:
     points = np.array([[x, 2 * x + 3] for x in range(-100, 100, 13)], np.float32)
     assert LeastSquaresCircle(points, meter).solve() is None
     assert LeastSquaresCircle(np.full((9, 2), 50, np.float32), meter).solve() is None
-    assert three_point_circle(points[:3], meter) is None
-    assert three_point_circle(np.array([[1, 0], [1, 5], [1, 9]], np.float32), meter) is None
+    upright = np.array([[1, 0], [1, 5], [1, 9]], np.float32)
+    assert LeastSquaresCircle(upright, meter).solve() is None
 
 
 def test_residuals_are_distances_from_the_circle(meter: Meter) -> None:
@@ -75,25 +71,3 @@ def test_residuals_are_distances_from_the_circle(meter: Meter) -> None:
     radius = 150 + outside
     points = np.stack([10 + radius * np.cos(turn), -20 + radius * np.sin(turn)], axis=1)
     assert circle.residuals(points.astype(np.float32), meter) == pytest.approx(outside, abs=0.02)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_three_points_of_a_circle(meter: Meter, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    centre, radius = rng.uniform(-100, 100, 2), rng.uniform(50, 180)
-    turn = rng.uniform(0, 2.1) + np.array([0, 2.1, 4.2]) + rng.uniform(-0.3, 0.3, 3)
-    points = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    circle = three_point_circle(points.astype(np.float32), meter)
-    assert circle is not None
-    assert [circle.x, circle.y, circle.radius] == pytest.approx([*centre, radius], abs=0.05)
-
-
-@pytest.mark.parametrize("turn", range(3))
-@pytest.mark.parametrize("backwards", [False, True])
-def test_three_points_with_upright_and_level_chords(
-    meter: Meter, turn: int, backwards: bool
-) -> None:
-    points = np.roll(np.array([[0, 0], [0, 60], [80, 60]], np.float32), turn, axis=0)
-    circle = three_point_circle(points[::-1] if backwards else points, meter)
-    assert circle is not None
-    assert [circle.x, circle.y, circle.radius] == pytest.approx([40, 30, 50], abs=1e-3)

@@ -14,7 +14,7 @@ from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
 
-from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, chequered, distort, earth, place, scan
+from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, chequered, distort, earth, feed, place, scan
 
 WHOLE = EdgeConfig(sub_pixel=False)
 NO_RIM = EdgeConfig(sub_pixel=False, rim_px=1000)
@@ -24,7 +24,7 @@ def search(
     picture: NDArray[np.uint8], config: EdgeConfig, meter: Meter, read_out: ReadOut = FULL_SIZE
 ) -> EdgeList:
     lines = NadirLines(config, meter, read_out)
-    lines.feed(scan(picture, read_out))
+    feed(lines, scan(picture, read_out))
     return lines.edges
 
 
@@ -69,30 +69,14 @@ def test_whole_pixels_agree_with_the_literal_search_in_rough_pictures(
     assert edges.full == (len(expected) > MAX_EDGES)
 
 
-def test_the_pieces_in_which_bytes_come_do_not_matter(meter: Meter) -> None:
-    data = scan(earth(10, -5))
-    at_once = NadirLines(EdgeConfig(), meter)
-    at_once.feed(data)
-    cycles = meter.take()
-    cuts = np.sort(np.random.default_rng(3).integers(0, len(data), 300))
-    piecewise = NadirLines(EdgeConfig(), meter)
-    for piece in np.split(data, cuts):
-        piecewise.feed(piece)
-    assert piecewise.edges.points.tolist() == at_once.edges.points.tolist()
-    assert meter.take() == cycles
-    assert piecewise.wanted == 0
-
-
 def test_the_buffer_asks_for_64_pixels_and_32_at_a_column_s_end(meter: Meter) -> None:
     lines = NadirLines(EdgeConfig(), meter)
     asked = []
     while lines.wanted:
         asked.append(lines.wanted)
-        lines.feed(np.zeros(lines.wanted, np.uint8))
+        lines.filled()
     assert asked == [1, *[64] * 80, 1, *([64] * 7 + [32]) * 10]
     assert sum(asked) == 1 + 5120 + 1 + 4800
-    with pytest.raises(ValueError, match="1 bytes are too many"):
-        lines.feed(np.zeros(1, np.uint8))
 
 
 @pytest.mark.parametrize(("start", "end", "steps"), [(200, 300, 6 + 6), (0, 463, 6 + 5)])

@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.cubesense.codes import DetectResult
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
-from ..scenery import COLUMNS, ROWS, angular_radius_deg, chequered, earth, error_deg, scan
+from ..scenery import COLUMNS, ROWS, angular_radius_deg, chequered, earth, error_deg, feed, scan
 
 
 def measure(
@@ -17,7 +17,7 @@ def measure(
 ) -> NadirResult:
     meter = Meter(PIC18F45K20)
     lines = NadirLines(edges or EdgeConfig(), meter)
-    lines.feed(scan(picture))
+    feed(lines, scan(picture))
     return find_nadir(lines.edges, config, meter)
 
 
@@ -129,7 +129,7 @@ def test_not_every_edge_may_be_dropped(ours: NadirConfig) -> None:
 
 def test_phases_are_charged(ours: NadirConfig, meter: Meter) -> None:
     lines = NadirLines(EdgeConfig(), meter)
-    lines.feed(scan(earth(0, 0)))
+    feed(lines, scan(earth(0, 0)))
     find_nadir(lines.edges, ours, meter)
     assert set(meter.phases) == {"undistort", "fit"}
     assert meter.phases["undistort"] > 1000 * len(lines.edges)

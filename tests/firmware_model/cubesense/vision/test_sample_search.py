@@ -10,7 +10,7 @@ from cubestack.firmware_model.cubesense.vision.sample_search import Between, aro
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
 from cubestack.firmware_model.mcu.costs import Meter
 
-from ..scenery import earth, error_deg, scan
+from ..scenery import earth, error_deg, feed, scan
 
 
 @pytest.mark.parametrize("between", Between)
@@ -20,7 +20,7 @@ def test_edges_on_rows_are_those_of_the_line_scan(
 ) -> None:
     picture = earth(alpha, beta, rng=np.random.default_rng(4))
     lines = NadirLines(EdgeConfig(), meter)
-    lines.feed(scan(picture))
+    feed(lines, scan(picture))
     edges = answered(
         around_samples(EdgeConfig(), meter, between), lambda at: int(picture[at[1], at[0]])
     )
@@ -65,7 +65,7 @@ def test_the_searches_cost_less_in_the_order_expected(meter: Meter) -> None:
     lines = NadirLines(EdgeConfig(), meter)
     data = scan(picture)
     meter.charge(scan_byte=len(data))
-    lines.feed(data)
+    feed(lines, data)
     cycles.append(meter.take())
     for between in (Between.SEQUENTIAL, Between.BINARY):
 
