@@ -90,9 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = make_parser().parse_args(arguments)
     try:
         return int(args.run(args) or DONE)
-    except KeyboardInterrupt:
-        return FAILED
-    except BrokenPipeError:
+    except (KeyboardInterrupt, BrokenPipeError):
         return FAILED
     except ValueError as error:  # every bad input of ours is a ValueError with a full sentence
         print(f"cubestack {args.command}: {error}", file=sys.stderr)

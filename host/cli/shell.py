@@ -20,7 +20,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -106,9 +106,8 @@ def _show_text(result: Result) -> None:
         print(f"{name:<{width}}  {text}" if name else text)
 
 
-def _interactive(shell: Shell, show: object) -> int:
+def _interactive(shell: Shell, show: Callable[[Result], None]) -> int:
     """Ask for commands until the end of the input; errors are told and change nothing else."""
-    assert callable(show)
     say(f"{shell.target.interface.name} at {shell.target.name}; Tab completes, help lists")
     with _line_editor(shell):
         while True:

@@ -13,6 +13,7 @@ from enum import Enum
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NoAnswerError, NodeError
@@ -93,6 +94,13 @@ class CheckRun:
     def failed(self) -> int:
         """Number of checks that failed."""
         return sum(check.verdict is Verdict.FAILED for check in self.checks)
+
+    @property
+    def registers(self) -> RegisterClient:
+        """Client of the registers; SkippedError where they are not within reach."""
+        if self.target.registers is None:
+            raise SkippedError("no I2C bus within reach")
+        return self.target.registers
 
     @contextmanager
     def check(self, name: str) -> Iterator[list[str]]:

@@ -52,7 +52,7 @@ class EmulatedControls:
                 self.fault(words)
             case ("scene", name):
                 with written(Document(name, control.text)) as path:
-                    self._show(path)
+                    self._emulated.scene = path
                 self.on_act(control.words, control.text)
             case ("power", channel, "on" | "off" as state):
                 self.switch(channel, state == "on")
@@ -90,13 +90,10 @@ class EmulatedControls:
     def scene(self, path: Path) -> None:
         """Show the scene in a file; ValueError for one that is none."""
         try:
-            self._show(path)
+            self._emulated.scene = path
         except FileNotFoundError:
             raise TargetError(f"no scene file {path}") from None
         self.on_act(("scene", str(path)), read_document(path).text)
-
-    def _show(self, path: Path) -> None:
-        self._emulated.scene = path
 
     def currents(self) -> dict[str, float]:
         """Supply currents in mA: all, and each channel's."""

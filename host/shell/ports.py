@@ -7,7 +7,7 @@ from cubestack.host.devices.targets import Target
 from cubestack.host.errors import TargetError
 from cubestack.host.pictures.images import save_picture
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count
-from cubestack.host.transport.streams import Transport
+from cubestack.host.transport.streams import READ_BYTES, read_answer
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +17,6 @@ RAW_TIMEOUT_S = 0.3
 """Silence after which the answer to raw bytes is over."""
 
 LETTER_TIMEOUT_S = 10.0
-READ_BYTES = 4096
 SHORT_ANSWER = 8
 """Longest answer to a bench letter that is shown."""
 
@@ -85,7 +84,7 @@ class PortCommands:
             known = ", ".join(f"{known.letter} ({known.name})" for known in protocol.letters)
             raise ShellError(f"bench: no letter {words[0]!r}; known: {known}")
         line.write(letter.request)
-        answer = _read(line, letter.length)
+        answer = read_answer(line, letter.length, LETTER_TIMEOUT_S)
         whole = len(answer) == letter.length
         shown = whole and len(answer) <= SHORT_ANSWER
         text = repr(answer.decode("latin-1")) if shown else f"{len(answer)} bytes"
@@ -109,11 +108,3 @@ class PortCommands:
         while more := line.read(READ_BYTES, RAW_TIMEOUT_S):
             answer += more
         return Result([("", answer.hex(" ") or "(nothing)")], {"answer": answer.hex()})
-
-
-def _read(line: Transport, length: int) -> bytearray:
-    """What comes, until it is ``length`` bytes or the line is silent."""
-    answer = bytearray()
-    while len(answer) < length and (data := line.read(READ_BYTES, LETTER_TIMEOUT_S)):
-        answer += data
-    return answer

@@ -15,6 +15,7 @@ import serial
 from cubestack.host.errors import PortClosedError, PortOpenError, TargetError
 
 CONNECT_TIMEOUT_S = 5.0
+READ_BYTES = 4096
 
 
 class Transport(Protocol):
@@ -31,6 +32,14 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Release the line."""
+
+
+def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
+    """What comes, until it is ``length`` bytes or the line is silent for ``silence_s``."""
+    answer = bytearray()
+    while len(answer) < length and (data := line.read(READ_BYTES, silence_s)):
+        answer += data
+    return bytes(answer)
 
 
 class SerialTransport:

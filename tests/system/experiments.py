@@ -14,7 +14,6 @@ Each runs the whole stack, reads the serial line and prints what it found::
 import argparse
 import math
 from collections import defaultdict
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
@@ -28,7 +27,6 @@ from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.scene.attitude import (
-    attitude_error_deg,
     matrix_from_quaternion,
     pointing_from_matrix,
     random_quaternion,
@@ -38,6 +36,8 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.experiments.attitude import errors, is_right, rough_boresight
+from cubestack.host.experiments.cubestar.measure import give_hint
 
 PUBLISHED_PAIR_LIMIT_DEG = 42.1
 SIDEREAL_DEG_S = 360 / 86164.1
@@ -92,46 +92,30 @@ class Stack:
     def close(self) -> None:
         self.board.close()
 
-    def shoot(self, hint: "Callable[[Any], None] | None" = None, **scene: Any) -> Shot:
-        """Capture and process; ``hint`` is given the true attitude's matrix before."""
+    def shoot(self, hint: "tuple[float, np.random.Generator] | None" = None, **scene: Any) -> Shot:
+        """Capture and process; ``hint`` tells a boresight that is at most so many degrees off."""
         sky = SkyScene(**scene)
         condition = replace(CONDITION, optics=self.optics, seed=sky.seed)
         self.board.camera.scene = SkyView(sky, condition)
         client = self.cubestar.client
         client.command("setIDMode", IdMode=IdMode.TRACKING if hint else IdMode.LOST_IN_SPACE)
         if hint is not None:
-            hint(matrix_from_quaternion(sky.truth(0)))
+            give_hint(self.cubestar, rough_boresight(sky.truth(0), *hint))
         self.cubestar.capture_and_process()
         attitude, phases = self.cubestar.attitude(), self.cubestar.phase_times()
         truth = self.board.truth()
         assert truth is not None
-        cross, roll = attitude_error_deg(attitude.quaternion, truth)
+        cross, roll = errors(attitude.quaternion, truth)
         detected = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
         matched = attitude.matched if attitude.valid else 0
-        right = attitude.valid and cross < 0.1 and abs(roll) < 0.3
+        right = attitude.valid and is_right(cross, roll)
         return Shot(attitude.valid, right, detected, matched, cross, roll, phases)
-
-    def hint_within(self, error_deg: float, rng: np.random.Generator) -> "Callable[[Any], None]":
-        """Tells the device a boresight that is at most this far off, uniform over that cap."""
-
-        def tell(matrix: Any) -> None:
-            away = math.radians(error_deg) * math.sqrt(rng.random())
-            side = rng.random() * 2 * math.pi
-            across = math.cos(side) * matrix[0] + math.sin(side) * matrix[1]
-            x, y, z = math.cos(away) * matrix[2] + math.sin(away) * across
-            self.cubestar.client.command(
-                "setTrackingMode",
-                RightAscension=math.atan2(y, x),
-                Declination=math.atan2(z, math.hypot(x, y)),
-            )
-
-        return tell
 
 
 def rates(stack: Stack, frames: int, error_deg: float | None, **scene: Any) -> str:
     """Percentages over random poses; the same ones in every call."""
     rng = np.random.default_rng(1)
-    hint = None if error_deg is None else stack.hint_within(error_deg, rng)
+    hint = None if error_deg is None else (error_deg, rng)
     shots = [
         stack.shoot(hint, quaternion=random_quaternion(rng), seed=number, **scene)
         for number in range(frames)
@@ -206,7 +190,7 @@ def repeatability(frames: int) -> None:
         for _ in range(5):
             pose = random_quaternion(rng)
             axis_in_camera = matrix_from_quaternion(pose)[:, 2]
-            errors, counts = [], []
+            scatter, counts = [], []
             for number in range(frames):
                 shot = stack.shoot(
                     quaternion=pose,
@@ -221,12 +205,12 @@ def repeatability(frames: int) -> None:
                         np.array(pointing_from_matrix(matrix_from_quaternion(q)))
                         for q in (stack.cubestar.attitude().quaternion, truth)
                     )
-                    errors.append((measured - true + 180) % 360 - 180)
+                    scatter.append((measured - true + 180) % 360 - 180)
                     counts.append(shot.matched)
-            ra, dec, roll = np.std(errors, axis=0)
+            ra, dec, roll = np.std(scatter, axis=0)
             across = ra * math.cos(math.radians(true[1]))
             print(
-                f"{len(errors)} of {frames} right, {np.mean(counts):4.1f} stars: RA cos(Dec) "
+                f"{len(scatter)} of {frames} right, {np.mean(counts):4.1f} stars: RA cos(Dec) "
                 f"{across:.4f}, Dec {dec:.4f}, roll {roll:.4f} deg (1 sigma)",
                 flush=True,
             )

@@ -161,7 +161,7 @@ def _measure(
             raise ValueError(f"--mode {options.mode} needs a scene whose attitude is known")
         client.command("setIDMode", IdMode=IdMode.TRACKING)
         tracking = options.mode == "tracking"
-        _give_hint(cubestar, rough_boresight(known, 0.0 if tracking else options.hint_error, rng))
+        give_hint(cubestar, rough_boresight(known, 0.0 if tracking else options.hint_error, rng))
         if tracking:
             _prime_tracking(emulated, scene, options.hint_error, rng)
     status = cubestar.capture_and_process()
@@ -186,7 +186,8 @@ def _measure(
     )
 
 
-def _give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
+def give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
+    """Tell the device roughly where it looks: an inertial vector (3,)."""
     x, y, z = boresight
     cubestar.client.command(
         "setTrackingMode",
