@@ -5,13 +5,9 @@ fpgaWriteToRam and imageTransfer. The previous image is processed while the FPGA
 frame (section 5.3.6).
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.phases import Phases
 from cubestack.firmware_model.cubestar.pictures.contract import Pictures
-from cubestack.firmware_model.cubestar.pictures.copied import CopiedPictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
@@ -41,12 +37,6 @@ class ImageCapture:
         self._supply = supply
         self.sensor = ImageSensor(state, phases)
         self.pictures = pictures
-
-    @property
-    def image(self) -> NDArray[np.uint8]:
-        """The newest picture where the processor has a memory of its own, shape (512, 1024)."""
-        assert isinstance(self.pictures, CopiedPictures)
-        return self.pictures.image
 
     def get_image(self, meanwhile: Routine[bool] | None = None) -> Routine[bool]:
         """Capture a picture; False, with a flag raised, when it failed.

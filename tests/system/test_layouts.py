@@ -83,7 +83,7 @@ def node(session: Open, layout: Layout) -> Iterator[AnyEmulated]:
 def published() -> dict[str, Any]:
     with open_device("cubestar", ORION) as opened:
         found = seen(opened)
-        picture: np.ndarray = opened.board.program._capture.image.copy()
+        picture: np.ndarray = opened.board.program._capture.pictures.image.copy()
         star = int(picture.argmax()) // FULL
         assert blocks(opened, range(star, star + 1)) == block_of(picture, star)
     return found | {"picture": picture, "star": star}

@@ -5,8 +5,6 @@ addresses are those of ``docs/gateware-cubestar-next.md``; assumed, as none of i
 pixels are zeroed and written back over the bus.
 """
 
-from abc import abstractmethod
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,15 +45,15 @@ class _BusPictures(Pictures):
     acknowledge: str = ACK
     while_storing = True
     iteration_us = FAST_ITERATION_US
-    memories: tuple[tuple[int, int, int], ...]
+    memories: tuple[tuple[int, int, int], ...] = ((0, 0, 2 * IMAGE_BYTES),)
     """Chip select, first address and size of each memory."""
 
     _open = False
     """Whether the bus leads to the newest picture."""
 
-    @abstractmethod
     def _address_of(self, place: int) -> tuple[int, int]:
         """Chip select and first address of ``place``."""
+        return 0, place * IMAGE_BYTES
 
     def fetch(self) -> Routine[bool]:
         """Nothing is copied."""
@@ -155,7 +153,6 @@ class SharedPictures(_BusPictures):
 
     while_storing = False
     iteration_us = ITERATION_US
-    memories = ((0, 0, 2 * IMAGE_BYTES),)
 
     def start(self) -> Routine[None]:
         """Take the bus."""
@@ -177,17 +174,12 @@ class SharedPictures(_BusPictures):
         """Take the bus back."""
         yield from self.start()
 
-    def _address_of(self, place: int) -> tuple[int, int]:
-        return 0, place * IMAGE_BYTES
-
 
 class TwoMemoryPictures(_BusPictures):
     """Two memories of one picture each at one FPGA, in turn.
 
     A place is a memory. There are no banks to select.
     """
-
-    memories = ((0, 0, 2 * IMAGE_BYTES),)
 
     def start(self) -> Routine[None]:
         """Take the bus."""
@@ -205,9 +197,6 @@ class TwoMemoryPictures(_BusPictures):
         yield SetPin(RNW, 1)
         if stored:
             self._state.retained.image_place ^= 1
-
-    def _address_of(self, place: int) -> tuple[int, int]:
-        return 0, place * IMAGE_BYTES
 
 
 class TwoBoardPictures(_BusPictures):

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from cubestack.firmware_model.cubestar.processing import Processing, Results
+from cubestack.firmware_model.interface.cubestar import INTERFACE
 
 NOT_IDENTIFIED = 0xFFFF
 NO_STAR = 0xFF
@@ -80,15 +81,8 @@ class StarReports:
         detection = self._results.detection
         star = self._step("StarPositions", range(len(self._results.vectors)))
         if star is None or detection is None:
-            return {
-                "X_Coordinate": 0.0,
-                "Y_Coordinate": 0.0,
-                "X_CorrectedCoordinate": 0.0,
-                "Y_CorrectedCoordinate": 0.0,
-                "StarNumber": NO_STAR,
-                "Size": 0,
-                "Intensity": 0,
-            }
+            nothing = INTERFACE.telemetry("StarPositions").reset_values()
+            return {**nothing, "StarNumber": NO_STAR}
         return {
             **_named(("X_Coordinate", "Y_Coordinate"), detection.centroids[star]),
             **_named(

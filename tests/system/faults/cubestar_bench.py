@@ -28,7 +28,7 @@ def stored(bench: Bench) -> np.ndarray:
 
 def transferred(bench: Bench) -> np.ndarray:
     """What the processor read of it, (512, 1024)."""
-    memory: np.ndarray = bench.board.program._capture.image
+    memory: np.ndarray = bench.board.program._capture.pictures.image
     return memory.copy()
 
 
