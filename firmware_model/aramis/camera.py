@@ -22,7 +22,7 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import (
     gain_register,
 )
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep, pause
 
 SETTLE_US = 2_000
 """From power-up to the first register access; assumed."""
@@ -79,8 +79,7 @@ class Camera:
         """Turn the supply on and wait until the sensor is ready, at its reset values."""
         self._hardware.switch_camera(True)
         self.off = False
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + SETTLE_US, wakeable=False)
+        yield from pause(SETTLE_US)
 
     def start(self) -> Routine[Reason | None]:
         """Let the sensor send frames as the settings say; why it does not."""

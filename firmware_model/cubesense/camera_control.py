@@ -89,7 +89,7 @@ class CameraControl:
             yield SetPin(CAMERA_SCL[camera], 1)
             yield SetPin(CAMERA_SDA[camera], 1)
             yield SetPin(CAMERA_POWER[camera], 1)
-        yield from self._pause(START_UP_US)
+        yield from self._supply.pause(START_UP_US)
         for camera in Camera:
             yield from self._configure(camera)
 
@@ -98,7 +98,7 @@ class CameraControl:
         for camera in Camera:
             yield SetPin(CAMERA_POWER[camera], 0)
             self._written[camera] = None
-        yield from self._pause(OFF_TIME_US)
+        yield from self._supply.pause(OFF_TIME_US)
         yield from self.start()
 
     def forget_set_up(self, camera: Camera) -> None:
@@ -165,7 +165,3 @@ class CameraControl:
         self._meter.charge(i8=1, loop=1)
         yield SetPin(scl, 1)
         self._meter.charge(i8=1)
-
-    def _pause(self, us: int) -> Routine[None]:
-        now_us: int = yield ReadTimer()
-        yield from self._supply.watch_until(now_us + us)

@@ -36,7 +36,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Pay, Routine, pause
 
 READ_OUT_TICKS = ticks_of(ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
 """From a picture's first row to its end: 30.5 ms."""
@@ -185,6 +185,5 @@ class Measurement:
             table = fine_table(self._meter, PROJECTIONS[camera], factors)
             yield Pay()
             blocks = -(-table.size // FLASH_ERASE_BYTES) + -(-table.size // FLASH_WRITE_BYTES)
-            now_us: int = yield ReadTimer()
-            yield Sleep(now_us + blocks * FLASH_STEP_US, wakeable=False)
+            yield from pause(blocks * FLASH_STEP_US)
         self._tables[camera] = factors, table

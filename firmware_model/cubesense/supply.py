@@ -46,7 +46,7 @@ class Supply:
         """Switch both memories on."""
         for sram in Sram:
             yield from self._switch(sram, True)
-        yield from self._pause(SETTLE_US)
+        yield from self.pause(SETTLE_US)
 
     def available(self, sram: Sram) -> bool:
         """Whether ``sram`` is on."""
@@ -96,12 +96,13 @@ class Supply:
         for sram in cut:
             yield from self._switch(sram, True)
             self._state.over_current[sram] = False
-        yield from self._pause(SETTLE_US)
+        yield from self.pause(SETTLE_US)
 
     def _switch(self, sram: Sram, on: bool) -> Routine[None]:
         yield SetPin(SRAM_POWER[sram], int(on))
         self._on[sram] = on
 
-    def _pause(self, us: int) -> Routine[None]:
+    def pause(self, us: int) -> Routine[None]:
+        """Wait for ``us`` as ``watch_until`` does."""
         now_us: int = yield ReadTimer()
         yield from self.watch_until(now_us + us)

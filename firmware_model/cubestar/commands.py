@@ -21,7 +21,7 @@ from cubestack.firmware_model.interface.cubestar.codes import (
     TestPattern,
 )
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, pause
 from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
@@ -113,8 +113,7 @@ class Commands(CommandExecutor):
 
     def _test_watchdog(self, _command: QueuedCommand) -> Routine[None]:
         """Hang; interrupts are still served."""
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + WATCHDOG_US, wakeable=False)
+        yield from pause(WATCHDOG_US)
         self._reset_cause = ResetCause.WATCHDOG
 
     def _clear_watchdog_count(self, _command: QueuedCommand) -> None:

@@ -13,7 +13,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import (
     ROWS,
     SYNC_APPLY,
 )
-from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, pause
 
 SETTLE_US = 2_000
 """From power-up to the first register access; assumed."""
@@ -51,8 +51,7 @@ class ImageSensor:
 
     def power_up(self) -> Routine[None]:
         """Wait after power-up; the registers are at their reset values."""
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + SETTLE_US, wakeable=False)
+        yield from pause(SETTLE_US)
         self._state.retained.camera_setup = 0
 
     def forget_set_up(self) -> None:

@@ -5,7 +5,7 @@ CubeStar thesis, section 5.2.3. The main loop later powers the channel up again.
 
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Routine, pause
 
 #: The processor's SRAM; the boards of FPGA and image sensor.
 CHANNELS = ("memory", "imager")
@@ -74,8 +74,7 @@ class SupplyMonitor:
         A channel that is cut meanwhile waits for the next call.
         """
         channels = self.cut
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + OFF_TIME_US, wakeable=False)
+        yield from pause(OFF_TIME_US)
         for channel in channels:
             self._state.retained.cut &= ~(1 << CHANNELS.index(channel))
             self._state.retained.power_cycles += 1

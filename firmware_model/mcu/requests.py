@@ -135,3 +135,9 @@ Request = (
 T = TypeVar("T")
 Routine = Generator[Request, Any, T]
 """Part of a firmware program that takes time; used with ``yield from``."""
+
+
+def pause(us: int) -> Routine[None]:
+    """Sleep for ``us``, whatever happens meanwhile."""
+    now_us: int = yield ReadTimer()
+    yield Sleep(now_us + us, wakeable=False)

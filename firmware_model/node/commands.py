@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Pay, Routine, pause
 from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.queue import QueuedCommand
 from cubestack.firmware_model.node.settings import Settings
@@ -49,5 +49,4 @@ class CommandExecutor:
     def _await_room(self, backlog_bytes: int) -> Routine[None]:
         """Sleep until the UART has no more than ``backlog_bytes`` to send."""
         while self._uart.uart_backlog() > backlog_bytes:
-            now_us: int = yield ReadTimer()
-            yield Sleep(now_us + STREAM_PAUSE_US, wakeable=False)
+            yield from pause(STREAM_PAUSE_US)

@@ -23,7 +23,7 @@ from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
 
 HEADER = struct.Struct("<4sI")
 MAGIC = b"AFLS"
@@ -138,9 +138,9 @@ class CatalogueStore:
         self._meter.charge(coded_word=len(coded) // CODED_BYTES, loop=len(coded) // CODED_BYTES)
         for start in range(0, len(coded), SECTOR_BYTES):
             sector = coded[start : start + SECTOR_BYTES]
-            yield from self._wait(ERASE_US)
+            yield from pause(ERASE_US)
             flash[start : start + SECTOR_BYTES] = 0xFF
-            yield from self._wait(PROGRAM_WORD_US * -(-len(sector) // 2))
+            yield from pause(PROGRAM_WORD_US * -(-len(sector) // 2))
             flash[start : start + len(sector)] = sector
 
     def refresh(self) -> Routine[bool]:
@@ -149,10 +149,6 @@ class CatalogueStore:
             return False
         yield from self.program(self._ram(self._length).tobytes())
         return True
-
-    def _wait(self, duration_us: int) -> Routine[None]:
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + duration_us, wakeable=False)
 
     def _ram(self, length: int) -> NDArray[np.uint8]:
         return self._hardware.sdram[CATALOGUE_AT : CATALOGUE_AT + length]
