@@ -61,38 +61,33 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _fixture(name: str) -> Any:
-    """The fixture of a device."""
+    """The fixture of a device: powered up as the test's marker says, and down after it."""
 
     def powered(request: pytest.FixtureRequest) -> Iterator[AnyEmulated]:
-        yield from _powered(request, name)
+        from cubestack.emulator.faults.plan import load_plan, parse_plan
+        from cubestack.host.devices.emulated import open_device
+        from cubestack.host.devices.registry import device
+
+        options = _options(request.node)
+        config = request.config
+        seed = options.get("seed", config.getoption("--cubestack-seed"))
+        engine: Engine = config.getoption("--cubestack-engine") if device(name).has_fpga else "auto"
+        with open_device(name, options.get("scene"), seed=seed, engine=engine) as opened:
+            plan = options.get("faults")
+            if plan is not None:
+                text = isinstance(plan, str) and ("\n" in plan or "=" in plan)
+                opened.faults.load(parse_plan(plan) if text else load_plan(Path(plan)))
+            request.node.stash.setdefault(_DEVICES, {})[name] = opened
+            yield opened
+            for key, value in (
+                ("seed", seed),
+                ("virtual_time_s", f"{opened.time_s:.9f}"),
+                ("fault_events", opened.faults.events),
+            ):
+                request.node.user_properties.append((f"{MARKER}.{name}.{key}", value))
 
     powered.__doc__ = f"An emulated {name}; see ``cubestack.EmulatedDevice``."
     return pytest.fixture(powered, name=name)
-
-
-def _powered(request: pytest.FixtureRequest, name: str) -> Iterator[AnyEmulated]:
-    """Power a device up as the test's marker says, and down after it."""
-    from cubestack.emulator.faults.plan import load_plan, parse_plan
-    from cubestack.host.devices.emulated import open_device
-    from cubestack.host.devices.registry import device
-
-    options = _options(request.node)
-    config = request.config
-    seed = options.get("seed", config.getoption("--cubestack-seed"))
-    engine: Engine = config.getoption("--cubestack-engine") if device(name).has_fpga else "auto"
-    with open_device(name, options.get("scene"), seed=seed, engine=engine) as opened:
-        plan = options.get("faults")
-        if plan is not None:
-            text = isinstance(plan, str) and ("\n" in plan or "=" in plan)
-            opened.faults.load(parse_plan(plan) if text else load_plan(Path(plan)))
-        request.node.stash.setdefault(_DEVICES, {})[name] = opened
-        yield opened
-        for key, value in (
-            ("seed", seed),
-            ("virtual_time_s", f"{opened.time_s:.9f}"),
-            ("fault_events", opened.faults.events),
-        ):
-            request.node.user_properties.append((f"{MARKER}.{name}.{key}", value))
 
 
 def _options(item: pytest.Item) -> dict[str, Any]:

@@ -20,17 +20,11 @@ SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
 
 
 def _open_board(
-    scene: EarthSunScene | EarthSunView,
-    *,
-    baud: int | None = None,
-    mcu_addressing: bool = False,
-    **common: Any,
+    scene: EarthSunScene | EarthSunView, *, baud: int | None = None, **common: Any
 ) -> CubeSenseBoard:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-    return CubeSenseBoard(
-        scene, baud=baud or INTERFACE.baud, mcu_addressing=mcu_addressing, **common
-    )
+    return CubeSenseBoard(scene, baud=baud or INTERFACE.baud, **common)
 
 
 def _default_scene() -> EarthSunScene:

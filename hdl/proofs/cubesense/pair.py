@@ -9,7 +9,6 @@ from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
 from cubestack.firmware_model.interface.cubesense.fpga import (
     ADDRESS_BYTES,
     Action,
-    ReadOut,
     actions,
     link_shows_enables,
 )
@@ -118,10 +117,6 @@ def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
         m.d.comb += Assert(~microcontroller_may | ~d.DATA_OE)
 
 
-def _pair(mcu_addressing: bool, size: ReadOut) -> CubeSensePair:
-    return CubeSensePair(size, mcu_addressing)
-
-
 # The microcontroller's address is the one that is read.
 
 _TAKEN = {
@@ -202,7 +197,7 @@ PROOFS = {
     **{
         f"pair-drivers{'-addressing' * mcu_addressing}": Proof(
             "No wire of the two FPGAs has two drivers in any settled state",
-            made(partial(_pair, mcu_addressing)),
+            made(partial(CubeSensePair, mcu_addressing=mcu_addressing)),
             _DRIVERS,
             partial(_drivers, mcu_addressing),
             Fault("nadir.dataflow.pass_edge", 1),
