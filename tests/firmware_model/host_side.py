@@ -82,10 +82,11 @@ class HostSide:
         (error,) = answer
         return error
 
-    def command(self, name: str, **values: object) -> None:
-        """Send a telecommand, which must be accepted, and run it to its end."""
-        assert self.send(name, **values) == 0
-        self.run()
+    def command(self, *names: str, **values: object) -> None:
+        """Send telecommands, which must be accepted, and run each to its end before the next."""
+        for name in names:
+            assert self.send(name, **values) == 0
+            self.run()
 
     def telemetry(self, name: str) -> dict[str, Any]:
         message = self.interface.telemetry(name)

@@ -12,6 +12,8 @@ from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.solution import NONE, Solution, StarList
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 
 Array = NDArray[np.float64]
 
@@ -19,7 +21,14 @@ FALSE_STAR = 0
 """Stands for the Hipparcos number of a star that does not exist."""
 
 
+FIELD = Field()
+
 _build = lru_cache(maxsize=4)(build_database)
+
+
+def meter() -> Meter:
+    """A fresh one of AraMiS' processor."""
+    return Meter(BLACKFIN_BF533)
 
 
 def database(parameters: CatalogueParameters | None = None) -> Database:

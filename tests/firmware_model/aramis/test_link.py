@@ -1,5 +1,7 @@
 from typing import Any
 
+import pytest
+
 from cubestack.firmware_model.aramis.link import AramisLink
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import INTERFACE, AckError
@@ -35,13 +37,17 @@ class Served(Harness):
         self.told.append(command.message.name)
 
 
+@pytest.fixture
+def desk() -> Served:
+    return Served()
+
+
 def sleep() -> Routine[bool]:
     """A wake-up that came before is not lost."""
     return (yield Sleep(None))
 
 
-def test_telecommands_are_acknowledged_queued_and_wake_the_program() -> None:
-    desk = Served()
+def test_telecommands_are_acknowledged_queued_and_wake_the_program(desk: Served) -> None:
     desk.now_us = 77
     gain = INTERFACE.telecommand("SetGain")
     frame = encode_frame(bytes([gain.id]) + gain.pack(Gain=2.0))
@@ -53,8 +59,7 @@ def test_telecommands_are_acknowledged_queued_and_wake_the_program() -> None:
     assert desk.state.telecommands == 1
 
 
-def test_wrong_parameters_raise_their_flags() -> None:
-    desk = Served()
+def test_wrong_parameters_raise_their_flags(desk: Served) -> None:
     assert desk.send("SetExposure", Rows=0) == AckError.BAD_PARAMETER
     assert desk.state.flags == {"ParameterError"}
     wrong = AckError.BAD_PARAMETER
@@ -72,8 +77,7 @@ def test_wrong_parameters_raise_their_flags() -> None:
     assert desk.frames(nan) == [bytes([wrong])]
 
 
-def test_the_buffer_holds_four() -> None:
-    desk = Served()
+def test_the_buffer_holds_four(desk: Served) -> None:
     assert [desk.send("StopLoop") for _ in range(5)] == [AckError.OK] * 4 + [AckError.BUFFER_FULL]
     assert desk.state.flags == {"TcmdBufferOverflow"}
     assert len(desk.told) == 4

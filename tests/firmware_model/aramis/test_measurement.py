@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
+from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.matching.identification import Profile
 from cubestack.firmware_model.aramis.measurement import configuration
-from cubestack.firmware_model.aramis.pipeline import VERIFIED
+from cubestack.firmware_model.aramis.pipeline import VERIFIED, Detection
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.telemetry import body_quaternion
 from cubestack.firmware_model.interface.aramis import INTERFACE
@@ -71,3 +73,27 @@ def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
         turn.as_quat().astype(np.float32), attitude.as_quat().astype(np.float32)
     )
     assert ((turn * attitude).inv() * Rotation.from_quat(found)).magnitude() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("settings", "setting", "words"),
+    [
+        (Field, {"fov_deg": 0.5}, "fov_deg must be 1 to 90, not 0.5"),
+        (Field, {"fov_deg": float("nan")}, "fov_deg must be 1 to 90, not nan"),
+        (Field, {"columns": 5000}, "columns must be 16 to 4096, not 5000"),
+        (Field, {"rows": 0}, "rows must be 16 to 4096, not 0"),
+        (Field, {"pitch_y_mm": 0.0}, "pitch_y_mm must be 0.0001 to 1, not 0.0"),
+        (Detection, {"sigmas": -1.0}, "sigmas must be 0 to 20, not -1.0"),
+        (Detection, {"needed": 26}, "needed must be 1 to 25, not 26"),
+        (Detection, {"min_pixels": 9, "max_pixels": 8}, "min_pixels must be 1 to 8, not 9"),
+        (Detection, {"max_stars": 2}, "max_stars must be 3 to 255, not 2"),
+        (Profile, {"sigma_rad": 0.0}, "sigma_rad must be 1e-07 to 0.01, not 0.0"),
+        (Profile, {"sigma_rad": float("nan")}, "sigma_rad must be"),
+        (Profile, {"pivots": 4}, "pivots must be 0 to 3, not 4"),
+        (Profile, {"triple_stars": 2}, "triple_stars must be 3 to 64, not 2"),
+        (Profile, {"largest_chance": -1.0}, "largest_chance must be 0 to 1, not -1.0"),
+    ],
+)
+def test_limits(settings: type, setting: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        settings(**setting)

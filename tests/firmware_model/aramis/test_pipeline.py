@@ -8,27 +8,18 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
-from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.pipeline import (
     PUBLISHED,
     VERIFIED,
     Configuration,
-    Detection,
     detect,
     solve,
 )
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
-from .sky import Light, Picture, database, errors_deg, picture
+from .sky import FIELD, Light, Picture, database, errors_deg, meter, picture
 
-FIELD = Field()
 SPOT_PX = 1.5
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def render(made: Picture, rng: np.random.Generator, noise: float = 1.5) -> NDArray[np.uint8]:
@@ -154,17 +145,3 @@ def test_phases_and_time() -> None:
     solve(image, Background(), VERIFIED, database(), spent)
     assert {"threshold", "spikes", "centroids", "search", "attitude"} <= set(spent.phases)
     assert 0.02 < spent.table.seconds(spent.total) < 2
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ({"sigmas": -1.0}, "sigmas must be 0 to 20, not -1.0"),
-        ({"needed": 26}, "needed must be 1 to 25, not 26"),
-        ({"min_pixels": 9, "max_pixels": 8}, "min_pixels must be 1 to 8, not 9"),
-        ({"max_stars": 2}, "max_stars must be 3 to 255, not 2"),
-    ],
-)
-def test_settings_out_of_range_are_refused(setting: dict[str, float], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        Detection(**setting)  # type: ignore[arg-type]

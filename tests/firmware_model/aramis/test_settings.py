@@ -1,21 +1,9 @@
 import pytest
 
-from cubestack.firmware_model.aramis.settings import (
-    BODY_PAGE,
-    CONFIG_PAGE,
-    SETTING_COMMANDS,
-    StoredSettings,
-)
-from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.firmware_model.aramis.settings import BODY_PAGE, CONFIG_PAGE, StoredSettings
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 TURN = {"Q0": 0.0, "Q1": 0.0, "Q2": 1.0, "Q3": 0.0}
-
-
-def test_settings_start_at_the_declared_values() -> None:
-    settings = StoredSettings(FlashStore())
-    for name in SETTING_COMMANDS:
-        assert settings.all(name) == INTERFACE.telecommand(name).reset_values()
 
 
 def test_saved_settings_come_back_and_others_do_not() -> None:

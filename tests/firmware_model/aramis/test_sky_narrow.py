@@ -19,10 +19,8 @@ from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, solve
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
-from .sky import database, errors_deg
+from .sky import database, errors_deg, meter
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "sky_narrow"
 PICTURES = sorted(FOLDER.glob("*.png"))
@@ -53,9 +51,7 @@ def test_each_is_solved(path: Path, aided: bool) -> None:
     picture, truth = load(path)
     hint = truth.inv().apply([0.03, 0.02, 1.0]).astype(np.float32) if aided else None
     configuration = replace(VERIFIED, field=FIELD)
-    solution = solve(
-        picture, Background(), configuration, database(ONBOARD), Meter(BLACKFIN_BF533), hint
-    )
+    solution = solve(picture, Background(), configuration, database(ONBOARD), meter(), hint)
     assert solution.outcome is MeasurementOutcome.CONCLUSIVE
     assert solution.quaternion is not None
     cross, roll = errors_deg(solution.quaternion, truth)
@@ -70,9 +66,7 @@ def test_most_are_solved_as_published(aided: bool) -> None:
     for path in PICTURES:
         picture, truth = load(path)
         hint = truth.inv().apply([0.03, 0.02, 1.0]).astype(np.float32) if aided else None
-        solution = solve(
-            picture, Background(), configuration, database(ONBOARD), Meter(BLACKFIN_BF533), hint
-        )
+        solution = solve(picture, Background(), configuration, database(ONBOARD), meter(), hint)
         if solution.quaternion is not None:
             good = errors_deg(solution.quaternion, truth)[0] < 0.05
             right += good

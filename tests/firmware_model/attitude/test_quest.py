@@ -113,9 +113,7 @@ def test_two_stars_are_enough() -> None:
         ([[0, 0, 1], [0.6, 0, 0.8]], [0, 0], "add up to 0"),
     ],
 )
-def test_vectors_that_determine_nothing_are_refused(
-    body: list[list[float]], weights: list[float], message: str
-) -> None:
+def test_vectors_are_refused(body: list[list[float]], weights: list[float], message: str) -> None:
     with pytest.raises(AttitudeError, match=message):
         solve(np.array(body), np.array(body), np.array(weights, dtype=float))
 

@@ -26,7 +26,7 @@ from cubestack.firmware_model.interface.cubesense.pins import (
     Monitor,
 )
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import AwaitPin, Routine, StrobeRead
+from cubestack.firmware_model.mcu.requests import AwaitPin, Request, Routine, StrobeRead
 
 from ..host_side import HostSide, write_bytes
 from ..runner import Runner
@@ -206,6 +206,16 @@ class Harness(Runner, HostSide):
         data = bytes(registers.i2c_read() or 0 for _ in range(count))
         registers.i2c_stop()
         return data
+
+    def latch_on(self, wanted: Request | type, sram: Sram) -> None:
+        """``sram`` latches up at each such request from now on."""
+        kind = wanted if isinstance(wanted, type) else None
+
+        def latch(request: Request) -> None:
+            if request == wanted or (kind is not None and isinstance(request, kind)):
+                self.latched.add(sram)
+
+        self.on_request = latch
 
     def cut(self) -> set[Sram]:
         """Memories whose supply is off."""

@@ -83,9 +83,7 @@ S = Action.STANDBY
         (Camera.NADIR, Sram.SRAM1, Actions(Action.STORE_OTHER, Action.SEND_PICTURE)),
     ],
 )
-def test_a_picture_goes_to_the_memory_that_was_asked_for(
-    rig: Rig, camera: Camera, sram: Sram, row: Actions
-) -> None:
+def test_a_picture_goes_to_its_memory(rig: Rig, camera: Camera, sram: Sram, row: Actions) -> None:
     rig.unit.scenes[camera] = picture = earth(0, 0)
     other = Sram(1 - sram)
     kept = rig.unit.memories[other].copy()

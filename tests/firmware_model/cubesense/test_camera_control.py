@@ -45,9 +45,7 @@ def test_clock_phases_are_those_of_a_400_khz_bus(unit: Harness) -> None:
         assert 600 <= high_ns < 2000
 
 
-def test_the_emulated_camera_reads_the_same(
-    unit: Harness, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_the_emulated_camera_reads_it_so(unit: Harness, caplog: pytest.LogCaptureFixture) -> None:
     written: list[tuple[int, int]] = []
     slave = SccbSlave(REGISTERS.i2c_address, lambda at, value, _ps: written.append((at, value)))
     lines = {CAMERA_SCL[Camera.NADIR]: "SCL", CAMERA_SDA[Camera.NADIR]: "SDA"}

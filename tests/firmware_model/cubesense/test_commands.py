@@ -23,6 +23,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER
 from cubestack.firmware_model.mcu.requests import SetPin
 
+from ..registry import registered_in
 from .harness import Harness
 from .scenery import earth, place, sun, thumbnail
 
@@ -32,15 +33,8 @@ EFFECTS: dict[str, Effect] = {}
 SUN_BORESIGHT = (369.0, 250.0)
 
 
-def telecommand(*names: str) -> Callable[[Effect], Effect]:
-    """The function shows what the telecommands do."""
-
-    def register(effect: Effect) -> Effect:
-        for name in names:
-            assert EFFECTS.setdefault(name, effect) is effect
-        return effect
-
-    return register
+#: Decorator: the function shows what the named telecommands do.
+telecommand = registered_in(EFFECTS)
 
 
 def lit(unit: Harness) -> None:
@@ -72,9 +66,6 @@ def test_every_telecommand_does_what_it_says(unit: Harness, name: str) -> None:
 def test_every_telecommand_has_an_effect_and_no_other_does(unit: Harness) -> None:
     declared = {message.name for message in INTERFACE.telecommands}
     assert unit.program.commands.handled == EFFECTS.keys() == declared
-
-
-# --- node ---------------------------------------------------------------------------------------
 
 
 @telecommand("Reset")
@@ -115,9 +106,6 @@ def clear_over_current(unit: Harness) -> None:
         assert unit.cut() == set(Sram) - memories
 
 
-# --- measurement --------------------------------------------------------------------------------
-
-
 @telecommand("CaptureAndDetect")
 def capture_and_detect(unit: Harness) -> None:
     lit(unit)
@@ -140,9 +128,6 @@ def capture_only(unit: Harness) -> None:
             unit.command("CaptureOnly", Camera=camera, Sram=sram)
             assert result(unit, camera)["Detect"] == DetectResult.NONE_SCHEDULED
             np.testing.assert_array_equal(unit.memories[sram], unit.scenes[camera])
-
-
-# --- settings -----------------------------------------------------------------------------------
 
 
 @telecommand("DetectionThreshold1", "DetectionThreshold2")
@@ -251,17 +236,12 @@ def test_a_search_that_the_fpgas_are_not_built_for_is_refused(unit: Harness) -> 
     assert unit.send("SetNadirSearch", Search=NadirSearch.LINES) == 0
 
 
-def test_a_lens_that_only_the_table_finds_out_is_refused_later(
-    unit: Harness, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lens_without_table(unit: Harness, monkeypatch: pytest.MonkeyPatch) -> None:
     lit(unit)
     monkeypatch.setattr("cubestack.firmware_model.cubesense.links.node.invertible", lambda *_: True)
     unit.command("Distortion1", **{f"Mantissa{power}": 0 for power in range(5)})
     assert unit.telemetry("TcmdProcessed") == {"LastTcmd": 54, "Processed": 1, "Error": 3}
     assert measured(unit, Camera.SUN)[0] is DetectResult.SUCCESS
-
-
-# --- download -----------------------------------------------------------------------------------
 
 
 @telecommand("StartImageDownload", "NextImageFrame")
@@ -284,9 +264,6 @@ def image_download(unit: Harness) -> None:
             assert data == expected[number].tobytes()
             info = {"FrameNumber": number, "Checksum": checksum(data)}
             assert unit.telemetry("ImageFrameInfo") == info
-
-
-# --- order --------------------------------------------------------------------------------------
 
 
 def test_telecommands_are_executed_in_order(unit: Harness) -> None:

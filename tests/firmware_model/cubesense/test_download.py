@@ -104,8 +104,7 @@ def test_no_frame_is_ready_from_the_request_on(node: Links) -> None:
 def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Links) -> None:
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=12)
-    node.send("NextImageFrame", Frame=14)
-    node.run()
+    node.command("NextImageFrame", Frame=14)
     assert shown(node, 14) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[14]
     assert node.read == 80
     assert node.telemetry("TcmdProcessed")["Processed"] == 1

@@ -100,8 +100,7 @@ def stays_sane(unit: Harness) -> None:
     unit.received()
     unit.bench_sent.clear()
     unit.command("ClearOverCurrent", Selection=2)
-    assert unit.send("Reset", Target=3) == 0
-    unit.run()
+    unit.command("Reset", Target=3)
     assert unit.telemetry("Identification")["InterfaceVersion"] == INTERFACE.version
     unit.scenes[Camera.NADIR] = EARTH
     unit.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)

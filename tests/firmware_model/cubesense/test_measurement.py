@@ -54,18 +54,22 @@ def sun_at(alpha: float, beta: float) -> NDArray[np.uint8]:
     return sun(place(alpha, beta, SUN_BORESIGHT), 6)
 
 
+@pytest.fixture
+def lit(unit: Harness) -> Harness:
+    """A program whose cameras both see what they look for."""
+    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
+    return unit
+
+
 def edges_of(unit: Harness) -> set[tuple[float, float]]:
     """Edges of the latest nadir picture, px, as telemetry hands them out."""
     values = {**unit.telemetry("NadirEdges1"), **unit.telemetry("NadirEdges2")}
     return {(values[f"X{n}"], values[f"Y{n}"]) for n in range(1, values["Count"] + 1)}
 
 
-# --- results ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (25.0, -40.0), (-60.0, 35.0)])
-def test_the_sun_with_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
+def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
     unit.scenes[Camera.SUN] = picture = sun_at(*truth)
     measured = measure(unit, Camera.SUN, sram)
     own = sram is Sram.SRAM1
@@ -85,9 +89,7 @@ def test_the_sun_with_either_memory(unit: Harness, sram: Sram, truth: tuple[floa
 
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (15.0, -25.0), (-40.0, 30.0)])
-def test_the_earth_with_either_memory(
-    unit: Harness, sram: Sram, truth: tuple[float, float]
-) -> None:
+def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
     unit.scenes[Camera.NADIR] = picture = earth(*truth)
     measured = measure(unit, Camera.NADIR, sram)
     own = sram is Sram.SRAM2
@@ -126,9 +128,6 @@ def test_a_capture_alone_schedules_no_detection(unit: Harness) -> None:
     assert (measured["Search"], measured["Centroid"]) == (0, 0)
 
 
-# --- result codes -----------------------------------------------------------------------------
-
-
 def no_memory(unit: Harness, sram: Sram) -> None:
     unit.latched.add(sram)
     unit.run(until_us=unit.now_us + 10_000)
@@ -152,9 +151,7 @@ def noise(rows: int) -> NDArray[np.uint8]:
     ],
     ids=["dark", "bright", "chequered", "rectangle"],
 )
-def test_a_nadir_picture_that_is_no_earth(
-    unit: Harness, picture: NDArray[np.uint8], detect: DetectResult
-) -> None:
+def test_no_earth(unit: Harness, picture: NDArray[np.uint8], detect: DetectResult) -> None:
     unit.scenes[Camera.NADIR] = earth(1, 2)
     measure(unit, Camera.NADIR)
     unit.scenes[Camera.NADIR] = picture
@@ -182,9 +179,7 @@ def test_a_dead_camera(unit: Harness, camera: Camera, sram: Sram) -> None:
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_camera_that_sent_no_picture_is_set_up_again(
-    unit: Harness, camera: Camera, sram: Sram
-) -> None:
+def test_a_camera_that_failed_is_set_up_again(unit: Harness, camera: Camera, sram: Sram) -> None:
     registers = dict(unit.cameras[camera].registers)
     other = dict(unit.cameras[Camera(1 - camera)].registers)
     scene, unit.scenes[camera] = unit.scenes[camera], None
@@ -210,11 +205,7 @@ def test_a_memory_that_is_off(unit: Harness, camera: Camera) -> None:
 def test_a_latch_up_while_the_picture_is_stored(unit: Harness, camera: Camera, sram: Sram) -> None:
     enable = SetPin(("SUNEN", "NADEN")[camera], 0)
 
-    def latch(request: Request) -> None:
-        if request == enable:
-            unit.latched.add(sram)
-
-    unit.on_request = latch
+    unit.latch_on(enable, sram)
     measured = measure(unit, camera, sram)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
     assert unit.cut() == {sram}
@@ -223,12 +214,8 @@ def test_a_latch_up_while_the_picture_is_stored(unit: Harness, camera: Camera, s
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
 def test_a_latch_up_under_the_search(unit: Harness, camera: Camera, sram: Sram) -> None:
-    def latch(request: Request) -> None:
-        if isinstance(request, StrobeRead):
-            unit.latched.add(sram)
-
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
-    unit.on_request = latch
+    unit.latch_on(StrobeRead, sram)
     measured = measure(unit, camera, sram)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
     unit.on_request = lambda _request: None
@@ -255,14 +242,9 @@ def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
     ]
 
 
-# --- redundancy -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("other_is_dead", [False, True])
-def test_a_camera_measures_with_the_other_memory_when_its_own_is_off(
-    unit: Harness, camera: Camera, other_is_dead: bool
-) -> None:
+def test_the_other_memory_serves(unit: Harness, camera: Camera, other_is_dead: bool) -> None:
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(-20, 10), earth(-20, 10)
     no_memory(unit, Sram(camera))
     if other_is_dead:
@@ -270,9 +252,6 @@ def test_a_camera_measures_with_the_other_memory_when_its_own_is_off(
     measured = measure(unit, camera, Sram(1 - camera))
     assert codes(measured) == (CaptureResult.STORED_OTHER_SRAM, DetectResult.SUCCESS)
     assert error_deg((measured["Alpha"], measured["Beta"]), (-20, 10)) < 0.1
-
-
-# --- times ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("camera", Camera)
@@ -316,9 +295,6 @@ def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness
     after = measure(unit, Camera.SUN)["Total"]
     assert after == pytest.approx(before, abs=60)
     assert unit.now_us - start_us > after + 36_000
-
-
-# --- settings ---------------------------------------------------------------------------------
 
 
 def test_thresholds(unit: Harness) -> None:
@@ -379,16 +355,11 @@ def test_new_distortion_coefficients_make_a_new_table_once(unit: Harness, camera
         assert reset[key] == before[key]
 
 
-# --- addresses from the program ---------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("search", "most"),
     [(NadirSearch.AROUND_SAMPLES, 250), (NadirSearch.AROUND_SAMPLES_STEPPING, 1200)],
 )
-def test_a_search_around_samples_reads_few_pixels_and_finds_the_same(
-    search: NadirSearch, most: int
-) -> None:
+def test_a_search_around_samples_finds_the_same(search: NadirSearch, most: int) -> None:
     unit = Harness(mcu_addressing=True)
     unit.scenes[Camera.NADIR] = earth(-15, 20)
     lines = measure(unit, Camera.NADIR)
@@ -416,10 +387,6 @@ def test_a_latch_up_under_a_search_by_address() -> None:
     unit.scenes[Camera.NADIR] = earth(-15, 20)
     unit.command("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES)
 
-    def latch(request: Request) -> None:
-        if isinstance(request, StrobeRead):
-            unit.latched.add(Sram.SRAM2)
-
-    unit.on_request = latch
+    unit.latch_on(StrobeRead, Sram.SRAM2)
     measured = measure(unit, Camera.NADIR)
     assert codes(measured) == (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)

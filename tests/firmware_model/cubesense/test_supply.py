@@ -81,12 +81,8 @@ def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) ->
 
 
 def test_a_lasting_latch_up_is_cut_again(unit: Harness) -> None:
-    def latch_again(request: Request) -> None:
-        if request == SetPin(SRAM_POWER[Sram.SRAM1], 1):
-            unit.latched.add(Sram.SRAM1)
-
     unit.latched.add(Sram.SRAM1)
-    unit.on_request = latch_again
+    unit.latch_on(SetPin(SRAM_POWER[Sram.SRAM1], 1), Sram.SRAM1)
     unit.run(until_us=unit.now_us + 10_000)
     unit.log.clear()
     unit.command("ClearOverCurrent", Selection=SramSelection.SRAM1)

@@ -32,6 +32,11 @@ UPTIME_US = 70_123_456
 OVER = 0x10000
 
 
+@pytest.fixture
+def node() -> Links:
+    return Links()
+
+
 def no_two_alike(node: Links) -> None:
     """Give everything that telemetry shows a value of its own."""
     node.now_us = UPTIME_US
@@ -186,8 +191,7 @@ EXPECTED: dict[str, Callable[[], Values]] = {
 
 
 @pytest.mark.parametrize("name", [message.name for message in INTERFACE.telemetries])
-def test_every_field_shows_its_source(name: str) -> None:
-    node = Links()
+def test_every_field_shows_its_source(node: Links, name: str) -> None:
     no_two_alike(node)
     expected = EXPECTED[name]()
     assert node.telemetry(name) == pytest.approx(expected)
@@ -201,15 +205,13 @@ def test_every_frame_is_expected() -> None:
 @pytest.mark.parametrize(
     "flag", ["TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete"]
 )
-def test_each_flag_is_shown_alone(flag: str) -> None:
-    node = Links()
+def test_each_flag_is_shown_alone(node: Links, flag: str) -> None:
     node.state.flags.add(flag)
     values = node.telemetry("CommunicationStatus")
     assert {name for name, value in values.items() if value and "Count" not in name} == {flag}
 
 
-def test_after_start_up() -> None:
-    node = Links()
+def test_after_start_up(node: Links) -> None:
     for number in (1, 2):
         values = node.telemetry(f"Result{number}")
         assert values == {"Alpha": 0, "Beta": 0, "Capture": 0, "Detect": 0}
@@ -225,8 +227,7 @@ def test_after_start_up() -> None:
                 assert shown[f"{names.get(name, name)}{number}"] == value
 
 
-def test_uptime_wraps_at_16_bits_of_seconds() -> None:
-    node = Links()
+def test_uptime_wraps_at_16_bits_of_seconds(node: Links) -> None:
     node.now_us = (0x10000 + 5) * 1_000_000 + 999_999
     values = node.telemetry("Identification")
     assert (values["RuntimeSeconds"], values["RuntimeMilliseconds"]) == (5, 999)
@@ -235,14 +236,12 @@ def test_uptime_wraps_at_16_bits_of_seconds() -> None:
 @pytest.mark.parametrize(
     ("text", "sent"), [("", bytes(6)), ("A1", b"A1\0\0\0\0"), ("12345678", b"123456"), ("é", b"?")]
 )
-def test_serial_numbers_are_six_bytes_of_ascii(text: str, sent: bytes) -> None:
-    node = Links()
+def test_serial_numbers_are_six_bytes_of_ascii(node: Links, text: str, sent: bytes) -> None:
     node.serial_number = text
     assert node.telemetry("SerialNumber")["SerialNumber"] == sent.ljust(6, b"\0")
 
 
-def test_a_frame_and_its_checksum_belong_together() -> None:
-    node = Links()
+def test_a_frame_and_its_checksum_belong_together(node: Links) -> None:
     node.pictures[:] = np.random.default_rng(3).integers(0, 256, node.pictures.shape)
     node.command("StartImageDownload", Size=ImageSize.SIDE_64)
     node.command("NextImageFrame", Frame=12)

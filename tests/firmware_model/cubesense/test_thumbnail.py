@@ -14,9 +14,7 @@ def picture() -> NDArray[np.uint8]:
 
 
 @pytest.mark.parametrize("size", ImageSize)
-def test_the_square_is_the_padded_picture_with_pixels_left_out(
-    size: ImageSize, picture: NDArray[np.uint8]
-) -> None:
+def test_the_square_is_padded_and_thinned(size: ImageSize, picture: NDArray[np.uint8]) -> None:
     canvas = np.pad(picture, ((272, 272), (192, 192)))
     assert canvas.shape == (1024, 1024)
     step = 1024 // size.side

@@ -88,9 +88,7 @@ def fitted(pixels: int, config: SunConfig) -> CostTable:
     return pic18f45k20(low)
 
 
-def test_the_nadir_sensor_s_time_is_predicted(
-    published_sun: SunConfig, published_nadir: NadirConfig
-) -> None:
+def test_the_nadir_time(published_sun: SunConfig, published_nadir: NadirConfig) -> None:
     whole_pixels = EdgeConfig(sub_pixel=False)
     predicted = IMAGING_S + nadir_seconds(PIC18F45K20, published_nadir, whole_pixels)
     # A quarter below the published 245 ms: the Sun pixels of the fit are a guess.

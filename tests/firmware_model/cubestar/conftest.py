@@ -33,3 +33,10 @@ def sky(catalogue: StarCatalogue, pose: Rotation) -> Sky:
 @pytest.fixture
 def unit(catalogue: StarCatalogue) -> Harness:
     return Harness(catalogue)
+
+
+@pytest.fixture
+def lit(unit: Harness, sky: Sky) -> Harness:
+    """The program whose FPGA delivers the picture of ``sky``."""
+    unit.picture = sky.picture
+    return unit

@@ -4,21 +4,15 @@ from collections.abc import Callable
 
 import pytest
 
+from ..registry import registered_in
 from .harness import Harness
 from .sky import Sky
 
 Effect = Callable[[Harness, Sky], None]
 EFFECTS: dict[str, Effect] = {}
 
-
-def telecommand(name: str) -> Callable[[Effect], Effect]:
-    """The function shows what telecommand ``name`` does."""
-
-    def register(effect: Effect) -> Effect:
-        assert EFFECTS.setdefault(name, effect) is effect
-        return effect
-
-    return register
+#: Decorator: the function shows what the named telecommand does.
+telecommand = registered_in(EFFECTS)
 
 
 def shown(unit: Harness, frame: str, **values: float) -> None:

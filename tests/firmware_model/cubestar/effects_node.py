@@ -10,8 +10,6 @@ from .effects import shown, telecommand
 from .harness import Harness
 from .sky import Sky
 
-# --- node ---------------------------------------------------------------------------------------
-
 
 @telecommand("TogglePowerSW")
 def toggle_power_sw(unit: Harness, _: Sky) -> None:
@@ -33,8 +31,7 @@ def reset(unit: Harness, _: Sky) -> None:
     unit.command("SetDiscardDelay", Delay=1)
     unit.telemetry("IDMargin")
     unit.uart(b"noise")
-    unit.command("TogglePowerSW")
-    unit.command("Reset")
+    unit.command("TogglePowerSW", "Reset")
     assert unit.resets == [ResetCause.SYSTEM_REQUEST]
     assert unit.telemetry("ExtendedIdentification")["TcmdCount"] == 0
     assert unit.flags() == set()
@@ -46,8 +43,7 @@ def reset(unit: Harness, _: Sky) -> None:
 @telecommand("MCUReset")
 def mcu_reset(unit: Harness, _: Sky) -> None:
     unit.command("Exposure", exposure=9)
-    unit.command("TestSRAM")
-    unit.command("MCUReset")
+    unit.command("TestSRAM", "MCUReset")
     assert unit.resets == [ResetCause.SYSTEM_REQUEST]
     shown(unit, "Exposure", exposure=9)
     assert unit.telemetry("SRAMTestResults")["TestResult"] == MemoryTest.NOT_RUN
@@ -68,21 +64,19 @@ def set_delay_timer_timeout(unit: Harness, _: Sky) -> None:
 
 @telecommand("ClearWDGResetCounter")
 def clear_wdg_reset_counter(unit: Harness, _: Sky) -> None:
-    unit.command("TestWDG")
-    unit.command("ClearWDGResetCounter")
+    unit.command("TestWDG", "ClearWDGResetCounter")
     assert unit.telemetry("ExtendedIdentification")["WDGResetCount"] == 0
     assert unit.telemetry("LogStatus")["WDGcounter"] == 0
 
 
 @telecommand("ClearErrorFlags")
 def clear_error_flags(unit: Harness, _: Sky) -> None:
+    assert unit.flags() == set()
     unit.command("IDStars")
-    assert unit.flags() == {"StatusError"}
+    unit.uart(b"noise")
+    assert unit.flags() == {"StatusError", "UART_ProtocolError"}
     unit.command("ClearErrorFlags")
     assert unit.flags() == set()
-
-
-# --- image sensor ---------------------------------------------------------------------------------
 
 
 @telecommand("Exposure")
@@ -105,6 +99,7 @@ def write_to_is_register(unit: Harness, _: Sky) -> None:
 
 @telecommand("ReadFrom_IS_Register")
 def read_from_is_register(unit: Harness, _: Sky) -> None:
+    shown(unit, "IS_Register", DataH=0, DataL=0)
     unit.camera[0x8527] = 0x42
     unit.command("ReadFrom_IS_Register", Reg=0x27)
     shown(unit, "IS_Register", DataH=0, DataL=0x42)
@@ -160,9 +155,6 @@ def select_image_bank(unit: Harness, _: Sky) -> None:
     assert unit.pins["BANK"] == 1
 
 
-# --- configuration, tests and operation -----------------------------------------------------------
-
-
 @telecommand("SaveConfig")
 def save_config(unit: Harness, _: Sky) -> None:
     unit.command("Exposure", exposure=5)
@@ -185,8 +177,7 @@ def read_config(unit: Harness, _: Sky) -> None:
 @telecommand("ClearConfig")
 def clear_config(unit: Harness, _: Sky) -> None:
     unit.command("Exposure", exposure=5)
-    unit.command("SaveConfig")
-    unit.command("ClearConfig")
+    unit.command("SaveConfig", "ClearConfig")
     shown(unit, "Exposure", exposure=0)
     unit.command("Exposure", exposure=6)
     unit.power_on()
@@ -195,8 +186,8 @@ def clear_config(unit: Harness, _: Sky) -> None:
 
 @telecommand("TestSRAM")
 def sram_test(unit: Harness, _: Sky) -> None:
-    unit.command("CaptureImage")
-    unit.command("TestSRAM")
+    shown(unit, "SRAMTestResults", TestResult=MemoryTest.NOT_RUN)
+    unit.command("CaptureImage", "TestSRAM")
     shown(unit, "SRAMTestResults", TestResult=MemoryTest.PASSED)
     unit.command("DetectStars")
     assert "StatusError" in unit.flags()  # the picture is lost
@@ -256,8 +247,7 @@ def process_image(unit: Harness, sky: Sky) -> None:
 
 @telecommand("Trigger")
 def trigger(unit: Harness, _: Sky) -> None:
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 3_900_000)
+    unit.start_loop(3.9)
     values = unit.telemetry("LoopStatus")
     assert values["Running"]
     assert values["Iterations"] == 4
@@ -265,8 +255,7 @@ def trigger(unit: Harness, _: Sky) -> None:
 
 @telecommand("StopLoop")
 def stop_loop(unit: Harness, _: Sky) -> None:
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 1_200_000)
+    unit.start_loop(1.2)
     unit.command("StopLoop")
     assert unit.telemetry("LoopStatus")["Iterations"] == 2  # the one under way was finished
     assert not unit.telemetry("LoopStatus")["Running"]

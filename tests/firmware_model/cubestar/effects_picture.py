@@ -19,9 +19,6 @@ def image(unit: Harness) -> np.ndarray:
     return unit.external_ram[:IMAGE_BYTES].reshape(512, 1024)
 
 
-# --- optics ---------------------------------------------------------------------------------------
-
-
 @telecommand("setFocalLength")
 def set_focal_length(unit: Harness, sky: Sky) -> None:
     unit.command("setFocalLength", FocalLength=12.0)
@@ -64,8 +61,7 @@ def set_tangental_distortion_gains(unit: Harness, sky: Sky) -> None:
 
 def first_position(unit: Harness, sky: Sky) -> dict[str, float]:
     unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.command("DetectStars")
+    unit.command("CaptureImage", "DetectStars")
     return unit.telemetry("StarPositions")
 
 
@@ -83,9 +79,6 @@ def first_vector(unit: Harness, sky: Sky) -> np.ndarray:
     first_position(unit, sky)
     values = unit.telemetry("BodyUnitVectors")
     return np.array([values["VbX"], values["VbY"], values["VbZ"]])
-
-
-# --- picture --------------------------------------------------------------------------------------
 
 
 @telecommand("CaptureTestPatern")
@@ -117,6 +110,9 @@ def upload_image(unit: Harness, _: Sky) -> None:
     unit.command("UploadImage")
     assert not image(unit).any()
     shown(unit, "UploadStatus", NextBlock=0, BlocksReceived=0)
+    for number in (7, 9, 9):
+        unit.command("UploadBlock", BlockNumber=number, Data=bytes(128))
+    shown(unit, "UploadStatus", NextBlock=10, BlocksReceived=3)
 
 
 @telecommand("UploadBlock")
@@ -151,14 +147,10 @@ def image_block_set(unit: Harness, _: Sky) -> None:
 @telecommand("StreamDownImage")
 def stream_down_image(unit: Harness, sky: Sky) -> None:
     unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.command("StreamDownImage")
+    unit.command("CaptureImage", "StreamDownImage")
     frames = unit.received()
     assert len(frames) == 4096
     assert b"".join(frames) == sky.picture.tobytes()
-
-
-# --- stars ----------------------------------------------------------------------------------------
 
 
 @telecommand("setDetectionRegion")

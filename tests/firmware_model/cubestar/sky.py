@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 
 COLUMNS, ROWS = 1024, 512
 FX, FY, CX, CY = 1147.5, 1147.4, 539.0, 175.5
@@ -15,6 +17,11 @@ K1, K2, P1, P2 = 0.32358, -0.12456, -0.00414, 0.00624
 FOCAL_PX = 6.28 / 0.0056
 SIGMA_PX = 1.1
 PEAK_DN = 150.0
+
+
+def meter() -> Meter:
+    """A fresh one of CubeStar's processor."""
+    return Meter(CORTEX_M3)
 
 
 @dataclass

@@ -15,7 +15,6 @@ from cubestack.firmware_model.mcu.requests import (
 )
 
 from .harness import FRAME_US, Harness
-from .sky import Sky
 
 MODE_SELECT = REGISTERS["MODE_SELECT"].address.to_bytes(2, "big")
 ENABLE = MODE_SELECT + b"\x21"
@@ -59,8 +58,7 @@ def test_the_first_frame_is_left_to_pass(unit: Harness, delay_ms: int) -> None:
 def test_the_telecommands_wait_is_not_cut_short(unit: Harness) -> None:
     waits = []
     unit.on_request = lambda request: waits.append(request) if isinstance(request, Sleep) else None
-    unit.send("CaptureImage")
-    unit.run()
+    unit.command("CaptureImage")
     assert [wait.wakeable for wait in waits] == [False, True]  # the last one: idle
 
 
@@ -81,27 +79,25 @@ def test_the_bank_is_chosen_before_storing_and_kept_for_the_transfer(unit: Harne
         (lambda data: True, "ISSetupError"),
     ],
 )
-def test_a_camera_that_does_not_answer(unit: Harness, sky: Sky, refused: object, flag: str) -> None:
-    unit.picture = sky.picture
+def test_a_camera_that_does_not_answer(lit: Harness, refused: object, flag: str) -> None:
     assert callable(refused)
-    unit.camera_refuses = refused
-    unit.command("CaptureImage")
-    assert unit.status() is TaskStatus.CAPTURE_FAILED
-    assert unit.flags() == {flag}
-    assert not any(isinstance(request, SetPin) for _, request in unit.log)
-    assert not unit.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
-    unit.camera_refuses = lambda _data: False
-    unit.command("CaptureAndProcess")
-    assert unit.status() is TaskStatus.CALCULATED
+    lit.camera_refuses = refused
+    lit.command("CaptureImage")
+    assert lit.status() is TaskStatus.CAPTURE_FAILED
+    assert lit.flags() == {flag}
+    assert not any(isinstance(request, SetPin) for _, request in lit.log)
+    assert not lit.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
+    lit.camera_refuses = lambda _data: False
+    lit.command("CaptureAndProcess")
+    assert lit.status() is TaskStatus.CALCULATED
 
 
-def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.camera_refuses = lambda data: data == DISABLE
-    unit.command("CaptureAndProcess")
-    assert unit.status() is TaskStatus.CALCULATED
-    assert unit.flags() == {"ISDisableError"}
+def test_a_camera_that_can_not_be_disabled_gives_a_good_picture(lit: Harness) -> None:
+    lit.command("CaptureImage")
+    lit.camera_refuses = lambda data: data == DISABLE
+    lit.command("CaptureAndProcess")
+    assert lit.status() is TaskStatus.CALCULATED
+    assert lit.flags() == {"ISDisableError"}
 
 
 @pytest.mark.parametrize("failure", ["no frame", "not disabled"])
@@ -121,24 +117,23 @@ def test_a_camera_that_failed_is_set_up_again(unit: Harness, failure: str) -> No
     assert unit.camera == set_up
 
 
-def test_a_frame_that_never_comes(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.frame_us = None
-    unit.log.clear()
-    start_us = unit.now_us
-    unit.command("CaptureImage")
-    assert unit.now_us - start_us == pytest.approx(ACK_TIMEOUT_US + 70_000, rel=0.01)
-    assert unit.status() is TaskStatus.CAPTURE_FAILED
-    assert unit.flags() == {"ImageCaptureError"}
-    assert unit.pins == {"ENABLE": 0, "RNW": 0, "BANK": 0}
-    assert unit.camera_writes[-1] == DISABLE
-    assert not any(isinstance(request, StrobeRead) for _, request in unit.log)
-    unit.command("DetectStars")  # the picture before is not taken for this one
-    assert unit.status() is TaskStatus.DETECTION_FAILED
-    unit.frame_us = FRAME_US
-    unit.command("CaptureAndProcess")
-    assert unit.status() is TaskStatus.CALCULATED
+def test_a_frame_that_never_comes(lit: Harness) -> None:
+    lit.command("CaptureImage")
+    lit.frame_us = None
+    lit.log.clear()
+    start_us = lit.now_us
+    lit.command("CaptureImage")
+    assert lit.now_us - start_us == pytest.approx(ACK_TIMEOUT_US + 70_000, rel=0.01)
+    assert lit.status() is TaskStatus.CAPTURE_FAILED
+    assert lit.flags() == {"ImageCaptureError"}
+    assert lit.pins == {"ENABLE": 0, "RNW": 0, "BANK": 0}
+    assert lit.camera_writes[-1] == DISABLE
+    assert not any(isinstance(request, StrobeRead) for _, request in lit.log)
+    lit.command("DetectStars")  # the picture before is not taken for this one
+    assert lit.status() is TaskStatus.DETECTION_FAILED
+    lit.frame_us = FRAME_US
+    lit.command("CaptureAndProcess")
+    assert lit.status() is TaskStatus.CALCULATED
 
 
 def test_the_times_of_a_capture(unit: Harness) -> None:
@@ -154,27 +149,22 @@ def test_the_times_of_a_capture(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize(("rate", "exposure"), [(7, 0), (7, 500), (7, 60_000), (30, 0), (6, 10)])
-def test_the_pictures_time_is_its_mid_exposure(
-    unit: Harness, sky: Sky, rate: int, exposure: int
-) -> None:
-    unit.picture = sky.picture
-    unit.command("SetFrameRate", FrameRate=rate)
-    unit.command("Exposure", exposure=exposure)
-    unit.log.clear()
-    unit.command("CaptureAndProcess")
+def test_a_pictures_time_is_mid_exposure(lit: Harness, rate: int, exposure: int) -> None:
+    lit.command("SetFrameRate", FrameRate=rate)
+    lit.command("Exposure", exposure=exposure)
+    lit.log.clear()
+    lit.command("CaptureAndProcess")
     line_us = 132.2
     frame_lines = round(27e6 / (rate * 1322))
     exposed = min(exposure or frame_lines, frame_lines - 1)
-    ack_us = next(us for us, what in unit.log if what == SetPin("ENABLE", 0))
+    ack_us = next(us for us, what in lit.log if what == SetPin("ENABLE", 0))
     expected_us = ack_us - (256 + exposed / 2) * line_us
-    assert unit.telemetry("AttitudeQuaternion")["ImageTime"] == pytest.approx(
+    assert lit.telemetry("AttitudeQuaternion")["ImageTime"] == pytest.approx(
         expected_us / 1000, abs=1.1
     )
 
 
-def test_pictures_are_counted(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureTestPatern", TestPaternType=0)
-    unit.command("UploadImage")
-    unit.command("CaptureAndProcess")
-    assert unit.telemetry("AttitudeQuaternion")["FrameCounter"] == 3
+def test_pictures_are_counted(lit: Harness) -> None:
+    lit.command("CaptureTestPatern", TestPaternType=0)
+    lit.command("UploadImage", "CaptureAndProcess")
+    assert lit.telemetry("AttitudeQuaternion")["FrameCounter"] == 3

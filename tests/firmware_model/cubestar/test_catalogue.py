@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.cubestar.catalogue import CatalogueError, StarCatalogue
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
+
+from .sky import meter
 
 
 def random_sky(
@@ -126,7 +126,7 @@ def test_reduced_keeps_what_lies_in_the_cap_and_the_pairs_within_it(radius_deg: 
     hip, vectors, v_mag = random_sky(300, 7)
     catalogue = StarCatalogue.build(hip, vectors, v_mag, 9.0, 50)
     boresight = np.array([0.6, -0.48, 0.64])
-    reduced = catalogue.reduced(boresight.astype(np.float32), radius_deg, Meter(CORTEX_M3))
+    reduced = catalogue.reduced(boresight.astype(np.float32), radius_deg, meter())
     inside = {
         star
         for star, vector in enumerate(vectors[np.argsort(hip)])
@@ -142,7 +142,7 @@ def test_reduced_keeps_what_lies_in_the_cap_and_the_pairs_within_it(radius_deg: 
 def test_reduced_charges_one_pass_over_each_list_and_the_copies() -> None:
     catalogue = StarCatalogue.build(*random_sky(300, 8), mag_limit=9.0, pair_limit_deg=50)
     boresight = np.array([0, 0, 1], dtype=np.float32)
-    narrow, wide = Meter(CORTEX_M3), Meter(CORTEX_M3)
+    narrow, wide = meter(), meter()
     few = catalogue.reduced(boresight, 10.0, narrow)
     many = catalogue.reduced(boresight, 60.0, wide)
     assert narrow.counts["loop"] == wide.counts["loop"] == 300 + len(catalogue.pairs)

@@ -45,9 +45,7 @@ def test_processed_says_when_the_last_telecommand_is_done(unit: Harness) -> None
 
 
 @pytest.mark.parametrize("name", ["Reset", "MCUReset"])
-def test_a_telecommand_that_resets_is_not_processed_before_the_reset(
-    unit: Harness, name: str
-) -> None:
+def test_a_telecommand_that_resets_is_not_processed_before_it(unit: Harness, name: str) -> None:
     seen: dict[int, set[int]] = {0: set(), 1: set()}
     unit.on_request = lambda _request: seen[len(unit.resets)].add(
         unit.telemetry("TcmdProcessed")["Processed"]
@@ -59,8 +57,7 @@ def test_a_telecommand_that_resets_is_not_processed_before_the_reset(
 @pytest.mark.parametrize("name", ["Reset", "MCUReset", "TestWDG"])
 def test_a_reset_drops_the_telecommands_that_wait(unit: Harness, name: str) -> None:
     unit.send(name)
-    unit.send("Exposure", exposure=9)
-    unit.run()
+    unit.command("Exposure", exposure=9)
     shown(unit, "Exposure", exposure=0)
 
 
@@ -89,8 +86,7 @@ def test_a_configuration_survives_the_power_cycle_and_nothing_else_does(unit: Ha
     unit.command("setIDMargin", Margin=0.002)
     unit.command("SaveConfig")
     unit.command("setIDMargin", Margin=0.003)
-    unit.command("IDStars")
-    unit.command("TestWDG")
+    unit.command("IDStars", "TestWDG")
     unit.power_on()
     shown(unit, "IDMargin", Margin=0.002)
     assert unit.flags() == set()

@@ -25,17 +25,18 @@ SETTERS = [
 ]
 """Parameters that raise a flag when they are out of range."""
 
-Cause = Callable[[Harness, Sky], None]
-CAUSES: dict[str, Cause] = {}
+Act = Callable[[Harness, Sky], object]
+CAUSES: dict[str, Act] = {}
 
 MODE_SELECT = b"\x81\x00"
 DISABLE = MODE_SELECT + b"\x20"
+DARK = np.zeros((512, 1024), np.uint8)
 
 
-def flag(name: str, *others: str) -> Callable[[Cause], Cause]:
+def flag(name: str, *others: str) -> Callable[[Act], Act]:
     """The function brings flag ``name`` about, and ``others`` with it."""
 
-    def register(cause: Cause) -> Cause:
+    def register(cause: Act) -> Act:
         def check(unit: Harness, sky: Sky) -> None:
             cause(unit, sky)
             assert unit.flags() == {name, *others}
@@ -90,29 +91,10 @@ def test_flags_that_this_hardware_can_not_raise() -> None:
     assert not NEVER_RAISED.keys() & CAUSES.keys()
 
 
-# --- supply ---------------------------------------------------------------------------------------
-
-
-@flag("OverCurrent")
-def over_current(unit: Harness, _: Sky) -> None:
-    unit.program.supply.overcurrent("imager")
-    unit.run()
-
-
-@flag("UnderCurrent")
-def under_current(unit: Harness, _: Sky) -> None:
-    unit.currents["imager"] = 0.0
-    unit.telemetry("PowerStatus")
-    unit.currents["imager"] = 50.0
-
-
-# --- buses ----------------------------------------------------------------------------------------
-
-
-def overflow(send: Callable[[Harness], object]) -> Callable[[Harness], None]:
+def overflow(send: Callable[[Harness], object]) -> Act:
     """One telecommand more than the queue holds."""
 
-    def fill(unit: Harness) -> None:
+    def fill(unit: Harness, _: Sky) -> None:
         for _ in range(QUEUE_DEPTH + 1):
             send(unit)
         unit.run()
@@ -120,93 +102,107 @@ def overflow(send: Callable[[Harness], object]) -> Callable[[Harness], None]:
     return fill
 
 
-def silence(unit: Harness) -> None:
+def silence(unit: Harness, _: Sky) -> None:
     unit.uart(b"\x1f\x7f\x07")
     unit.link.uart_silence()
 
 
-BUS_CAUSES: dict[tuple[str, ...], Callable[[Harness], object]] = {
-    ("UART_ProtocolError",): lambda unit: unit.uart(b"\x55"),
-    ("UART_TcmdBufOfError",): overflow(lambda unit: unit.send("Exposure")),
-    ("UART_Tcmd_TooManyParm",): lambda unit: unit.frames(b"\x10\x00"),
-    ("UART_Tcmd_TooFewParm",): lambda unit: unit.frames(b"\x07\x00"),
-    ("UART_MsgIncomplete",): lambda unit: unit.uart(b"\x1f\x7f\x07" + encode_frame(b"\x83")),
-    ("UART_RXTimeout", "UART_MsgIncomplete"): silence,
-    ("I2C_WaitForIDReadRequestError",): lambda unit: unit.i2c_read(1),
-    ("I2C_TcmdBufOFError",): overflow(lambda unit: unit.i2c_write(b"\x07\x00\x00")),
-    ("I2C_TCMD_TooFewParm",): lambda unit: unit.i2c_write(b"\x07\x00"),
-    ("I2C_TCMD_TooManyparm",): lambda unit: unit.i2c_write(b"\x07\x00\x00\x00"),
-    ("TcmdIDError",): lambda unit: unit.frames(b"\x63"),
-    ("TlmIDError",): lambda unit: unit.frames(b"\xc0"),
-}
-for raised, act in BUS_CAUSES.items():
-    flag(*raised)(lambda unit, _sky, act=act: act(unit))
+def refusing(refuse: Callable[[bytes], bool], *before: str) -> Act:
+    """The camera does not answer in a capture that comes after telecommands ``before``."""
+
+    def capture(unit: Harness, _: Sky) -> None:
+        for name in before:
+            unit.command(name, **({"exposure": 9} if name == "Exposure" else {}))
+        unit.camera_refuses = refuse
+        unit.command("CaptureImage")
+
+    return capture
 
 
-# --- image sensor and picture ---------------------------------------------------------------------
+def over_current(unit: Harness, _: Sky) -> None:
+    unit.program.supply.overcurrent("imager")
+    unit.run()
 
 
-@flag("StatusError")
-def status_error(unit: Harness, _: Sky) -> None:
-    unit.command("DetectStars")
+def under_current(unit: Harness, _: Sky) -> None:
+    unit.currents["imager"] = 0.0
+    unit.telemetry("PowerStatus")
+    unit.currents["imager"] = 50.0
 
 
-@flag("ISSetupError")
-def set_up(unit: Harness, _: Sky) -> None:
-    unit.camera_refuses = lambda _data: True
-    unit.command("CaptureImage")
-
-
-@flag("ConfigChangeError")
-def config_change(unit: Harness, _: Sky) -> None:
-    unit.command("CaptureImage")
-    unit.command("Exposure", exposure=9)
-    unit.camera_refuses = lambda _data: True
-    unit.command("CaptureImage")
-
-
-@flag("ISEnableError")
-def enable(unit: Harness, _: Sky) -> None:
-    unit.command("CaptureImage")
-    unit.camera_refuses = lambda data: data[:2] == MODE_SELECT
-    unit.command("CaptureImage")
-
-
-@flag("ISDisableError")
-def disable(unit: Harness, _: Sky) -> None:
-    unit.command("CaptureImage")
-    unit.camera_refuses = lambda data: data == DISABLE
-    unit.command("CaptureImage")
-
-
-@flag("ImageCaptureError")
 def image_capture(unit: Harness, _: Sky) -> None:
     unit.frame_us = None
     unit.command("CaptureImage")
 
 
-# --- loop -----------------------------------------------------------------------------------------
+def detect(unit: Harness, picture: np.ndarray) -> None:
+    unit.picture = picture
+    unit.command("CaptureImage", "DetectStars")
+
+
+def look_where_the_catalogue_has_no_stars(unit: Harness, sky: Sky, declination: float) -> None:
+    """The catalogue keeps the stars north of 12 deg."""
+    whole = unit.catalogue
+    north = whole.vectors[:, 2] > 0.2
+    unit.catalogue = StarCatalogue.build(
+        whole.hip[north], whole.vectors[north].astype(float), whole.v_mag[north], 9.0, 50.0
+    )
+    unit.power_on()
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    unit.command("setTrackingMode", RightAscension=0.3, Declination=declination)
+    unit.picture = sky.picture
+    unit.command("CaptureAndProcess")
+
+
+NO_STARS = "LessThanThreeStarsDetected"
+NOT_FOUND = ("IDSearchError", "LessThanThreeStarsID")
+NOT_IN_FIELD = ("LessThanThreeStarsInFoV", *NOT_FOUND)
+ACTS: dict[tuple[str, ...], Act] = {
+    ("OverCurrent",): over_current,
+    ("UnderCurrent",): under_current,
+    ("UART_ProtocolError",): lambda unit, _: unit.uart(b"\x55"),
+    ("UART_TcmdBufOfError",): overflow(lambda unit: unit.send("Exposure")),
+    ("UART_Tcmd_TooManyParm",): lambda unit, _: unit.frames(b"\x10\x00"),
+    ("UART_Tcmd_TooFewParm",): lambda unit, _: unit.frames(b"\x07\x00"),
+    ("UART_MsgIncomplete",): lambda unit, _: unit.uart(b"\x1f\x7f\x07" + encode_frame(b"\x83")),
+    ("UART_RXTimeout", "UART_MsgIncomplete"): silence,
+    ("I2C_WaitForIDReadRequestError",): lambda unit, _: unit.i2c_read(1),
+    ("I2C_TcmdBufOFError",): overflow(lambda unit: unit.i2c_write(b"\x07\x00\x00")),
+    ("I2C_TCMD_TooFewParm",): lambda unit, _: unit.i2c_write(b"\x07\x00"),
+    ("I2C_TCMD_TooManyparm",): lambda unit, _: unit.i2c_write(b"\x07\x00\x00\x00"),
+    ("TcmdIDError",): lambda unit, _: unit.frames(b"\x63"),
+    ("TlmIDError",): lambda unit, _: unit.frames(b"\xc0"),
+    ("StatusError",): lambda unit, _: unit.command("DetectStars"),
+    ("ISSetupError",): refusing(lambda _data: True),
+    ("ConfigChangeError",): refusing(lambda _data: True, "CaptureImage", "Exposure"),
+    ("ISEnableError",): refusing(lambda data: data[:2] == MODE_SELECT, "CaptureImage"),
+    ("ISDisableError",): refusing(lambda data: data == DISABLE, "CaptureImage"),
+    ("ImageCaptureError",): image_capture,
+    ("MaxInvalidStarsDetectionError", NO_STARS): lambda unit, _: detect(unit, DARK + np.uint8(80)),
+    (NO_STARS,): lambda unit, _: detect(unit, DARK),
+    NOT_IN_FIELD: lambda *given: look_where_the_catalogue_has_no_stars(*given, declination=-0.35),
+    ("ReducedIDListSizeError", *NOT_IN_FIELD): lambda *given: look_where_the_catalogue_has_no_stars(
+        *given, declination=-1.2
+    ),
+}
+for raised, act in ACTS.items():
+    flag(*raised)(act)
 
 
 @flag("TimingError")
 def timing(unit: Harness, sky: Sky) -> None:
     unit.picture = sky.picture
     unit.command("SetDiscardDelay", Delay=1000)  # and 386 ms, and 404 ms
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 2_500_000)
-    unit.send("StopLoop")
-    unit.run()
+    unit.start_loop(2.5)
+    unit.command("StopLoop")
 
 
 @flag("TriggerAlreadySet")
 def triggered(unit: Harness, sky: Sky) -> None:
     unit.picture = sky.picture
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 100_000)
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 850_000)
-    unit.send("StopLoop")
-    unit.run()
+    unit.start_loop(0.1)
+    unit.start_loop(0.85)
+    unit.command("StopLoop")
 
 
 @flag("TimerAlreadyRunning")
@@ -214,17 +210,7 @@ def timer_running(unit: Harness, _: Sky) -> None:
     unit.command("setDelayTimerTimeout", Time=1.0)
     unit.send("Trigger")
     unit.send("Trigger")
-    unit.send("StopLoop")
-    unit.run()
-
-
-# --- detection ------------------------------------------------------------------------------------
-
-
-def detect(unit: Harness, picture: np.ndarray) -> None:
-    unit.picture = picture
-    unit.command("CaptureImage")
-    unit.command("DetectStars")
+    unit.command("StopLoop")
 
 
 @flag("MaxStarsDetection")
@@ -233,31 +219,11 @@ def max_stars(unit: Harness, sky: Sky) -> None:
     detect(unit, sky.picture)
 
 
-@flag("MaxInvalidStarsDetectionError", "LessThanThreeStarsDetected")
-def max_invalid(unit: Harness, _: Sky) -> None:
-    detect(unit, np.full((512, 1024), 80, np.uint8))
-
-
 @flag("MaxNoiseDetected", "LessThanThreeStarsDetected")
 def max_noise(unit: Harness, _: Sky) -> None:
-    picture = np.zeros((512, 1024), np.uint8)
+    picture = DARK.copy()
     picture[::3, ::3] = 60
     detect(unit, picture)
-
-
-@flag("LessThanThreeStarsDetected")
-def few_detected(unit: Harness, _: Sky) -> None:
-    detect(unit, np.zeros((512, 1024), np.uint8))
-
-
-# --- identification -------------------------------------------------------------------------------
-
-
-def spots(*places: tuple[int, int]) -> np.ndarray:
-    picture = np.zeros((512, 1024), np.uint8)
-    for x, y in places:
-        picture[y : y + 4, x : x + 4] = 80
-    return picture
 
 
 @flag("IDModeError")
@@ -280,14 +246,16 @@ def id_error(unit: Harness, sky: Sky) -> None:
     detect(unit, sky.picture[:, ::-1])  # the sky in a mirror
     unit.command("setPrincipalPoint", Cx=1023 - 539.0, Cy=175.5)
     unit.command("setTangentalDistortionGains", P1=-0.00414, P2=-0.00624)
-    unit.command("DetectStars")
-    unit.command("IDStars")
+    unit.command("DetectStars", "IDStars")
 
 
 @flag("IDSearchError", "LessThanThreeStarsID")
 def id_search(unit: Harness, sky: Sky) -> None:
     unit.command("setIDMargin", Margin=0.0001)
-    detect(unit, spots((60, 60), (71, 60), (60, 72)))  # closer than any three in the catalogue
+    picture = DARK.copy()
+    for x, y in ((60, 60), (71, 60), (60, 72)):  # closer than any three in the catalogue
+        picture[y : y + 4, x : x + 4] = 80
+    detect(unit, picture)
     unit.command("IDStars")
 
 
@@ -299,30 +267,6 @@ def rate_exceeded(unit: Harness, sky: Sky) -> None:
     turned = Rotation.from_euler("x", 2.0, degrees=True) * sky.attitude
     unit.picture = take(unit.catalogue, turned).picture
     unit.command("CaptureAndProcess")
-
-
-def look_where_the_catalogue_has_no_stars(unit: Harness, sky: Sky, declination: float) -> None:
-    """The catalogue keeps the stars north of 12 deg."""
-    whole = unit.catalogue
-    north = whole.vectors[:, 2] > 0.2
-    unit.catalogue = StarCatalogue.build(
-        whole.hip[north], whole.vectors[north].astype(float), whole.v_mag[north], 9.0, 50.0
-    )
-    unit.power_on()
-    unit.command("setIDMode", IdMode=IdMode.TRACKING)
-    unit.command("setTrackingMode", RightAscension=0.3, Declination=declination)
-    unit.picture = sky.picture
-    unit.command("CaptureAndProcess")
-
-
-@flag("LessThanThreeStarsInFoV", "IDSearchError", "LessThanThreeStarsID")
-def few_in_field(unit: Harness, sky: Sky) -> None:
-    look_where_the_catalogue_has_no_stars(unit, sky, declination=-0.35)
-
-
-@flag("ReducedIDListSizeError", "LessThanThreeStarsInFoV", "IDSearchError", "LessThanThreeStarsID")
-def none_near(unit: Harness, sky: Sky) -> None:
-    look_where_the_catalogue_has_no_stars(unit, sky, declination=-1.2)
 
 
 @flag("QuestindexError")

@@ -19,30 +19,27 @@ def stays_sane(unit: Harness) -> None:
     unit.program.link.uart_silence()
     unit.run(until_us=unit.now_us + 200_000_000)  # what was accepted comes to its end
     unit.received()
-    assert unit.send("StopLoop") == AckError.OK
-    unit.run()
+    unit.command("StopLoop")
     unit.command("Reset")
     assert unit.telemetry("Identification")["InterfaceVersion"] == 3
     assert unit.i2c_read(1, 131) == b"\1"
-    unit.command("ClearConfig")
-    unit.command("CaptureAndProcess")
+    unit.command("ClearConfig", "CaptureAndProcess")
     assert unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_random_bytes_on_the_uart(unit: Harness, sky: Sky, seed: int) -> None:
-    unit.picture = sky.picture
+def test_random_bytes_on_the_uart(lit: Harness, seed: int) -> None:
     rng = np.random.default_rng(seed)
     data = rng.integers(0, 256, UART_BYTES, dtype=np.uint8)
     # As likely as any other byte in one half of the noise, every third byte in the other.
     special = rng.choice(np.array([0x1F, 0x7F, 0xFF], np.uint8), UART_BYTES)
     data = np.where(rng.random(UART_BYTES) < 0.33 * seed, special, data)
     for start in range(0, UART_BYTES, 1000):
-        unit.uart(data[start : start + 1000].tobytes())
-        unit.run(until_us=unit.now_us + 1000 * 174)
-    unit.program.link.uart_silence()
-    assert unit.flags() >= {"UART_ProtocolError"}
-    stays_sane(unit)
+        lit.uart(data[start : start + 1000].tobytes())
+        lit.run(until_us=lit.now_us + 1000 * 174)
+    lit.program.link.uart_silence()
+    assert lit.flags() >= {"UART_ProtocolError"}
+    stays_sane(lit)
 
 
 def test_random_frames_on_the_uart(unit: Harness, sky: Sky) -> None:
@@ -69,8 +66,7 @@ def test_random_frames_on_the_uart(unit: Harness, sky: Sky) -> None:
     stays_sane(unit)
 
 
-def test_random_messages_on_i2c(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
+def test_random_messages_on_i2c(lit: Harness) -> None:
     rng = np.random.default_rng(12)
     for _ in range(I2C_MESSAGES):
         identifier = int(rng.integers(0, 256))
@@ -78,22 +74,22 @@ def test_random_messages_on_i2c(unit: Harness, sky: Sky) -> None:
             continue
         match rng.integers(0, 4):
             case 0:
-                unit.i2c_write(bytes([identifier]) + rng.bytes(int(rng.integers(0, 12))))
+                lit.i2c_write(bytes([identifier]) + rng.bytes(int(rng.integers(0, 12))))
             case 1:
-                unit.i2c_write(rng.bytes(int(rng.integers(0, 300))))
+                lit.i2c_write(rng.bytes(int(rng.integers(0, 300))))
             case 2:
-                unit.i2c_read(int(rng.integers(0, 300)), identifier)
+                lit.i2c_read(int(rng.integers(0, 300)), identifier)
             case 3:
-                unit.i2c_read(int(rng.integers(0, 40)))
-        unit.run(until_us=unit.now_us + int(rng.integers(0, 50_000)))
-    assert unit.flags() >= {
+                lit.i2c_read(int(rng.integers(0, 40)))
+        lit.run(until_us=lit.now_us + int(rng.integers(0, 50_000)))
+    assert lit.flags() >= {
         "I2C_WaitForIDReadRequestError",
         "I2C_TCMD_TooFewParm",
         "I2C_TCMD_TooManyparm",
         "TcmdIDError",
         "TlmIDError",
     }
-    stays_sane(unit)
+    stays_sane(lit)
 
 
 def test_random_transitions_on_i2c(unit: Harness, sky: Sky) -> None:
@@ -117,15 +113,14 @@ def test_random_transitions_on_i2c(unit: Harness, sky: Sky) -> None:
     stays_sane(unit)
 
 
-def test_a_flood_of_good_frames_whose_answers_find_no_room(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
+def test_a_flood_of_good_frames_whose_answers_find_no_room(lit: Harness) -> None:
     flood = encode_frame(bytes([143])) + encode_frame(b"\x10") + encode_frame(b"\x80")
     answers = 0
     for _ in range(3000):
-        answers += len(unit.uart(flood))  # none of them is cut short
-        unit.backlog = min(unit.backlog + 120, 2048)
-        unit.run(until_us=unit.now_us + 2_600)
+        answers += len(lit.uart(flood))  # none of them is cut short
+        lit.backlog = min(lit.backlog + 120, 2048)
+        lit.run(until_us=lit.now_us + 2_600)
     assert 3 <= answers < 9000
-    unit.backlog = 0
-    assert "UART_TcmdBufOfError" in unit.flags()
-    stays_sane(unit)
+    lit.backlog = 0
+    assert "UART_TcmdBufOfError" in lit.flags()
+    stays_sane(lit)

@@ -2,7 +2,6 @@
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
-from cubestack.firmware_model.node.queue import QUEUE_DEPTH
 
 from .harness import Harness
 
@@ -17,22 +16,6 @@ def ack(error: AckError) -> list[bytes]:
 def exposure(unit: Harness) -> int:
     unit.run()
     return int(unit.telemetry("Exposure")["exposure"])
-
-
-def test_a_good_telecommand_is_acknowledged_and_executed(unit: Harness) -> None:
-    assert unit.uart(encode_frame(GOOD)) == ack(AckError.OK)
-    assert exposure(unit) == 5
-    assert unit.flags() == set()
-
-
-def test_a_full_buffer(unit: Harness) -> None:
-    for value in range(QUEUE_DEPTH):
-        assert unit.send("Exposure", exposure=value) == AckError.OK
-    assert unit.send("Exposure", exposure=99) == AckError.BUFFER_FULL
-    assert unit.flags() == {"UART_TcmdBufOfError"}
-    assert exposure(unit) == QUEUE_DEPTH - 1
-    assert unit.send("Exposure", exposure=99) == AckError.OK
-    assert exposure(unit) == 99
 
 
 def test_counters_count_what_was_accepted_and_answered(unit: Harness) -> None:

@@ -24,9 +24,7 @@ def test_idle_time_is_what_was_slept_since_the_last_capture(unit: Harness) -> No
 
 
 def test_work_is_not_idle_time(unit: Harness) -> None:
-    unit.command("CaptureImage")
-    unit.command("TestSRAM")
-    unit.command("CaptureImage")
+    unit.command("CaptureImage", "TestSRAM", "CaptureImage")
     assert idle_us(unit) < 100
 
 

@@ -47,9 +47,6 @@ def tracking(unit: Harness) -> Harness:
 DARK = np.zeros((512, 1024), np.uint8)
 
 
-# --- the attitude ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_a_picture_gives_its_attitude(unit: Harness, catalogue: StarCatalogue, seed: int) -> None:
     true = Rotation.random(rng=np.random.default_rng(seed))
@@ -62,17 +59,11 @@ def test_a_picture_gives_its_attitude(unit: Harness, catalogue: StarCatalogue, s
     assert values["Matched"] == unit.telemetry("NumIdStars")["numIdStars"] >= 4
 
 
-def test_the_attitude_belongs_to_the_picture_that_the_stars_came_from(
-    unit: Harness, sky: Sky
-) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.command("DetectStars")
-    unit.command("IDStars")
-    at_ms = unit.now_us / 1000
-    unit.command("CaptureImage")
-    unit.command("EstimateAttitude")
-    values = unit.telemetry("AttitudeQuaternion")
+def test_the_attitude_belongs_to_the_picture_of_the_stars(lit: Harness) -> None:
+    lit.command("CaptureImage", "DetectStars", "IDStars")
+    at_ms = lit.now_us / 1000
+    lit.command("CaptureImage", "EstimateAttitude")
+    values = lit.telemetry("AttitudeQuaternion")
     assert values["FrameCounter"] == 1
     assert values["ImageTime"] < at_ms
 
@@ -102,9 +93,7 @@ def test_a_failure_leaves_the_last_attitude_but_not_its_validity(unit: Harness, 
     assert not unit.telemetry("PerformanceParameters")["AttitudeSuccess"]
 
 
-def test_identifying_again_takes_the_validity_back_until_the_attitude_is_there(
-    unit: Harness, sky: Sky
-) -> None:
+def test_identifying_again_takes_the_validity_back(unit: Harness, sky: Sky) -> None:
     process(unit, sky.picture)
     unit.command("IDStars")
     assert not unit.telemetry("AttitudeQuaternion")["Valid"]
@@ -116,9 +105,6 @@ def test_the_attitude_survives_power_off_in_flash(unit: Harness, sky: Sky) -> No
     good = process(unit, sky.picture)
     unit.power_on()
     assert unit.telemetry("AttitudeQuaternion") == good | {"Valid": False}
-
-
-# --- steps that can not be done -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -157,9 +143,7 @@ def test_stars_that_are_not_in_the_catalogue(unit: Harness) -> None:
     assert unit.telemetry("NumIdStars")["numIdStars"] == 0
 
 
-def test_stars_that_determine_no_attitude(
-    unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky
-) -> None:
+def test_stars_without_attitude(unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky) -> None:
     def refuse(*_arguments: object) -> None:
         raise AttitudeError("the vectors all point the same way")
 
@@ -171,9 +155,6 @@ def test_stars_that_determine_no_attitude(
     assert not unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
-# --- modes ----------------------------------------------------------------------------------------
-
-
 def test_lost_in_space_stays_so_when_asked_to(unit: Harness, sky: Sky) -> None:
     for _ in range(2):
         assert process(unit, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
@@ -181,18 +162,14 @@ def test_lost_in_space_stays_so_when_asked_to(unit: Harness, sky: Sky) -> None:
         assert mode_flag(unit) is MatchMode.TRACKING  # the firmware's own flag
 
 
-def test_tracking_without_attitude_and_hint_starts_lost_in_space(
-    tracking: Harness, sky: Sky
-) -> None:
+def test_tracking_without_attitude_and_hint_starts_lost(tracking: Harness, sky: Sky) -> None:
     assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
     assert tracking.flags() == {"IDModeError"}
     assert process(tracking, sky.picture)["Mode"] == MatchMode.TRACKING
     assert tracking.flags() == set()
 
 
-def test_a_hint_gives_an_assisted_match_and_then_tracking(
-    tracking: Harness, sky: Sky, pose: Rotation
-) -> None:
+def test_a_hint_gives_assisted_then_tracking(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, pose)
     assert mode_flag(tracking) is MatchMode.ASSISTED
     assert process(tracking, sky.picture)["Mode"] == MatchMode.ASSISTED
@@ -200,9 +177,7 @@ def test_a_hint_gives_an_assisted_match_and_then_tracking(
     assert process(tracking, sky.picture)["Mode"] == MatchMode.TRACKING
 
 
-def test_a_wrong_hint_steps_back_to_lost_in_space(
-    tracking: Harness, sky: Sky, pose: Rotation
-) -> None:
+def test_a_wrong_hint_leads_to_lost_in_space(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, turned(pose, 150))
     assert not process(tracking, sky.picture)["Valid"]
     assert "IDModeError" not in tracking.flags()
@@ -285,9 +260,7 @@ def test_too_few_stars_are_no_sign_of_a_rate(
     assert tracking.flags() == {"LessThanThreeStarsDetected"}
 
 
-def test_the_mode_flag_is_in_flash_and_only_written_when_it_changes(
-    tracking: Harness, sky: Sky
-) -> None:
+def test_the_mode_flag_is_written_to_flash_when_it_changes(tracking: Harness, sky: Sky) -> None:
     for _ in range(3):
         process(tracking, sky.picture)
     assert tracking.flash.writes == {"mode": 1, "attitude": 3}
@@ -295,18 +268,13 @@ def test_the_mode_flag_is_in_flash_and_only_written_when_it_changes(
     assert mode_flag(tracking) is MatchMode.TRACKING
 
 
-def test_a_mode_flag_without_an_attitude_does_not_count(
-    tracking: Harness, sky: Sky, pose: Rotation
-) -> None:
+def test_a_mode_flag_needs_an_attitude(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, pose)
     tracking.power_on()  # the flag is in flash, the hint is gone
     tracking.command("setIDMode", IdMode=IdMode.TRACKING)
     assert mode_flag(tracking) is MatchMode.ASSISTED
     assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
     assert tracking.flags() == {"IDModeError"}
-
-
-# --- what a failure says --------------------------------------------------------------------------
 
 
 def empty_half(catalogue: StarCatalogue) -> StarCatalogue:
@@ -333,9 +301,7 @@ def test_a_boresight_where_the_catalogue_is_empty(catalogue: StarCatalogue, sky:
         assert performance["LessThanThreeStarsInFoV"] == bool(flags)
 
 
-def test_nothing_is_said_about_the_catalogue_when_lost_in_space(
-    catalogue: StarCatalogue, pose: Rotation
-) -> None:
+def test_lost_in_space_blames_no_catalogue(catalogue: StarCatalogue, pose: Rotation) -> None:
     unit = Harness(empty_half(catalogue))
     south = Rotation.from_euler("x", 180, degrees=True)
     process(unit, take(catalogue, south).picture)
@@ -361,32 +327,24 @@ def test_why_a_search_stopped(unit: Harness, sky: Sky, limits: dict[str, int], f
     assert unit.flags() - {"LessThanThreeStarsDetected"} == {flag}
 
 
-# --- times ----------------------------------------------------------------------------------------
-
-
-def test_times_are_those_of_the_charged_cycles(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    start_us = unit.now_us
-    unit.command("DetectStars")
-    detect_us = unit.now_us - start_us
-    unit.command("IDStars")
-    unit.command("SelectBestStars")
-    unit.command("EstimateAttitude")
-    assert unit.telemetry("PhaseTimes")["Detect"] == pytest.approx(detect_us, abs=100)
-    parts = unit.telemetry("DetectionTimingOne")
+def test_times_are_those_of_the_charged_cycles(lit: Harness) -> None:
+    lit.command("CaptureImage")
+    start_us = lit.now_us
+    lit.command("DetectStars")
+    detect_us = lit.now_us - start_us
+    lit.command("IDStars", "SelectBestStars", "EstimateAttitude")
+    assert lit.telemetry("PhaseTimes")["Detect"] == pytest.approx(detect_us, abs=100)
+    parts = lit.telemetry("DetectionTimingOne")
     assert parts["MaxStarSearchTime"] > 10
-    whole = unit.telemetry("DetectionTimingTwo")
+    whole = lit.telemetry("DetectionTimingTwo")
     assert whole["StarDetectionTime"] == whole["MaxStarDetectionTime"]
     assert sum(parts.values()) == pytest.approx(whole["StarDetectionTime"], abs=2.5)
-    assert unit.telemetry("TimingSummary")["DetectionTime"] == whole["StarDetectionTime"]
+    assert lit.telemetry("TimingSummary")["DetectionTime"] == whole["StarDetectionTime"]
 
 
-def test_the_longest_time_is_kept(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.command("DetectStars")
-    unit.command("setDetectionRegion", Yend=40)
-    unit.command("DetectStars")
-    times = unit.telemetry("DetectionTimingTwo")
+def test_the_longest_time_is_kept(lit: Harness) -> None:
+    lit.command("CaptureImage", "DetectStars")
+    lit.command("setDetectionRegion", Yend=40)
+    lit.command("DetectStars")
+    times = lit.telemetry("DetectionTimingTwo")
     assert 0 < times["StarDetectionTime"] < times["MaxStarDetectionTime"]

@@ -23,8 +23,6 @@ from cubestack.firmware_model.mcu.requests import (
 from .harness import Harness
 from .sky import Sky, attitude_of, error_deg, take
 
-# --- one iteration after the other ----------------------------------------------------------------
-
 
 def test_the_period_is_exactly_one_second(unit: Harness) -> None:
     unit.start_loop(20.5)
@@ -58,10 +56,7 @@ def test_delays_at_the_start_do_not_add_up(unit: Harness) -> None:
     assert times[10] - times[1] == pytest.approx(9 * ITERATION_US, abs=50)
 
 
-def test_an_iteration_processes_the_previous_picture_while_the_next_is_stored(
-    unit: Harness, sky: Sky
-) -> None:
-    unit.picture = sky.picture
+def test_an_iteration_processes_while_the_next_picture_is_stored(lit: Harness) -> None:
     order: list[str] = []
 
     def note(request: Request) -> None:
@@ -75,13 +70,13 @@ def test_an_iteration_processes_the_previous_picture_while_the_next_is_stored(
             order.append(names.get(request, request.pin))
         elif isinstance(request, AwaitPin | StrobeRead | Reset | CameraTransfer):
             order.append(type(request).__name__)
-        status = unit.status().name
+        status = lit.status().name
         if status.endswith("ING") and status != "CAPTURING" and status not in order:
             order.append(status)
 
-    unit.start_loop(0.9)
-    unit.on_request = note
-    unit.run(until_us=unit.now_us + 1_100_000)
+    lit.start_loop(0.9)
+    lit.on_request = note
+    lit.run(until_us=lit.now_us + 1_100_000)
     begin, end = order.index("CameraTransfer"), order.index("Reset", order.index("CameraTransfer"))
     assert order[begin : end + 1] == [
         "CameraTransfer",  # enable the sensor
@@ -121,41 +116,37 @@ def test_the_attitude_of_a_picture_comes_one_iteration_later(
             assert values["ImageTime"] == pytest.approx(stored_at / 1000 + 386 - 227, abs=2)
 
 
-def test_what_survives_the_reset(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("setIDMargin", Margin=0.0012)
-    unit.command("IDStars")
-    start_us = unit.start_loop(1.98)
-    before = unit.telemetry("AttitudeQuaternion")
+def test_what_survives_the_reset(lit: Harness, sky: Sky) -> None:
+    lit.command("setIDMargin", Margin=0.0012)
+    lit.command("IDStars")
+    start_us = lit.start_loop(1.98)
+    before = lit.telemetry("AttitudeQuaternion")
     assert before["Valid"]
-    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
-    assert unit.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] > 10
-    unit.run(until_us=start_us + 2_005_000)
-    assert unit.resets == [ResetCause.SYSTEM_REQUEST] * 2
+    assert lit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
+    assert lit.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] > 10
+    lit.run(until_us=start_us + 2_005_000)
+    assert lit.resets == [ResetCause.SYSTEM_REQUEST] * 2
     # RAM is lost ...
-    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
-    assert unit.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] == 0
-    assert unit.telemetry("NumIdStars")["numIdStars"] == 0
+    assert lit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
+    assert lit.telemetry("DetectionTimingTwo")["MaxStarDetectionTime"] == 0
+    assert lit.telemetry("NumIdStars")["numIdStars"] == 0
     # ... settings, counters, flags, picture and attitude are not.
-    assert unit.telemetry("IDMargin")["Margin"] == 0.0012
-    assert unit.telemetry("ExtendedIdentification")["TcmdCount"] == 3
-    assert unit.telemetry("LoopStatus")["Iterations"] == 2
-    assert unit.flags() == {"StatusError"}
-    assert unit.telemetry("AttitudeQuaternion") == before
-    assert np.array_equal(unit.external_ram[: sky.picture.size], sky.picture.reshape(-1))
+    assert lit.telemetry("IDMargin")["Margin"] == 0.0012
+    assert lit.telemetry("ExtendedIdentification")["TcmdCount"] == 3
+    assert lit.telemetry("LoopStatus")["Iterations"] == 2
+    assert lit.flags() == {"StatusError"}
+    assert lit.telemetry("AttitudeQuaternion") == before
+    assert np.array_equal(lit.external_ram[: sky.picture.size], sky.picture.reshape(-1))
 
 
-def test_results_can_be_read_until_shortly_before_the_next_iteration(
-    unit: Harness, sky: Sky
-) -> None:
-    unit.picture = sky.picture
-    start_us = unit.start_loop(1.98)
+def test_results_can_be_read_until_the_next_iteration(lit: Harness, sky: Sky) -> None:
+    start_us = lit.start_loop(1.98)
     due_us = start_us + 2 * ITERATION_US
-    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
-    unit.run(until_us=due_us - RESET_LEAD_US - 100)
-    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
-    unit.run(until_us=due_us - RESET_LEAD_US + 2_000)
-    assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
+    assert lit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
+    lit.run(until_us=due_us - RESET_LEAD_US - 100)
+    assert lit.telemetry("DetectionSummary")["NumStarsDetected"] == len(sky.stars)
+    lit.run(until_us=due_us - RESET_LEAD_US + 2_000)
+    assert lit.telemetry("DetectionSummary")["NumStarsDetected"] == 0
 
 
 def test_the_phases_fill_the_second(unit: Harness) -> None:
@@ -171,44 +162,39 @@ def test_the_phases_fill_the_second(unit: Harness) -> None:
     assert times["MaxLoopTime"] > times["LoopTime"]  # the first one set the camera up
 
 
-# --- trouble --------------------------------------------------------------------------------------
-
-
-def test_a_failed_capture_leaves_nothing_to_process(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    start_us = unit.start_loop(1.9)
-    assert unit.telemetry("AttitudeQuaternion")["FrameCounter"] == 1
-    unit.camera_refuses = lambda _data: True
-    unit.run(until_us=start_us + 2_900_000)
-    assert unit.telemetry("AttitudeQuaternion")["FrameCounter"] == 2  # processed all the same
-    written = unit.flash.writes["attitude"]
-    unit.run(until_us=start_us + 5_900_000)
-    assert unit.flash.writes["attitude"] == written
-    unit.camera_refuses = lambda _data: False
-    unit.run(until_us=start_us + 7_900_000)
-    values = unit.telemetry("AttitudeQuaternion")
+def test_a_failed_capture_leaves_nothing_to_process(lit: Harness) -> None:
+    start_us = lit.start_loop(1.9)
+    assert lit.telemetry("AttitudeQuaternion")["FrameCounter"] == 1
+    lit.camera_refuses = lambda _data: True
+    lit.run(until_us=start_us + 2_900_000)
+    assert lit.telemetry("AttitudeQuaternion")["FrameCounter"] == 2  # processed all the same
+    written = lit.flash.writes["attitude"]
+    lit.run(until_us=start_us + 5_900_000)
+    assert lit.flash.writes["attitude"] == written
+    lit.camera_refuses = lambda _data: False
+    lit.run(until_us=start_us + 7_900_000)
+    values = lit.telemetry("AttitudeQuaternion")
     assert values["Valid"]
     assert values["FrameCounter"] == 3
-    assert np.diff(unit.stored_us()[-2:]) == pytest.approx(ITERATION_US, abs=10_000)
+    assert np.diff(lit.stored_us()[-2:]) == pytest.approx(ITERATION_US, abs=10_000)
 
 
-def test_a_latch_up_in_the_loop_costs_one_picture(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
+def test_a_latch_up_in_the_loop_costs_one_picture(lit: Harness) -> None:
 
     def strike(request: Request) -> None:
         if isinstance(request, AwaitPin):
-            unit.on_request = lambda _request: None
-            unit.program.supply.overcurrent("imager")
-            unit.never_stored()
+            lit.on_request = lambda _request: None
+            lit.program.supply.overcurrent("imager")
+            lit.never_stored()
 
-    start_us = unit.start_loop(2.95)
-    unit.on_request = strike
-    unit.run(until_us=start_us + 9_950_000)
-    assert unit.switches["imager"]
-    assert unit.telemetry("SupplyReport")["PowerCycles"] == 1
-    assert "ImageCaptureError" in unit.flags()
-    assert unit.telemetry("AttitudeQuaternion")["Valid"]
-    assert np.diff(unit.stored_us()[-3:]) == pytest.approx(ITERATION_US, abs=10_000)
+    start_us = lit.start_loop(2.95)
+    lit.on_request = strike
+    lit.run(until_us=start_us + 9_950_000)
+    assert lit.switches["imager"]
+    assert lit.telemetry("SupplyReport")["PowerCycles"] == 1
+    assert "ImageCaptureError" in lit.flags()
+    assert lit.telemetry("AttitudeQuaternion")["Valid"]
+    assert np.diff(lit.stored_us()[-3:]) == pytest.approx(ITERATION_US, abs=10_000)
 
 
 def test_a_latch_up_at_the_reset_is_not_forgotten(unit: Harness) -> None:
@@ -253,8 +239,7 @@ def test_a_lasting_short_circuit_leaves_the_node_in_command(unit: Harness) -> No
 
 def test_the_time_from_reset_to_the_main_loop(unit: Harness) -> None:
     assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000
-    unit.command("CaptureImage")
-    unit.command("MCUReset")
+    unit.command("CaptureImage", "MCUReset")
     assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000
     unit.command("TestWDG")
     assert unit.telemetry("StartAndLoopTime")["StartupTime"] == Harness.boot_us / 1000

@@ -22,23 +22,23 @@ class Memories:
         self.flash = FlashStore()
 
 
+@pytest.fixture
+def memories() -> Memories:
+    return Memories()
+
+
 def state(memories: Memories) -> State:
     return State(memories)  # type: ignore[arg-type]
 
 
-# --- retention registers --------------------------------------------------------------------------
-
-
-def test_the_layout_fits_the_retention_registers() -> None:
+def test_the_layout_fits_the_retention_registers(memories: Memories) -> None:
     assert State.RETENTION_SIZE <= RETENTION_BYTES
-    memories = Memories()
     state(memories).retain()
     assert len(memories.retention) == RETENTION_BYTES
     assert not any(memories.retention[State.RETENTION_SIZE :])
 
 
-def test_settings_flags_and_counters_come_back() -> None:
-    memories = Memories()
+def test_settings_flags_and_counters_come_back(memories: Memories) -> None:
     before = state(memories)
     before.settings.put("Exposure", {"exposure": 1234})
     before.flags |= set(FLAGS[::3])
@@ -52,16 +52,14 @@ def test_settings_flags_and_counters_come_back() -> None:
 
 
 @pytest.mark.parametrize("name", COUNTERS)
-def test_a_counter_that_overflows_wraps(name: str) -> None:
-    memories = Memories()
+def test_a_counter_that_overflows_wraps(name: str, memories: Memories) -> None:
     before = state(memories)
     setattr(before.retained, name, 2**64 + 3)
     before.retain()
     assert getattr(state(memories).retained, name) == 3
 
 
-def test_without_the_mark_the_retention_registers_mean_nothing() -> None:
-    memories = Memories()
+def test_without_the_mark_the_retention_registers_mean_nothing(memories: Memories) -> None:
     memories.retention[:] = np.random.default_rng(7).bytes(RETENTION_BYTES)
     fresh = state(memories)
     assert fresh.retained == Retained()
@@ -69,8 +67,7 @@ def test_without_the_mark_the_retention_registers_mean_nothing() -> None:
     assert fresh.settings.pack() == state(Memories()).settings.pack()
 
 
-def test_forgetting_returns_to_the_values_after_power_up() -> None:
-    memories = Memories()
+def test_forgetting_returns_to_the_values_after_power_up(memories: Memories) -> None:
     before = state(memories)
     before.settings.put("Exposure", {"exposure": 5})
     before.save_config()
@@ -84,11 +81,7 @@ def test_forgetting_returns_to_the_values_after_power_up() -> None:
     assert before.flags == set()
 
 
-# --- flash ----------------------------------------------------------------------------------------
-
-
-def test_the_configuration() -> None:
-    memories = Memories()
+def test_the_configuration(memories: Memories) -> None:
     first = state(memories)
     first.settings.put("setIDMargin", {"Margin": 0.002})
     first.save_config()
@@ -99,8 +92,7 @@ def test_the_configuration() -> None:
     assert state(memories).settings.get("setIDMargin", "Margin") == 0.001
 
 
-def test_retention_registers_go_before_the_configuration() -> None:
-    memories = Memories()
+def test_retention_registers_go_before_the_configuration(memories: Memories) -> None:
     first = state(memories)
     first.save_config()
     first.settings.put("Exposure", {"exposure": 8})
@@ -108,8 +100,7 @@ def test_retention_registers_go_before_the_configuration() -> None:
     assert state(memories).settings.get("Exposure", "exposure") == 8
 
 
-def test_the_mode_flag() -> None:
-    memories = Memories()
+def test_the_mode_flag(memories: Memories) -> None:
     assert state(memories).mode is MatchMode.LOST_IN_SPACE
     for mode in MatchMode:
         state(memories).mode = mode
@@ -119,8 +110,7 @@ def test_the_mode_flag() -> None:
     assert memories.flash.writes == writes  # it is that already
 
 
-def test_the_attitude_is_kept_in_single_precision() -> None:
-    memories = Memories()
+def test_the_attitude_is_kept_in_single_precision(memories: Memories) -> None:
     assert state(memories).attitude is None
     quaternion = np.array([0.1, -0.2, 0.3, 0.9], np.float32)
     kept = Attitude(quaternion, 7, 123_456, 12, MatchMode.TRACKING)
@@ -138,14 +128,10 @@ def test_pictures_and_times_beyond_32_bits_wrap() -> None:
     assert (found.frame, found.image_ms) == (5, 6)
 
 
-def test_every_attitude_is_one_write() -> None:
-    memories = Memories()
+def test_every_attitude_is_one_write(memories: Memories) -> None:
     for number in range(5):
         state(memories).attitude = Attitude(np.zeros(4, np.float32), number, 0, 0, 0)
     assert memories.flash.writes == {"attitude": 5}
-
-
-# --- flags ----------------------------------------------------------------------------------------
 
 
 def test_a_flag_that_is_not_declared_is_a_programming_error() -> None:

@@ -7,7 +7,6 @@ from cubestack.firmware_model.interface.cubestar import TaskStatus
 from cubestack.firmware_model.mcu.requests import AwaitPin, Request, Sleep, StrobeRead
 
 from .harness import Harness
-from .sky import Sky
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
@@ -66,14 +65,13 @@ def test_the_camera_is_not_set_up_twice_otherwise(unit: Harness) -> None:
     assert len(unit.camera_writes) == count + 2  # enable and disable
 
 
-def test_the_memory_channel_loses_the_picture(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    unit.program.supply.overcurrent("memory")
-    assert not unit.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
-    unit.command("ProcessImage")
-    assert unit.status() is TaskStatus.DETECTION_FAILED
-    assert unit.flags() == {"OverCurrent", "StatusError"}
+def test_the_memory_channel_loses_the_picture(lit: Harness) -> None:
+    lit.command("CaptureImage")
+    lit.program.supply.overcurrent("memory")
+    assert not lit.telemetry("PerformanceParameters")["ImageCaptureSuccess"]
+    lit.command("ProcessImage")
+    assert lit.status() is TaskStatus.DETECTION_FAILED
+    assert lit.flags() == {"OverCurrent", "StatusError"}
 
 
 @pytest.mark.parametrize(
@@ -81,27 +79,25 @@ def test_the_memory_channel_loses_the_picture(unit: Harness, sky: Sky) -> None:
     [("imager", AwaitPin), ("imager", StrobeRead), ("memory", AwaitPin), ("memory", StrobeRead)],
 )
 def test_a_latch_up_in_a_capture_spoils_it_and_the_next_one_works(
-    unit: Harness, sky: Sky, channel: str, moment: type
+    lit: Harness, channel: str, moment: type
 ) -> None:
-    unit.picture = sky.picture
 
     def strike(request: Request) -> None:
         if isinstance(request, moment):
-            unit.program.supply.overcurrent(channel)
-            unit.on_request = lambda _request: None
+            lit.program.supply.overcurrent(channel)
+            lit.on_request = lambda _request: None
             if channel == "imager":
-                unit.never_stored()
+                lit.never_stored()
 
-    unit.on_request = strike
-    unit.send("CaptureAndProcess")
-    unit.run()
-    assert unit.flags() == {"OverCurrent", "ImageCaptureError"} | (
+    lit.on_request = strike
+    lit.command("CaptureAndProcess")
+    assert lit.flags() == {"OverCurrent", "ImageCaptureError"} | (
         {"ISDisableError"} if (channel, moment) == ("imager", AwaitPin) else set()
     )
-    assert not unit.telemetry("AttitudeQuaternion")["Valid"]
-    assert unit.switches[channel]
-    unit.command("CaptureAndProcess")
-    assert unit.status() is TaskStatus.CALCULATED
+    assert not lit.telemetry("AttitudeQuaternion")["Valid"]
+    assert lit.switches[channel]
+    lit.command("CaptureAndProcess")
+    assert lit.status() is TaskStatus.CALCULATED
 
 
 def test_under_current(unit: Harness) -> None:
@@ -120,9 +116,7 @@ def test_no_current_behind_an_open_switch_is_no_error(unit: Harness) -> None:
     assert unit.flags() == {"OverCurrent"}
 
 
-def test_currents_are_those_of_imager_and_frame_buffer(
-    unit: Harness, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_currents_of_imager_and_memory(unit: Harness, monkeypatch: pytest.MonkeyPatch) -> None:
     unit.command("CaptureImage")
     values = unit.telemetry("PowerStatus")
     assert (values["Current"], values["MinCurrent"], values["MaxCurrent"]) == (52.8, 52.8, 52.8)
@@ -151,8 +145,7 @@ def test_each_channel_is_reported(unit: Harness) -> None:
 
 
 def test_an_open_switch_stays_open_over_a_reset_of_the_processor(unit: Harness) -> None:
-    unit.command("TogglePowerSW")
-    unit.command("MCUReset")
+    unit.command("TogglePowerSW", "MCUReset")
     assert unit.telemetry("PowerStatus")["Status"] == 0
     unit.command("TogglePowerSW")
     assert unit.switches["imager"]
@@ -180,8 +173,7 @@ def test_opening_the_switch_of_a_channel_that_is_cut_leaves_it_open(unit: Harnes
 
 
 def test_a_capture_with_the_switch_open_fails(unit: Harness) -> None:
-    unit.command("TogglePowerSW")
-    unit.command("CaptureImage")
+    unit.command("TogglePowerSW", "CaptureImage")
     assert unit.status() is TaskStatus.CAPTURE_FAILED
     assert unit.flags() == {"ISSetupError"}
 

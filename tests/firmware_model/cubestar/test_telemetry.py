@@ -11,12 +11,12 @@ from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
     IdMode,
     MatchMode,
-    MemoryTest,
     ResetCause,
     TaskStatus,
 )
 from cubestack.firmware_model.node.identification import FIRMWARE_VERSION, SERIAL_NUMBER
 
+from ..registry import registered_in
 from .harness import FRAME_US, Harness
 from .sky import Sky
 
@@ -45,17 +45,18 @@ ELSEWHERE = {
          "IDTimingThree", "BestStarSelectionTime", "AttitudeTiming"),
         "test_telemetry_tables",
     ),
+    **dict.fromkeys(
+        ("ErrorFlags", "TcmdProcessed", "SRAMTestResults", "IS_Register", "ImageBlock",
+         "UploadStatus"),
+        "test_commands",
+    ),
+    "PowerStatus": "test_supply",
+    "CameraTiming": "test_image_sensor",
 }  # fmt: skip
 
 
-def telemetry(name: str) -> Callable[[Check], Check]:
-    """The function checks telemetry ``name``."""
-
-    def register(check: Check) -> Check:
-        assert CHECKS.setdefault(name, check) is check
-        return check
-
-    return register
+#: Decorator: the function checks the named telemetry.
+telemetry = registered_in(CHECKS)
 
 
 @pytest.mark.parametrize("name", [name for name in SUPPORTED if name not in ELSEWHERE])
@@ -83,12 +84,8 @@ def test_every_frame_is_whole_at_any_time(name: str, unit: Harness, sky: Sky) ->
 
     unit.picture = sky.picture
     unit.on_request = lambda _request: asked()
-    unit.send("CaptureAndProcess")
-    unit.run()
+    unit.command("CaptureAndProcess")
     asked()
-
-
-# --- node -----------------------------------------------------------------------------------------
 
 
 @telemetry("Identification")
@@ -107,8 +104,7 @@ def identification(unit: Harness, _: Sky) -> None:
 
 @telemetry("ExtendedIdentification")
 def extended_identification(unit: Harness, _: Sky) -> None:
-    unit.command("TestWDG")
-    unit.command("Exposure")
+    unit.command("TestWDG", "Exposure")
     unit.telemetry("IDMode")
     assert unit.telemetry("ExtendedIdentification") == {
         "SerialNumber": SERIAL_NUMBER,
@@ -120,30 +116,12 @@ def extended_identification(unit: Harness, _: Sky) -> None:
     }
 
 
-@telemetry("ErrorFlags")
-def error_flags(unit: Harness, _: Sky) -> None:
-    assert not any(unit.telemetry("ErrorFlags").values())
-    unit.command("IDStars")
-    unit.uart(b"noise")
-    raised = {name for name, up in unit.telemetry("ErrorFlags").items() if up}
-    assert raised == {"StatusError", "UART_ProtocolError"}
-
-
-@telemetry("TcmdProcessed")
-def processed(unit: Harness, _: Sky) -> None:
-    unit.send("Exposure")
-    assert unit.telemetry("TcmdProcessed") == {"Processed": 0}
-    unit.run()
-    assert unit.telemetry("TcmdProcessed") == {"Processed": 1}
-
-
 @telemetry("TaskStatus")
 def task_status(unit: Harness, sky: Sky) -> None:
     seen = []
     unit.picture = sky.picture
     unit.on_request = lambda _request: seen.append(unit.telemetry("TaskStatus")["taskStatus"])
-    unit.send("CaptureAndProcess")
-    unit.run()
+    unit.command("CaptureAndProcess")
     steps = [TaskStatus(value) for value in dict.fromkeys(seen)]
     assert steps == [  # between some of them no time passes
         TaskStatus.POWERED_UP,
@@ -163,31 +141,15 @@ def start_and_loop_time(unit: Harness, _: Sky) -> None:
         "LoopTime": 0,
         "MaxLoopTime": 0,
     }
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 1_900_000)
+    unit.start_loop(1.9)
     times = unit.telemetry("StartAndLoopTime")
     assert times["LoopTime"] == pytest.approx(70 + FRAME_US / 1000 + 404, abs=3)
     assert times["MaxLoopTime"] > times["LoopTime"]
 
 
-@telemetry("SRAMTestResults")
-def memory_test(unit: Harness, _: Sky) -> None:
-    assert unit.telemetry("SRAMTestResults") == {"TestResult": MemoryTest.NOT_RUN}
-    unit.command("TestSRAM")
-    assert unit.telemetry("SRAMTestResults") == {"TestResult": MemoryTest.PASSED}
-
-
-@telemetry("PowerStatus")
-def power_status(unit: Harness, _: Sky) -> None:
-    unit.currents["imager"] = 71.2
-    currents = {"Current": 71.2, "MaxCurrent": 71.2, "MinCurrent": 52.8}
-    assert unit.telemetry("PowerStatus") == {"Status": 1, **currents}
-
-
 @telemetry("LogStatus")
 def log_status(unit: Harness, _: Sky) -> None:
-    unit.command("TestWDG")
-    unit.command("IDStars")
+    unit.command("TestWDG", "IDStars")
     unit.now_us = 99_999 * 1_000_000
     unit.currents["imager"] = 60.1
     values = unit.telemetry("LogStatus")
@@ -224,8 +186,7 @@ def loop_status(unit: Harness, _: Sky) -> None:
     unit.command("SetDiscardDelay", Delay=71)
     unit.command("SelectImageBank", Bank=1)
     unit.command("SetCameraRegisterPage", Page=0x84)
-    unit.send("Trigger")
-    unit.run(until_us=unit.now_us + 1_900_000)
+    unit.start_loop(1.9)
     assert unit.telemetry("LoopStatus") == {
         "Iterations": 2,
         "ModeFlag": MatchMode.ASSISTED,
@@ -237,20 +198,9 @@ def loop_status(unit: Harness, _: Sky) -> None:
     }
 
 
-# --- camera and picture ---------------------------------------------------------------------------
-
-
 @telemetry("ImageSetup")
 def image_setup(unit: Harness, _: Sky) -> None:
     assert unit.telemetry("ImageSetup") == {"FirstLine": 0, "Width": 1024, "Height": 512}
-
-
-@telemetry("IS_Register")
-def sensor_register(unit: Harness, _: Sky) -> None:
-    assert unit.telemetry("IS_Register") == {"DataH": 0, "DataL": 0}
-    unit.camera[0x8511] = 0xC3
-    unit.command("ReadFrom_IS_Register", Reg=0x11)
-    assert unit.telemetry("IS_Register") == {"DataH": 0, "DataL": 0xC3}
 
 
 @telemetry("CameraRegister")
@@ -259,34 +209,6 @@ def camera_register(unit: Harness, _: Sky) -> None:
     unit.camera[0x8511] = 0xC3
     unit.command("ReadFrom_IS_Register", Reg=0x11)
     assert unit.telemetry("CameraRegister") == {"Address": 0x8511, "Value": 0xC3, "Valid": 1}
-
-
-@telemetry("ImageBlock")
-def image_block(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureImage")
-    lit = int(np.flatnonzero(sky.picture)[0]) // 128
-    unit.command("ImageBlockSet", BlockNumber=lit, BlockSize=2)
-    expected = sky.picture.reshape(-1, 128)[lit].tobytes()
-    assert any(expected)
-    assert unit.telemetry("ImageBlock") == {"Block": expected}
-
-
-@telemetry("UploadStatus")
-def upload_status(unit: Harness, _: Sky) -> None:
-    unit.command("UploadImage")
-    for number in (7, 9, 9):
-        unit.command("UploadBlock", BlockNumber=number, Data=bytes(128))
-    assert unit.telemetry("UploadStatus") == {"NextBlock": 10, "BlocksReceived": 3}
-
-
-@telemetry("CameraTiming")
-def camera_timing(unit: Harness, _: Sky) -> None:
-    assert not any(unit.telemetry("CameraTiming").values())
-    unit.command("CaptureImage")
-    values = unit.telemetry("CameraTiming")
-    assert values["SetupTime"] > values["ExposureUpdateTime"] >= 1
-    assert values["CaptureTime"] == 70 + FRAME_US // 1000
 
 
 @telemetry("TimingSummary")
@@ -321,9 +243,6 @@ def thresholds(unit: Harness, _: Sky) -> None:
     unit.picture = np.full((512, 1024), 17, np.uint8)
     unit.command("CaptureAndProcess")
     assert unit.telemetry("DetectionThresholdValues") == values | {"DarkThreshold": 17}
-
-
-# --- ends of ranges -------------------------------------------------------------------------------
 
 
 def test_counters_wrap_or_saturate_on_the_wire(unit: Harness) -> None:

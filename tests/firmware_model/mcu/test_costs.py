@@ -68,9 +68,7 @@ def test_phase_ends_when_its_block_fails() -> None:
         (1, "measured", "", "needs a source"),
     ],
 )
-def test_untrustworthy_costs_are_refused(
-    cycles: int, provenance: str, source: str, message: str
-) -> None:
+def test_doubtful_are_refused(cycles: int, provenance: str, source: str, message: str) -> None:
     with pytest.raises(CostError, match=message):
         Cost(cycles, provenance, source)  # type: ignore[arg-type]
 

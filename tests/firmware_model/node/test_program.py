@@ -112,9 +112,7 @@ def test_a_telecommand_without_an_action_is_a_setting(node: Node) -> None:
         (bytes([77]), AckError.INVALID_ID, "TcmdRefused"),
     ],
 )
-def test_what_is_refused_raises_a_flag(
-    node: Node, payload: bytes, error: AckError, flag: str
-) -> None:
+def test_a_refusal_raises_a_flag(node: Node, payload: bytes, error: AckError, flag: str) -> None:
     assert node.frames(payload) == [bytes([error])]
     assert [name for name, up in node.telemetry("ErrorFlags").items() if up] == [flag]
     assert node.telemetry("TcmdProcessed")["Error"] == error

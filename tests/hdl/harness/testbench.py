@@ -1,6 +1,8 @@
 """What the testbench of every top has in common."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable
+from functools import wraps
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import cocotb
@@ -11,6 +13,7 @@ from tests.hdl.harness.sram import Sram
 from tests.hdl.harness.timing import ANY, Timing
 
 P = TypeVar("P")
+B = TypeVar("B", bound="Testbench[Any]")
 
 #: Decorator of tests: as `cocotb.test`, and long before this much time they are over.
 timed_test = cocotb.test(timeout_time=30, timeout_unit="ms")
@@ -89,3 +92,18 @@ class Testbench(ABC, Generic[P]):
     def patience(self, place: P) -> int:
         """Time in ps in which a picture is over, however often the camera's clock stalls."""
         return patience(self.camera_of(place))
+
+
+def checked_test(testbench: type[B]) -> Callable[[Callable[[B], Awaitable[None]]], Any]:
+    """Decorator of timed tests of a testbench, which is started before and checked in the end."""
+
+    def register(test: Callable[[B], Awaitable[None]]) -> Any:
+        @wraps(test)
+        async def started(dut: Any) -> None:
+            bench = await testbench.start(dut)
+            await test(bench)
+            await bench.check()
+
+        return timed_test(started)
+
+    return register

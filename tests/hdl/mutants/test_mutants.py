@@ -76,9 +76,7 @@ def test_difference_is_found(every: list[Mutant], equivalence: Equivalence) -> N
     assert (stuck.equivalent, stuck.steps) == (False, 2 * (COLUMNS - 1) + 1)
 
 
-def test_what_no_reset_reaches_is_a_difference(
-    every: list[Mutant], equivalence: Equivalence
-) -> None:
+def test_what_no_reset_reaches_differs(every: list[Mutant], equivalence: Equivalence) -> None:
     unreset = next(m for m in every if (m.mode, m.port) == ("const0", "ARST"))
     verdict = equivalence.compare(unreset)
     assert (verdict.equivalent, verdict.steps) == (False, 1)

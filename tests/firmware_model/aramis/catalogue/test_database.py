@@ -89,9 +89,7 @@ def test_any_flipped_bit_is_noticed(image: bytes, seed: int) -> None:
         ("vectors", struct.pack("<f", float("nan")), "vectors of the image are not all finite"),
     ],
 )
-def test_contents_that_would_mislead_the_program(
-    image: bytes, name: str, value: bytes, words: str
-) -> None:
+def test_misleading_contents_are_refused(image: bytes, name: str, value: bytes, words: str) -> None:
     start = place(image, name)
     with pytest.raises(DatabaseError, match=words):
         Database.unpack(sealed(image[:start] + value + image[start + len(value) :]))

@@ -10,14 +10,10 @@ from cubestack.firmware_model.aramis.catalogue.hamming import (
     decode,
     encode,
 )
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 words = st.binary(min_size=8, max_size=8)
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def flipped(coded: np.ndarray, *bits: int) -> np.ndarray:

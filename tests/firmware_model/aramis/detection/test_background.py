@@ -5,15 +5,11 @@ import pytest
 
 from cubestack.firmware_model.aramis.detection.background import FRAMES, Background
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 FLAT = Field(columns=64, rows=48, round=False)
 ROUND = Field(columns=64, rows=48)
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def noise(level: float, sigma: float, seed: int) -> np.ndarray:

@@ -10,16 +10,12 @@ from scipy import ndimage
 
 from cubestack.firmware_model.aramis.detection.regions import MOST_RUNS, find_regions, locate_stars
 from cubestack.firmware_model.aramis.solution import StarList
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 TOUCHING = np.ones((3, 3))
 
 masks = arrays(np.bool_, st.tuples(st.integers(1, 14), st.integers(1, 14)))
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 @given(masks)

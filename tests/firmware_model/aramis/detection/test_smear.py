@@ -8,21 +8,12 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.regions import find_regions
 from cubestack.firmware_model.aramis.detection.smear import is_drawn_out, smear_px
-from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, explain
 from cubestack.firmware_model.aramis.solution import StarList, unsolved
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
-from ..sky import database, picture
-
-FIELD = Field()
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
+from ..sky import FIELD, database, meter, picture
 
 
 def swept(

@@ -37,9 +37,7 @@ def slowly(mask: Mask, method: SpikeRemoval, needed: int) -> Mask:
 @pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("needed", [1, 8, HALF, 25])
-def test_against_window_by_window(
-    method: SpikeRemoval, shape: tuple[int, int], needed: int
-) -> None:
+def test_each_window_by_itself(method: SpikeRemoval, shape: tuple[int, int], needed: int) -> None:
     for seed in range(5):
         mask = np.random.default_rng(seed).random(shape) < 0.5
         np.testing.assert_array_equal(run(mask, method, needed), slowly(mask, method, needed))

@@ -8,16 +8,12 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.matching.assignment import assign, variation
 from cubestack.firmware_model.aramis.matching.triangles import measure_triangle
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 Vectors = NDArray[np.float32]
 
 MAGNITUDES = np.array([1.0, 2.0, 3.0], dtype=np.float32)
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def corners(seed: int) -> Vectors:

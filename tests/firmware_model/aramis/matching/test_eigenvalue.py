@@ -7,14 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue, quartic
 from cubestack.firmware_model.attitude.quest import quest
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 Array = NDArray[np.float64]
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def davenport(profile: Array) -> Array:

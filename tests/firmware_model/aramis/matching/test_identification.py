@@ -17,9 +17,7 @@ from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 
 from ..campaign import COARSE, rates
-from ..sky import Light, Picture, database, errors_deg, picture
-
-FIELD = Field()
+from ..sky import FIELD, Light, Picture, database, errors_deg, picture
 
 
 def run(
@@ -71,9 +69,7 @@ def test_a_rough_direction_rules_out_what_is_far_away() -> None:
         (Light(mag_limit=5, false_stars=5), None, 0.95),
     ],
 )
-def test_verification_is_right_and_never_wrong(
-    light: Light, hint_error_deg: float | None, right: float
-) -> None:
+def test_verification_is_right(light: Light, hint_error_deg: float | None, right: float) -> None:
     found = rates(50, VERIFIED.profile, light=light, hint_error_deg=hint_error_deg, seed=1)
     assert found["wrong"] == 0
     assert found["right"] >= right
@@ -197,18 +193,3 @@ def test_phases_add_up() -> None:
     assert set(meter.phases) >= {"faces", "triangles", "search", "identities", "attitude"}
     assert 0.9 * meter.total < sum(meter.phases.values()) <= meter.total
     assert meter.table.seconds(meter.total) < 0.1
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ({"sigma_rad": 0.0}, "sigma_rad must be 1e-07 to 0.01, not 0.0"),
-        ({"sigma_rad": float("nan")}, "sigma_rad must be"),
-        ({"pivots": 4}, "pivots must be 0 to 3, not 4"),
-        ({"triple_stars": 2}, "triple_stars must be 3 to 64, not 2"),
-        ({"largest_chance": -1.0}, "largest_chance must be 0 to 1, not -1.0"),
-    ],
-)
-def test_settings_out_of_range_are_refused(setting: dict[str, float], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        Profile(**setting)  # type: ignore[arg-type]

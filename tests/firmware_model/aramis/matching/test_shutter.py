@@ -7,18 +7,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
 from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
-from ..sky import database, errors_deg, picture
+from ..sky import FIELD, database, errors_deg, meter, picture
 
-FIELD = Field()
 ROLL = (0.0, 0.0, 0.0058)
 """10 deg/s about the boresight over 33 ms, rad."""
 ACROSS = (0.0005, 0.0009, 0.0)
@@ -27,10 +23,6 @@ ACROSS = (0.0005, 0.0009, 0.0)
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(7)
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def stars(rng: np.random.Generator, count: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

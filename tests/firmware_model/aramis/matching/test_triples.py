@@ -6,21 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
 from cubestack.firmware_model.aramis.matching.triples import find_triangles, match_triple
 from cubestack.firmware_model.interface.aramis import Reason
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
-from ..sky import Light, Picture, database, picture
+from ..sky import FIELD, Light, Picture, database, meter, picture
 
 SIGMA = 5.6e-5
-FIELD = Field()
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def directions(made: Picture) -> NDArray[np.float32]:

@@ -9,17 +9,10 @@ from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.verification import Confirmation, confirm, sides_agree
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
-from ..sky import Light, Picture, database, picture
+from ..sky import FIELD, Light, Picture, database, meter, picture
 
-FIELD = Field()
 TOLERANCE = 1.2e-3
-
-
-def meter() -> Meter:
-    return Meter(BLACKFIN_BF533)
 
 
 def check(made: Picture, attitude: Rotation, tolerance: float = TOLERANCE) -> Confirmation:

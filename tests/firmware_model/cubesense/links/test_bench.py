@@ -53,9 +53,7 @@ def test_a_capture_that_fails_is_not_answered(node: Links, outcome: CaptureResul
 @pytest.mark.parametrize(
     ("letter", "camera"), [(b"s", Camera.NADIR), (b"w", Camera.SUN)], ids=["nadir", "sun"]
 )
-def test_a_picture_is_sent_at_the_pace_of_the_line(
-    node: Links, letter: bytes, camera: Camera
-) -> None:
+def test_a_picture_is_sent_at_the_line_s_pace(node: Links, letter: bytes, camera: Camera) -> None:
     assert DOWNLOADS[camera].request == letter
     largest = 0
 

@@ -43,9 +43,6 @@ def write(node: Links, name: str, number: int) -> None:
     assert node.write_register(REGISTERS[name].address, number) == 2
 
 
-# --- registers -----------------------------------------------------------------------------------
-
-
 def test_every_readable_register_starts_with_its_declared_value(node: Links) -> None:
     for register in REGISTERS:
         if register.readable and not register.streams:
@@ -61,9 +58,7 @@ def test_a_write_only_register_reads_as_nothing(node: Links) -> None:
 @pytest.mark.parametrize(
     "register", [r for r in REGISTERS if r.readable and r.writable], ids=lambda r: r.name
 )
-def test_a_setting_is_read_back_and_is_the_node_protocols_own(
-    node: Links, register: object
-) -> None:
+def test_a_setting_is_read_back_and_is_the_node_s_own(node: Links, register: object) -> None:
     name = register.name  # type: ignore[attr-defined]
     before = {r.name: value(node, r.name) for r in REGISTERS if r.readable and not r.streams}
     write(node, name, 1)
@@ -168,9 +163,6 @@ def test_an_action_is_no_telecommand(node: Links) -> None:
     assert node.telemetry("TcmdProcessed") == {"LastTcmd": 21, "Processed": 1, "Error": 0}
 
 
-# --- transfers -----------------------------------------------------------------------------------
-
-
 def test_a_value_is_latched_when_its_address_is_written(node: Links) -> None:
     result = node.state.results[Camera.SUN]
     result.x = 0x0102
@@ -193,9 +185,6 @@ def test_a_second_data_byte_is_not_acknowledged(node: Links) -> None:
 
 def test_a_read_before_any_pointer_gives_nothing(node: Links) -> None:
     assert node.read_register(3) == bytes([FILL] * 3)
-
-
-# --- picture -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("sram", Sram)

@@ -82,16 +82,12 @@ def test_other_coefficients(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("coefficients", [(0.0, -1.0), (0.0, 1.0, -0.01), (0.0, 0.0), (0.0, 0.1)])
-def test_coefficients_without_an_inverse_are_refused(
-    meter: Meter, coefficients: tuple[float, ...]
-) -> None:
+def test_what_has_no_inverse_is_refused(meter: Meter, coefficients: tuple[float, ...]) -> None:
     with pytest.raises(DistortionError, match="must"):
         fine_table(meter, Projection.EQUIDISTANT, coefficients)
 
 
-def test_every_point_costs_the_same_and_a_wide_table_more(
-    meter: Meter, equidistant: RadiusTable
-) -> None:
+def test_points_cost_the_same_and_a_wide_table_more(meter: Meter, equidistant: RadiusTable) -> None:
     table = byte_table(meter)
     costs = []
     for used, count in ((table, 1), (table, 10), (equidistant, 1)):

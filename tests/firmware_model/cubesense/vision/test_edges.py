@@ -55,9 +55,7 @@ def literal(picture: NDArray[np.uint8], config: EdgeConfig) -> list[list[int]]:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_whole_pixels_agree_with_the_literal_search_in_rough_pictures(
-    meter: Meter, seed: int
-) -> None:
+def test_whole_pixels_agree_with_the_literal_search_in_roughness(meter: Meter, seed: int) -> None:
     rng = np.random.default_rng(seed)
     picture = rng.integers(0, 90, (ROWS, COLUMNS)).astype(np.uint8)
     picture[rng.integers(0, 2, (ROWS // 40, COLUMNS // 40)).repeat(40, 0).repeat(40, 1) > 0] += 60

@@ -137,9 +137,7 @@ def test_phases_are_charged(ours: NadirConfig, meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("turn", [0, 90, 180, 270])
-def test_a_centre_that_the_interface_can_not_tell_is_a_bad_fit(
-    ours: NadirConfig, turn: int
-) -> None:
+def test_a_centre_beyond_the_interface_is_a_bad_fit(ours: NadirConfig, turn: int) -> None:
     for tilt in (98.0, 101.0, 104.0, 112.0):
         truth = (tilt * np.cos(np.radians(turn)), tilt * np.sin(np.radians(turn)))
         result = measure(earth(*truth), ours)

@@ -15,9 +15,7 @@ from ..scenery import earth, error_deg, feed, scan
 
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize(("alpha", "beta"), [(0, 0), (12, -7), (-20, 20)])
-def test_edges_on_rows_are_those_of_the_line_scan(
-    meter: Meter, between: Between, alpha: float, beta: float
-) -> None:
+def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float) -> None:
     picture = earth(alpha, beta, rng=np.random.default_rng(4))
     lines = NadirLines(EdgeConfig(), meter)
     feed(lines, scan(picture))
@@ -34,7 +32,7 @@ def test_edges_on_rows_are_those_of_the_line_scan(
 
 
 @pytest.mark.parametrize("between", Between)
-def test_the_result_is_as_good_from_far_fewer_pixels(
+def test_as_good_from_few_pixels(
     stereographic: RadiusTable, between: Between, meter: Meter
 ) -> None:
     rng = np.random.default_rng(5)

@@ -47,18 +47,14 @@ def test_the_published_way_misses_it(meter: Meter) -> None:
     assert p95(published, 7, 45, 90, False) < 2
 
 
-def test_whole_chords_hold_a_sun_that_overflows_the_window(
-    ours: SunConfig, equidistant: RadiusTable
-) -> None:
+def test_whole_chords_hold_an_overflowing_sun(ours: SunConfig, equidistant: RadiusTable) -> None:
     all_pixels = SunConfig(equidistant, whole_chords=False)
     assert p95(ours, 7, 0, 90, True) < 0.13 < 0.2 < p95(all_pixels, 7, 0, 90, True)
     # At 8 px some Suns leave no whole column.
     assert p95(ours, 8, 0, 90, True) < 0.8 * p95(all_pixels, 8, 0, 90, True)
 
 
-def test_the_mean_is_weighted_and_counts_from_the_boresight(
-    equidistant: RadiusTable, meter: Meter
-) -> None:
+def test_the_mean_is_weighted_from_the_boresight(equidistant: RadiusTable, meter: Meter) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[250, 369:372] = 240
     picture[251, 371] = 225
@@ -81,9 +77,7 @@ def test_an_uncut_sun_has_the_published_mean(equidistant: RadiusTable, meter: Me
 
 
 @pytest.mark.parametrize("centre", [(3, 240), (300, 2), (636, 478), (0.4, 0.2)])
-def test_a_sun_at_the_picture_s_border(
-    ours: SunConfig, meter: Meter, centre: tuple[float, float]
-) -> None:
+def test_a_sun_at_the_border(ours: SunConfig, meter: Meter, centre: tuple[float, float]) -> None:
     # The window is moved inside; the Sun's half beyond the border is missed.
     config = SunConfig(ours.table, boresight=(centre[0], centre[1]))
     result = find_sun(window(sun(np.array(centre), 5)), config, meter)
@@ -141,9 +135,7 @@ def test_light_beyond_the_rim_of_the_field_is_no_sun(
 
 
 @pytest.mark.parametrize(("slope", "found"), [(0.8, True), (0.72, False)])
-def test_no_angle_is_beyond_the_interface_whatever_the_lens(
-    meter: Meter, slope: float, found: bool
-) -> None:
+def test_no_lens_gives_an_angle_out_of_range(meter: Meter, slope: float, found: bool) -> None:
     """The Sun 215 px to the left, which such a lens images at 93 or at 103 deg."""
     config = SunConfig(fine_table(meter, Projection.EQUIDISTANT, (0, slope, 0, 0, 0)))
     centre = np.array(SUN_BORESIGHT) - (215, 0)

@@ -18,8 +18,7 @@ def solved(unit: Harness, sky: Sky) -> Harness:
     """A unit that has identified the sky, in which one spot is no star."""
     unit.picture = sky.picture.copy()
     unit.picture[480:484, 30:34] = 70
-    unit.command("CaptureAndProcess")
-    unit.command("SelectBestStars")
+    unit.command("CaptureAndProcess", "SelectBestStars")
     return unit
 
 
@@ -38,9 +37,6 @@ def truth(unit: Harness, sky: Sky) -> dict[int, int]:
             found[number] = int(distance.argmin())
     assert len(found) == len(sky.stars)
     return found
-
-
-# --- stepping -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("frame", STEPPING)
@@ -89,9 +85,6 @@ def test_a_failed_identification_leaves_none(solved: Harness, frame: str) -> Non
     assert solved.telemetry("NumIdStars")["numIdStars"] == 0
 
 
-# --- detected stars -------------------------------------------------------------------------------
-
-
 def test_summary(solved: Harness, sky: Sky) -> None:
     solved.picture = np.maximum(solved.picture, 3)
     solved.picture[51, 900:903] = 99  # noise
@@ -129,9 +122,6 @@ def test_directions_in_the_camera(solved: Harness, sky: Sky) -> None:
         for number, star in truth(solved, sky).items():
             vector = [found[number][axis] for axis in axes]
             assert vector == pytest.approx(body[star], abs=VECTOR_STEP)
-
-
-# --- identified stars -----------------------------------------------------------------------------
 
 
 def test_identities(solved: Harness, sky: Sky) -> None:
@@ -180,12 +170,7 @@ def test_match_summary(solved: Harness, sky: Sky) -> None:
     assert not any(fresh.values())
 
 
-# --- selected stars -------------------------------------------------------------------------------
-
-
-def test_the_selected_stars_are_the_brightest_of_those_with_most_votes(
-    solved: Harness, sky: Sky
-) -> None:
+def test_selected_are_the_brightest_of_those_with_most_votes(solved: Harness, sky: Sky) -> None:
     stars = truth(solved, sky)
     positions = records(solved, "StarPositions", len(stars) + 1)
     by_light = sorted(stars, key=lambda number: -positions[number]["Intensity"])
@@ -213,16 +198,14 @@ def test_details_of_the_selected_stars(solved: Harness, sky: Sky) -> None:
         assert values[f"S{n}Conf"] == round(100 * (len(stars) - 1) / len(stars))
 
 
-def test_fewer_than_three_can_be_selected(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureAndProcess")
-    unit.command("setIDMode", IdMode=0)  # tracking needs two stars
-    unit.picture = take(unit.catalogue, sky.attitude, most=2).picture
-    unit.command("CaptureAndProcess")
-    unit.command("SelectBestStars")
-    chosen = unit.telemetry("BestStarIndex")
+def test_fewer_than_three_can_be_selected(lit: Harness, sky: Sky) -> None:
+    lit.command("CaptureAndProcess")
+    lit.command("setIDMode", IdMode=0)  # tracking needs two stars
+    lit.picture = take(lit.catalogue, sky.attitude, most=2).picture
+    lit.command("CaptureAndProcess", "SelectBestStars")
+    chosen = lit.telemetry("BestStarIndex")
     assert sorted([chosen["Star1Index"], chosen["Star2Index"]]) == [0, 1]
     assert chosen["Star3Index"] == 255
-    values = unit.telemetry("Star3Details")
+    values = lit.telemetry("Star3Details")
     assert values.pop("S3CatNum") == 65535
     assert not any(values.values())

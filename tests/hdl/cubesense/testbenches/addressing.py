@@ -12,7 +12,7 @@ from tests.hdl.cubesense.reference import SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.instants import ODD, wait
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 CORNERS = [(x, y) for x in (0, COLUMNS - 1) for y in (0, ROWS - 1)]
@@ -26,23 +26,20 @@ def byte_at(bench: PairTestbench, side: str, x: int, y: int) -> int:
     return bench.srams[side].memory[GEOMETRY.address(x, y)]
 
 
-@timed_test
-async def pixels_in_any_order(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def pixels_in_any_order(bench: PairTestbench) -> None:
     """The first clock presents the addressed byte, in either memory."""
-    bench = await PairTestbench.start(dut)
     for side in SIDES:
         await bench.mcu.open_address(side)
         for x, y in [*CORNERS, *(any_pixel() for _ in range(30))]:
             await bench.mcu.take(address_bytes(x, y, READ_OUT))
             assert await bench.mcu.clock() == byte_at(bench, side, x, y)
         await bench.mcu.standby()
-    await bench.check()
 
 
-@timed_test
-async def goes_on_row_by_row(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def goes_on_row_by_row(bench: PairTestbench) -> None:
     """Past the end of a row comes the next one, past the last pixel the first one."""
-    bench = await PairTestbench.start(dut)
     for x, y in [*CORNERS, *(any_pixel() for _ in range(5))]:
         side = random.choice(SIDES)
         await bench.mcu.open_address(side)
@@ -51,13 +48,11 @@ async def goes_on_row_by_row(dut: Any) -> None:
         stored = bench.content(side)
         assert await bench.mcu.read(9) == (stored + stored)[start : start + 9]
         await bench.mcu.standby()
-    await bench.check()
 
 
-@timed_test
-async def addresses_outside_of_the_picture(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def addresses_outside_of_the_picture(bench: PairTestbench) -> None:
     """Any address of the memory can be looked at; bits beyond it are ignored."""
-    bench = await PairTestbench.start(dut)
     side = random.choice(SIDES)
     await bench.mcu.open_address(side)
     for _ in range(20):
@@ -65,12 +60,10 @@ async def addresses_outside_of_the_picture(dut: Any) -> None:
         await bench.mcu.take(address.to_bytes(ADDRESS_BYTES, "big"))
         wanted = bench.srams[side].memory[address % GEOMETRY.bank_size]
         assert await bench.mcu.clock() == wanted
-    await bench.check()
 
 
-@timed_test
-async def standby_and_any_other_row_forget_the_address(dut: Any) -> None:
-    bench = await PairTestbench.start(dut)
+@checked_test(PairTestbench)
+async def standby_and_any_other_row_forget_the_address(bench: PairTestbench) -> None:
     for side in SIDES:
         await bench.mcu.open_address(side)
         await bench.mcu.take(address_bytes(COLUMNS - 1, ROWS - 1, READ_OUT))
@@ -82,7 +75,6 @@ async def standby_and_any_other_row_forget_the_address(dut: Any) -> None:
         await bench.mcu.read_picture(side)
         assert await bench.mcu.read(2) == bench.content(side)[:2]
         await bench.mcu.standby()
-    await bench.check()
 
 
 @timed_test
@@ -102,9 +94,8 @@ async def shift_keeps_the_address(dut: Any) -> None:
         await bench.mcu.standby()
 
 
-@timed_test
-async def address_is_used_after_shift_moved(dut: Any) -> None:
-    bench = await PairTestbench.start(dut)
+@checked_test(PairTestbench)
+async def address_is_used_after_shift_moved(bench: PairTestbench) -> None:
     for side in SIDES:
         x, y = any_pixel()
         await bench.mcu.open_address(side)
@@ -114,7 +105,6 @@ async def address_is_used_after_shift_moved(dut: Any) -> None:
             await bench.mcu.set(SHIFT=1)
         assert await bench.mcu.clock() == byte_at(bench, side, x, y)
         await bench.mcu.standby()
-    await bench.check()
 
 
 @timed_test
@@ -133,10 +123,9 @@ async def memory_is_off_while_an_address_is_taken(dut: Any) -> None:
         await bench.mcu.standby()
 
 
-@timed_test
-async def the_other_enable_ends_it(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def the_other_enable_ends_it(bench: PairTestbench) -> None:
     """Both enables low are rows of the link, which need no address."""
-    bench = await PairTestbench.start(dut)
     for side in SIDES:
         other = f"{PREFIXES[OTHER[side]]}EN"
         await bench.mcu.open_address(side)
@@ -144,10 +133,9 @@ async def the_other_enable_ends_it(dut: Any) -> None:
         await bench.mcu.set(SHIFT=0)
         await bench.mcu.set(**{other: 0})
         await wait(1_000, ODD)
-        assert not int(dut.DATA_OE.value)
-        assert int(getattr(dut, f"{PREFIXES[side]}_SRAM_A").value) == 0
+        assert not int(bench.dut.DATA_OE.value)
+        assert int(getattr(bench.dut, f"{PREFIXES[side]}_SRAM_A").value) == 0
         await bench.mcu.set(**{other: 1})
         await bench.mcu.set(SHIFT=1)
         assert await bench.mcu.read(1) == bench.content(side)[:1]
         await bench.mcu.standby()
-    await bench.check()

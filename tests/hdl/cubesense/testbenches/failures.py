@@ -37,31 +37,23 @@ async def measures(bench: PairTestbench, sensor: str, memory: str) -> None:
 
 
 @timed_test
-@cocotb.parametrize(failed=SIDES)
-async def memory_failed(dut: Any, failed: str) -> None:
-    """Each sensor measures with the other memory."""
-    bench = await PairTestbench.start(dut, failed_sram=failed)
-    for sensor in random.sample(SIDES, 2):
-        await measures(bench, sensor, OTHER[failed])
-
-
-@timed_test
-@cocotb.parametrize(dead=SIDES)
-async def camera_dead(dut: Any, dead: str) -> None:
-    """The other sensor measures with either memory."""
-    bench = await PairTestbench.start(dut, dead_camera=dead)
-    for memory in random.sample(SIDES, 2):
-        await measures(bench, OTHER[dead], memory)
-    await bench.check()
-
-
-@timed_test
-@cocotb.parametrize(dead=SIDES)
-async def camera_dead_and_memory_failed(dut: Any, dead: str) -> None:
-    """The other sensor, whose memory failed, measures with the dead camera's memory."""
-    bench = await PairTestbench.start(dut, dead_camera=dead, failed_sram=OTHER[dead])
-    for _ in range(2):
-        await measures(bench, OTHER[dead], dead)
+@cocotb.parametrize(side=SIDES, broken=("memory", "camera", "both"))
+async def what_works_still_measures(dut: Any, side: str, broken: str) -> None:
+    """With a side's memory failed, each sensor in the other one; with a camera dead, the other
+    sensor in either memory, or in the dead camera's when its own failed.
+    """
+    other = OTHER[side]
+    if broken == "memory":
+        bench = await PairTestbench.start(dut, failed_sram=side)
+        for sensor in random.sample(SIDES, 2):
+            await measures(bench, sensor, other)
+        return
+    failed = other if broken == "both" else ""
+    bench = await PairTestbench.start(dut, dead_camera=side, failed_sram=failed)
+    for memory in (side, side) if failed else random.sample(SIDES, 2):
+        await measures(bench, other, memory)
+    if not failed:
+        await bench.check()
 
 
 @timed_test

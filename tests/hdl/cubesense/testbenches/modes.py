@@ -12,7 +12,7 @@ from tests.hdl.cubesense.reference import SIDES
 from tests.hdl.cubesense.settings import MCU_ADDRESSING
 from tests.hdl.harness.camera import picture
 from tests.hdl.harness.instants import ODD, wait
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 from tests.hdl.harness.watching import disturb_in_standby, levels
 
 #: Idle times in ps, from a glitch to a few clocks.
@@ -43,10 +43,9 @@ async def works(bench: PairTestbench) -> None:
         assert await bench.read(place[1], 7) == content[:7]
 
 
-@timed_test
-async def every_row_and_every_unlisted_row(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def every_row_and_every_unlisted_row(bench: PairTestbench) -> None:
     """Which drivers are on, settled, with both cameras' clocks running."""
-    bench = await PairTestbench.start(dut)
     done = set()
     rows = list(product((0, 1), repeat=5))
     for shift, edge, rnw, sunen, naden in random.sample(rows, len(rows)):
@@ -68,29 +67,29 @@ async def every_row_and_every_unlisted_row(dut: Any) -> None:
             action = getattr(wanted, side)
             prefix = PREFIXES[side]
             chip, output, bus, link, copies = DRIVES[action]
-            fpga = getattr(dut, side)
-            assert int(getattr(dut, f"{prefix}_SRAM_CE_N").value) == 1 - chip
-            assert int(getattr(dut, f"{prefix}_SRAM_OE_N").value) == 1 - output
+            fpga = getattr(bench.dut, side)
+            assert int(getattr(bench.dut, f"{prefix}_SRAM_CE_N").value) == 1 - chip
+            assert int(getattr(bench.dut, f"{prefix}_SRAM_OE_N").value) == 1 - output
             assert int(fpga.DATA_OE.value) == bus
             assert int(fpga.LINK_D_OE.value) == link
             shows = link_shows_enables(shift, edge) and not (sunen, naden)[index]
             assert int(fpga.LINK_C_OE.value) == (3 if copies else shows << index)
             done.add(action)
-        assert not int(dut.CONTENTION.value)
+        assert not int(bench.dut.CONTENTION.value)
         if wanted == (Action.STANDBY, Action.STANDBY):
-            quiet = {n: v for n, v in levels(dut, STANDBY).items() if not n.endswith("LINK_C_OE")}
+            quiet = {
+                n: v for n, v in levels(bench.dut, STANDBY).items() if not n.endswith("LINK_C_OE")
+            }
             assert quiet == {n: v for n, v in STANDBY.items() if n in quiet}
         await bench.mcu.standby()
         await Timer(1, unit="step")
-        assert levels(dut, STANDBY) == STANDBY
+        assert levels(bench.dut, STANDBY) == STANDBY
     assert done == set(DRIVES)
-    await bench.check()
 
 
-@timed_test
-async def rows_one_after_the_other(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def rows_one_after_the_other(bench: PairTestbench) -> None:
     """Random rows, each left at any moment for standby, with cameras and data clock running."""
-    bench = await PairTestbench.start(dut)
     await bench.shoot(("sun", "nadir"), picture())
     await bench.shoot(("sun", "sun"), picture())
     for _ in range(60):
@@ -104,7 +103,6 @@ async def rows_one_after_the_other(dut: Any) -> None:
             await wait(random.randrange(20) * bench.cameras["sun"].period, ODD)
         await bench.mcu.standby()
     await works(bench)
-    await bench.check()
 
 
 @timed_test

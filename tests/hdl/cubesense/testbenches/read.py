@@ -3,32 +3,28 @@
 import os
 import random
 from itertools import product
-from typing import Any
 
 from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, with_sun
 from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import picture
 from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 
 
-@timed_test
-async def pictures(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def pictures(bench: PairTestbench) -> None:
     """From the first pixel on, however far the last reading came, and past the last one."""
-    bench = await PairTestbench.start(dut)
     for count in (3, GEOMETRY.pixels // 2, GEOMETRY.pixels + COLUMNS + 1, 1):
         for side in SIDES:
             assert await bench.read(side, count) == (2 * bench.content(side))[:count]
-    await bench.check()
 
 
-@timed_test
-async def nadir_scan(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def nadir_scan(bench: PairTestbench) -> None:
     """Each clock of a line presents its pixel, from either memory."""
-    bench = await PairTestbench.start(dut)
     for memory in random.sample(SIDES, 2):
         await bench.shoot(("nadir", memory), picture())
         rows = [bench.content(memory)[y * COLUMNS :][:COLUMNS] for y in range(ROWS)]
@@ -38,13 +34,11 @@ async def nadir_scan(dut: Any) -> None:
         assert data[1:][: len(horizontal)] == horizontal
         assert data[1 + len(horizontal) + 1 :] == vertical + vertical[:5]
         assert (await bench.read_edge("nadir", memory, 4))[1:] == horizontal[:3]
-    await bench.check()
 
 
-@timed_test
-async def sun_window(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def sun_window(bench: PairTestbench) -> None:
     """Around Suns in the middle, at the borders and in the corners, and around none."""
-    bench = await PairTestbench.start(dut)
     columns, rows = (0, COLUMNS // 2, COLUMNS - 3), (0, ROWS // 2, ROWS - 1)
     places = [*product(columns, rows), NOT_FOUND]
     cases = list(product(places, SIDES))
@@ -60,13 +54,11 @@ async def sun_window(dut: Any) -> None:
         expected = bytes([x & 255, x >> 8, y & 255, y >> 8]) + window + window[:2]
         assert await bench.read_edge("sun", memory, len(expected)) == expected
         assert await bench.read_edge("sun", memory, 5) == expected[:5]
-    await bench.check()
 
 
-@timed_test
-async def orders_start_anew_without_standby(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def orders_start_anew_without_standby(bench: PairTestbench) -> None:
     """EDGE may change while an FPGA is enabled."""
-    bench = await PairTestbench.start(dut)
     await bench.shoot(("sun", "sun"), with_sun(4, 2))
     for side in SIDES:
         await bench.mcu.read_picture(side)
@@ -75,13 +67,11 @@ async def orders_start_anew_without_standby(dut: Any) -> None:
             await bench.mcu.set(EDGE=edge)
         await bench.mcu.read(3)
         await bench.mcu.standby()
-    await bench.check()
 
 
-@timed_test
-async def while_cameras_send(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def while_cameras_send(bench: PairTestbench) -> None:
     """No camera's clock reaches a read-out."""
-    bench = await PairTestbench.start(dut)
     await bench.shoot(("sun", "nadir"), with_sun(6, 3))
     await bench.shoot(("sun", "sun"), with_sun(3, 3))
     for camera in bench.cameras.values():
@@ -91,4 +81,3 @@ async def while_cameras_send(dut: Any) -> None:
         sensor, memory = random.choice(SIDES), random.choice(SIDES)
         await bench.read_edge(sensor, memory, random.randrange(1, 40))
         await bench.read(OTHER[memory], random.randrange(1, 20))
-    await bench.check()

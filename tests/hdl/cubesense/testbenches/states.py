@@ -6,7 +6,6 @@ What there is to reach is what ``cover_points`` declares.
 import random
 from collections.abc import Sequence
 from itertools import product
-from typing import Any
 
 from cocotb.triggers import Timer
 
@@ -18,7 +17,7 @@ from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
 from tests.hdl.harness.camera import flat, line, lines, picture
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.reference import Tick
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 ROWS_OF_TABLE = COMMANDS[1:] + ADDRESSING_COMMANDS * MCU_ADDRESSING
@@ -121,9 +120,8 @@ async def leave_reading(bench: PairTestbench, side: str, action: Action, state: 
     await mcu.set(**STAND)
 
 
-@timed_test
-async def every_action_is_left_in_every_state(dut: Any) -> None:
-    bench = await PairTestbench.start(dut)
+@checked_test(PairTestbench)
+async def every_action_is_left_in_every_state(bench: PairTestbench) -> None:
     await bench.shoot(("sun", "sun"), picture())
     await bench.shoot(("sun", "nadir"), picture())
     wanted = [point[1:] for point in GROUPS["pair state"].points() if point[0] == TOP]
@@ -139,12 +137,10 @@ async def every_action_is_left_in_every_state(dut: Any) -> None:
         await bench.cameras_are_done()
     for place in bench.PLACES:
         await bench.shoot(place)
-    await bench.check()
 
 
-@timed_test
-async def every_row_in_every_order_of_the_enables(dut: Any) -> None:
-    bench = await PairTestbench.start(dut)
+@checked_test(PairTestbench)
+async def every_row_in_every_order_of_the_enables(bench: PairTestbench) -> None:
     for shift, edge, rnw, *levels in random.sample(list(product((0, 1), repeat=5)), 32):
         names = [name for name, level in zip(STAND, levels, strict=True) if not level]
         orders = [[name] for name in names], [names], [[name] for name in names[::-1]]
@@ -154,7 +150,6 @@ async def every_row_in_every_order_of_the_enables(dut: Any) -> None:
                 await bench.mcu.set(**dict.fromkeys(group, 0))
             await bench.mcu.set(**STAND)
     await bench.shoot(("sun", "nadir"), picture())
-    await bench.check()
 
 
 def irregular(case: str) -> list[Tick]:
@@ -173,10 +168,9 @@ def irregular(case: str) -> list[Tick]:
     return [*gap(), *flat(rows)]
 
 
-@timed_test
-async def irregular_cameras_on_every_path(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def irregular_cameras_on_every_path(bench: PairTestbench) -> None:
     """Left before ACK, and once more when it came, with a regular picture after it."""
-    bench = await PairTestbench.start(dut)
     cases = GROUPS["pair border"].points()
     for camera, memory, case, acknowledged in random.sample(cases, len(cases)):
         source, place = bench.cameras[camera], (camera, memory)
@@ -198,4 +192,3 @@ async def irregular_cameras_on_every_path(dut: Any) -> None:
             assert await bench.acknowledged(place)
         await source.sent()
         await bench.mcu.set(**STAND)
-    await bench.check()

@@ -9,7 +9,7 @@ from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import flat, line, lines, picture
 from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 
@@ -19,9 +19,8 @@ def any_path() -> tuple[str, str]:
     return random.choice(SIDES), random.choice(SIDES)
 
 
-@timed_test
-async def every_camera_to_every_memory(dut: Any) -> None:
-    bench = await PairTestbench.start(dut)
+@checked_test(PairTestbench)
+async def every_camera_to_every_memory(bench: PairTestbench) -> None:
     paths = [(camera, memory) for camera in SIDES for memory in SIDES] * 2
     random.shuffle(paths)
     for camera, memory in paths:
@@ -32,13 +31,11 @@ async def every_camera_to_every_memory(dut: Any) -> None:
             GEOMETRY.address(column, row) for row in range(ROWS) for column in range(COLUMNS)
         ]
         assert bench.content(OTHER[memory]) == other
-    await bench.check()
 
 
-@timed_test
-async def both_at_once(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def both_at_once(bench: PairTestbench) -> None:
     """Each on its own clock; enabling or disabling one does not disturb the other."""
-    bench = await PairTestbench.start(dut)
     for first, second in (SIDES, SIDES[::-1]):
         contents = {side: picture() for side in SIDES}
         first_en, second_en = (f"{PREFIXES[side]}EN" for side in (first, second))
@@ -57,13 +54,11 @@ async def both_at_once(dut: Any) -> None:
         assert await bench.mcu.acknowledged(first)
         await bench.mcu.standby()
         assert {side: bench.content(side) for side in SIDES} == contents
-    await bench.check()
 
 
-@timed_test
-async def joined_anywhere(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def joined_anywhere(bench: PairTestbench) -> None:
     """A frame that is joined after its gap has begun is dropped, and the next one stored."""
-    bench = await PairTestbench.start(dut)
     for _ in range(8):
         camera, memory = any_path()
         first, second = frame(picture()), picture()
@@ -73,13 +68,11 @@ async def joined_anywhere(dut: Any) -> None:
         bench.cameras[camera].send(frame(second))
         assert await bench.mcu.acknowledged(memory)
         await bench.mcu.standby()
-    await bench.check()
 
 
-@timed_test
-async def ack_stays_and_nothing_more_is_stored(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def ack_stays_and_nothing_more_is_stored(bench: PairTestbench) -> None:
     """Nor do the Sun's coordinates change, over gaps and whole frames."""
-    bench = await PairTestbench.start(dut)
     for memory in SIDES:
         content = bytearray(GEOMETRY.pixels)
         content[2 * COLUMNS + 3 : 2 * COLUMNS + 6] = bytes([255] * 3)
@@ -89,17 +82,15 @@ async def ack_stays_and_nothing_more_is_stored(dut: Any) -> None:
         assert await bench.mcu.acknowledged(memory)
         sun.send([*frame(picture()), *frame(bytes([255]) * GEOMETRY.pixels), *frame(picture())])
         await sun.sent()
-        assert int(getattr(dut, f"{PREFIXES[memory]}ACK").value)
+        assert int(getattr(bench.dut, f"{PREFIXES[memory]}ACK").value)
         await bench.mcu.standby()
         assert bench.content(memory) == bytes(content)
         assert await bench.read_edge("sun", memory, 4) == bytes([3, 0, 2, 0])
-    await bench.check()
 
 
-@timed_test
-async def lines_too_long_and_too_short(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def lines_too_long_and_too_short(bench: PairTestbench) -> None:
     """Surplus pixels and rows are ignored; what is missing stays as it was."""
-    bench = await PairTestbench.start(dut)
     for _ in range(6):
         camera, memory = any_path()
         await bench.store((camera, memory))
@@ -112,13 +103,11 @@ async def lines_too_long_and_too_short(dut: Any) -> None:
         source.send([*flat(lines(picture())), *frame(b"")])
         await source.sent()
         await bench.mcu.standby()
-    await bench.check()
 
 
-@timed_test
-async def sun_is_found_while_storing(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def sun_is_found_while_storing(bench: PairTestbench) -> None:
     """In either memory; the coordinates outlive standby and the nadir camera's pictures."""
-    bench = await PairTestbench.start(dut)
     for _ in range(6):
         memory = random.choice(SIDES)
         x, y = random.randrange(COLUMNS - 2), random.randrange(ROWS)
@@ -129,7 +118,6 @@ async def sun_is_found_while_storing(dut: Any) -> None:
             await bench.shoot(("nadir", random.choice(SIDES)))
         expected = x.to_bytes(2, "little") + y.to_bytes(2, "little")
         assert await bench.read_edge("sun", memory, 4) == expected
-    await bench.check()
 
 
 @timed_test
@@ -152,10 +140,9 @@ async def any_waveform(dut: Any) -> None:
     assert any(half.pulses for half in halves.values())
 
 
-@timed_test
-async def lines_a_gap_apart(dut: Any) -> None:
+@checked_test(PairTestbench)
+async def lines_a_gap_apart(bench: PairTestbench) -> None:
     """As many low clocks as a gap may not have make no frame's end; one more does."""
-    bench = await PairTestbench.start(dut)
     for camera, memory in product(SIDES, SIDES):
         source = bench.cameras[camera]
         content = picture()
@@ -166,4 +153,3 @@ async def lines_a_gap_apart(dut: Any) -> None:
             acknowledged = await bench.mcu.acknowledged(memory, 4 * source.period)
             assert acknowledged == (pause == GAP)
             await bench.mcu.standby()
-    await bench.check()

@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Iterable
-from typing import Any
 
 import cocotb
 
@@ -10,7 +9,7 @@ from tests.hdl.cubestar.published import PublishedTestbench
 from tests.hdl.harness.camera import flat, frame, line, lines, picture
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.reference import Tick
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test
 from tests.hdl.harness.watching import stays_in_the_picture
 
 COLUMNS, ROWS = GEOMETRY
@@ -21,10 +20,9 @@ def rows_of(sizes: Iterable[int]) -> list[Tick]:
     return flat(list(line(random.randbytes(size))) for size in sizes)
 
 
-@timed_test
-async def with_lines_of_any_length(dut: Any) -> None:
-    bench = await PublishedTestbench.start(dut)
-    cocotb.start_soon(stays_in_the_picture(dut.SRAM_A))
+@checked_test(PublishedTestbench)
+async def with_lines_of_any_length(bench: PublishedTestbench) -> None:
+    cocotb.start_soon(stays_in_the_picture(bench.dut.SRAM_A))
     whole, short = [COLUMNS] * (ROWS - 1), [1] * (ROWS - 1)
     for rows in ([*whole, 1], [*short, COLUMNS - 1], [*whole, COLUMNS + 1], [*short, 3 * COLUMNS]):
         await bench.store(random.getrandbits(1))
@@ -32,4 +30,3 @@ async def with_lines_of_any_length(dut: Any) -> None:
         bench.camera.send([*frame(picture()), *flat(lines(picture()))])
         await bench.camera.sent()
         await bench.mcu.standby()
-    await bench.check()

@@ -4,7 +4,6 @@
 """
 
 import random
-from typing import Any
 
 import cocotb
 from cocotb.triggers import Timer
@@ -14,7 +13,7 @@ from tests.hdl.harness.any_top import TESTBENCH
 from tests.hdl.harness.camera import picture
 from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.sram import SLOWEST_ACCESS
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test
 
 
 async def works_on(bench: BusTestbench, accesses: int, *memories: int) -> None:
@@ -42,18 +41,15 @@ async def is_cut_off(bench: BusTestbench, accesses: int, *memories: int) -> None
             assert await bench.bus.read(address, select) is None
 
 
-@timed_test
-async def bus_has_all_memories(dut: Any) -> None:
+@checked_test(TESTBENCH)
+async def bus_has_all_memories(bench: TESTBENCH) -> None:
     """Each access reaches the memory that is meant, and no other."""
-    bench = await TESTBENCH.start(dut)
     await bench.open_all()
     await works_on(bench, 300)
-    await bench.check()
 
 
-@timed_test
-async def picture_is_worked_on_where_it_was_stored(dut: Any) -> None:
-    bench = await TESTBENCH.start(dut)
+@checked_test(TESTBENCH)
+async def picture_is_worked_on_where_it_was_stored(bench: TESTBENCH) -> None:
     for place in (*bench.PLACES, bench.PLACES[0]):
         content = await bench.shoot(place)
         assert await bench.fetch(place) == content
@@ -63,13 +59,11 @@ async def picture_is_worked_on_where_it_was_stored(dut: Any) -> None:
         await bench.bus.write(first, content[0] ^ 0xFF, window.select)
         assert await bench.bus.read(first, window.select) == content[0] ^ 0xFF
         await bench.standby()
-    await bench.check()
 
 
-@timed_test
-async def memory_that_is_filled_is_out_of_reach(dut: Any) -> None:
+@checked_test(TESTBENCH)
+async def memory_that_is_filled_is_out_of_reach(bench: TESTBENCH) -> None:
     """However long the accesses go on; what else it holds stays."""
-    bench = await TESTBENCH.start(dut)
     for place in (*bench.PLACES, *bench.PLACES):
         sram, bank = bench.memory_of(place)
         other = sram.picture(1 - bank)
@@ -80,17 +74,15 @@ async def memory_that_is_filled_is_out_of_reach(dut: Any) -> None:
         assert await bench.acknowledged(place)
         meddling.cancel()
         for name in (*bench.SELECTS, "RE_N", "WE_N"):
-            getattr(dut, name).value = 1
+            getattr(bench.dut, name).value = 1
         bench.bus.drives = True
         await bench.standby()
         assert (sram.picture(bank), sram.picture(1 - bank)) == (content, other)
-    await bench.check()
 
 
-@timed_test
-async def one_is_filled_while_the_other_is_worked_on(dut: Any) -> None:
+@checked_test(TESTBENCH)
+async def one_is_filled_while_the_other_is_worked_on(bench: TESTBENCH) -> None:
     """In turn; of a board with one memory there is no other."""
-    bench = await TESTBENCH.start(dut)
     if len(bench.srams) == 1:
         return
     for filled in (0, 1, 0, 1, random.getrandbits(1)):
@@ -102,22 +94,18 @@ async def one_is_filled_while_the_other_is_worked_on(dut: Any) -> None:
         assert await bench.acknowledged(filled)
         await bench.standby()
         assert bench.stored(filled) == content
-    await bench.check()
 
 
-@timed_test
-async def standby_answers_nothing(dut: Any) -> None:
-    bench = await TESTBENCH.start(dut)
+@checked_test(TESTBENCH)
+async def standby_answers_nothing(bench: TESTBENCH) -> None:
     before = [bytes(sram.memory) for sram in bench.srams]
     await is_cut_off(bench, 60)
     assert [sram.memory for sram in bench.srams] == before
-    await bench.check()
 
 
-@timed_test
-async def strobes_together_read(dut: Any) -> None:
+@checked_test(TESTBENCH)
+async def strobes_together_read(bench: TESTBENCH) -> None:
     """A processor never does that; FPGA and SRAM must not fight over it."""
-    bench = await TESTBENCH.start(dut)
     before = [bytes(sram.memory) for sram in bench.srams]
     await bench.open_all()
     for _ in range(4):
@@ -125,25 +113,22 @@ async def strobes_together_read(dut: Any) -> None:
         assert await bench.bus.read_and_write(address, select) == sram.memory[position]
     assert [sram.memory for sram in bench.srams] == before
     assert not any(sram.edges for sram in bench.srams)
-    await bench.check()
 
 
-@timed_test
-async def nothing_happens_without_the_chip_select(dut: Any) -> None:
+@checked_test(TESTBENCH)
+async def nothing_happens_without_the_chip_select(bench: TESTBENCH) -> None:
     """No memory is selected or written, and the bus is not driven."""
-    bench = await TESTBENCH.start(dut)
     await bench.open_all()
     before = [bytes(sram.memory) for sram in bench.srams]
     for strobe in ["RE_N", "WE_N"] * 8:
         await bench.bus.address(random.randrange(2 * MEMORY))
-        dut.AD_LOW_I.value = random.getrandbits(8)
-        getattr(dut, strobe).value = 0
+        bench.dut.AD_LOW_I.value = random.getrandbits(8)
+        getattr(bench.dut, strobe).value = 0
         await wait(SLOWEST_ACCESS, ODD)
-        assert not int(dut.AD_LOW_OE.value)
+        assert not int(bench.dut.AD_LOW_OE.value)
         for memory in bench.MEMORIES:
             for name in ("CE_N", "OE_N", "WE_N"):
-                assert int(getattr(dut, f"{memory}{name}").value)
-        getattr(dut, strobe).value = 1
+                assert int(getattr(bench.dut, f"{memory}{name}").value)
+        getattr(bench.dut, strobe).value = 1
         await Timer(1, unit="ns")
     assert [sram.memory for sram in bench.srams] == before
-    await bench.check()

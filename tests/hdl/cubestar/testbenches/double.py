@@ -8,7 +8,7 @@ from cocotb.triggers import Timer
 from tests.hdl.cubestar.next_version import DoubleTestbench
 from tests.hdl.cubestar.testbenches.bus import works_on
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 
 
 async def fills(bench: DoubleTestbench, memory: int) -> None:
@@ -22,17 +22,15 @@ async def fills(bench: DoubleTestbench, memory: int) -> None:
     assert not int(bench.dut.ACK.value)
 
 
-@timed_test
-async def one_memory_serves_both_in_turn(dut: Any) -> None:
+@checked_test(DoubleTestbench)
+async def one_memory_serves_both_in_turn(bench: DoubleTestbench) -> None:
     """The other one has failed: it is not stored in, not asked, and never selected."""
-    bench = await DoubleTestbench.start(dut)
     good = random.getrandbits(1)
-    failed = getattr(dut, f"SRAM{2 - good}_CE_N")
+    failed = getattr(bench.dut, f"SRAM{2 - good}_CE_N")
     for _ in range(3):
         await fills(bench, good)
         await works_on(bench, 20, good)
         assert int(failed.value)
-    await bench.check()
 
 
 @timed_test

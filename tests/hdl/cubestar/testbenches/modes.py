@@ -12,7 +12,7 @@ from cocotb.triggers import FallingEdge, Timer
 from tests.hdl.cubestar.published import PublishedTestbench
 from tests.hdl.harness.camera import flat, frame, lines, picture
 from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 from tests.hdl.harness.watching import disturb_in_standby
 
 #: Idle times in ps, from a glitch to a few clocks.
@@ -55,33 +55,30 @@ async def controls_change_at_any_moment(dut: Any) -> None:
     assert len(expected.data) > 1
 
 
-@timed_test
-async def write_pulse_cut_off(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def write_pulse_cut_off(bench: PublishedTestbench) -> None:
     """ENABLE falling or RNW rising in a write pulse ends it at once; the next frame is right.
 
     The bank stays, so that a late end of the pulse can not touch the other one.
     """
-    bench = await PublishedTestbench.start(dut)
     for change in ({"ENABLE": 0}, {"RNW": 1}, {"ENABLE": 0, "RNW": 1}) * 3:
         bank = random.getrandbits(1)
         await bench.store(bank)
         bench.camera.send(frame(picture()))
         for _ in range(random.randint(1, GEOMETRY.pixels)):
-            await FallingEdge(dut.SRAM_WE_N)
+            await FallingEdge(bench.dut.SRAM_WE_N)
         await bench.mcu.set(random.randrange(1, bench.camera.period // 4), **change)
         await Timer(1, unit="step")
-        assert int(dut.SRAM_WE_N.value)
-        assert not int(dut.SRAM_D_OE.value)
-        assert int(dut.SRAM_A.value) // GEOMETRY.bank_size == bank
+        assert int(bench.dut.SRAM_WE_N.value)
+        assert not int(bench.dut.SRAM_D_OE.value)
+        assert int(bench.dut.SRAM_A.value) // GEOMETRY.bank_size == bank
         assert bench.sram.pulses[-1].end == bench.mcu.controls[-1].time
         await works(bench)
-    await bench.check()
 
 
-@timed_test
-async def pause_in_a_frame(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def pause_in_a_frame(bench: PublishedTestbench) -> None:
     """A glitch of either pin throws away what was stored; the next whole frame counts."""
-    bench = await PublishedTestbench.start(dut)
     for away, back in (({"ENABLE": 0}, {"ENABLE": 1}), ({"RNW": 1}, {"RNW": 0})) * 3:
         await bench.store()
         first, second = frame(picture()), picture()
@@ -95,7 +92,6 @@ async def pause_in_a_frame(dut: Any) -> None:
         assert await bench.mcu.acknowledged()
         assert bench.stored() == second
         await bench.mcu.standby()
-    await bench.check()
 
 
 @timed_test
@@ -112,10 +108,9 @@ async def idle_is_reset(dut: Any) -> None:
     await bench.check()
 
 
-@timed_test
-async def standby_is_reset_from_any_state(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def standby_is_reset_from_any_state(bench: PublishedTestbench) -> None:
     """However it was left, each output is back at its reset value the moment ENABLE is low."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(20):
         bench.camera.send(frame(picture()))
         for _ in range(random.randint(1, 6)):
@@ -124,4 +119,3 @@ async def standby_is_reset_from_any_state(dut: Any) -> None:
         await Timer(1, unit="step")
         bench.in_standby()
     await works(bench)
-    await bench.check()

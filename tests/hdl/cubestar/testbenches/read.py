@@ -12,7 +12,7 @@ from tests.hdl.cubestar.published import PublishedTestbench
 from tests.hdl.harness.camera import frame, picture
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.instants import ODD, wait
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 
 
 def wrapped(content: bytes, count: int) -> bytes:
@@ -20,10 +20,9 @@ def wrapped(content: bytes, count: int) -> bytes:
     return (content * (count // len(content) + 1))[:count]
 
 
-@timed_test
-async def starts_at_the_first_pixel(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def starts_at_the_first_pixel(bench: PublishedTestbench) -> None:
     """However far the last reading came, and whichever pin ended it."""
-    bench = await PublishedTestbench.start(dut)
     for end in ({"ENABLE": 0}, {"RNW": 0}, {"ENABLE": 0, "RNW": 0}, {"ENABLE": 0}):
         await bench.mcu.open()
         count = random.choice([1, GEOMETRY.columns, random.randrange(GEOMETRY.pixels)])
@@ -33,16 +32,13 @@ async def starts_at_the_first_pixel(dut: Any) -> None:
             await bench.mcu.set(RNW=1)
             assert await bench.mcu.read(3) == bench.stored()[:3]
             await bench.mcu.standby()
-    await bench.check()
 
 
-@timed_test
-async def wraps_past_the_last_pixel(dut: Any) -> None:
-    bench = await PublishedTestbench.start(dut)
+@checked_test(PublishedTestbench)
+async def wraps_past_the_last_pixel(bench: PublishedTestbench) -> None:
     await bench.mcu.open()
     count = 2 * GEOMETRY.pixels + random.randrange(GEOMETRY.pixels)
     assert await bench.mcu.read(count) == wrapped(bench.stored(), count)
-    await bench.check()
 
 
 @timed_test
@@ -57,10 +53,9 @@ async def without_a_camera(dut: Any) -> None:
     await bench.check()
 
 
-@timed_test
-async def camera_dies_while_storing(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def camera_dies_while_storing(bench: PublishedTestbench) -> None:
     """At any level of its clock, in a write pulse too; with ENABLE held or not."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(8):
         await bench.store()
         start = await bench.camera.begin(frame(picture()))
@@ -78,13 +73,11 @@ async def camera_dies_while_storing(dut: Any) -> None:
         await bench.mcu.set(ENABLE=0, RNW=0)
         bench.camera.go()
         await bench.camera.sent()
-    await bench.check()
 
 
-@timed_test
-async def both_banks(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def both_banks(bench: PublishedTestbench) -> None:
     """BANK counts when ENABLE rises only; the other bank's picture is left alone."""
-    bench = await PublishedTestbench.start(dut)
     content = {bank: bench.stored(bank) for bank in (0, 1)}
     for _ in range(6):
         bank = random.getrandbits(1)
@@ -102,25 +95,21 @@ async def both_banks(dut: Any) -> None:
             await bench.mcu.set(BANK=random.getrandbits(1))
             assert await bench.mcu.clock() == expected
         await bench.mcu.set(ENABLE=0, RNW=0)
-    await bench.check()
 
 
-@timed_test
-async def byte_stands_until_the_next_clock(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def byte_stands_until_the_next_clock(bench: PublishedTestbench) -> None:
     """DATA keeps still between rising edges, whatever the memory offers meanwhile."""
-    bench = await PublishedTestbench.start(dut)
     await bench.mcu.open()
     for expected in bench.stored():
         assert await bench.mcu.clock() == expected
         await bench.mcu.set(after=random.randrange(200_000))
-        assert int(dut.DATA.value) == expected
-    await bench.check()
+        assert int(bench.dut.DATA.value) == expected
 
 
-@timed_test
-async def left_after_any_count_by_any_pin(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def left_after_any_count_by_any_pin(bench: PublishedTestbench) -> None:
     """The next reading starts at the first pixel all the same."""
-    bench = await PublishedTestbench.start(dut)
     pixels, columns = GEOMETRY.pixels, GEOMETRY.columns
     further = random.randrange(columns, pixels)
     counts = (0, random.randrange(1, columns), further, pixels, pixels + random.randrange(1, 9))
@@ -130,7 +119,6 @@ async def left_after_any_count_by_any_pin(dut: Any) -> None:
         assert await bench.mcu.read(count) == wrapped(bench.stored(bank), count)
         await bench.mcu.set(**end)
         await bench.mcu.set(ENABLE=0)
-    await bench.check()
 
 
 @timed_test
@@ -168,10 +156,9 @@ async def every_command(bench: PublishedTestbench) -> None:
         await bench.mcu.standby()
 
 
-@timed_test
-async def clock_stops_while_storing(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def clock_stops_while_storing(bench: PublishedTestbench) -> None:
     """At either level, in a picture that is given up and in one that goes on to ACK."""
-    bench = await PublishedTestbench.start(dut)
     for edge, goes_on in product((RisingEdge, FallingEdge), (True, False)):
         content = picture()
         await bench.store()
@@ -185,4 +172,3 @@ async def clock_stops_while_storing(dut: Any) -> None:
         await bench.mcu.standby()
         bench.camera.go()
         await bench.camera.sent()
-    await bench.check()

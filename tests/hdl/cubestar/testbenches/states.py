@@ -4,7 +4,6 @@
 """
 
 import random
-from typing import Any
 
 from cocotb.triggers import Timer
 
@@ -14,7 +13,7 @@ from tests.hdl.harness.any_top import TESTBENCH, works
 from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.reference import Tick
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test
 
 COLUMNS, ROWS = GEOMETRY
 
@@ -52,9 +51,8 @@ async def leave(bench: CubeStarTestbench, place: int, state: str, pins: dict[str
     await bench.control(place).set(random.randrange(1, bench.camera.period // 8), **pins)
 
 
-@timed_test
-async def left_in_every_state_by_every_pin(dut: Any) -> None:
-    bench = await TESTBENCH.start(dut)
+@checked_test(TESTBENCH)
+async def left_in_every_state_by_every_pin(bench: TESTBENCH) -> None:
     wanted = [point[1:] for point in GROUPS["cubestar store"].points() if point[0] == TESTBENCH.TOP]
     for state, left_by in random.sample(wanted, len(wanted)):
         place = random.choice(TESTBENCH.PLACES)
@@ -65,4 +63,3 @@ async def left_in_every_state_by_every_pin(dut: Any) -> None:
         if random.random() < 0.3:
             await works(bench, place)
     await works(bench, random.choice(TESTBENCH.PLACES))
-    await bench.check()

@@ -11,7 +11,7 @@ from tests.hdl.cubestar.published import PublishedTestbench
 from tests.hdl.harness.camera import flat, frame, line, lines, picture, vsync
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.reference import Tick
-from tests.hdl.harness.testbench import timed_test
+from tests.hdl.harness.testbench import checked_test, timed_test
 
 COLUMNS, ROWS = GEOMETRY
 TIMES = 4  # repetitions of a case, each with new pictures, blanking and moments
@@ -40,9 +40,8 @@ async def is_dropped(bench: PublishedTestbench) -> None:
     await is_stored(bench, content)
 
 
-@timed_test
-async def whole_frame(dut: Any) -> None:
-    bench = await PublishedTestbench.start(dut)
+@checked_test(PublishedTestbench)
+async def whole_frame(bench: PublishedTestbench) -> None:
     for _ in range(TIMES):
         bank = random.getrandbits(1)
         before = len(bench.sram.pulses)
@@ -55,7 +54,6 @@ async def whole_frame(dut: Any) -> None:
             GEOMETRY.address(column, row, bank) for row in range(ROWS) for column in range(COLUMNS)
         ]
         await bench.mcu.standby()
-    await bench.check()
 
 
 @timed_test
@@ -80,10 +78,9 @@ async def joined_at_every_clock(dut: Any) -> None:
     await bench.check()
 
 
-@timed_test
-async def split_picture_without_vsync(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def split_picture_without_vsync(bench: PublishedTestbench) -> None:
     """Joined in a line, no VSYNC to the next frame: the rest of one, the start of the other."""
-    bench = await PublishedTestbench.start(dut)
     for row in range(ROWS):
         first, second = picture(), picture()
         upper = [list(vsync()), *lines(first)]
@@ -92,7 +89,6 @@ async def split_picture_without_vsync(dut: Any) -> None:
         await join(bench, start)
         next_line = (row + 1) * COLUMNS
         await is_stored(bench, first[next_line:] + second[:next_line])
-    await bench.check()
 
 
 @timed_test
@@ -118,22 +114,19 @@ async def ack_stays(dut: Any) -> None:
     assert [time for time, level in expected.ack if level] == last_pulses
 
 
-@timed_test
-async def vsync_starts_again(dut: Any) -> None:
-    bench = await PublishedTestbench.start(dut)
+@checked_test(PublishedTestbench)
+async def vsync_starts_again(bench: PublishedTestbench) -> None:
     for _ in range(2 * TIMES):
         await bench.store()
         cut = random.randrange(1, ROWS * COLUMNS)
         content = picture()
         bench.camera.send([*frame(picture()[:cut]), *frame(content)])
         await is_stored(bench, content)
-    await bench.check()
 
 
-@timed_test
-async def vsync_in_a_line_ends_it(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def vsync_in_a_line_ends_it(bench: PublishedTestbench) -> None:
     """What follows VSYNC without HSYNC in between is no line's start."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(TIMES):
         await bench.store()
         content = picture()
@@ -142,13 +135,11 @@ async def vsync_in_a_line_ends_it(dut: Any) -> None:
         bench.camera.send([*frame(picture()[:-COLUMNS]), *broken, *line([])])
         bench.camera.send(flat(lines(content)))
         await is_stored(bench, content)
-    await bench.check()
 
 
-@timed_test
-async def line_too_long(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def line_too_long(bench: PublishedTestbench) -> None:
     """Surplus pixels are ignored."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(TIMES):
         await bench.store()
         content = picture()
@@ -156,13 +147,11 @@ async def line_too_long(dut: Any) -> None:
         rows = [row + random.randbytes(random.choice([0, 1, 2, 3 * COLUMNS])) for row in rows]
         bench.camera.send([*vsync(), *flat([list(line(row)) for row in rows])])
         await is_stored(bench, content)
-    await bench.check()
 
 
-@timed_test
-async def line_too_short(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def line_too_short(bench: PublishedTestbench) -> None:
     """The rest of the row stays as it was; the frame counts, unless it was the last row."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(TIMES):
         await bench.store()
         old, new = bench.stored(), picture()
@@ -171,13 +160,11 @@ async def line_too_short(dut: Any) -> None:
         bench.camera.send([*vsync(), *flat([list(line(row)) for row in rows])])
         kept = [old[row * COLUMNS :][size:COLUMNS] for row, size in enumerate(sizes)]
         await is_stored(bench, b"".join(flat([[a, b] for a, b in zip(rows, kept, strict=True)])))
-    await bench.check()
 
 
-@timed_test
-async def last_row_too_short(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def last_row_too_short(bench: PublishedTestbench) -> None:
     """No ACK; further lines are not stored either."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(TIMES):
         await bench.store()
         cut = random.randrange(1, COLUMNS)
@@ -186,13 +173,11 @@ async def last_row_too_short(dut: Any) -> None:
         await bench.camera.sent()
         assert len(bench.sram.pulses) - before == GEOMETRY.pixels - cut
         await is_dropped(bench)
-    await bench.check()
 
 
-@timed_test
-async def hsync_missing(dut: Any) -> None:
+@checked_test(PublishedTestbench)
+async def hsync_missing(bench: PublishedTestbench) -> None:
     """Two lines in one: the second is surplus, and a row is missing at the end."""
-    bench = await PublishedTestbench.start(dut)
     for _ in range(TIMES):
         await bench.store()
         rows = lines(picture())
@@ -200,7 +185,6 @@ async def hsync_missing(dut: Any) -> None:
         rows[merged] = [tick for tick in rows[merged] if tick.hsync]
         bench.camera.send([*vsync(), *flat(rows)])
         await is_dropped(bench)
-    await bench.check()
 
 
 @timed_test
