@@ -174,5 +174,6 @@ def _move(text: str) -> tuple[int, int]:
         return addresses[name] if name in addresses else int(name, 0), int(new, 0)
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not NAME=0xNN, as in {min(addresses)}=0x2a; names: {', '.join(addresses)}"
+            f"{text!r} is not NAME=0xNN, as in {next(iter(addresses))}=0x2a; "
+            f"names: {', '.join(addresses)}"
         ) from None

@@ -62,7 +62,7 @@ def device_name() -> str:
     return "cubestar"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # of a session, it would be the first folder's
 def measure(device_name: str) -> Measure:
     """`cubestack measure` this device `--json` with more arguments; the results that it prints."""
 
