@@ -125,8 +125,9 @@ class Device(Generic[BoardT_co, ClientT_co]):
         summary: one phrase for lists.
         interface: its messages, registers and service port.
         client: makes the device's client from a client of its node.
-        open_board: powers a board up: (scene, *, seed, engine, baud, kernel, i2c_bus, and what
-            ``options`` names) as ``emulator.boards.contract.Board`` has them.
+        open_board: powers a board up: (scene, *, seed, engine) and, where they are chosen, baud
+            (bits a second), kernel and i2c_bus (of a board beside it) and what ``options``
+            names; so each of these needs a default. ValueError for what can not be.
         load_scene: reads a scene file; ValueError names the key that is wrong.
         default_scene: what it looks at when nothing is said.
         default_scene_title: that, for the help.
@@ -138,7 +139,6 @@ class Device(Generic[BoardT_co, ClientT_co]):
         demo: shows it end to end, with pictures; None for nothing.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
-        profiles: names of the firmware's profiles, the default one first.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
@@ -161,7 +161,6 @@ class Device(Generic[BoardT_co, ClientT_co]):
     demo: Callable[[], Demo] | None = None
     tops: Callable[[], TopTable] = dict
     proofs: Callable[[], Mapping[str, Proof]] = dict
-    profiles: tuple[str, ...] = ("extended",)
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
 

@@ -1,5 +1,6 @@
 """What all image sensors have: a scene before them, a condition, a supply, and a pixel clock."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, ClassVar, Generic, TypeVar
@@ -19,7 +20,7 @@ C = TypeVar("C")
 Grey = NDArray[np.uint8]
 
 
-class ImageSensor(Generic[S, C]):
+class ImageSensor(ABC, Generic[S, C]):
     """One sensor behind its lens, powered from time 0 on.
 
     Attributes:
@@ -111,9 +112,9 @@ class ImageSensor(Generic[S, C]):
         self._restarted(now_ps)
         self.on_change()
 
+    @abstractmethod
     def _restarted(self, now_ps: int) -> None:
         """Forget all that was under way when the part started or stopped."""
-        raise NotImplementedError
 
     def _once(self, frame: object, make: Callable[[], Grey]) -> Grey:
         """The picture of ``frame``, made anew only when frame, scene or condition is another."""

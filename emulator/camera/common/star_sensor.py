@@ -1,5 +1,6 @@
 """What the sensors behind star trackers' lenses share: reset pin, two-wire bus, pictures."""
 
+from abc import abstractmethod
 from typing import ClassVar
 
 from cubestack.emulator.camera.common.image_sensor import ImageSensor
@@ -74,6 +75,6 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
         words = (self._registers.read().to_bytes(size) for _ in range(-(-count // size)))
         return b"".join(words)[:count]
 
+    @abstractmethod
     def _write(self, words: list[int], now_ps: int) -> None:
         """Write to the selected register and those that follow."""
-        raise NotImplementedError
