@@ -17,30 +17,7 @@ from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
 from cubestack.firmware_model.cubesense.vision.edges import EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
-from cubestack.firmware_model.interface.cubesense.codes import (
-    IMAGE_BYTES,
-    Camera,
-    CaptureResult,
-    Sram,
-)
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    ADDRESS_BYTES,
-    ADDRESSING_COMMANDS,
-    COMMANDS,
-    FULL_SIZE,
-    Action,
-    Actions,
-    address_bytes,
-)
-from cubestack.firmware_model.interface.cubesense.pins import (
-    ACKNOWLEDGE,
-    CLK,
-    DATA_I,
-    EDGE,
-    ENABLE,
-    RNW,
-    SHIFT,
-)
+from cubestack.firmware_model.interface.cubesense import codes, fpga, pins
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
 
@@ -50,21 +27,23 @@ ACK_POLL_CYCLES = 9
 ACK_TIMEOUT_US = 70_000
 """Longer than ACK can take, two frames of 33.37 ms less the gap between them: assumed."""
 
-CHUNK = FULL_SIZE.scan_step
+CHUNK = fpga.FULL_SIZE.scan_step
 """Bytes that a picture is read in at most: those of the scan's buffer."""
 
-SAMPLE_BYTES = FULL_SIZE.columns
+SAMPLE_BYTES = fpga.FULL_SIZE.columns
 """So many bytes are read from one look at the memories' currents to the next."""
 
 SAMPLE_PIXELS = 64
 """The same for pixels that are addressed one by one."""
 
-_ROWS = {command.actions: command for command in COMMANDS + ADDRESSING_COMMANDS}
+_ROWS = {command.actions: command for command in fpga.COMMANDS + fpga.ADDRESSING_COMMANDS}
 
 
-def _actions(half: Camera | Sram, action: Action, other: Action = Action.STANDBY) -> Actions:
+def _actions(
+    half: codes.Camera | codes.Sram, action: fpga.Action, other: fpga.Action = fpga.Action.STANDBY
+) -> fpga.Actions:
     """``action`` for one half's FPGA and ``other`` for the other one."""
-    return Actions(action, other) if half == Camera.SUN else Actions(other, action)
+    return fpga.Actions(action, other) if half == codes.Camera.SUN else fpga.Actions(other, action)
 
 
 class Acquisition:
@@ -79,7 +58,7 @@ class Acquisition:
         self._buffer = self._window[:CHUNK]  # one place: never in use at the same time
         self._strobe_cycles = meter.table.operations["strobe_byte"].cycles
         self._scan_cycles = meter.table.operations["scan_byte"].cycles
-        self._open: Sram | None = None
+        self._open: codes.Sram | None = None
         self._position = 0
         self._unwatched = 0
 
@@ -88,36 +67,38 @@ class Acquisition:
         """For scanned pixels (64,), and for the Sun window (229,), of which they are a part."""
         return self._buffer, self._window
 
-    def can_address(self, camera: Camera, sram: Sram) -> bool:
+    def can_address(self, camera: codes.Camera, sram: codes.Sram) -> bool:
         """Whether the program can choose the pixels that it reads of ``camera``'s picture."""
-        return self._mcu_addressing and sram is Sram(camera)
+        return self._mcu_addressing and sram is codes.Sram(camera)
 
-    def store(self, camera: Camera, sram: Sram) -> Routine[CaptureResult]:
+    def store(self, camera: codes.Camera, sram: codes.Sram) -> Routine[codes.CaptureResult]:
         """Store the next whole picture of ``camera`` in ``sram``.
 
         What ``sram`` holds stays as it is when the camera sends none.
         """
         if not self._supply.available(sram):
-            return CaptureResult.SRAM_OVER_CURRENT
-        own = sram is Sram(camera)
+            return codes.CaptureResult.SRAM_OVER_CURRENT
+        own = sram is codes.Sram(camera)
         if own:
-            yield from self._enter(_actions(camera, Action.STORE))
+            yield from self._enter(_actions(camera, fpga.Action.STORE))
         else:
-            yield from self._enter(_actions(camera, Action.SEND_PICTURE, Action.STORE_OTHER))
+            yield from self._enter(
+                _actions(camera, fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER)
+            )
         stored = yield from self._await_ack(sram)
         yield from self._standby()
         if not self._supply.available(sram):
-            return CaptureResult.SRAM_OVER_CURRENT
+            return codes.CaptureResult.SRAM_OVER_CURRENT
         if not stored:
-            return CaptureResult.CAMERA_TIMEOUT
-        return CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
+            return codes.CaptureResult.CAMERA_TIMEOUT
+        return codes.CaptureResult.STORED_OWN_SRAM if own else codes.CaptureResult.STORED_OTHER_SRAM
 
-    def scan(self, sram: Sram, lines: NadirLines) -> Routine[bool]:
+    def scan(self, sram: codes.Sram, lines: NadirLines) -> Routine[bool]:
         """Let ``lines`` see the nadir camera's picture in ``sram``.
 
         False when that memory was cut off meanwhile.
         """
-        yield from self._enter_edge(Camera.NADIR, sram)
+        yield from self._enter_edge(codes.Camera.NADIR, sram)
         read = 0
         while lines.wanted and self._supply.available(sram):
             space = lines.space
@@ -130,12 +111,12 @@ class Acquisition:
         yield from self._standby()
         return self._supply.available(sram)
 
-    def window(self, sram: Sram) -> Routine[NDArray[np.uint8] | None]:
+    def window(self, sram: codes.Sram) -> Routine[NDArray[np.uint8] | None]:
         """Coordinates and window of the Sun camera's picture in ``sram``; None as for ``scan``.
 
         The bytes (229,) count until the next call.
         """
-        yield from self._enter_edge(Camera.SUN, sram)
+        yield from self._enter_edge(codes.Camera.SUN, sram)
         yield StrobeRead(self._window, self._strobe_cycles)
         yield from self._supply.sample()
         yield from self._standby()
@@ -148,15 +129,15 @@ class Acquisition:
         """Whether the FPGA still presents the picture of ``open_picture``, where reading ended."""
         return self._open is not None and self._supply.available(self._open)
 
-    def open_picture(self, sram: Sram) -> Routine[bool]:
+    def open_picture(self, sram: codes.Sram) -> Routine[bool]:
         """Begin with the first pixel of the picture in ``sram``; False when the memory is off."""
         if not self._supply.available(sram):
             return False
         if self._mcu_addressing:
-            yield from self._enter(_actions(sram, Action.TAKE_ADDRESS))
+            yield from self._enter(_actions(sram, fpga.Action.TAKE_ADDRESS))
             yield from self._send_address(0)
         else:
-            yield from self._enter(_actions(sram, Action.READ))
+            yield from self._enter(_actions(sram, fpga.Action.READ))
         self._open, self._position, self._unwatched = sram, 0, 0
         return True
 
@@ -166,10 +147,10 @@ class Acquisition:
 
     def skip_bytes(self, count: int) -> Routine[None]:
         """Pass ``count`` bytes: at once if the program can choose the address, else clocked."""
-        if self._mcu_addressing and count > ADDRESS_BYTES and self.picture_open:
+        if self._mcu_addressing and count > fpga.ADDRESS_BYTES and self.picture_open:
             self._position += count
-            yield SetPin(SHIFT, 0)
-            yield from self._send_address(self._position % IMAGE_BYTES)
+            yield SetPin(pins.SHIFT, 0)
+            yield from self._send_address(self._position % codes.IMAGE_BYTES)
             return
         buffer = self._buffer
         yield from self._strobe_all(
@@ -194,23 +175,23 @@ class Acquisition:
     # --- single pixels --------------------------------------------------------------------------
 
     def answer(
-        self, sram: Sram, search: Generator[tuple[int, int], int, EdgeList]
+        self, sram: codes.Sram, search: Generator[tuple[int, int], int, EdgeList]
     ) -> Routine[tuple[EdgeList, int] | None]:
         """Read the pixels that ``search`` asks for, of the picture in ``sram``.
 
         Returns what it found, and how many pixels it took; None as for ``scan``. Only for
         FPGAs that ``can_address``.
         """
-        yield from self._enter(_actions(sram, Action.TAKE_ADDRESS))
+        yield from self._enter(_actions(sram, fpga.Action.TAKE_ADDRESS))
         pixels = 0
         pixel = self._buffer[:1]
         found: EdgeList | None = None
         asked: tuple[int, int] | None = next(search)
         while asked is not None and self._supply.available(sram):
             x, y = asked
-            yield from self._send_address(y * FULL_SIZE.columns + x)
+            yield from self._send_address(y * fpga.FULL_SIZE.columns + x)
             yield StrobeRead(pixel, self._strobe_cycles)
-            yield SetPin(SHIFT, 0)
+            yield SetPin(pins.SHIFT, 0)
             pixels += 1
             if pixels % SAMPLE_PIXELS == 0:
                 yield from self._supply.sample()
@@ -225,46 +206,46 @@ class Acquisition:
 
     def _send_address(self, pixel: int) -> Routine[None]:
         """Give the FPGA a pixel's address; the data lines are inputs again before it answers."""
-        y, x = divmod(pixel, FULL_SIZE.columns)
+        y, x = divmod(pixel, fpga.FULL_SIZE.columns)
         self._meter.charge(i16_add=2, port_write=2)
-        for byte in address_bytes(x, y):
-            yield SetPin(DATA_I, byte)
-            yield SetPin(CLK, 1)
-            yield SetPin(CLK, 0)
-        yield SetPin(SHIFT, 1)
+        for byte in fpga.address_bytes(x, y):
+            yield SetPin(pins.DATA_I, byte)
+            yield SetPin(pins.CLK, 1)
+            yield SetPin(pins.CLK, 0)
+        yield SetPin(pins.SHIFT, 1)
 
-    def _await_ack(self, sram: Sram) -> Routine[bool]:
+    def _await_ack(self, sram: codes.Sram) -> Routine[bool]:
         """Whether ACK came in time; returns at once when the memory is cut off."""
         now_us: int = yield ReadTimer()
         deadline_us = now_us + ACK_TIMEOUT_US
         stored = False
         while not stored and now_us < deadline_us and self._supply.available(sram):
             timeout_us = min(SAMPLE_US, deadline_us - now_us)
-            stored = yield AwaitPin(ACKNOWLEDGE[sram], 1, timeout_us, ACK_POLL_CYCLES)
+            stored = yield AwaitPin(pins.ACKNOWLEDGE[sram], 1, timeout_us, ACK_POLL_CYCLES)
             yield from self._supply.sample()
             now_us = yield ReadTimer()
         return stored
 
-    def _enter_edge(self, camera: Camera, sram: Sram) -> Routine[None]:
-        if sram is Sram(camera):
-            yield from self._enter(_actions(camera, Action.EDGE))
+    def _enter_edge(self, camera: codes.Camera, sram: codes.Sram) -> Routine[None]:
+        if sram is codes.Sram(camera):
+            yield from self._enter(_actions(camera, fpga.Action.EDGE))
         else:
-            yield from self._enter(_actions(camera, Action.PASS_EDGE, Action.SEND_EDGE))
+            yield from self._enter(_actions(camera, fpga.Action.PASS_EDGE, fpga.Action.SEND_EDGE))
 
-    def _enter(self, wanted: Actions) -> Routine[None]:
+    def _enter(self, wanted: fpga.Actions) -> Routine[None]:
         """Through standby to the command that makes the FPGAs do ``wanted``."""
         if self._open is not None:
             yield from self._standby()
         row = _ROWS[wanted]
         self._meter.charge(call=1)
-        for pin, level in ((SHIFT, row.shift), (EDGE, row.edge), (RNW, row.rnw)):
+        for pin, level in ((pins.SHIFT, row.shift), (pins.EDGE, row.edge), (pins.RNW, row.rnw)):
             assert level is not None
             yield SetPin(pin, level)
-        for pin, level in zip(ENABLE, (row.sunen, row.naden), strict=True):
+        for pin, level in zip(pins.ENABLE, (row.sunen, row.naden), strict=True):
             if not level:
                 yield SetPin(pin, 0)
 
     def _standby(self) -> Routine[None]:
         self._open = None
-        for pin in ENABLE:
+        for pin in pins.ENABLE:
             yield SetPin(pin, 1)

@@ -11,14 +11,7 @@ the latter, so a camera that sends no picture counts as such.
 
 from cubestack.firmware_model.cubesense.state import CameraSettings, State
 from cubestack.firmware_model.cubesense.supply import OFF_TIME_US, Supply
-from cubestack.firmware_model.interface.cameras.ov7620 import (
-    CLOCKS_PER_LINE,
-    LINES_PER_FRAME,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    window_column,
-    window_row,
-)
+from cubestack.firmware_model.interface.cameras import ov7620
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
 from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER, CAMERA_SCL, CAMERA_SDA
 from cubestack.firmware_model.mcu.costs import Meter
@@ -27,16 +20,16 @@ from cubestack.firmware_model.mcu.requests import ReadPin, ReadTimer, Routine, S
 START_UP_US = 2_000
 """From a camera's switch to the first write; assumed."""
 
-_BLANKING_LINES = LINES_PER_FRAME - ROWS
-_SETTLE_CLOCKS = (LINES_PER_FRAME + _BLANKING_LINES) * CLOCKS_PER_LINE
+_BLANKING_LINES = ov7620.LINES_PER_FRAME - ROWS
+_SETTLE_CLOCKS = (ov7620.LINES_PER_FRAME + _BLANKING_LINES) * ov7620.CLOCKS_PER_LINE
 
-EXPOSURE_SETTLE_US = _SETTLE_CLOCKS * 1_000_000 // PIXEL_CLOCK_HZ + 100
+EXPOSURE_SETTLE_US = _SETTLE_CLOCKS * 1_000_000 // ov7620.PIXEL_CLOCK_HZ + 100
 """From a write to when the FPGA may look for a frame: the frame that runs then, and the next one,
 still have the exposure of before. The latter's blanking must be over, or it would be stored."""
 
 _BITS = 8
 _LARGEST = dict.fromkeys(("EXPOSURE", "BLUE_GAIN", "RED_GAIN"), (1 << _BITS) - 1) | {
-    "GAIN": REGISTERS["GAIN"].bits
+    "GAIN": ov7620.REGISTERS["GAIN"].bits
 }
 
 
@@ -52,20 +45,22 @@ def register_values(settings: CameraSettings) -> dict[str, int]:
     return {
         "COMMON_A": _bits("COMMON_A", AUTO_WHITE_BALANCE=automatic, AUTO_GAIN=automatic),
         "COMMON_B": _bits("COMMON_B", AUTO_ADJUST=automatic),
-        "COMMON_C": REGISTERS["COMMON_C"].reset,
+        "COMMON_C": ov7620.REGISTERS["COMMON_C"].reset,
         "COMMON_H": _bits("COMMON_H", PROGRESSIVE=1, BLACK_AND_WHITE=1),
         "COMMON_I": _bits("COMMON_I", MANUAL_EXPOSURE=1 - automatic),
-        "HSTART": window_column(0),
-        "HSTOP": window_column(COLUMNS),
-        "VSTART": window_row(0),
-        "VSTOP": window_row(ROWS),
+        "HSTART": ov7620.window_column(0),
+        "HSTOP": ov7620.window_column(COLUMNS),
+        "VSTART": ov7620.window_row(0),
+        "VSTOP": ov7620.window_row(ROWS),
         **{name: min(value, _LARGEST[name]) for name, value in numbers.items()},
     }
 
 
 def _bits(register: str, **fields: int) -> int:
     """Value of ``register`` with the named bit fields and all others 0."""
-    return sum(value << REGISTERS[register].field(name).lsb for name, value in fields.items())
+    return sum(
+        value << ov7620.REGISTERS[register].field(name).lsb for name, value in fields.items()
+    )
 
 
 class CameraControl:
@@ -121,7 +116,7 @@ class CameraControl:
             return
         self._written[camera] = None
         for name, value in values.items():
-            if not (yield from self._write(camera, REGISTERS[name].address, value)):
+            if not (yield from self._write(camera, ov7620.REGISTERS[name].address, value)):
                 return
         now_us: int = yield ReadTimer()
         self._settled_us[camera] = now_us + EXPOSURE_SETTLE_US
@@ -135,7 +130,7 @@ class CameraControl:
         self._meter.charge(i8=1)
         yield SetPin(scl, 0)
         answered = True
-        for byte in (REGISTERS.i2c_address << 1, address, value):
+        for byte in (ov7620.REGISTERS.i2c_address << 1, address, value):
             answered = answered and (yield from self._send(scl, sda, byte))
         yield SetPin(sda, 0)  # stop
         self._meter.charge(i8=1, loop=1)

@@ -16,20 +16,10 @@ from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, Te
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import CameraSettings, State, distortion_of
 from cubestack.firmware_model.cubesense.supply import Supply
-from cubestack.firmware_model.cubesense.vision.distortion import (
-    DistortionError,
-    Projection,
-    fine_table,
-)
+from cubestack.firmware_model.cubesense.vision import distortion
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    NadirSearch,
-    ResetTarget,
-    Sram,
-    SramSelection,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
@@ -84,7 +74,9 @@ class Commands:
             "SetNadirSearch": self._set_search,
         }
         self._cameras_by_setting = {
-            f"{name}{camera + 1}": (name, camera) for name in self._settings for camera in Camera
+            f"{name}{camera + 1}": (name, camera)
+            for name in self._settings
+            for camera in codes.Camera
         }
         self.handled = frozenset({*self._routines, *self._cameras_by_setting})
 
@@ -118,25 +110,27 @@ class Commands:
     # --- node ---------------------------------------------------------------------------------
 
     def _reset(self, job: TelecommandJob) -> Routine[int | None]:
-        match ResetTarget(job.values["Target"]):
-            case ResetTarget.COMMUNICATION:
+        match codes.ResetTarget(job.values["Target"]):
+            case codes.ResetTarget.COMMUNICATION:
                 self._state.reset_communication()
                 self.download.forget()
-            case ResetTarget.CAMERAS:
+            case codes.ResetTarget.CAMERAS:
                 yield from self._cameras.restart()
-            case ResetTarget.MCU:
+            case codes.ResetTarget.MCU:
                 return SOFTWARE_RESET
         return None
 
     def _clear_over_current(self, job: TelecommandJob) -> Routine[None]:
-        selection = SramSelection(job.values["Selection"])
-        both = selection is SramSelection.BOTH
-        yield from self._supply.clear_over_current(*(Sram if both else [Sram(selection)]))
+        selection = codes.SramSelection(job.values["Selection"])
+        both = selection is codes.SramSelection.BOTH
+        yield from self._supply.clear_over_current(
+            *(codes.Sram if both else [codes.Sram(selection)])
+        )
 
     # --- pictures -----------------------------------------------------------------------------
 
     def _capture(self, job: TelecommandJob) -> Routine[None]:
-        camera, sram = Camera(job.values["Camera"]), Sram(job.values["Sram"])
+        camera, sram = codes.Camera(job.values["Camera"]), codes.Sram(job.values["Sram"])
         detect = job.message.name == "CaptureAndDetect"
         yield from self._measurement.measure(camera, sram, detect=detect)
 
@@ -147,7 +141,7 @@ class Commands:
     # --- settings -----------------------------------------------------------------------------
 
     def _set_search(self, job: TelecommandJob) -> Routine[None]:
-        self._state.nadir_search = NadirSearch(job.values["Search"])
+        self._state.nadir_search = codes.NadirSearch(job.values["Search"])
         yield Pay()
 
     @staticmethod
@@ -179,9 +173,9 @@ class Commands:
         """
         factors = distortion_of(values)
         try:
-            for projection in Projection:
-                fine_table(Meter(self._meter.table), projection, factors)
-        except DistortionError:
+            for projection in distortion.Projection:
+                distortion.fine_table(Meter(self._meter.table), projection, factors)
+        except distortion.DistortionError:
             self._state.last_error = AckError.BAD_PARAMETER
         else:
             settings.distortion = factors

@@ -19,13 +19,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.jobs import FrameRequest
 from cubestack.firmware_model.cubesense.thumbnail import OUTSIDE, frame_pixels
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EMPTY_FRAME,
-    FRAME_BYTES,
-    ImageSize,
-    Sram,
-    checksum,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
@@ -36,11 +30,11 @@ class PictureReader:
     def __init__(self, acquisition: Acquisition) -> None:
         """Read with ``acquisition``, which others use too."""
         self._acquisition = acquisition
-        self._sram = Sram.SRAM1
+        self._sram = codes.Sram.SRAM1
         self._next = 0
 
     def read(
-        self, sram: Sram, pixels: NDArray[np.int32], target: NDArray[np.uint8]
+        self, sram: codes.Sram, pixels: NDArray[np.int32], target: NDArray[np.uint8]
     ) -> Routine[bool]:
         """Read ``pixels`` (n,), numbers that ascend, into ``target`` (n,).
 
@@ -56,14 +50,14 @@ class PictureReader:
             self._next += end - start
         return self._acquisition.picture_open
 
-    def read_run(self, sram: Sram, start: int, count: int) -> Routine[bytes | None]:
+    def read_run(self, sram: codes.Sram, start: int, count: int) -> Routine[bytes | None]:
         """``count`` pixels from ``start`` on; None as where ``read`` gives False."""
         data = np.zeros(count, np.uint8)
         pixels = np.arange(start, start + count, dtype=np.int32)
         done = yield from self.read(sram, pixels, data)
         return data.tobytes() if done else None
 
-    def _seek(self, sram: Sram, pixel: int) -> Routine[bool]:
+    def _seek(self, sram: codes.Sram, pixel: int) -> Routine[bool]:
         """Go to ``pixel``; what lies behind is reached from the first one again."""
         if not self._acquisition.picture_open or sram != self._sram or pixel < self._next:
             self._sram, self._next = sram, 0
@@ -89,8 +83,8 @@ class Download:
         self._meter = meter
         self._reader = reader
         self._wanted: FrameRequest | None = None
-        self.data = np.zeros(FRAME_BYTES, np.uint8)
-        self.number = EMPTY_FRAME
+        self.data = np.zeros(codes.FRAME_BYTES, np.uint8)
+        self.number = codes.EMPTY_FRAME
         self.checksum = 0
 
     def has(self, frame: int) -> bool:
@@ -106,7 +100,7 @@ class Download:
             assert self._wanted is not None
             wanted = FrameRequest(self._wanted.sram, self._wanted.size, values["Frame"])
         else:
-            wanted = FrameRequest(Sram(values["Sram"]), ImageSize(values["Size"]), 0)
+            wanted = FrameRequest(codes.Sram(values["Sram"]), codes.ImageSize(values["Size"]), 0)
         self._select(wanted)
         return wanted
 
@@ -121,18 +115,20 @@ class Download:
         pixels = frame_pixels(request.size, request.frame)
         inside = pixels != OUTSIDE
         values = np.zeros(np.count_nonzero(inside), np.uint8)
-        self._meter.charge(i16_add=4 * FRAME_BYTES, i8=FRAME_BYTES, loop=FRAME_BYTES)
+        self._meter.charge(
+            i16_add=4 * codes.FRAME_BYTES, i8=codes.FRAME_BYTES, loop=codes.FRAME_BYTES
+        )
         if not (yield from self._reader.read(request.sram, pixels[inside], values)):
             return
         self.data[:] = 0
         self.data[inside] = values
-        self._meter.charge(i8=FRAME_BYTES, loop=FRAME_BYTES)
+        self._meter.charge(i8=codes.FRAME_BYTES, loop=codes.FRAME_BYTES)
         yield Pay()
         if request is self._wanted:
-            self.checksum = checksum(self.data.tobytes())
+            self.checksum = codes.checksum(self.data.tobytes())
             self.number = request.frame
 
     def _select(self, wanted: FrameRequest | None) -> None:
         self._wanted = wanted
-        self.number = EMPTY_FRAME
+        self.number = codes.EMPTY_FRAME
         self.checksum = 0

@@ -14,39 +14,29 @@ from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
 from cubestack.firmware_model.cubesense.timer import microseconds, read_ticks, ticks_of, ticks_since
-from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.cubesense.vision import distortion, sun_centroid
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sample_search import Between, around_samples
-from cubestack.firmware_model.cubesense.vision.sun_centroid import (
-    COORDINATE_BYTES,
-    SunConfig,
-    find_sun,
-)
 from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
-from cubestack.firmware_model.interface.cubesense.codes import (
-    PIXELS_PER_DEGREE,
-    ROWS,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    NadirSearch,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, Routine, pause
 
-READ_OUT_TICKS = ticks_of(ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
+READ_OUT_TICKS = ticks_of(codes.ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
 """From a picture's first row to its end: 30.5 ms."""
 
 BETWEEN = {
-    NadirSearch.AROUND_SAMPLES: Between.BINARY,
-    NadirSearch.AROUND_SAMPLES_STEPPING: Between.SEQUENTIAL,
+    codes.NadirSearch.AROUND_SAMPLES: Between.BINARY,
+    codes.NadirSearch.AROUND_SAMPLES_STEPPING: Between.SEQUENTIAL,
 }
 
-PROJECTIONS = {Camera.SUN: Projection.EQUIDISTANT, Camera.NADIR: Projection.STEREOGRAPHIC}
+PROJECTIONS = {
+    codes.Camera.SUN: distortion.Projection.EQUIDISTANT,
+    codes.Camera.NADIR: distortion.Projection.STEREOGRAPHIC,
+}
 
 SCANNED_PIXELS = (
     len(FULL_SIZE.scan_rows) * FULL_SIZE.columns + len(FULL_SIZE.scan_columns) * FULL_SIZE.rows
@@ -57,10 +47,10 @@ FLASH_ERASE_BYTES, FLASH_WRITE_BYTES, FLASH_STEP_US = 64, 32, 2_000
 
 
 @cache
-def _constant_table(camera: Camera) -> RadiusTable:
+def _constant_table(camera: codes.Camera) -> distortion.RadiusTable:
     """Made of the reset values, by the compiler."""
     factors = CameraSettings.at_reset(camera).distortion
-    return fine_table(Meter(PIC18F45K20), PROJECTIONS[camera], factors)
+    return distortion.fine_table(Meter(PIC18F45K20), PROJECTIONS[camera], factors)
 
 
 class Measurement:
@@ -76,31 +66,33 @@ class Measurement:
         self._acquisition = acquisition
         self._tables = {
             camera: (CameraSettings.at_reset(camera).distortion, _constant_table(camera))
-            for camera in Camera
+            for camera in codes.Camera
         }
 
-    def measure(self, camera: Camera, sram: Sram, *, detect: bool = True) -> Routine[None]:
+    def measure(
+        self, camera: codes.Camera, sram: codes.Sram, *, detect: bool = True
+    ) -> Routine[None]:
         """Take a picture of ``camera`` into ``sram`` and, with ``detect``, measure in it."""
-        result = Result(CaptureResult.PENDING, DetectResult.PENDING, sram=sram)
+        result = Result(codes.CaptureResult.PENDING, codes.DetectResult.PENDING, sram=sram)
         if not detect:
-            result.detect = DetectResult.NONE_SCHEDULED
+            result.detect = codes.DetectResult.NONE_SCHEDULED
         self._state.results[camera] = result
         if detect:
             yield from self._update_table(camera)
         yield from self._cameras.prepare(camera)
         started = yield from read_ticks()
         capture = yield from self._acquisition.store(camera, sram)
-        if capture is CaptureResult.CAMERA_TIMEOUT:
+        if capture is codes.CaptureResult.CAMERA_TIMEOUT:
             self._cameras.forget_set_up(camera)
         yield from self._stored(result, capture, started)
         if detect and capture.stored:
-            measured = self._measure_nadir if camera == Camera.NADIR else self._measure_sun
+            measured = self._measure_nadir if camera == codes.Camera.NADIR else self._measure_sun
             found = yield from measured(result, started)
             if not found:  # the memory was cut off under the search
-                result.capture = CaptureResult.SRAM_OVER_CURRENT
-                result.detect = DetectResult.NONE_SCHEDULED
+                result.capture = codes.CaptureResult.SRAM_OVER_CURRENT
+                result.detect = codes.DetectResult.NONE_SCHEDULED
 
-    def _stored(self, result: Result, capture: CaptureResult, started: int) -> Routine[None]:
+    def _stored(self, result: Result, capture: codes.CaptureResult, started: int) -> Routine[None]:
         """The picture is there, or will not come."""
         ticks = yield from ticks_since(started)
         reading = min(READ_OUT_TICKS, ticks) if capture.stored else 0
@@ -109,11 +101,11 @@ class Measurement:
         result.total_us = microseconds(ticks)
         result.capture = capture
         if not capture.stored:
-            result.detect = DetectResult.NONE_SCHEDULED
+            result.detect = codes.DetectResult.NONE_SCHEDULED
 
     def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
         """The Earth; False when the memory was cut off."""
-        settings = self._state.cameras[Camera.NADIR]
+        settings = self._state.cameras[codes.Camera.NADIR]
         config = EdgeConfig(settings.threshold, settings.boresight, masks=tuple(settings.masks))
         stored = yield from read_ticks()
         edges = yield from self._find_edges(result, config)
@@ -121,13 +113,13 @@ class Measurement:
             return False
         searched = yield from read_ticks()
         result.search_us = microseconds((yield from ticks_since(stored)))
-        _, table = self._tables[Camera.NADIR]
+        _, table = self._tables[codes.Camera.NADIR]
         found = find_nadir(edges, NadirConfig(table), self._meter)
         self._meter.charge(f32_mul=1, f32_convert=1)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
         result.total_us = microseconds((yield from ticks_since(started)))
         result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
-        result.radius = round(found.radius_deg * PIXELS_PER_DEGREE * 100)
+        result.radius = round(found.radius_deg * codes.PIXELS_PER_DEGREE * 100)
         result.points = found.edges
         result.edges = edges.points
         result.detect = found.detect
@@ -136,7 +128,7 @@ class Measurement:
     def _find_edges(self, result: Result, config: EdgeConfig) -> Routine[EdgeList | None]:
         acquisition, sram = self._acquisition, result.sram
         between = BETWEEN.get(self._state.nadir_search)
-        if between is not None and acquisition.can_address(Camera.NADIR, sram):
+        if between is not None and acquisition.can_address(codes.Camera.NADIR, sram):
             search = around_samples(config, self._meter, between)
             answer = yield from acquisition.answer(sram, search)
             if answer is None:
@@ -151,29 +143,29 @@ class Measurement:
 
     def _measure_sun(self, result: Result, started: int) -> Routine[bool]:
         """The Sun; False when the memory was cut off."""
-        settings = self._state.cameras[Camera.SUN]
+        settings = self._state.cameras[codes.Camera.SUN]
         stored = yield from read_ticks()
         data = yield from self._acquisition.window(result.sram)
         if data is None:
             return False
         searched = yield from read_ticks()
         result.search_us = microseconds((yield from ticks_since(stored)))
-        _, table = self._tables[Camera.SUN]
-        config = SunConfig(
+        _, table = self._tables[codes.Camera.SUN]
+        config = sun_centroid.SunConfig(
             table, settings.threshold, settings.boresight, masks=tuple(settings.masks)
         )
-        found = find_sun(data, config, self._meter)
+        found = sun_centroid.find_sun(data, config, self._meter)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
         result.total_us = microseconds((yield from ticks_since(started)))
-        x_low, x_high, y_low, y_high = (int(byte) for byte in data[:COORDINATE_BYTES])
+        x_low, x_high, y_low, y_high = (int(byte) for byte in data[: sun_centroid.COORDINATE_BYTES])
         result.first = (x_low + 256 * x_high, y_low + 256 * y_high)
-        result.pixels_read = len(data) - COORDINATE_BYTES
+        result.pixels_read = len(data) - sun_centroid.COORDINATE_BYTES
         result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
         result.points = found.pixels
         result.detect = found.detect
         return True
 
-    def _update_table(self, camera: Camera) -> Routine[None]:
+    def _update_table(self, camera: codes.Camera) -> Routine[None]:
         """Make the distortion table anew, in flash, when its coefficients have changed."""
         factors = self._state.cameras[camera].distortion
         if self._tables[camera][0] == factors:
@@ -182,7 +174,7 @@ class Measurement:
         if factors == reset:
             table = _constant_table(camera)
         else:
-            table = fine_table(self._meter, PROJECTIONS[camera], factors)
+            table = distortion.fine_table(self._meter, PROJECTIONS[camera], factors)
             yield Pay()
             blocks = -(-table.size // FLASH_ERASE_BYTES) + -(-table.size // FLASH_WRITE_BYTES)
             yield from pause(blocks * FLASH_STEP_US)

@@ -13,17 +13,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    MASK_AREAS,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    NadirSearch,
-    Sram,
-    coefficient,
-)
-from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telecommands
 from cubestack.firmware_model.node.state import NodeState
 
 ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
@@ -33,8 +23,8 @@ ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "Uar
 def distortion_of(values: Mapping[str, Any]) -> tuple[float, ...]:
     """Factors of the polynomial from the parameters of telecommand Distortion."""
     return tuple(
-        coefficient(values[f"Mantissa{power}"], values[f"Exponent{power}"])
-        for power in range(DISTORTION_TERMS)
+        codes.coefficient(values[f"Mantissa{power}"], values[f"Exponent{power}"])
+        for power in range(telecommands.DISTORTION_TERMS)
     )
 
 
@@ -61,10 +51,10 @@ class CameraSettings:
     red_gain: int
     boresight: tuple[float, float]
     distortion: tuple[float, ...]
-    masks: list[Mask] = field(default_factory=lambda: [Mask()] * MASK_AREAS)
+    masks: list[Mask] = field(default_factory=lambda: [Mask()] * codes.MASK_AREAS)
 
     @classmethod
-    def at_reset(cls, camera: Camera) -> "CameraSettings":
+    def at_reset(cls, camera: codes.Camera) -> "CameraSettings":
         """The declared reset values."""
         number = camera + 1
 
@@ -101,8 +91,8 @@ class Result:
         wait_us, store_us, search_us, centroid_us, total_us: as telemetry PhaseTimes has them.
     """
 
-    capture: CaptureResult = CaptureResult.START_UP
-    detect: DetectResult = DetectResult.START_UP
+    capture: codes.CaptureResult = codes.CaptureResult.START_UP
+    detect: codes.DetectResult = codes.DetectResult.START_UP
     alpha: int = 0
     beta: int = 0
     x: int = 0
@@ -110,7 +100,7 @@ class Result:
     radius: int = 0
     points: int = 0
     edges: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 2), np.int16))
-    sram: Sram = Sram.SRAM1
+    sram: codes.Sram = codes.Sram.SRAM1
     first: tuple[int, int] = (0, 0)
     pixels_read: int = 0
     wait_us: int = 0
@@ -136,11 +126,11 @@ class State(NodeState):
     def __init__(self) -> None:
         """Start with the declared reset values."""
         super().__init__(ERROR_FLAGS)
-        self.cameras = {camera: CameraSettings.at_reset(camera) for camera in Camera}
-        self.results = {camera: Result(sram=Sram(camera)) for camera in Camera}
-        self.over_current = dict.fromkeys(Sram, False)
-        self.nadir_search = NadirSearch.LINES
-        self.image_sram = Sram.SRAM1
+        self.cameras = {camera: CameraSettings.at_reset(camera) for camera in codes.Camera}
+        self.results = {camera: Result(sram=codes.Sram(camera)) for camera in codes.Camera}
+        self.over_current = dict.fromkeys(codes.Sram, False)
+        self.nadir_search = codes.NadirSearch.LINES
+        self.image_sram = codes.Sram.SRAM1
         self.reset_communication()
 
     def reset_communication(self) -> None:
@@ -152,12 +142,12 @@ class State(NodeState):
         self.last_processed = 1
         self.last_error = AckError.OK
 
-    def schedule(self, camera: Camera, sram: Sram, *, detect: bool) -> None:
+    def schedule(self, camera: codes.Camera, sram: codes.Sram, *, detect: bool) -> None:
         """Mark the results of a measurement that was accepted and has not begun."""
         result = self.results[camera]
-        result.capture = CaptureResult.PENDING
+        result.capture = codes.CaptureResult.PENDING
         result.sram = sram
         if detect:
-            result.detect = DetectResult.PENDING
+            result.detect = codes.DetectResult.PENDING
         else:
-            result.detect = DetectResult.NONE_SCHEDULED
+            result.detect = codes.DetectResult.NONE_SCHEDULED

@@ -12,15 +12,7 @@ from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EDGE_UNIT,
-    EDGES_PER_FRAME,
-    Camera,
-    Sram,
-)
-from cubestack.firmware_model.interface.cubesense.pins import Monitor
-from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins, telemetry
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import identification
 
@@ -29,7 +21,7 @@ NODE_TYPE = 4
 
 SERIAL_BYTES = INTERFACE.telemetry("SerialNumber").length
 
-EDGE_FRAMES = -(-MAX_EDGES // EDGES_PER_FRAME)
+EDGE_FRAMES = -(-MAX_EDGES // codes.EDGES_PER_FRAME)
 
 _COUNTER = 1 << 16
 _HUNDREDTHS = 100
@@ -66,13 +58,13 @@ class Telemetry:
             **{f"NadirEdges{part + 1}": partial(self._edges, part) for part in range(EDGE_FRAMES)},
             "NadirSearchMode": lambda: {"Search": state.nadir_search},
         }
-        for camera in Camera:
+        for camera in codes.Camera:
             number = camera + 1
             self._sources[f"Masks{number}"] = partial(self._masks, camera)
             self._sources[f"Details{number}"] = partial(self._details, camera)
             self._sources[f"PhaseTimes{number}"] = partial(self._times, camera)
-        shown = {identifier: camera for camera, identifier in RESULTS.items()}
-        shown |= {identifier: camera for identifier, (camera, _) in SCHEDULES.items()}
+        shown = {identifier: camera for camera, identifier in telemetry.RESULTS.items()}
+        shown |= {identifier: camera for identifier, (camera, _) in telemetry.SCHEDULES.items()}
         for identifier, camera in shown.items():
             self._sources[INTERFACE.telemetry(identifier).name] = partial(self._result, camera)
 
@@ -100,7 +92,7 @@ class Telemetry:
             "Error": state.last_error,
         }
 
-    def _result(self, camera: Camera) -> Values:
+    def _result(self, camera: codes.Camera) -> Values:
         result = self._state.results[camera]
         return {
             "Alpha": result.alpha / _HUNDREDTHS,
@@ -113,12 +105,12 @@ class Telemetry:
         currents = self._supply.currents()
         over = self._state.over_current
         return {
-            "Current3V3": currents[Monitor.SUPPLY_3V3],
-            "CurrentSram1": currents[Monitor.SRAM1],
-            "CurrentSram2": currents[Monitor.SRAM2],
-            "Current5V": currents[Monitor.SUPPLY_5V],
-            "OverCurrent1": over[Sram.SRAM1],
-            "OverCurrent2": over[Sram.SRAM2],
+            "Current3V3": currents[pins.Monitor.SUPPLY_3V3],
+            "CurrentSram1": currents[pins.Monitor.SRAM1],
+            "CurrentSram2": currents[pins.Monitor.SRAM2],
+            "Current5V": currents[pins.Monitor.SUPPLY_5V],
+            "OverCurrent1": over[codes.Sram.SRAM1],
+            "OverCurrent2": over[codes.Sram.SRAM2],
         }
 
     def _configuration(self) -> Values:
@@ -142,7 +134,7 @@ class Telemetry:
     def _frame_info(self) -> Values:
         return {"FrameNumber": self._download.number, "Checksum": self._download.checksum}
 
-    def _masks(self, camera: Camera) -> Values:
+    def _masks(self, camera: codes.Camera) -> Values:
         values: Values = {}
         for index, mask in enumerate(self._state.cameras[camera].masks):
             area = index + 1
@@ -154,7 +146,7 @@ class Telemetry:
             }
         return values
 
-    def _details(self, camera: Camera) -> Values:
+    def _details(self, camera: codes.Camera) -> Values:
         result = self._state.results[camera]
         return {
             "X": result.x / _HUNDREDTHS,
@@ -167,7 +159,7 @@ class Telemetry:
             "PixelsRead": result.pixels_read,
         }
 
-    def _times(self, camera: Camera) -> Values:
+    def _times(self, camera: codes.Camera) -> Values:
         result = self._state.results[camera]
         return {
             "Wait": result.wait_us,
@@ -178,11 +170,11 @@ class Telemetry:
         }
 
     def _edges(self, part: int) -> Values:
-        edges = self._state.results[Camera.NADIR].edges
-        shown = np.zeros((EDGES_PER_FRAME, 2))
-        there = edges[part * EDGES_PER_FRAME :][:EDGES_PER_FRAME]
-        shown[: len(there)] = there / EDGE_UNIT
-        first = part * EDGES_PER_FRAME + 1
+        edges = self._state.results[codes.Camera.NADIR].edges
+        shown = np.zeros((codes.EDGES_PER_FRAME, 2))
+        there = edges[part * codes.EDGES_PER_FRAME :][: codes.EDGES_PER_FRAME]
+        shown[: len(there)] = there / codes.EDGE_UNIT
+        first = part * codes.EDGES_PER_FRAME + 1
         values: Values = {"Count": len(edges)}
         for number, (x, y) in enumerate(shown, start=first):
             values |= {f"X{number}": x, f"Y{number}": y}

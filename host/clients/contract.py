@@ -8,7 +8,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self, TypeVar
 
-from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
+from cubestack.firmware_model.interface.codec.field import Value
+from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError, TargetError
 

@@ -12,7 +12,8 @@ from typing import Any, Protocol
 
 from smbus2 import i2c_msg
 
-from cubestack.firmware_model.interface.codec.message import Interface, Message, Value
+from cubestack.firmware_model.interface.codec.field import Value
+from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.host.clients.contract import Client
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
 

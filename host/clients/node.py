@@ -6,8 +6,9 @@ answer belongs to the request before it, and only one request is under way at a 
 
 from collections.abc import Iterator
 
+from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.codec.message import Interface, Value
+from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.contract import Client
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.transport.streams import Transport

@@ -8,7 +8,8 @@ import re
 from collections.abc import Iterator
 from enum import IntEnum
 
-from cubestack.firmware_model.interface.codec.message import Field, Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.host.export.side_protocols import side_c
 
 _ACCESSORS = """

@@ -15,12 +15,7 @@ from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.letters import Letter
-from cubestack.firmware_model.interface.cubesense.codes import IMAGE_BYTES, Camera, Sram
-from cubestack.firmware_model.interface.cubesense.service_port import (
-    CAPTURES,
-    DOWNLOADS,
-    SERVICE_PORT,
-)
+from cubestack.firmware_model.interface.cubesense import codes, service_port
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
@@ -30,10 +25,12 @@ LETTERS = 4
 CHUNK_BYTES = 24
 """Bytes of a picture that are read and handed to the UART at once, while as many may still wait."""
 
-_BYTE_US = -(-10 * 1_000_000 // SERVICE_PORT.baud)
+_BYTE_US = -(-10 * 1_000_000 // service_port.SERVICE_PORT.baud)
 
-_CAMERAS: dict[Letter, Camera] = {
-    letter: camera for table in (CAPTURES, DOWNLOADS) for camera, letter in table.items()
+_CAMERAS: dict[Letter, codes.Camera] = {
+    letter: camera
+    for table in (service_port.CAPTURES, service_port.DOWNLOADS)
+    for camera, letter in table.items()
 }
 
 
@@ -63,7 +60,7 @@ class BenchLink:
     def uart_byte(self, byte: int) -> None:
         """Interrupt: a byte came."""
         self._meter.charge(uart_interrupt=1)
-        letter = SERVICE_PORT.find(byte)
+        letter = service_port.SERVICE_PORT.find(byte)
         if letter is None or len(self._letters) >= LETTERS:
             return
         self._letters.append(letter)
@@ -77,38 +74,38 @@ class BenchLink:
         """Main loop: answer the oldest letter, a picture piece by piece."""
         letter = self._letters[0]
         camera = _CAMERAS[letter]
-        if letter == CAPTURES[camera]:
+        if letter == service_port.CAPTURES[camera]:
             done = yield from self._capture(letter, camera)
         else:
-            done = yield from self._send(Sram(camera))
+            done = yield from self._send(codes.Sram(camera))
         if done:
             self._letters.popleft()
             self._sent = 0
         if self._letters:
             self._queue.request(self._work, next_turn=True)
 
-    def _capture(self, letter: Letter, camera: Camera) -> Routine[bool]:
-        sram = Sram(camera)
+    def _capture(self, letter: Letter, camera: codes.Camera) -> Routine[bool]:
+        sram = codes.Sram(camera)
         self._state.schedule(camera, sram, detect=False)
         yield from self._measurement.measure(camera, sram, detect=False)
         if self._state.results[camera].capture.stored:
             self._uart_send(letter.answer or b"")
         return True
 
-    def _send(self, sram: Sram) -> Routine[bool]:
+    def _send(self, sram: codes.Sram) -> Routine[bool]:
         """Send what there is room for; True at the picture's end."""
         too_many = self._hardware.uart_backlog(Port.BENCH) - CHUNK_BYTES
         if too_many > 0:
             now_us: int = yield ReadTimer()
             yield Sleep(now_us + too_many * _BYTE_US)
             return False
-        count = min(CHUNK_BYTES, IMAGE_BYTES - self._sent)
+        count = min(CHUNK_BYTES, codes.IMAGE_BYTES - self._sent)
         data = yield from self._reader.read_run(sram, self._sent, count)
         if data is None:
             return True
         self._uart_send(data)
         self._sent += count
-        return self._sent == IMAGE_BYTES
+        return self._sent == codes.IMAGE_BYTES
 
     def _uart_send(self, data: bytes) -> None:
         self._meter.charge(uart_interrupt=len(data))

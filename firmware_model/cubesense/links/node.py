@@ -19,18 +19,12 @@ from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    FRAME_BYTES,
-    Camera,
-    NadirSearch,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes
 from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
 
-SEND_BYTES = len(encode_frame(b"")) + 2 * FRAME_BYTES
+SEND_BYTES = len(encode_frame(b"")) + 2 * codes.FRAME_BYTES
 """What the UART may still have to send: the longest answer, every byte of it doubled."""
 
 _FLAGS = LinkFlags(
@@ -129,7 +123,7 @@ class NodeLink(SatelliteLink):
             case "Distortion1" | "Distortion2":
                 return invertible(distortion_of(values), self._meter)
             case "SetNadirSearch":
-                return values["Search"] == NadirSearch.LINES or self._mcu_addressing
+                return values["Search"] == codes.NadirSearch.LINES or self._mcu_addressing
         return True
 
     def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
@@ -145,6 +139,8 @@ class NodeLink(SatelliteLink):
         match job.message.name:
             case "CaptureAndDetect" | "CaptureOnly":
                 detect = job.message.name == "CaptureAndDetect"
-                self._state.schedule(Camera(values["Camera"]), Sram(values["Sram"]), detect=detect)
+                self._state.schedule(
+                    codes.Camera(values["Camera"]), codes.Sram(values["Sram"]), detect=detect
+                )
             case "StartImageDownload" | "NextImageFrame":
                 job.frame = self._download.request(values)

@@ -17,15 +17,7 @@ from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, TelecommandJob
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerRegister
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    IMAGE_BYTES,
-    Camera,
-    Measurement,
-    NadirSearch,
-    Sram,
-)
-from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, registers
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Routine
 
@@ -34,7 +26,7 @@ READ_AHEAD_BYTES = 32
 
 _SETTINGS = {
     f"{camera.name}_{name}": (camera, attribute)
-    for camera in Camera
+    for camera in codes.Camera
     for name, attribute in (
         ("THRESHOLD", "threshold"),
         ("EXPOSURE", "exposure"),
@@ -46,9 +38,9 @@ _SETTINGS = {
 }
 """Camera, and attribute of its settings, by register."""
 
-_RESULTS: dict[str, tuple[Camera, str, int]] = {
+_RESULTS: dict[str, tuple[codes.Camera, str, int]] = {
     f"{camera.name}_{name}": (camera, name.lower(), scale)
-    for camera in Camera
+    for camera in codes.Camera
     for name, scale in (("CAPTURE", 1), ("DETECT", 1), ("POINTS", 1), ("X", 100), ("Y", 100))
 }
 """Camera, attribute of its result, and counts for a unit, by register."""
@@ -64,7 +56,7 @@ class ImageStream:
         self._reader = reader
         self._work = Background(self._fill)
         self._ahead = bytearray()
-        self._sram: Sram | None = None
+        self._sram: codes.Sram | None = None
         self._fetched = 0
         self._turn = 0
 
@@ -73,7 +65,7 @@ class ImageStream:
         """Whether the pointer is at the picture."""
         return self._sram is not None
 
-    def begin(self, sram: Sram | None) -> None:
+    def begin(self, sram: codes.Sram | None) -> None:
         """Stream the picture in ``sram`` from its first pixel, or None: end the stream."""
         self._sram = sram
         self._ahead.clear()
@@ -82,24 +74,24 @@ class ImageStream:
 
     def next(self) -> int | None:
         """The next byte; None while it has to be waited for."""
-        wanted = self._fetched < IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2
+        wanted = self._fetched < codes.IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2
         if wanted and self._queue.request(self._work):
             self._hardware.wake()
         if self._ahead:
             return self._ahead.pop(0)
-        return None if self._fetched < IMAGE_BYTES else FILL
+        return None if self._fetched < codes.IMAGE_BYTES else FILL
 
     def _fill(self) -> Routine[None]:
         """Main loop: read ahead."""
         turn, sram, start = self._turn, self._sram, self._fetched
-        count = min(READ_AHEAD_BYTES - len(self._ahead), IMAGE_BYTES - start)
+        count = min(READ_AHEAD_BYTES - len(self._ahead), codes.IMAGE_BYTES - start)
         if sram is None or count <= 0:
             return
         data = yield from self._reader.read_run(sram, start, count)
         if turn != self._turn:  # the pointer moved meanwhile
             return
         self._ahead += data or b""
-        self._fetched = IMAGE_BYTES if data is None else start + count
+        self._fetched = codes.IMAGE_BYTES if data is None else start + count
 
 
 class RegisterLink:
@@ -124,9 +116,9 @@ class RegisterLink:
         self._position = 0
         self._written = 0
         self._actions: dict[str, Callable[[Any], None]] = {
-            "MEASURE": lambda value: self._measure(Measurement(value), detect=True),
-            "CAPTURE": lambda value: self._measure(Measurement(value), detect=False),
-            "IMAGE_SRAM": lambda value: setattr(state, "image_sram", Sram(value)),
+            "MEASURE": lambda value: self._measure(codes.Measurement(value), detect=True),
+            "CAPTURE": lambda value: self._measure(codes.Measurement(value), detect=False),
+            "IMAGE_SRAM": lambda value: setattr(state, "image_sram", codes.Sram(value)),
             "CLEAR_OVER_CURRENT": self._clear_over_current,
             "NADIR_SEARCH": self._search,
         }
@@ -140,7 +132,7 @@ class RegisterLink:
         self._meter.charge(i2c_interrupt=1)
         self._written += 1
         if self._written == 1:
-            self._register = REGISTERS.at(byte)
+            self._register = registers.REGISTERS.at(byte)
         elif self._written == 2:
             self._write(byte)
         else:
@@ -205,7 +197,7 @@ class RegisterLink:
         else:
             self._actions[register.name](byte)
 
-    def _measure(self, target: Measurement, *, detect: bool) -> None:
+    def _measure(self, target: codes.Measurement, *, detect: bool) -> None:
         if self._put(Measure(target.camera, target.sram, detect)):
             self._state.schedule(target.camera, target.sram, detect=detect)
 
@@ -214,8 +206,8 @@ class RegisterLink:
         self._put(TelecommandJob(message, {"Selection": selection}))
 
     def _search(self, value: int) -> None:
-        if value == NadirSearch.LINES or self._hardware.mcu_addressing:
-            self._state.nadir_search = NadirSearch(value)
+        if value == codes.NadirSearch.LINES or self._hardware.mcu_addressing:
+            self._state.nadir_search = codes.NadirSearch(value)
 
     def _put(self, job: Measure | TelecommandJob) -> bool:
         accepted = self._queue.put(job)

@@ -21,19 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.vision.arithmetic import (
-    HUNDREDTHS,
-    sequential_sum,
-    to_int16,
-)
+from cubestack.firmware_model.cubesense.vision import arithmetic
 from cubestack.firmware_model.cubesense.vision.circle import Circle, LeastSquaresCircle
 from cubestack.firmware_model.cubesense.vision.distortion import FOCAL_PX, Projection, RadiusTable
 from cubestack.firmware_model.cubesense.vision.edges import EdgeList
-from cubestack.firmware_model.interface.cubesense.codes import (
-    LARGEST_ANGLE_DEG,
-    PIXELS_PER_DEGREE,
-    DetectResult,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 
 DROPPED_SHARE = 4
@@ -47,7 +39,7 @@ stereographic one, edges of a sunlit limb stay below 0.35 px, and a looser limit
 terminator pass.
 """
 
-LARGEST_PX = np.float32(LARGEST_ANGLE_DEG * PIXELS_PER_DEGREE)
+LARGEST_PX = np.float32(codes.LARGEST_ANGLE_DEG * codes.PIXELS_PER_DEGREE)
 
 Values = NDArray[np.float32]
 
@@ -82,7 +74,7 @@ class NadirResult:
         radius_deg: angular radius of the circle; 0 when there is none.
     """
 
-    detect: DetectResult
+    detect: codes.DetectResult
     x: int = 0
     y: int = 0
     alpha: int = 0
@@ -96,37 +88,37 @@ def angle_of(hundredths: NDArray[np.int16], meter: Meter) -> NDArray[np.int16]:
     """1/100 px, undistorted, to 1/100 deg, rounded towards zero."""
     count = hundredths.size
     meter.charge(f32_convert=2 * count, f32_div=count)
-    return to_int16(hundredths.astype(np.float32) / np.float32(PIXELS_PER_DEGREE))
+    return arithmetic.to_int16(hundredths.astype(np.float32) / np.float32(codes.PIXELS_PER_DEGREE))
 
 
 def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResult:
     """Undistort the edges, fit the circle, judge it. Phases: `undistort` and `fit`."""
     meter.charge(i8=3)
     if edges.full:
-        return NadirResult(DetectResult.TOO_MANY_EDGES, edges=len(edges))
+        return NadirResult(codes.DetectResult.TOO_MANY_EDGES, edges=len(edges))
     if len(edges) < config.min_edges:
-        return NadirResult(DetectResult.TOO_FEW_EDGES, edges=len(edges))
+        return NadirResult(codes.DetectResult.TOO_FEW_EDGES, edges=len(edges))
     with meter.phase("undistort"):
         corrected = config.table.correct(edges.offsets(), meter)
-        points = corrected.astype(np.float32) / HUNDREDTHS
+        points = corrected.astype(np.float32) / arithmetic.HUNDREDTHS
         meter.charge(f32_convert=2 * len(points), f32_div=2 * len(points))
     with meter.phase("fit"):
         circle, used = _fit(points, config, meter)
         dropped = len(edges) - used
         if circle is None:
-            return NadirResult(DetectResult.BAD_FIT, edges=used, dropped=dropped)
+            return NadirResult(codes.DetectResult.BAD_FIT, edges=used, dropped=dropped)
         centre, radius_deg = _on_the_sky(circle, config.projection, meter)
         low, high = config.radius_deg
         meter.charge(f32_compare=4)
         in_range = bool(np.all(np.abs(centre) <= LARGEST_PX))
         if not (in_range and low <= radius_deg <= high):
-            detect = DetectResult.BAD_FIT
+            detect = codes.DetectResult.BAD_FIT
             return NadirResult(detect, edges=used, dropped=dropped, radius_deg=radius_deg)
         meter.charge(f32_mul=2, f32_convert=2)
-        position = to_int16(centre * HUNDREDTHS)
+        position = arithmetic.to_int16(centre * arithmetic.HUNDREDTHS)
         angle = angle_of(position, meter)
     return NadirResult(
-        DetectResult.SUCCESS,
+        codes.DetectResult.SUCCESS,
         int(position[0]),
         int(position[1]),
         int(angle[0]),
@@ -149,7 +141,7 @@ def _fit(points: Values, config: NadirConfig, meter: Meter) -> tuple[Circle | No
         square = circle.residuals(points, meter) ** 2
         count = len(points)
         meter.charge(f32_mul=count + 1, f32_add=count, f32_compare=count + 1, f32_div=1)
-        if sequential_sum(square) / np.float32(count) <= limit:
+        if arithmetic.sequential_sum(square) / np.float32(count) <= limit:
             return circle, count
         if count == fewest:
             return None, count
@@ -163,7 +155,7 @@ def _on_the_sky(circle: Circle, projection: Projection, meter: Meter) -> tuple[V
     centre = np.array([circle.x, circle.y], np.float32)
     if projection is Projection.EQUIDISTANT:
         meter.charge(f32_div=1)
-        return centre, float(circle.radius / np.float32(PIXELS_PER_DEGREE))
+        return centre, float(circle.radius / np.float32(codes.PIXELS_PER_DEGREE))
     f = FOCAL_PX
     power = circle.power
     distance = np.sqrt(circle.x * circle.x + circle.y * circle.y)

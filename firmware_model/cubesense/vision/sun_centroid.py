@@ -25,19 +25,13 @@ from cubestack.firmware_model.cubesense.vision.arithmetic import sequential_sum
 from cubestack.firmware_model.cubesense.vision.distortion import RIM_PX, RadiusTable
 from cubestack.firmware_model.cubesense.vision.masks import Mask, masked
 from cubestack.firmware_model.cubesense.vision.nadir import angle_of
-from cubestack.firmware_model.interface.cubesense.codes import LARGEST_ANGLE_DEG, DetectResult
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    FULL_SIZE,
-    SUN_NOT_FOUND,
-    SUN_RUN,
-    ReadOut,
-)
+from cubestack.firmware_model.interface.cubesense import codes, fpga
 from cubestack.firmware_model.mcu.costs import Meter
 
 COORDINATE_BYTES = 4
 """x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
 
-_LARGEST_ANGLE = LARGEST_ANGLE_DEG * 100
+_LARGEST_ANGLE = codes.LARGEST_ANGLE_DEG * 100
 """In 1/100 deg; only another lens images anything beyond."""
 
 
@@ -58,7 +52,7 @@ class SunConfig:
     threshold: int = 225
     boresight: tuple[float, float] = (369.0, 250.0)
     masks: Sequence[Mask] = ()
-    min_pixels: int = SUN_RUN + 1
+    min_pixels: int = fpga.SUN_RUN + 1
     whole_chords: bool = True
 
 
@@ -73,7 +67,7 @@ class SunResult:
         pixels: that reached the threshold.
     """
 
-    detect: DetectResult
+    detect: codes.DetectResult
     x: int = 0
     y: int = 0
     alpha: int = 0
@@ -81,13 +75,16 @@ class SunResult:
     pixels: int = 0
 
 
-def window_bytes(read_out: ReadOut = FULL_SIZE) -> int:
+def window_bytes(read_out: fpga.ReadOut = fpga.FULL_SIZE) -> int:
     """Bytes that the FPGA hands out: coordinates and window."""
     return COORDINATE_BYTES + read_out.window**2
 
 
 def find_sun(
-    data: NDArray[np.uint8], config: SunConfig, meter: Meter, read_out: ReadOut = FULL_SIZE
+    data: NDArray[np.uint8],
+    config: SunConfig,
+    meter: Meter,
+    read_out: fpga.ReadOut = fpga.FULL_SIZE,
 ) -> SunResult:
     """Measure in the bytes of one window read-out; phases: `centroid` and `undistort`.
 
@@ -104,8 +101,8 @@ def find_sun(
     window = data[COORDINATE_BYTES:].reshape(read_out.window, read_out.window)
     with meter.phase("centroid"):
         meter.charge(i16_add=8)
-        if first == SUN_NOT_FOUND:
-            return SunResult(DetectResult.SUN_NOT_FOUND)
+        if first == fpga.SUN_NOT_FOUND:
+            return SunResult(codes.DetectResult.SUN_NOT_FOUND)
         meter.charge(i8=window.size, loop16=read_out.window)
         rows, columns = np.nonzero(window >= config.threshold)
         kept = ~masked(columns + origin[0], rows + origin[1], config.masks, meter)
@@ -113,7 +110,7 @@ def find_sun(
         pixels = len(rows)
         meter.charge(i8=1)
         if pixels < config.min_pixels:
-            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
+            return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
         _charge_sums(pixels, meter)
         values = window[rows, columns]
         mean = np.array(
@@ -129,15 +126,15 @@ def find_sun(
         meter.charge(f32_convert=2, i16_add=6)
         across, down = (int(value) for value in offset)
         if across * across + down * down > RIM_PX * RIM_PX:
-            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
+            return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
     with meter.phase("undistort"):
         centre = config.table.correct(offset[None], meter)[0]
         angle = angle_of(centre, meter)
         meter.charge(i16_add=4)
         if np.abs(angle).max() > _LARGEST_ANGLE:
-            return SunResult(DetectResult.SUN_NOT_FOUND, pixels=pixels)
+            return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
     x, y, alpha, beta = (int(value) for value in (*centre, *angle))
-    return SunResult(DetectResult.SUCCESS, x, y, alpha, beta, pixels)
+    return SunResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, pixels)
 
 
 def _charge_sums(pixels: int, meter: Meter) -> None:

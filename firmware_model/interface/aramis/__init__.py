@@ -5,7 +5,6 @@ CubeSpace family's nodes; I2C address, baud rate, IDs and layouts are assumed.
 """
 
 from cubestack.firmware_model.interface.aramis.codes import (
-    AckError,
     CatalogueState,
     LatchUpStep,
     MeasurementMode,
@@ -25,6 +24,7 @@ from cubestack.firmware_model.interface.aramis.telecommands import (
 )
 from cubestack.firmware_model.interface.aramis.telemetry import PHASES, TELEMETRY
 from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 
 __all__ = [
     "BLOCK_BYTES",

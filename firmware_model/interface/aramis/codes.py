@@ -6,21 +6,6 @@ are what its use case for the attitude asks for (section 2.2).
 
 from enum import IntEnum
 
-from cubestack.firmware_model.interface.codec.node_codes import AckError
-
-__all__ = [
-    "AckError",
-    "CatalogueState",
-    "LatchUpStep",
-    "MeasurementMode",
-    "MeasurementOutcome",
-    "OnOff",
-    "Reason",
-    "ResetCause",
-    "SensorState",
-    "SpikeMethod",
-]
-
 
 class SensorState(IntEnum):
     """What the star tracker is doing."""

@@ -14,17 +14,12 @@ from cubestack.firmware_model.interface.aramis.codes import (
     OnOff,
     SpikeMethod,
 )
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    COLUMNS,
-    HIGHEST_GAIN,
-    REGISTERS,
-    ROWS,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 
 #: Bytes of a picture: one for each pixel, row after row.
-IMAGE_BYTES = COLUMNS * ROWS
+IMAGE_BYTES = mt9m001.COLUMNS * mt9m001.ROWS
 
 #: Bytes that a block of a picture or of the catalogue has.
 BLOCK_BYTES = 128
@@ -113,11 +108,13 @@ _EXTENSIONS = (
     Message(101, "StopLoop", "stop measuring again and again"),
     Message(102, "SetExposure", "exposure of the image sensor").of(
         u16("Rows", "row times of 31.75 us", "rows", reset=_DEFAULT_EXPOSURE_ROWS).within(
-            1, REGISTERS["SHUTTER_WIDTH"].field("ROWS").mask
+            1, mt9m001.REGISTERS["SHUTTER_WIDTH"].field("ROWS").mask
         )
     ),
     Message(103, "SetGain", "gain of the image sensor; it takes the nearest that it has").of(
-        u8("Gain", "amplification", scale=8, reset=HIGHEST_GAIN).within(1, HIGHEST_GAIN)
+        u8("Gain", "amplification", scale=8, reset=mt9m001.HIGHEST_GAIN).within(
+            1, mt9m001.HIGHEST_GAIN
+        )
     ),
     Message(104, "SetDetection", "search for stars").of(
         u8(

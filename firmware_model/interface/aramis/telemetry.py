@@ -6,20 +6,12 @@ there is none. IDs and layouts are assumed; those from 200 on have no use case b
 
 from dataclasses import replace
 
-from cubestack.firmware_model.interface.aramis.codes import (
-    AckError,
-    CatalogueState,
-    MeasurementMode,
-    MeasurementOutcome,
-    OnOff,
-    Reason,
-    ResetCause,
-    SensorState,
-)
+from cubestack.firmware_model.interface.aramis import codes
 from cubestack.firmware_model.interface.aramis.flags import flag_fields
 from cubestack.firmware_model.interface.aramis.telecommands import BLOCK_BYTES, TELECOMMANDS
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 
 #: Steps of a measurement, in the order of telemetry PhaseTimes, with their meanings.
 PHASES = {
@@ -65,7 +57,7 @@ _NODE = (
     ),
     Message(129, "ExtendedIdentification", "the unit and its traffic").of(
         u16("SerialNumber", "of the unit"),
-        enum8("ResetCause", "why the program started", choices=ResetCause),
+        enum8("ResetCause", "why the program started", choices=codes.ResetCause),
         u16("TcmdCount", "accepted telecommands, wraps"),
         u16("TlmCount", "answered telemetry, wraps"),
     ),
@@ -81,10 +73,10 @@ _NODE = (
         enum8("Error", "its error code", choices=AckError),
     ),
     Message(132, "SensorStatus", "what the star tracker does").of(
-        enum8("State", "state", choices=SensorState),
-        enum8("Catalogue", "its catalogue", choices=CatalogueState),
-        enum8("CameraSupply", "switch of the camera unit", choices=OnOff),
-        enum8("Loop", "measuring again and again", choices=OnOff),
+        enum8("State", "state", choices=codes.SensorState),
+        enum8("Catalogue", "its catalogue", choices=codes.CatalogueState),
+        enum8("CameraSupply", "switch of the camera unit", choices=codes.OnOff),
+        enum8("Loop", "measuring again and again", choices=codes.OnOff),
         u8("TimeSet", "1: the clock was set"),
     ),
     Message(133, "SystemTime", "the clock").of(
@@ -98,9 +90,9 @@ _RESULTS = (
         *_time("mid-exposure of the latest measurement's picture"),
         u32("ImageUptime", "the same since power-up, wraps", "ms"),
         u32("FrameCounter", "number of that picture since power-up"),
-        enum8("Outcome", "outcome", choices=MeasurementOutcome),
-        enum8("Reason", "why", choices=Reason),
-        enum8("Mode", "mode", choices=MeasurementMode),
+        enum8("Outcome", "outcome", choices=codes.MeasurementOutcome),
+        enum8("Reason", "why", choices=codes.Reason),
+        enum8("Mode", "mode", choices=codes.MeasurementMode),
         u8("Valid", "1: that picture gave the quaternion, else an older one"),
         u8("Matched", "stars that the quaternion rests on"),
         u8("Detected", "stars in the picture"),
@@ -108,7 +100,7 @@ _RESULTS = (
     Message(135, "BodyAttitude", "the latest attitude of the spacecraft").of(
         *_quaternion("v_body = q v_inertial q*"),
         *_time("mid-exposure of the latest measurement's picture"),
-        enum8("Reason", "why", choices=Reason),
+        enum8("Reason", "why", choices=codes.Reason),
         u8("Valid", "as in Attitude"),
     ),
     Message(136, "Boresight", "direction of the latest attitude").of(
@@ -123,7 +115,7 @@ _REPORTS = (
         *(u32(name, meaning, "us") for name, meaning in PHASES.items())
     ),
     Message(201, "CatalogueStatus", "the catalogue and its errors").of(
-        enum8("State", "state", choices=CatalogueState),
+        enum8("State", "state", choices=codes.CatalogueState),
         u16("Stars", "in the catalogue"),
         u32("Triangles", "in the catalogue"),
         u32("Bytes", "of its image", "bytes"),
@@ -151,7 +143,7 @@ _REPORTS = (
         u8("Valid", "1: the sensor answered"),
     ),
     Message(205, "LoopStatus", "measuring again and again").of(
-        enum8("Running", "the loop", choices=OnOff),
+        enum8("Running", "the loop", choices=codes.OnOff),
         u16("Period", "of the loop", "ms"),
         u32("Iterations", "since power-up"),
         u16("LateIterations", "that began more than 10 ms after their time"),
@@ -180,7 +172,8 @@ _REPORTS = (
     Message(
         209, "SupplyStatus", "the camera unit's supply; whoever asks decides what a latch-up is"
     ).of(
-        enum8("Switch", "switch", choices=OnOff), u16("Current", "present current", "mA", scale=10)
+        enum8("Switch", "switch", choices=codes.OnOff),
+        u16("Current", "present current", "mA", scale=10),
     ),
 )
 

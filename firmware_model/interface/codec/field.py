@@ -22,22 +22,6 @@ from enum import IntEnum
 from functools import partial
 from typing import Self, SupportsFloat
 
-__all__ = [
-    "Choices",
-    "Field",
-    "InterfaceError",
-    "Value",
-    "bool1",
-    "enum8",
-    "f32",
-    "flags_at",
-    "i16",
-    "suggestion",
-    "u8",
-    "u16",
-    "u32",
-]
-
 #: A field's value: bool for bool1, bytes for bytesN, a number for all others.
 Value = int | float | bool | bytes
 

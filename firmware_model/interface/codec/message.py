@@ -22,17 +22,6 @@ from cubestack.firmware_model.interface.codec.field import (
 from cubestack.firmware_model.interface.codec.letters import LetterProtocol
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap
 
-__all__ = [
-    "TELEMETRY_BIT",
-    "Confidence",
-    "Field",
-    "Interface",
-    "InterfaceError",
-    "Kind",
-    "Message",
-    "Value",
-]
-
 #: Set in the IDs of telemetry, clear in those of telecommands.
 TELEMETRY_BIT = 0x80
 

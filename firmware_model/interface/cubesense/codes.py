@@ -10,33 +10,9 @@ from enum import IntEnum
 from functools import reduce
 from operator import xor
 
-from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.cameras import ov7620
 
-__all__ = [
-    "COLUMNS",
-    "EDGES_PER_FRAME",
-    "EDGE_UNIT",
-    "EMPTY_FRAME",
-    "FRAME_BYTES",
-    "IMAGE_BYTES",
-    "LARGEST_ANGLE_DEG",
-    "MASK_AREAS",
-    "PIXELS_PER_DEGREE",
-    "ROWS",
-    "Camera",
-    "CaptureResult",
-    "DetectResult",
-    "ImageLocation",
-    "ImageSize",
-    "Measurement",
-    "NadirSearch",
-    "ResetTarget",
-    "Sram",
-    "SramSelection",
-    "checksum",
-    "coefficient",
-    "split_coefficient",
-]
+COLUMNS, ROWS = ov7620.COLUMNS, ov7620.ROWS
 
 #: Bytes of a picture, row after row.
 IMAGE_BYTES = COLUMNS * ROWS

@@ -4,18 +4,12 @@ from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EDGE_UNIT,
-    EDGES_PER_FRAME,
-    Camera,
-    NadirSearch,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 
 _extension = partial(Message, extension=True)
 
 
-def _details(camera: Camera) -> Message:
+def _details(camera: codes.Camera) -> Message:
     return _extension(
         220 + camera,
         f"Details{camera + 1}",
@@ -25,14 +19,14 @@ def _details(camera: Camera) -> Message:
         i16("Y", "centre from the boresight, undistorted row", "px", 100),
         u16("Radius", "fitted circle, undistorted; 0 for the Sun", "px", 100),
         u8("Points", "edges of the fit, or Sun pixels of the mean"),
-        u8("Sram", "memory that held the picture", choices=Sram),
+        u8("Sram", "memory that held the picture", choices=codes.Sram),
         u16("FirstX", "first Sun pixel's column; 0 for the nadir camera", "px"),
         u16("FirstY", "first Sun pixel's row; 0 for the nadir camera", "px"),
         u32("PixelsRead", "pixels that the processor read from the FPGA"),
     )
 
 
-def _times(camera: Camera) -> Message:
+def _times(camera: codes.Camera) -> Message:
     phases = (
         ("Wait", "from the start until the picture's first row arrives"),
         ("Store", "while the picture is stored"),
@@ -48,16 +42,16 @@ def _times(camera: Camera) -> Message:
 
 
 def _edges(part: int) -> Message:
-    first = part * EDGES_PER_FRAME + 1
-    last = first + EDGES_PER_FRAME - 1
+    first = part * codes.EDGES_PER_FRAME + 1
+    last = first + codes.EDGES_PER_FRAME - 1
     coordinates = [
         i16(
             f"{axis}{first + index}",
             f"{line} of edge {first + index} in the picture; 0 where there is none",
             "px",
-            EDGE_UNIT,
+            codes.EDGE_UNIT,
         )
-        for index in range(EDGES_PER_FRAME)
+        for index in range(codes.EDGES_PER_FRAME)
         for axis, line in (("X", "column"), ("Y", "row"))
     ]
     return _extension(
@@ -68,10 +62,10 @@ def _edges(part: int) -> Message:
 
 
 EXTENSIONS = (
-    *(_details(camera) for camera in Camera),
-    *(_times(camera) for camera in Camera),
+    *(_details(camera) for camera in codes.Camera),
+    *(_times(camera) for camera in codes.Camera),
     _extension(224, "NadirSearchMode", "how the nadir camera's edges are looked for").of(
-        u8("Search", "way of the search", choices=NadirSearch)
+        u8("Search", "way of the search", choices=codes.NadirSearch)
     ),
     *(_edges(part) for part in range(2)),
 )

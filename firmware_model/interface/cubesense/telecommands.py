@@ -11,19 +11,7 @@ from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    MASK_AREAS,
-    ROWS,
-    Camera,
-    ImageLocation,
-    ImageSize,
-    NadirSearch,
-    ResetTarget,
-    Sram,
-    SramSelection,
-    split_coefficient,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 
 #: r_d = sum of DISTORTION[k] r_u^k, both radii in px from the boresight.
 DISTORTION = (0.1036, 0.9953, 7.6076e-5, -2.5572e-6, 0.0)
@@ -34,30 +22,30 @@ _high = partial(Message, confidence=Confidence.HIGH)
 _medium = partial(Message, confidence=Confidence.MEDIUM)
 _low = partial(Message, confidence=Confidence.LOW)
 
-_NAMES = {Camera.SUN: "the Sun camera", Camera.NADIR: "the nadir camera"}
-_THRESHOLDS = {Camera.SUN: 225, Camera.NADIR: 70}
-_EXPOSURES = {Camera.SUN: 1, Camera.NADIR: 4}
-_BORESIGHTS = {Camera.SUN: (369.0, 250.0), Camera.NADIR: (371.0, 236.0)}
+_NAMES = {codes.Camera.SUN: "the Sun camera", codes.Camera.NADIR: "the nadir camera"}
+_THRESHOLDS = {codes.Camera.SUN: 225, codes.Camera.NADIR: 70}
+_EXPOSURES = {codes.Camera.SUN: 1, codes.Camera.NADIR: 4}
+_BORESIGHTS = {codes.Camera.SUN: (369.0, 250.0), codes.Camera.NADIR: (371.0, 236.0)}
 
 
 def _camera() -> Field:
-    return u8("Camera", "camera that takes the picture", choices=Camera)
+    return u8("Camera", "camera that takes the picture", choices=codes.Camera)
 
 
 def _sram(meaning: str) -> Field:
-    return u8("Sram", meaning, choices=Sram)
+    return u8("Sram", meaning, choices=codes.Sram)
 
 
 def _location() -> Field:
     return u8(
         "Location",
         "half of the memory; one picture fills it",
-        choices=ImageLocation,
-        maximum=ImageLocation.TOP,
+        choices=codes.ImageLocation,
+        maximum=codes.ImageLocation.TOP,
     )
 
 
-def _of_camera(camera: Camera) -> tuple[Message, ...]:
+def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
     """Settings of a camera; the tables number cameras from 1."""
     number, name = camera + 1, _NAMES[camera]
     x, y = _BORESIGHTS[camera]
@@ -87,19 +75,19 @@ def _of_camera(camera: Camera) -> tuple[Message, ...]:
             f"Boresight{number}",
             f"pixel of the optical axis of camera {number}, {name}",
         ).of(
-            u16("X", "column", "px", 100, maximum=COLUMNS - 1, reset=x),
-            u16("Y", "row", "px", 100, maximum=ROWS - 1, reset=y),
+            u16("X", "column", "px", 100, maximum=codes.COLUMNS - 1, reset=x),
+            u16("Y", "row", "px", 100, maximum=codes.ROWS - 1, reset=y),
         ),
         _low(
             52 + camera,
             f"Mask{number}",
             f"area that detection ignores, camera {number}; ends included, all 0: none",
         ).of(
-            u8("Area", "number of the area", reset=1).within(1, MASK_AREAS),
-            u16("XMin", "first column", "px", maximum=COLUMNS - 1),
-            u16("XMax", "last column", "px", maximum=COLUMNS - 1),
-            u16("YMin", "first row", "px", maximum=ROWS - 1),
-            u16("YMax", "last row", "px", maximum=ROWS - 1),
+            u8("Area", "number of the area", reset=1).within(1, codes.MASK_AREAS),
+            u16("XMin", "first column", "px", maximum=codes.COLUMNS - 1),
+            u16("XMax", "last column", "px", maximum=codes.COLUMNS - 1),
+            u16("YMin", "first row", "px", maximum=codes.ROWS - 1),
+            u16("YMax", "last row", "px", maximum=codes.ROWS - 1),
             ordered=(("XMin", "XMax"), ("YMin", "YMax")),
         ),
         _low(
@@ -112,7 +100,7 @@ def _of_camera(camera: Camera) -> tuple[Message, ...]:
 
 def _coefficients() -> Iterator[Field]:
     for power, value in enumerate(DISTORTION):
-        mantissa, exponent = split_coefficient(value)
+        mantissa, exponent = codes.split_coefficient(value)
         meaning = f"of the factor of r_u^{power}; signed is ours"
         yield i16(f"Mantissa{power}", meaning, reset=mantissa)
         yield u8(f"Exponent{power}", "negative power of ten; ours", reset=exponent)
@@ -120,13 +108,18 @@ def _coefficients() -> Iterator[Field]:
 
 _COMMON = (
     _high(0, "Reset", "restart a part of the node").of(
-        u8("Target", "what restarts", choices=ResetTarget, reset=ResetTarget.COMMUNICATION)
+        u8(
+            "Target",
+            "what restarts",
+            choices=codes.ResetTarget,
+            reset=codes.ResetTarget.COMMUNICATION,
+        )
     ),
     _low(
         11,
         "ClearOverCurrent",
         "clear over-current flags of the memories, and switch those on again",
-    ).of(u8("Selection", "which memories", choices=SramSelection)),
+    ).of(u8("Selection", "which memories", choices=codes.SramSelection)),
     _high(
         20, "CaptureAndDetect", "take a picture and measure in it; results become pending at once"
     ).of(_camera(), _sram("memory that stores it")),
@@ -136,7 +129,7 @@ _COMMON = (
     _high(64, "StartImageDownload", "select a picture and its size, and prepare frame 0").of(
         _sram("memory that is read"),
         _location(),
-        u8("Size", "side of the square", choices=ImageSize),
+        u8("Size", "side of the square", choices=codes.ImageSize),
     ),
     _high(
         65, "NextImageFrame", "prepare a frame of the picture that StartImageDownload selected"
@@ -144,17 +137,17 @@ _COMMON = (
         u16(
             "Frame",
             "number from 0, row after row; must exist in the selected size",
-            maximum=ImageSize.SIDE_1024.frames - 1,
+            maximum=codes.ImageSize.SIDE_1024.frames - 1,
         )
     ),
     Message(
         100, "SetNadirSearch", "how the nadir camera's edges are looked for", extension=True
-    ).of(u8("Search", "way of the search", choices=NadirSearch)),
+    ).of(u8("Search", "way of the search", choices=codes.NadirSearch)),
 )
 
 TELECOMMANDS = tuple(
     sorted(
-        (*_COMMON, *_of_camera(Camera.SUN), *_of_camera(Camera.NADIR)),
+        (*_COMMON, *_of_camera(codes.Camera.SUN), *_of_camera(codes.Camera.NADIR)),
         key=lambda message: message.id,
     )
 )

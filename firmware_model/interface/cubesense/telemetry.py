@@ -11,18 +11,7 @@ from functools import partial
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    EMPTY_FRAME,
-    FRAME_BYTES,
-    LARGEST_ANGLE_DEG,
-    MASK_AREAS,
-    ROWS,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.extensions import EXTENSIONS
 
 _high = partial(Message, confidence=Confidence.HIGH)
@@ -30,38 +19,38 @@ _medium = partial(Message, confidence=Confidence.MEDIUM)
 _low = partial(Message, confidence=Confidence.LOW)
 
 #: ID of a camera's result.
-RESULTS: Mapping[Camera, int] = {Camera.SUN: 148, Camera.NADIR: 149}
+RESULTS: Mapping[codes.Camera, int] = {codes.Camera.SUN: 148, codes.Camera.NADIR: 149}
 
 #: ID of a result that, once it is read, makes the node capture and detect again: with which camera
 #: (whose result it is) and into which memory.
-SCHEDULES: Mapping[int, tuple[Camera, Sram]] = {
-    150: (Camera.SUN, Sram.SRAM1),
-    151: (Camera.NADIR, Sram.SRAM2),
-    152: (Camera.SUN, Sram.SRAM2),
-    153: (Camera.NADIR, Sram.SRAM1),
+SCHEDULES: Mapping[int, tuple[codes.Camera, codes.Sram]] = {
+    150: (codes.Camera.SUN, codes.Sram.SRAM1),
+    151: (codes.Camera.NADIR, codes.Sram.SRAM2),
+    152: (codes.Camera.SUN, codes.Sram.SRAM2),
+    153: (codes.Camera.NADIR, codes.Sram.SRAM1),
 }
 
 
 def _angle(name: str, meaning: str) -> Field:
-    return i16(name, meaning, "deg", 100).within(-LARGEST_ANGLE_DEG, LARGEST_ANGLE_DEG)
+    return i16(name, meaning, "deg", 100).within(-codes.LARGEST_ANGLE_DEG, codes.LARGEST_ANGLE_DEG)
 
 
 #: Fields of every result.
 _RESULT = (
     _angle("Alpha", "angle along the rows, x to the right"),
     _angle("Beta", "angle along the columns, y downwards"),
-    u8("Capture", "what became of the capture", choices=CaptureResult),
+    u8("Capture", "what became of the capture", choices=codes.CaptureResult),
     u8(
         "Detect",
         "what became of the detection; angles count with SUCCESS only",
-        choices=DetectResult,
+        choices=codes.DetectResult,
     ),
 )
 
 
 def _configuration_fields() -> tuple[Field, ...]:
-    fields = [u8(f"Threshold{camera + 1}", "detection threshold", "DN") for camera in Camera]
-    for camera in Camera:
+    fields = [u8(f"Threshold{camera + 1}", "detection threshold", "DN") for camera in codes.Camera]
+    for camera in codes.Camera:
         number = camera + 1
         fields += [
             u8(f"AutoAdjust{number}", "1: the camera adjusts itself"),
@@ -73,8 +62,13 @@ def _configuration_fields() -> tuple[Field, ...]:
     return tuple(fields)
 
 
-def _mask(camera: Camera) -> Message:
-    limits = (("XMin", COLUMNS), ("XMax", COLUMNS), ("YMin", ROWS), ("YMax", ROWS))
+def _mask(camera: codes.Camera) -> Message:
+    limits = (
+        ("XMin", codes.COLUMNS),
+        ("XMax", codes.COLUMNS),
+        ("YMin", codes.ROWS),
+        ("YMax", codes.ROWS),
+    )
     return _medium(
         200 + camera,
         f"Masks{camera + 1}",
@@ -88,7 +82,7 @@ def _mask(camera: Camera) -> Message:
                 "px",
                 maximum=size - 1,
             )
-            for area in range(MASK_AREAS)
+            for area in range(codes.MASK_AREAS)
             for name, size in limits
         )
     )
@@ -132,13 +126,13 @@ _STATE = (
     ),
     _high(168, "Configuration", "thresholds and camera settings").of(*_configuration_fields()),
     _high(192, "ImageFrame", "the frame that is ready").of(
-        Field(f"bytes{FRAME_BYTES}", "Frame", "pixels, row after row")
+        Field(f"bytes{codes.FRAME_BYTES}", "Frame", "pixels, row after row")
     ),
     _high(193, "ImageFrameInfo", "which frame is ready").of(
-        u16("FrameNumber", "65535 (ours): none is ready yet", reset=EMPTY_FRAME),
+        u16("FrameNumber", "65535 (ours): none is ready yet", reset=codes.EMPTY_FRAME),
         u8("Checksum", "exclusive or of the frame's bytes (ours)"),
     ),
-    *(_mask(camera) for camera in Camera),
+    *(_mask(camera) for camera in codes.Camera),
 )
 
 TELEMETRIES = (

@@ -7,8 +7,8 @@ through a page (SetCameraRegisterPage); telemetry 138 is answered as an unknown 
 """
 
 from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubestar.codes import (
-    AckError,
     GridSize,
     IdMode,
     ImageBlockSize,

@@ -6,21 +6,6 @@ is marked so.
 
 from enum import IntEnum
 
-from cubestack.firmware_model.interface.codec.node_codes import AckError
-
-__all__ = [
-    "AckError",
-    "GridSize",
-    "IdMode",
-    "ImageBlockSize",
-    "MatchMode",
-    "MemoryTest",
-    "ResetCause",
-    "SwitchState",
-    "TaskStatus",
-    "TestPattern",
-]
-
 
 class TaskStatus(IntEnum):
     """What the node last did, telemetry TaskStatus."""

@@ -10,12 +10,7 @@ import math
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.cubestar.codes import (
-    GridSize,
-    IdMode,
-    ImageBlockSize,
-    TestPattern,
-)
+from cubestack.firmware_model.interface.cubestar import codes
 
 #: Bytes of a picture: one for each pixel, row after row.
 IMAGE_BYTES = COLUMNS * ROWS
@@ -127,7 +122,7 @@ _IMAGE = (
         enum8(
             "TestPaternType",
             "pattern: column, row, or their sum, modulo 256",
-            choices=TestPattern,
+            choices=codes.TestPattern,
             range_flag="TestPatternConfigError",
         )
     ),
@@ -139,19 +134,19 @@ _IMAGE = (
         u16(
             "BlockNumber",
             "block of the picture, row after row",
-            maximum=IMAGE_BYTES // ImageBlockSize.BYTES_32.length - 1,
+            maximum=IMAGE_BYTES // codes.ImageBlockSize.BYTES_32.length - 1,
             maximum_by=(
                 "BlockSize",
-                {size: IMAGE_BYTES // size.length - 1 for size in ImageBlockSize},
+                {size: IMAGE_BYTES // size.length - 1 for size in codes.ImageBlockSize},
             ),
             range_flag="ImageBlockSizeError",
         ),
         enum8(
             "BlockSize",
             "size; a shorter one fills the front of ImageBlock, 256 bytes come as two reads",
-            choices=ImageBlockSize,
+            choices=codes.ImageBlockSize,
             range_flag="ImageBlockSizeError",
-            reset=ImageBlockSize.BYTES_128,
+            reset=codes.ImageBlockSize.BYTES_128,
         ),
     ),
     Message(
@@ -194,9 +189,9 @@ _DETECTION = (
             "GridSize",
             "side of the centroiding window",
             "px",
-            choices=GridSize,
+            choices=codes.GridSize,
             range_flag="CentroidingGridSizeSetError",
-            reset=GridSize.GRID_5,
+            reset=codes.GridSize.GRID_5,
         ),
         u8("MaxStars", "stars found", reset=20).within(2, 20, "MaxStarsSetError"),
         u8("MaxInvalidStars", "more areas than this were too large", reset=50),
@@ -212,9 +207,9 @@ _IDENTIFICATION = (
         enum8(
             "IdMode",
             "tracking starts with an assisted match from setTrackingMode until the first fix",
-            choices=IdMode,
+            choices=codes.IdMode,
             range_flag="SetIDModeError",
-            reset=IdMode.LOST_IN_SPACE,
+            reset=codes.IdMode.LOST_IN_SPACE,
         )
     ),
     Message(26, "setTrackingMode", "rough boresight for the assisted match").of(

@@ -22,13 +22,7 @@ from cubestack.firmware_model.interface.codec.field import (
     u32,
 )
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.cubestar.codes import (
-    IdMode,
-    MemoryTest,
-    ResetCause,
-    SwitchState,
-    TaskStatus,
-)
+from cubestack.firmware_model.interface.cubestar import codes
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 
 _UNIT_VECTOR_SCALE = 10_000
@@ -48,11 +42,11 @@ def _currents() -> tuple[Field, ...]:
 
 
 def _switch(name: str) -> Field:
-    return u8(name, "load switch of imager and frame buffer", choices=SwitchState)
+    return u8(name, "load switch of imager and frame buffer", choices=codes.SwitchState)
 
 
 def _task(name: str) -> Field:
-    return enum8(name, "what the node last did", choices=TaskStatus)
+    return enum8(name, "what the node last did", choices=codes.TaskStatus)
 
 
 def _temperature(name: str) -> Field:
@@ -109,7 +103,7 @@ _NODE = (
     Message(129, "ExtendedIdentification", "serial number and counters").of(
         u16("SerialNumber", "serial number"),
         _temperature("Temperature"),
-        enum8("ResetCause", "why the processor started", choices=ResetCause),
+        enum8("ResetCause", "why the processor started", choices=codes.ResetCause),
         u16("WDGResetCount", "resets by the watchdog"),
         u16("TcmdCount", "telecommands accepted, modulo 65536"),
         u16("TlmCount", "telemetry requests answered, modulo 65536"),
@@ -129,7 +123,7 @@ _NODE = (
         )
     ),
     Message(134, "SRAMTestResults", "result of TestSRAM").of(
-        u8("TestResult", "latest result", choices=MemoryTest)
+        u8("TestResult", "latest result", choices=codes.MemoryTest)
     ),
     Message(135, "PowerStatus", "switched supply of imager and frame buffer").of(
         _switch("Status"), *_currents()
@@ -246,7 +240,7 @@ _DETECTION = (
 
 _IDENTIFICATION = (
     Message(155, "IDMode", "identification mode that is set").of(
-        enum8("Mode", "mode", choices=IdMode)
+        enum8("Mode", "mode", choices=codes.IdMode)
     ),
     Message(156, "IDMargin", "tolerance of the distance between two stars").of(
         u8("Margin", "tolerance", "rad", 10_000)
@@ -307,7 +301,7 @@ _ATTITUDE = (
         u8("StarImageNoise", "areas that were too small"),
         u8("InvalidStars", "areas that were too large"),
         u8("NumberOfStarsID", "stars identified"),
-        enum8("Idmode", "identification mode that is set", choices=IdMode),
+        enum8("Idmode", "identification mode that is set", choices=codes.IdMode),
         u8("ImageDarkValue", "mean of the searched pixels below the threshold", "DN"),
         bool1("ImageCaptureSuccess", "a picture was stored"),
         bool1("DetectionSuccess", "stars were detected"),
@@ -366,7 +360,7 @@ _LOG = (
         u8("Detected", "stars detected"),
         u8("Invalid", "areas that were too large"),
         u8("Noise", "areas that were too small"),
-        u8("IDMode", "identification mode that is set", choices=IdMode),
+        u8("IDMode", "identification mode that is set", choices=codes.IdMode),
         u8("ID", "stars identified"),
     ),
 )

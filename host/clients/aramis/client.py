@@ -24,7 +24,7 @@ from cubestack.firmware_model.interface.aramis import (
     SensorState,
 )
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
-from cubestack.firmware_model.interface.codec.message import Value
+from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.clients.contract import DeviceClient, Progress
 from cubestack.host.clients.quaternions import unit_quaternion
 from cubestack.host.errors import StepFailedError, TargetError

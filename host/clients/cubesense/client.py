@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.codec.message import Value
+from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubesense.codes import (
     EDGES_PER_FRAME,
     MASK_AREAS,

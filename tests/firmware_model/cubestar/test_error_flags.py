@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.firmware_model.interface.codec.message import Field, Message
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError, IdMode
 from cubestack.firmware_model.interface.cubestar.flags import NEVER_RAISED
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH

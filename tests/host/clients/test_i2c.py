@@ -2,7 +2,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.firmware_model.interface.codec.message import InterfaceError
+from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.errors import CommandRefusedError, NoAnswerError

@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.firmware_model.interface.codec.message import InterfaceError, Message
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import MAX_READS, NodeClient
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import InterfaceError, bool1, i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
-from cubestack.firmware_model.interface.cubestar.codes import AckError
 
 MIXED = Message(200, "Mixed", "").of(
     u8("a", ""), bool1("b", ""), bool1("c", "", gap=6), i16("d", "", scale=100), u32("e", "")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.firmware_model.interface.codec.message import Value
+from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize, TaskStatus
 
 PRINTED = Path(__file__).with_name("printed_layouts.txt").read_text(encoding="ascii")
