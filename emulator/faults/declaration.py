@@ -62,17 +62,10 @@ def place(text: str, high: float) -> Any:
     return field(default=None, metadata={"parameter": Parameter(text, "", 0, high, drawn=True)})
 
 
-def choice(default: str | None, text: str, *choices: str) -> Any:
+def choice(default: str | bool | None, text: str, *choices: str) -> Any:
     """A field that is one of some texts; without choices any text, drawn when left out."""
     parameter = Parameter(text, choices=choices or None, drawn=default is None)
     return field(default=default, metadata={"parameter": parameter})
-
-
-def flag(default: bool, text: str) -> Any:
-    """A field that is true or false."""
-    return field(
-        default=default, metadata={"parameter": Parameter(text, choices=("false", "true"))}
-    )
 
 
 @dataclass(frozen=True)
@@ -87,7 +80,11 @@ class Fault:
 
     kind: ClassVar[str]
     site: ClassVar[Site]
-    momentary: ClassVar[bool] = False
+    momentary: ClassVar[bool]
+
+    def __init_subclass__(cls, kind: str, site: Site, momentary: bool = False) -> None:
+        """Declare what does not differ between two of a kind."""
+        cls.kind, cls.site, cls.momentary = kind, site, momentary
 
     def __post_init__(self) -> None:
         """Refuse what the declaration does not allow."""

@@ -1,4 +1,4 @@
-"""A fault that was injected: where, from when to when, with its own random numbers; and the log."""
+"""A fault that was injected, what carries it out, and the log."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from cubestack.emulator.faults.declaration import Fault
-from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 F = TypeVar("F", bound=Fault)
 
@@ -74,6 +74,32 @@ class Injection:
         if value is None:
             return int(self.generator_at(*key).integers(limit))
         return min(value, limit - 1)
+
+
+@dataclass(eq=False)
+class Mechanism:
+    """What carries out the faults of one target.
+
+    Attributes:
+        env: virtual time.
+        report: told what a fault did.
+        injections: that act, and those ahead where that is to be known.
+    """
+
+    env: Kernel
+    report: Report
+    injections: list[Injection] = field(default_factory=list, init=False)
+
+    def prepare(self, injection: Injection) -> None:
+        """Know of a fault ahead, or refuse it: ValueError."""
+
+    def begin(self, injection: Injection) -> None:
+        """Act from now on."""
+
+    def end(self, injection: Injection) -> None:
+        """Act no longer."""
+        if injection in self.injections:
+            self.injections.remove(injection)
 
 
 def active(

@@ -1,21 +1,16 @@
 """Injects faults into a board: at once or at a virtual time, for a while or for ever."""
 
 from collections.abc import Callable
-from typing import Any, Protocol, cast
+from functools import cached_property
+from typing import Any
 
+from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import Fault, FaultError, Site
-from cubestack.emulator.faults.injection import FaultEvent, Injection
+from cubestack.emulator.faults.injection import FaultEvent, Injection, Mechanism
 from cubestack.emulator.faults.parts import CameraFaults, MemoryFaults, RegisterFaults, SupplyFaults
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.plan import Plan
 from cubestack.emulator.faults.sites import Sites
-from cubestack.emulator.faults.table import (
-    FAULTS,
-    MemoryStuck,
-    RegisterFlip,
-    RegisterUpsets,
-    make_fault,
-)
 from cubestack.emulator.faults.wire import BusFaults, LineFaults
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
@@ -24,16 +19,6 @@ LOG_LIMIT = 100_000
 
 LONGEST_S = 1e9
 """Latest time and longest duration."""
-
-
-class _Mechanism(Protocol):
-    """What carries out the faults of one target."""
-
-    def prepare(self, injection: Injection) -> None: ...
-
-    def begin(self, injection: Injection) -> None: ...
-
-    def end(self, injection: Injection) -> None: ...
 
 
 class Faults:
@@ -50,9 +35,8 @@ class Faults:
         """Act on a board's ``sites``."""
         self._sites = sites
         self._env = sites.kernel
-        self._mechanisms: dict[tuple[str, str], _Mechanism] = {}
+        self._mechanisms: dict[tuple[Site, str], Mechanism] = {}
         self._running: list[Injection] = []
-        self._began: set[int] = set()
         self._count = 0
         self.seed = seed
         self.log: list[FaultEvent] = []
@@ -68,12 +52,12 @@ class Faults:
         engine = self._sites.engine
         refused: set[type[Fault]] = set()
         if engine is None:
-            refused.add(MemoryStuck)
+            refused.add(table.MemoryStuck)
         elif not engine.registers:
-            refused |= {RegisterFlip, RegisterUpsets}
+            refused |= {table.RegisterFlip, table.RegisterUpsets}
         return {
             kind: self.targets(fault.site)
-            for kind, fault in FAULTS.items()
+            for kind, fault in table.FAULTS.items()
             if fault not in refused and self.targets(fault.site)
         }
 
@@ -100,7 +84,7 @@ class Faults:
             ValueError: no such register, or none that the engine can turn over.
         """
         if isinstance(fault, str):
-            fault = make_fault(fault, **parameters)
+            fault = table.make_fault(fault, **parameters)
         elif parameters:
             raise FaultError(f"{fault.kind} has its parameters: leave {', '.join(parameters)} out")
         target = self._target(fault, target)
@@ -122,13 +106,12 @@ class Faults:
         injections = []
         for number, planned in enumerate(plan.faults, start=1):
             try:
-                injections.append(
-                    self.inject(
-                        planned.fault, target=planned.target, at_s=planned.at_s, for_s=planned.for_s
-                    )
+                injection = self.inject(
+                    planned.fault, target=planned.target, at_s=planned.at_s, for_s=planned.for_s
                 )
             except ValueError as error:
                 raise FaultError(f"{plan.name}: fault {number}: {error}") from None
+            injections.append(injection)
         return injections
 
     def clear(self, injection: Injection | None = None) -> None:
@@ -177,7 +160,7 @@ class Faults:
             raise FaultError(f"{fault.kind}: a duration must be over 0 s, not {for_s:g} s")
         return start_ps, start_ps + max(1, round(for_s * PS_PER_S))
 
-    def _follow(self, injection: Injection, mechanism: _Mechanism) -> Any:
+    def _follow(self, injection: Injection, mechanism: Mechanism) -> Any:
         if injection.start_ps > self._env.now:
             yield self._env.timeout(injection.start_ps - self._env.now)
             if injection not in self._running:
@@ -188,48 +171,44 @@ class Faults:
             if injection in self._running:
                 self._end(injection, mechanism)
 
-    def _begin(self, injection: Injection, mechanism: _Mechanism) -> None:
-        self._began.add(injection.number)
+    def _begin(self, injection: Injection, mechanism: Mechanism) -> None:
         mechanism.begin(injection)
         if injection.fault.momentary:
             self._running.remove(injection)
-            self._began.discard(injection.number)
 
-    def _end(self, injection: Injection, mechanism: _Mechanism) -> None:
+    def _end(self, injection: Injection, mechanism: Mechanism) -> None:
         self._running.remove(injection)
-        self._began.discard(injection.number)
         mechanism.end(injection)
 
-    def _mechanism(self, site: Site, target: str) -> _Mechanism:
-        # All pins of the FPGA are one mechanism: only one can stand before the processor.
-        group = "pins" if site in (Site.ACKNOWLEDGE, Site.CONTROL) else site.name
-        key = group, "" if group == "pins" else target
-        if key not in self._mechanisms:
-            self._mechanisms[key] = self._make(site, target)
-        return self._mechanisms[key]
+    def _mechanism(self, site: Site, target: str) -> Mechanism:
+        if (site, target) not in self._mechanisms:
+            self._mechanisms[site, target] = self._make(site, target)
+        return self._mechanisms[site, target]
 
-    def _make(self, site: Site, target: str) -> _Mechanism:
-        sites, env, engine = self._sites, self._env, self._sites.engine
+    def _make(self, site: Site, target: str) -> Mechanism:
+        sites, engine, who = self._sites, self._sites.engine, (self._env, self.report)
         match site:
             case Site.UART:
-                return LineFaults(env, sites.uarts[target], self.report)
+                return LineFaults(*who, sites.uarts[target])
             case Site.I2C:
-                return BusFaults(env, sites.buses[target], self.report)
+                return BusFaults(*who, sites.buses[target])
             case Site.SUPPLY:
-                return SupplyFaults(env, sites.supplies, self.report)
+                return SupplyFaults(*who, sites.supplies)
             case Site.MEMORY:
-                pins = None if engine is None else self._pins()
-                memory = sites.all_memories()[target]
-                return MemoryFaults(env, memory, engine, pins, self.report)
+                pins = None if engine is None else self._pins
+                return MemoryFaults(*who, sites.all_memories()[target], engine, pins)
         assert engine is not None
         match site:
             case Site.CAMERA:
-                camera = sites.cameras[target]
-                return CameraFaults(env, engine, target, camera, sites.supplies, self.report)
+                return CameraFaults(*who, engine, target, sites.cameras[target], sites.supplies)
             case Site.FPGA:
-                return RegisterFaults(env, engine, self.report)
+                return RegisterFaults(*who, engine)
             case _:
-                return PinFaults.placed(sites, self.report)
+                return self._pins
 
+    @cached_property
     def _pins(self) -> PinFaults:
-        return cast(PinFaults, self._mechanism(Site.CONTROL, ""))
+        """All pins of the FPGA: only one can stand before the processor."""
+        assert self._sites.engine is not None
+        self._sites.processor.fpga = pins = PinFaults(self._env, self.report, self._sites.engine)
+        return pins

@@ -1,27 +1,20 @@
 """Faults of parts: cameras, memories, the FPGA's registers, supplies."""
 
 from collections.abc import Generator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import simpy
 from numpy.typing import NDArray
 
+from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError
-from cubestack.emulator.faults.injection import Injection, Report, active
+from cubestack.emulator.faults.injection import Injection, Mechanism, Report, active
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.pixels import FaultySource
 from cubestack.emulator.faults.seu import flip_bit
 from cubestack.emulator.faults.sites import CameraSite
-from cubestack.emulator.faults.table import (
-    CameraDead,
-    LatchUp,
-    MemoryFlip,
-    MemoryStuck,
-    MemoryUpsets,
-    RegisterFlip,
-    RegisterUpsets,
-)
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
@@ -34,26 +27,22 @@ MOST_UPSETS_PER_S = 10_000.0
 BATCH_S = 1e-3
 
 
-class CameraFaults:
+class CameraFaults(Mechanism):
     """A camera's faults: those of its output, and its death."""
 
     def __init__(
         self,
         env: Kernel,
+        report: Report,
         engine: RtlEngine,
         name: str,
         site: CameraSite,
         power: PowerModel,
-        report: Report,
     ) -> None:
         """Stand between camera and FPGA."""
-        self._env = env
-        self._engine = engine
-        self._name = name
-        self._site = site
-        self._power = power
-        self._report = report
-        self._source = FaultySource(site.source, report)
+        super().__init__(env, report)
+        self._engine, self._name, self._site, self._power = engine, name, site, power
+        source = FaultySource(site.source, report, self.injections)
         switched = power.on_switch
 
         def follow(channel: str, on: bool) -> None:
@@ -62,57 +51,55 @@ class CameraFaults:
                 site.power(False, self._now_ps())
 
         power.on_switch = follow
-        engine.attach(self._source, name)
+        engine.attach(source, name)
 
     @property
     def _dead(self) -> bool:
-        return bool(active(self._source.injections, CameraDead, self._env.now))
+        return bool(active(self.injections, table.CameraDead, self.env.now))
 
     def _now_ps(self) -> int:
         """The engine may have run ahead."""
-        now_ps = max(self._env.now, self._engine.now_ps)
+        now_ps = max(self.env.now, self._engine.now_ps)
         self._engine.run(now_ps)
         return now_ps
 
     def prepare(self, injection: Injection) -> None:
         """Know of it ahead: lines are judged by their own time."""
-        self._source.injections.append(injection)
+        self.injections.append(injection)
 
     def begin(self, injection: Injection) -> None:
         """Act from now on."""
         now_ps = self._now_ps()
-        if isinstance(injection.fault, CameraDead):
-            self._report(now_ps, injection, "no clock, no answer")
+        if isinstance(injection.fault, table.CameraDead):
+            self.report(now_ps, injection, "no clock, no answer")
             self._site.power(False, now_ps)
         self._engine.stream_changed(self._name)
 
     def end(self, injection: Injection) -> None:
         """Act no longer."""
         now_ps = self._now_ps()
-        self._source.injections.remove(injection)
-        if isinstance(injection.fault, CameraDead) and not self._dead:
-            self._report(now_ps, injection, "is back")
+        super().end(injection)
+        if isinstance(injection.fault, table.CameraDead) and not self._dead:
+            self.report(now_ps, injection, "is back")
             self._site.power(self._power.is_on(self._site.channel), now_ps)
         self._engine.stream_changed(self._name)
 
 
-class MemoryFaults:
+class MemoryFaults(Mechanism):
     """Bits of one memory that turn over, or can not."""
 
     def __init__(
         self,
         env: Kernel,
-        memory: NDArray[np.uint8],
-        engine: RtlEngine | None,
-        pins: PinFaults | None,
         report: Report,
+        memory: NDArray[np.uint8],
+        engine: RtlEngine | None = None,
+        pins: PinFaults | None = None,
     ) -> None:
         """``pins`` says when the FPGA's memories are read; None without an FPGA."""
-        self._env = env
+        super().__init__(env, report)
         self._memory = memory
         self._engine = engine
-        self._report = report
-        self._injections: list[Injection] = []
         self._stuck: dict[Injection, tuple[int, int]] = {}
         self._read_by_strobes = pins is not None
         if pins is not None:
@@ -120,7 +107,7 @@ class MemoryFaults:
 
     def prepare(self, injection: Injection) -> None:
         """Refuse stuck bits where no reading can be noticed; FaultError."""
-        if isinstance(injection.fault, MemoryStuck) and not self._read_by_strobes:
+        if isinstance(injection.fault, table.MemoryStuck) and not self._read_by_strobes:
             raise FaultError("memory-stuck: only memories of a device with an FPGA can have it")
 
     def begin(self, injection: Injection) -> None:
@@ -128,43 +115,44 @@ class MemoryFaults:
         self._advance()
         fault = injection.fault
         match fault:
-            case MemoryFlip():
+            case table.MemoryFlip():
                 address, bit = self._place(injection, fault)
                 self._flip(injection, 8 * address + bit)
-            case MemoryStuck():
+            case table.MemoryStuck():
                 self._stuck[injection] = self._place(injection, fault)
                 self._hold()
-            case MemoryUpsets():
-                self._injections.append(injection)
-                self._env.process(self._upsets(injection, fault))
+            case table.MemoryUpsets():
+                self.injections.append(injection)
+                self.env.process(self._upsets(injection, fault))
 
     def end(self, injection: Injection) -> None:
         """Act no longer."""
+        super().end(injection)
         self._stuck.pop(injection, None)
-        if injection in self._injections:
-            self._injections.remove(injection)
 
-    def _place(self, injection: Injection, fault: MemoryFlip | MemoryStuck) -> tuple[int, int]:
+    def _place(
+        self, injection: Injection, fault: table.MemoryFlip | table.MemoryStuck
+    ) -> tuple[int, int]:
         """Byte and bit."""
         address = injection.drawn(fault.address, self._memory.size, 1)
         return address, injection.drawn(fault.bit, 8, 2)
 
     def _advance(self) -> None:
         if self._engine is not None:
-            self._engine.run(max(self._env.now, self._engine.now_ps))
+            self._engine.run(max(self.env.now, self._engine.now_ps))
 
     def _flip(self, injection: Injection, place: int) -> None:
         flip_bit(self._memory, place)
-        self._report(self._env.now, injection, f"byte {place // 8:#x}, bit {place % 8}")
+        self.report(self.env.now, injection, f"byte {place // 8:#x}, bit {place % 8}")
 
-    def _upsets(self, injection: Injection, fault: MemoryUpsets) -> Steps:
+    def _upsets(self, injection: Injection, fault: table.MemoryUpsets) -> Steps:
         bits, generator = 8 * self._memory.size, injection.generator
         per_s = fault.rate * bits
         one_by_one = per_s <= MOST_UPSETS_PER_S
         while True:
             wait_s = float(generator.exponential(1 / per_s)) if one_by_one else BATCH_S
-            yield self._env.timeout(max(1, round(wait_s * PS_PER_S)))
-            if injection not in self._injections:
+            yield self.env.timeout(max(1, round(wait_s * PS_PER_S)))
+            if injection not in self.injections:
                 return
             self._advance()
             if one_by_one:
@@ -173,99 +161,78 @@ class MemoryFaults:
                 places = generator.integers(bits, size=generator.poisson(per_s * BATCH_S))
                 masks = np.left_shift(1, places % 8).astype(np.uint8)
                 np.bitwise_xor.at(self._memory, places // 8, masks)
-                self._report(self._env.now, injection, f"{len(places)} bits")
+                self.report(self.env.now, injection, f"{len(places)} bits")
 
     def _hold(self) -> None:
         for injection, (address, bit) in self._stuck.items():
             fault = injection.fault
-            assert isinstance(fault, MemoryStuck)
+            assert isinstance(fault, table.MemoryStuck)
             if self._memory[address] >> bit & 1 != fault.level:
                 flip_bit(self._memory, 8 * address + bit)
-                self._report(
-                    self._env.now, injection, f"byte {address:#x}, bit {bit} does not hold"
-                )
+                text = f"byte {address:#x}, bit {bit} does not hold"
+                self.report(self.env.now, injection, text)
 
 
-class RegisterFaults:
-    """Bits of the FPGAs' registers that turn over."""
+@dataclass(eq=False)
+class RegisterFaults(Mechanism):
+    """Bits of the FPGAs' registers in ``engine`` that turn over."""
 
-    def __init__(self, env: Kernel, engine: RtlEngine, report: Report) -> None:
-        """Reach into ``engine``; FaultError of an injection when it has no way in."""
-        self._env = env
-        self._engine = engine
-        self._report = report
-        self._injections: list[Injection] = []
+    engine: RtlEngine
 
     def prepare(self, injection: Injection) -> None:
         """Refuse a register that is none; ValueError."""
         fault = injection.fault
-        if isinstance(fault, RegisterFlip):
+        if isinstance(fault, table.RegisterFlip):
             self._place(injection, fault)
-        elif not self._engine.registers:
-            self._engine.flip("", 0)
+        elif not self.engine.registers:
+            self.engine.flip("", 0)
 
     def begin(self, injection: Injection) -> None:
         """Act from now on."""
         fault = injection.fault
-        if isinstance(fault, RegisterFlip):
+        if isinstance(fault, table.RegisterFlip):
             self._flip(injection, *self._place(injection, fault))
-        elif isinstance(fault, RegisterUpsets):
-            self._injections.append(injection)
-            self._env.process(self._upsets(injection, fault))
+        elif isinstance(fault, table.RegisterUpsets):
+            self.injections.append(injection)
+            self.env.process(self._upsets(injection, fault))
 
-    def end(self, injection: Injection) -> None:
-        """Act no longer."""
-        if injection in self._injections:
-            self._injections.remove(injection)
-
-    def _place(self, injection: Injection, fault: RegisterFlip) -> tuple[str, int]:
-        registers = self._engine.registers
-        name = fault.register
+    def _place(self, injection: Injection, fault: table.RegisterFlip) -> tuple[str, int]:
+        registers, name, bit = self.engine.registers, fault.register, fault.bit
         if name not in registers:
             if name is not None or not registers:
-                self._engine.flip(name or "", 0)  # says what there is
+                self.engine.flip(name or "", 0)  # says what there is
             name = list(registers)[injection.drawn(None, len(registers), 1)]
-        bit = fault.bit
         if bit is not None and bit >= registers[name]:
-            self._engine.flip(name, bit)
+            self.engine.flip(name, bit)
         return name, injection.drawn(bit, registers[name], 2)
 
     def _flip(self, injection: Injection, register: str, bit: int) -> None:
-        self._engine.run(max(self._env.now, self._engine.now_ps))
-        self._engine.flip(register, bit)
-        self._report(self._env.now, injection, f"{register}[{bit}]")
+        self.engine.run(max(self.env.now, self.engine.now_ps))
+        self.engine.flip(register, bit)
+        self.report(self.env.now, injection, f"{register}[{bit}]")
 
-    def _upsets(self, injection: Injection, fault: RegisterUpsets) -> Steps:
+    def _upsets(self, injection: Injection, fault: table.RegisterUpsets) -> Steps:
         places = [
-            (name, bit) for name, bits in self._engine.registers.items() for bit in range(bits)
+            (name, bit) for name, bits in self.engine.registers.items() for bit in range(bits)
         ]
         while True:
             wait_s = float(injection.generator.exponential(1 / (fault.rate * len(places))))
-            yield self._env.timeout(max(1, round(wait_s * PS_PER_S)))
-            if injection not in self._injections:
+            yield self.env.timeout(max(1, round(wait_s * PS_PER_S)))
+            if injection not in self.injections:
                 return
             self._flip(injection, *places[int(injection.generator.integers(len(places)))])
 
 
-class SupplyFaults:
-    """Latch-ups."""
+@dataclass(eq=False)
+class SupplyFaults(Mechanism):
+    """Latch-ups; switching off ends them."""
 
-    def __init__(self, env: Kernel, power: PowerModel, report: Report) -> None:
-        """Act on ``power``."""
-        self._env = env
-        self._power = power
-        self._report = report
-
-    def prepare(self, injection: Injection) -> None:
-        """Nothing yet."""
+    power: PowerModel
 
     def begin(self, injection: Injection) -> None:
         """Strike."""
         fault = injection.fault
-        assert isinstance(fault, LatchUp)
-        on = "" if self._power.is_on(injection.target) else ", but it is off"
-        self._report(self._env.now, injection, f"{fault.extra_ma:g} mA on top{on}")
-        self._power.latch_up(injection.target, fault.extra_ma, lasting=fault.lasting)
-
-    def end(self, injection: Injection) -> None:
-        """Nothing: switching off ends it."""
+        assert isinstance(fault, table.LatchUp)
+        on = "" if self.power.is_on(injection.target) else ", but it is off"
+        self.report(self.env.now, injection, f"{fault.extra_ma:g} mA on top{on}")
+        self.power.latch_up(injection.target, fault.extra_ma, lasting=fault.lasting)

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.faults.injection import Injection, Report, active
-from cubestack.emulator.faults.sites import Sites
+from cubestack.emulator.faults.injection import Injection, Mechanism, Report, active
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
 from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
@@ -19,48 +18,30 @@ from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 PS_PER_NS = 1000
 
 
-class PinFaults(FpgaPort):
+class PinFaults(Mechanism, FpgaPort):
     """An FPGA whose pins are not what they should be.
 
     Attributes:
         around_reads: called before and after bytes are taken from the FPGA.
     """
 
-    def __init__(self, env: Kernel, engine: FpgaPort, report: Report) -> None:
+    def __init__(self, env: Kernel, report: Report, engine: FpgaPort) -> None:
         """Stand before ``engine``."""
-        self._env = env
+        super().__init__(env, report)
         self._engine = engine
-        self._report = report
-        self._injections: list[Injection] = []
         self._forced: dict[str, int] = {}
         self._driven: dict[str, int] = {}
         self._rose_ps: dict[str, int] = {}
         self.around_reads: list[Callable[[], None]] = []
 
-    @classmethod
-    def placed(cls, sites: Sites, report: Report) -> "PinFaults":
-        """Stand between the FPGA and the processor of a board."""
-        assert sites.engine is not None
-        pins = cls(sites.kernel, sites.engine, report)
-        sites.processor.fpga = pins
-        return pins
-
-    def prepare(self, injection: Injection) -> None:
-        """Nothing yet."""
-
     def begin(self, injection: Injection) -> None:
         """Act from now on."""
         if isinstance(injection.fault, ControlGlitch):
-            self._env.process(self._glitch(injection, injection.fault))
+            self.env.process(self._glitch(injection, injection.fault))
             return
-        self._injections.append(injection)
+        self.injections.append(injection)
         level = self._engine.get_pin(injection.target)
-        self._report(self._env.now, injection, f"begins with the pin at {level}")
-
-    def end(self, injection: Injection) -> None:
-        """Act no longer."""
-        if injection in self._injections:
-            self._injections.remove(injection)
+        self.report(self.env.now, injection, f"begins with the pin at {level}")
 
     # --- what a processor calls -----------------------------------------------------------------
 
@@ -83,8 +64,8 @@ class PinFaults(FpgaPort):
                 case AckStuck():
                     level = fault.level
                 case AckLost():
-                    if level:
-                        self._once(injection, name, "rise not seen")
+                    if level and injection.hits < 2:
+                        self.report(self.env.now, injection, f"{name} rise not seen")
                     level = 0
                 case AckLate() if level:
                     rose_ps = self._rose_ps.setdefault(name, self._engine.now_ps)
@@ -110,18 +91,16 @@ class PinFaults(FpgaPort):
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
         """Run the transfer loop."""
-        for act in self.around_reads:
-            act()
-        done = self._engine.strobe_read(out, period, until_ps)
-        for act in self.around_reads:
-            act()
-        return done
+        return self._around(lambda: self._engine.strobe_read(out, period, until_ps))
 
     def access(self, transactions: Transactions, until_ps: int) -> int:
         """Make transactions on the external bus."""
+        return self._around(lambda: self._engine.access(transactions, until_ps))
+
+    def _around(self, take: Callable[[], int]) -> int:
         for act in self.around_reads:
             act()
-        done = self._engine.access(transactions, until_ps)
+        done = take()
         for act in self.around_reads:
             act()
         return done
@@ -129,8 +108,8 @@ class PinFaults(FpgaPort):
     # --------------------------------------------------------------------------------------------
 
     def _on(self, pin: str) -> list[tuple[Injection, AckLate | AckLost | AckStuck]]:
-        now_ps = self._env.now
-        mine = [injection for injection in self._injections if injection.target == pin]
+        now_ps = self.env.now
+        mine = [injection for injection in self.injections if injection.target == pin]
         return [
             *active(mine, AckLate, now_ps),
             *active(mine, AckLost, now_ps),
@@ -139,30 +118,25 @@ class PinFaults(FpgaPort):
 
     def _note_rises(self, until_ps: int) -> None:
         """Run up to where an acknowledge rises that is to be seen late, and keep the time."""
-        for injection, _ in active(self._injections, AckLate, self._env.now):
+        for injection, _ in active(self.injections, AckLate, self.env.now):
             pin = injection.target
             if self._engine.get_pin(pin):
                 continue
             self._rose_ps.pop(pin, None)
             if self._engine.run(until_ps, (pin, 1)) and self._engine.get_pin(pin):
                 self._rose_ps[pin] = self._engine.now_ps
-                self._report(self._engine.now_ps, injection, "rises")
-
-    def _once(self, injection: Injection, pin: str, text: str) -> None:
-        """Report a fault's first hit only."""
-        if injection.hits < 2:
-            self._report(self._env.now, injection, f"{pin} {text}")
+                self.report(self._engine.now_ps, injection, "rises")
 
     def _glitch(self, injection: Injection, fault: ControlGlitch) -> Any:
         pin = injection.target
         if pin not in self._forced:
-            self._engine.run(max(self._env.now, self._engine.now_ps))
+            self._engine.run(max(self.env.now, self._engine.now_ps))
             self._driven[pin] = self._engine.get_pin(pin)
             self._forced[pin] = 1 - self._driven[pin]
             self._engine.set_pin(pin, self._forced[pin])
-            self._report(self._engine.now_ps, injection, f"goes to {self._forced[pin]}")
-            yield self._env.timeout(round(fault.width_ns * PS_PER_NS))
-            self._engine.run(max(self._env.now, self._engine.now_ps))
+            self.report(self._engine.now_ps, injection, f"goes to {self._forced[pin]}")
+            yield self.env.timeout(round(fault.width_ns * PS_PER_NS))
+            self._engine.run(max(self.env.now, self._engine.now_ps))
             del self._forced[pin]
             self._engine.set_pin(pin, self._driven[pin])
 

@@ -7,27 +7,19 @@ the edges that a real one would. At most one of these faults hits a line.
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection, Report, active
-from cubestack.emulator.faults.table import (
-    Blooming,
-    CameraDead,
-    ClockExtra,
-    ClockLost,
-    ColumnDefect,
-    LineMissing,
-    PixelDead,
-    PixelHot,
-)
 from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
 
 Picture = NDArray[np.uint8]
 
-_CLOCK_FAULTS = (ClockLost, ClockExtra, LineMissing)
-_PIXEL_FAULTS = (PixelHot, PixelDead, ColumnDefect, Blooming)
+_CLOCK_FAULTS = (table.ClockLost, table.ClockExtra, table.LineMissing)
+_PIXEL_FAULTS = (table.PixelHot, table.PixelDead, table.ColumnDefect, table.Blooming)
 
 
 @dataclass(frozen=True)
@@ -48,13 +40,12 @@ class _Piece:
         return self.start_ps + int(self.clocks * self.period)
 
 
-@dataclass(frozen=True)
-class _Hit:
+class _Hit(NamedTuple):
     """A fault of the clocks in one line."""
 
-    injection: Injection
     row: int
     column: int
+    injection: Injection
 
 
 class FaultySource:
@@ -65,11 +56,11 @@ class FaultySource:
         injections: faults that act or will act.
     """
 
-    def __init__(self, source: PixelSource, report: Report) -> None:
+    def __init__(self, source: PixelSource, report: Report, injections: list[Injection]) -> None:
         """Stand before ``source``."""
         self._source = source
         self._report = report
-        self.injections: list[Injection] = []
+        self.injections = injections
         self.period = source.period
         self.line_clocks = source.line_clocks
         self.active_columns = source.active_columns
@@ -77,7 +68,7 @@ class FaultySource:
 
     def segment_at(self, time_ps: int) -> PixelSegment | None:
         """What the source sends then, cut where a clock is lost or comes twice."""
-        if active(self.injections, CameraDead, time_ps):
+        if active(self.injections, table.CameraDead, time_ps):
             return None
         base = self._source.segment_at(time_ps)
         self.period = self._source.period
@@ -118,11 +109,10 @@ class FaultySource:
                     if lines:
                         text = _spoil(picture, lines, injection)
                         self._report(base.start_ps + int(lines.start * line_ps), injection, text)
-            for hit in hits:
-                place = f"line {hit.row}"
-                if not isinstance(hit.injection.fault, LineMissing):
-                    place += f", column {hit.column}"
-                self._report(base.start_ps + int(hit.row * line_ps), hit.injection, place)
+            for row, column, injection in hits:
+                line = isinstance(injection.fault, table.LineMissing)
+                place = f"line {row}" if line else f"line {row}, column {column}"
+                self._report(base.start_ps + int(row * line_ps), injection, place)
             rendered.append(picture)
             return picture
 
@@ -143,10 +133,10 @@ class FaultySource:
                 continue
             row = injection.drawn(fault.row, base.rows, key, 1)
             column = 0
-            if not isinstance(fault, LineMissing):
+            if not isinstance(fault, table.LineMissing):
                 column = injection.drawn(fault.column, self.active_columns, key, 2)
-            hits.setdefault(row, _Hit(injection, row, column))
-        return [hits[row] for row in sorted(hits)]
+            hits.setdefault(row, _Hit(row, column, injection))
+        return sorted(hits.values())
 
     def _pieces(self, base: PixelSegment) -> list[_Piece]:
         hits = self._hits(base)
@@ -169,7 +159,7 @@ class FaultySource:
             if rows is None:
                 piece = _Piece(start_ps, count, base.vsync, 0, None, step, count, 0)
             else:
-                number = len(range(*rows.indices(base.rows)))
+                number = rows.stop - rows.start
                 width = len(range(*part.indices(columns))) * repeat
 
                 def pixels() -> Picture:
@@ -181,23 +171,20 @@ class FaultySource:
             pieces.append(piece)
 
         done = 0
-        for hit in hits:
-            row, column = hit.row, hit.column
+        for row, column, injection in hits:
             first = row * clocks
             put(done * clocks, (row - done) * clocks, slice(done, row))
             one = slice(row, row + 1)
-            if isinstance(hit.injection.fault, LineMissing):
+            if isinstance(injection.fault, table.LineMissing):
                 put(first, clocks)
             else:
                 put(first, column, one, slice(0, column))
-                if isinstance(hit.injection.fault, ClockExtra):
+                if isinstance(injection.fault, table.ClockExtra):
                     twice = slice(column, column + 1)
                     put(first + column, 2, one, twice, step=period / 2, repeat=2)
                 rest = slice(column + 1, columns)
-                if column + 1 < columns:
-                    put(first + column + 1, clocks - column - 1, one, rest)
-                else:
-                    put(first + column + 1, clocks - column - 1)
+                lines = one if column + 1 < columns else None
+                put(first + column + 1, clocks - column - 1, lines, rest)
             done = row + 1
         put(done * clocks, (base.rows - done) * clocks, slice(done, base.rows))
         return pieces
@@ -218,16 +205,16 @@ def _spoil(picture: Picture, lines: range, injection: Injection) -> str:
     height, width = picture.shape
     fault = injection.fault
     match fault:
-        case PixelHot() | PixelDead():
+        case table.PixelHot() | table.PixelDead():
             x, y = injection.drawn(fault.x, width, 1), injection.drawn(fault.y, height, 2)
             if y in lines:
-                picture[y, x] = fault.level if isinstance(fault, PixelHot) else 0
+                picture[y, x] = fault.level if isinstance(fault, table.PixelHot) else 0
             return f"pixel ({x}, {y})"
-        case ColumnDefect():
+        case table.ColumnDefect():
             x = injection.drawn(fault.x, width, 1)
             picture[lines.start : lines.stop, x] = fault.level
             return f"column {x}"
-        case Blooming():
+        case table.Blooming():
             bright = picture[lines.start : lines.stop] >= fault.threshold
             spilled = bright.copy()
             for shift in range(1, min(fault.length, len(lines) - 1) + 1):

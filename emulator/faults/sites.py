@@ -1,6 +1,6 @@
 """What a board offers to faults, by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,23 +58,17 @@ class Sites:
 
     def targets(self, site: Site) -> tuple[str, ...]:
         """Names of everything that faults of a kind can hit, the usual one first."""
-        match site:
-            case Site.UART:
-                return tuple(self.uarts)
-            case Site.I2C:
-                return tuple(self.buses)
-            case Site.SUPPLY:
-                return tuple(self.supplies.table.channels)
-            case Site.CAMERA:
-                return tuple(self.cameras)
-            case Site.CONTROL:
-                return self.controls
-            case Site.MEMORY:
-                return tuple(self.all_memories())
-            case Site.ACKNOWLEDGE:
-                return () if self.engine is None else self.engine.wiring.acknowledges
-            case Site.FPGA:
-                return () if self.engine is None else ("fpga",)
+        names: dict[Site, Iterable[str]] = {
+            Site.UART: self.uarts,
+            Site.I2C: self.buses,
+            Site.SUPPLY: self.supplies.table.channels,
+            Site.CAMERA: self.cameras,
+            Site.CONTROL: self.controls,
+            Site.MEMORY: self.all_memories(),
+        }
+        if self.engine is not None:
+            names |= {Site.ACKNOWLEDGE: self.engine.wiring.acknowledges, Site.FPGA: ("fpga",)}
+        return tuple(names.get(site, ()))
 
     def all_memories(self) -> dict[str, NDArray[np.uint8]]:
         """Bytes of every memory."""

@@ -18,16 +18,12 @@ class Part:
         self.kernel = Kernel()
         self.memory = np.zeros(BITS // 8, np.uint8)
         self.log: list[tuple[int, str]] = []
-        faults = MemoryFaults(
-            self.kernel,
-            self.memory,
-            None,
-            None,
-            lambda time, _injection, text: self.log.append((time, text)),
-        )
+        self.faults = MemoryFaults(self.kernel, self._report, self.memory)
         self.injection = Injection(0, MemoryUpsets(rate=rate), "SRAM", 0, None, seed)
-        faults.begin(self.injection)
-        self.faults = faults
+        self.faults.begin(self.injection)
+
+    def _report(self, time_ps: int, _injection: Injection, text: str) -> None:
+        self.log.append((time_ps, text))
 
     def run(self, seconds: float) -> int:
         """How many bits are turned over after so long."""

@@ -41,7 +41,7 @@ def waiting(desk_of):
 
         desk = desk_of(body)
         desk.ack_at(ROSE_US)
-        pins = PinFaults(desk.kernel, desk.engine, lambda _time_ps, _injection, _text: None)
+        pins = PinFaults(desk.kernel, lambda _time_ps, _injection, _text: None, desk.engine)
         desk.processor.fpga = pins
         for number, fault in enumerate(faults):
             pins.begin(Injection(number, fault, "ACK", 0, None, 0))

@@ -75,10 +75,8 @@ def clocks(source: Any, until_ps: int) -> Iterator[Clock]:
 
 def faulty(*faults: Any, seed: int = 1) -> tuple[FaultySource, list[str]]:
     log: list[str] = []
-    source = FaultySource(Camera(), lambda _time, injection, text: log.append(text))
-    for number, fault in enumerate(faults):
-        source.injections.append(Injection(number, fault, "imager", 0, None, seed))
-    return source, log
+    injections = [Injection(n, fault, "imager", 0, None, seed) for n, fault in enumerate(faults)]
+    return FaultySource(Camera(), lambda _time, _by, text: log.append(text), injections), log
 
 
 def near(found: list[Clock], expected: list[Clock]) -> None:

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError, Parameter
-from cubestack.emulator.faults.document import markdown_table
-from cubestack.emulator.faults.table import FAULTS, make_fault
+from cubestack.emulator.faults.table import FAULTS, make_fault, markdown_table
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "faults.md"
 PARAMETERS = [(kind, name) for kind, fault in FAULTS.items() for name in fault.parameters()]

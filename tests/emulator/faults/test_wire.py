@@ -27,11 +27,11 @@ class Line:
         self._seed = seed
         self.uart = Uart(self.kernel, BAUD, self._hear, lambda: None, silence_bytes=1000)
         self.uart.line = self._deliver
-        self.faults = LineFaults(self.kernel, self.uart, self._report)
+        self.faults = LineFaults(self.kernel, self._report, self.uart)
 
     def inject(self, fault: Any, start: float = 0, end: float | None = None) -> Injection:
         end_ps = None if end is None else round(end * BYTE_PS)
-        number = len(self.faults._injections)
+        number = len(self.faults.injections)
         injection = Injection(number, fault, "uart", round(start * BYTE_PS), end_ps, self._seed)
         self.faults.prepare(injection)
         return injection
