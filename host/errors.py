@@ -1,22 +1,5 @@
 """What can go wrong between a host program and a node; every text is one line.
 
-::
-
-    ValueError
-     +-- TargetError              the text that names a target makes no sense
-     +-- CameraFileError          a camera file lacks something
-    OSError
-     +-- HostError
-          +-- TransportError
-          |    +-- PortOpenError        the port does not open
-          |    +-- PortClosedError      the other side has gone
-          |    +-- RecordingMismatchError  a recording has no such request at this place
-          +-- NodeError
-               +-- NoAnswerError        also a TimeoutError
-               +-- BadAnswerError       an answer that the interface does not allow
-               +-- CommandRefusedError  the acknowledge carries an error code
-               +-- StepFailedError      the node tried and failed
-
 Values that a message can not carry raise ``InterfaceError`` of the interface tables (a ValueError)
 before anything is sent.
 """

@@ -3,8 +3,6 @@
 The command line is generated from these declarations, and programs give the same names as keywords.
 """
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable
@@ -20,9 +18,8 @@ class Kind(Generic[T]):
     """A kind of value.
 
     Attributes:
-        what: what it is, for error texts: "an angle in 0..180 degrees".
-        read: makes one of a text or of a value that a program gave; ValueError or TypeError when
-            it is none.
+        what: for error texts: "an angle in 0..180 degrees".
+        read: makes one of a text or of a program's value; ValueError or TypeError when it is none.
         holds: whether it is in range.
     """
 
@@ -108,9 +105,7 @@ class Option:
 
     def take(self, given: Any) -> Any:
         """The value that ``given`` means; ValueError when it can not be."""
-        if self.many:
-            return tuple(self._one(each) for each in given)
-        return self._one(given)
+        return tuple(map(self._one, given)) if self.many else self._one(given)
 
     def _one(self, given: Any) -> Any:
         if self.kind is not None:
@@ -144,14 +139,12 @@ class Options:
         for name, declared in self.declared().items():
             if not self.given(name):
                 continue
+            chosen: Option = declared.metadata["option"]
             try:
-                value = declared.metadata["option"].take(getattr(self, name))
+                object.__setattr__(self, name, chosen.take(getattr(self, name)))
             except ValueError as error:
                 raise ValueError(f"{name}: {error}") from None
-            object.__setattr__(self, name, value)
-            group = declared.metadata["option"].group
-            other = groups.setdefault(group, name) if group is not None else name
-            if other != name:
+            if (other := groups.setdefault(chosen.group or name, name)) != name:
                 raise ValueError(f"{flag(other)} and {flag(name)} exclude each other")
         self.check()
 

@@ -4,15 +4,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+from rich import progress as bars
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 console = Console()
 _errors = Console(stderr=True)
@@ -25,14 +18,14 @@ def say(text: str) -> None:
     _errors.print(text, markup=False, highlight=False)
 
 
-def progress_bar() -> Progress:
+def progress_bar() -> bars.Progress:
     """A progress display on standard error; it stays silent when that is no terminal."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
+    return bars.Progress(
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
         console=_errors,
         disable=not _errors.is_terminal,
         transient=True,
@@ -40,10 +33,7 @@ def progress_bar() -> Progress:
 
 
 def progress(items: Iterable[T], total: int, label: str, *, quiet: bool = False) -> Iterator[T]:
-    """Pass ``items`` through with a progress bar, which may be inside another's loop.
-
-    ``quiet`` leaves it out.
-    """
+    """Pass ``items`` through with a bar, unless ``quiet``; it may be inside another's loop."""
     if quiet:
         yield from items
         return
@@ -55,11 +45,11 @@ def progress(items: Iterable[T], total: int, label: str, *, quiet: bool = False)
 
 
 #: The display that is on the terminal; a second one can not be.
-_open: list[Progress] = []
+_open: list[bars.Progress] = []
 
 
 @contextmanager
-def _shown_bar() -> Iterator[Progress]:
+def _shown_bar() -> Iterator[bars.Progress]:
     if _open:
         yield _open[0]
         return

@@ -1,20 +1,24 @@
 """The command line's arguments: values that are checked, and options made from declarations."""
 
-from __future__ import annotations
-
 import argparse
+from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import Field
 from typing import Any, NoReturn, TypeVar
 
 from cubestack.host import options
-from cubestack.host.options import Kind, Options, flag
+from cubestack.host.options import Kind, Option, Options, flag
 
 T = TypeVar("T")
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line."""
+    """A parser whose help stands as it is written, and whose errors are one line."""
+
+    def __init__(self, **options: Any) -> None:
+        """Take what every parser takes."""
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
 
     def error(self, message: str) -> NoReturn:
         """End with exit code 2."""
@@ -40,28 +44,19 @@ def whole(least: int, most: int | None = None) -> Callable[[str], int]:
 
 def add_options(parser: argparse.ArgumentParser, *declared: type[Options]) -> None:
     """Declare the options of these classes; one that several have is as the first has it."""
-    groups: dict[str, argparse._MutuallyExclusiveGroup] = {}
-    names: set[str] = set()
-    for name, field in ((n, f) for each in declared for n, f in each.declared().items()):
-        if name in names:
-            continue
-        names.add(name)
-        option = field.metadata["option"]
-        place: argparse._ActionsContainer = parser
-        if option.group is not None:
-            if option.group not in groups:
-                groups[option.group] = parser.add_mutually_exclusive_group()
-            place = groups[option.group]
+    groups = defaultdict[str, argparse._ActionsContainer](parser.add_mutually_exclusive_group)
+    fields: dict[str, Field[Any]] = {}
+    for each in declared:
+        fields |= {name: field for name, field in each.declared().items() if name not in fields}
+    for name, field in fields.items():
+        option: Option = field.metadata["option"]
+        place = parser if option.group is None else groups[option.group]
         how: dict[str, Any] = {"default": field.default, "help": option.help}
         if option.kind is None and not option.choices:
             place.add_argument(flag(name), action="store_true", **how)
             continue
-        if option.kind is not None:
-            how["type"] = typed(option.kind)
-        if option.choices:
-            how["choices"] = option.choices
-        if option.metavar is not None:
-            how["metavar"] = option.metavar
+        how["type"] = None if option.kind is None else typed(option.kind)
+        how |= {"choices": option.choices or None, "metavar": option.metavar}
         if option.many:
             how |= {"action": "append", "default": []}
         place.add_argument(flag(name), **how)

@@ -1,7 +1,5 @@
 """Measure the cost of the hot paths on this machine, on one core."""
 
-from __future__ import annotations
-
 import argparse
 import json
 
@@ -14,11 +12,12 @@ COMPARISON = "What compares the engines that can run the FPGA designs is `make b
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the option, and tell what each figure means."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    lines = []
-    for device in devices():
-        if device.benchmark is not None:
-            for name, meaning in device.benchmark().figures.items():
-                lines.append(f"{name:<17} {device.title}: {meaning}")
+    lines = [
+        f"{name:<17} {device.title}: {meaning}"
+        for device in devices()
+        if device.benchmark is not None
+        for name, meaning in device.benchmark().figures.items()
+    ]
     parser.epilog = "\n".join([*lines, "", f"{COMPARISON} (docs/engines.md)"])
 
 

@@ -45,16 +45,14 @@ def run(args: argparse.Namespace) -> int:
         target = open_any_target(text, args)
         try:
             args.device = args.device or target.interface.name.lower()
-            runs.append(run_suite(target, args.allow_write, _ignore if number else show))
+            # The second target's results are compared only.
+            on_check = (lambda _check: None) if number else show
+            runs.append(run_suite(target, args.allow_write, on_check))
         finally:
             target.close()
     difference = compare(*runs) if len(runs) == 2 else None
     _summarise(runs, difference, as_json=args.json)
     return int(any(one.failed for one in runs) or difference is not None)
-
-
-def _ignore(_check: CheckResult) -> None:
-    """The second target's results are compared only."""
 
 
 def _show_text(check: CheckResult) -> None:

@@ -7,8 +7,6 @@ a rendered sky, and may look at a photograph, one of --photographs if that
 folder has any; a sun and nadir sensor at the Sun, and at the Earth from 750 km.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -19,16 +19,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.device_options import (
-    add_board_arguments,
-    add_record_arguments,
-    add_start_arguments,
-    chosen_options,
-    inject_plan,
-    record,
-    tell_notices,
-)
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
@@ -38,6 +30,7 @@ from cubestack.host.terminal import progress, say
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
+    scenes = dict.fromkeys(device.default_scene_title for device in devices())
     parser.add_argument(
         "devices",
         nargs="+",
@@ -49,22 +42,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scene",
         type=Path,
         metavar="FILE",
-        help=f"TOML scene of the one device; default: {_default_scenes()}",
+        help=f"TOML scene of the one device; default: {', or '.join(scenes)}",
     )
     add_port_arguments(parser)
     parser.add_argument(
         "--i2c", type=whole(0, 255), metavar="BUS", help="I2C bus, for cubestack run --attach"
     )
     parser.add_argument("--baud", type=whole(1), help="of the node protocol; default 57600")
-    add_start_arguments(parser)
-    add_board_arguments(parser)
+    device_options.add_start_arguments(parser)
+    device_options.add_board_arguments(parser)
     parser.add_argument(
         "--pace",
         choices=("real", "fast"),
         default="real",
         help="real: virtual time is wall time; fast: ahead while there is work",
     )
-    add_record_arguments(parser)
+    device_options.add_record_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         opened: list[AnyEmulated] = []
         for name in args.devices:
             found = device(name)
-            options = chosen_options(args, found)
+            options = device_options.chosen_options(args, found)
             found.prepare(progress)
             emulated = power_up(
                 found,
@@ -96,11 +89,11 @@ def run(args: argparse.Namespace) -> int:
             )
             stack.callback(emulated.close)
             opened.append(emulated)
-            tell_notices(found, options, say)
+            device_options.tell_notices(found, options, say)
         if len(opened) == 1:
-            inject_plan(emulated.faults, args.faults, say)
+            device_options.inject_plan(emulated.faults, args.faults, say)
             setup = emulated_setup(args.seed, args.scene, args.faults, options)
-            record(args, emulated, stack, setup)
+            device_options.record(args, emulated, stack, setup)
         board = emulated.board  # what records may have taken the place of its bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
@@ -123,10 +116,8 @@ def run(args: argparse.Namespace) -> int:
             signal.signal(number, lambda _number, _frame: scheduler.stop())
         for one in opened:
             ports = [
-                f"{endpoint.name} at {line.baud} baud"
-                if not line.suffix
-                else f"{line.title} on {endpoint.name} at {line.baud} baud"
-                for owner, line, endpoint in served
+                f"{line.title + ' on ' if line.suffix else ''}{end.name} at {line.baud} baud"
+                for owner, line, end in served
                 if owner is one
             ]
             say(f"{one.device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
@@ -134,7 +125,3 @@ def run(args: argparse.Namespace) -> int:
             say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
         scheduler.run()
     return 0
-
-
-def _default_scenes() -> str:
-    return ", or ".join(dict.fromkeys(device.default_scene_title for device in devices()))

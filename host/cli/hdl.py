@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from cubestack.host.cli.arguments import Parser
 from cubestack.host.devices.registry import devices
 
 if TYPE_CHECKING:
@@ -79,8 +80,10 @@ def add_arguments(
 ) -> None:
     """Declare the subcommands and their options, for these tops and proofs."""
     parser.set_defaults(tops=tops, proofs=proofs)
-    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    area = _subcommand(actions, "area", "tiles of every design", AREA)
+    actions = parser.add_subparsers(
+        dest="action", required=True, metavar="ACTION", parser_class=Parser
+    )
+    area = actions.add_parser("area", help="tiles of every design", description=AREA)
     area.add_argument("names", metavar="NAME", nargs="*", help="designs; default: all")
     area.add_argument("--json", action="store_true", help="as JSON")
     area.add_argument(
@@ -90,15 +93,17 @@ def add_arguments(
         "--fmax", action="store_true", help="place on an iCE40 HX8K; needs the extra place"
     )
     area.set_defaults(act=_area)
-    verilog = _subcommand(actions, "verilog", "a top as one Verilog file", VERILOG)
+    verilog = actions.add_parser("verilog", help="a top as one Verilog file", description=VERILOG)
     verilog.add_argument("top", metavar="TOP", help="a top; a wrong name lists them")
     verilog.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
     verilog.set_defaults(act=_verilog)
-    prove = _subcommand(actions, "prove", "proofs of what the designs promise", PROVE)
+    prove = actions.add_parser(
+        "prove", help="proofs of what the designs promise", description=PROVE
+    )
     prove.add_argument("names", metavar="NAME", nargs="*", help="proofs; default: all")
     prove.add_argument("--json", action="store_true", help="as JSON, when all are done")
     prove.set_defaults(act=_prove)
-    wave = _subcommand(actions, "wave", "waveform of a test that failed", WAVE)
+    wave = actions.add_parser("wave", help="waveform of a test that failed", description=WAVE)
     wave.add_argument("test", metavar="TEST", help="part of its name, or a VCD file")
     wave.add_argument(
         "--folder", type=Path, default=Path("out/hdl/waves"), help="default: %(default)s"
@@ -112,20 +117,6 @@ def add_arguments(
 def run(args: argparse.Namespace) -> int:
     """Do what the subcommand says."""
     return int(args.act(args))
-
-
-def _subcommand(
-    actions: "argparse._SubParsersAction[argparse.ArgumentParser]",
-    name: str,
-    summary: str,
-    description: str,
-) -> argparse.ArgumentParser:
-    return actions.add_parser(
-        name,
-        help=summary,
-        description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
 
 
 def _chosen(table: Mapping[str, Entry], names: list[str], kind: str) -> dict[str, Entry]:
@@ -142,9 +133,8 @@ def _area(args: argparse.Namespace) -> int:
     from cubestack.host.terminal import progress
 
     table = _chosen(counted(args.tops()), args.names, "design of one FPGA")
-    rows = list(
-        progress(areas(table, args.ice40, args.fmax), len(table), "designs", quiet=args.json)
-    )
+    counting = areas(table, args.ice40, args.fmax)
+    rows = list(progress(counting, len(table), "designs", quiet=args.json))
     print(area_json(rows) if args.json else "\n".join(area_table(rows)))
     return 0
 

@@ -4,14 +4,10 @@ Exit codes: 0 done, 1 the run failed, 2 the call was wrong. An error is one line
 what would be right.
 """
 
-from __future__ import annotations
-
-import argparse
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
-from typing import Protocol
 
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.reports import reports
@@ -45,37 +41,16 @@ def make_parser() -> Parser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = import_module(f"cubestack.host.cli.{name}")
-        _add(commands, name, summary, _with_names(module.__doc__ or ""), module)
+        command = commands.add_parser(
+            name, help=summary, description=_with_names(module.__doc__ or "")
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
     for name, report in reports().items():
-        _add(commands, name, report.summary, report.description, report)
+        command = commands.add_parser(name, help=report.summary, description=report.description)
+        report.add_arguments(command)
+        command.set_defaults(run=report.run)
     return parser
-
-
-class _Command(Protocol):
-    """What a subcommand is: a module of ``host.cli``, or what devices declare."""
-
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Declare its options."""
-
-    def run(self, args: argparse.Namespace) -> int | None:
-        """Do it; returns the exit code."""
-
-
-def _add(
-    commands: argparse._SubParsersAction[Parser],
-    name: str,
-    summary: str,
-    description: str,
-    command: _Command,
-) -> None:
-    parser = commands.add_parser(
-        name,
-        help=summary,
-        description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_arguments(parser)
-    parser.set_defaults(run=command.run)
 
 
 def _with_names(text: str) -> str:

@@ -10,8 +10,6 @@ examples:
   cubestack measure DEVICE --help
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time
@@ -41,10 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             continue
         experiment = experiment_of(device)
         command = commands.add_parser(
-            device.name,
-            help=device.summary,
-            description=experiment.description,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            device.name, help=device.summary, description=experiment.description
         )
         command.add_argument(
             "--json", action="store_true", help="one JSON object a result, nothing else"
@@ -105,5 +100,5 @@ def _report(experiment: AnyExperiment, results: list[Result], wall_s: float) -> 
         console.print(table)
         if len(results) > SHOWN:
             console.print(f"... and {len(results) - SHOWN} more; --json lists them all")
-    for line in experiment.summarise(results).lines(wall_s):
+    for line in experiment.summarise(results, wall_s):
         console.print(line, soft_wrap=True)

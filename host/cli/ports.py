@@ -60,37 +60,27 @@ def open_ports(
     Raises ValueError when there are not enough ports from the given one on, PortError when one
     does not open.
     """
-    lines = [(opened, line) for opened in devices for line in opened.board.lines]
-    served = []
-    for index, (opened, line) in enumerate(lines):
-        endpoint = _open(args, len(devices) > 1, opened, line, index, len(lines))
-        stack.callback(endpoint.close)
-        served.append((opened, line, endpoint))
-    return served
-
-
-def _open(
-    args: argparse.Namespace,
-    several: bool,
-    opened: AnyEmulated,
-    line: SerialLine,
-    index: int,
-    count: int,
-) -> Endpoint:
     from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
     from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
     from cubestack.emulator.ports.tcp import TcpEndpoint
 
-    first = args.tcp if args.rfc2217 is None else args.rfc2217
-    if first is None:
-        name = opened.device.title.upper()
-        if args.pty is None:
-            path = Path(f"tty{name}")
-        else:
-            path = args.pty.with_name(args.pty.name + name) if several else args.pty
-        return PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
-    if first and first + count - 1 > LAST_PORT:
-        raise ValueError(f"{opened.device.title} needs {count} ports from {first} on")
     kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
-    port = first and first + index  # 0 lets the system choose each one
-    return kind(args.listen, port, line.uart, allow_remote=args.allow_remote)
+    first = args.tcp if args.rfc2217 is None else args.rfc2217
+    lines = [(opened, line) for opened in devices for line in opened.board.lines]
+    served: list[tuple[AnyEmulated, SerialLine, Endpoint]] = []
+    for index, (opened, line) in enumerate(lines):
+        endpoint: Endpoint
+        if first is None:
+            name = opened.device.title.upper()
+            path = args.pty or Path(f"tty{name}")
+            if args.pty is not None and len(devices) > 1:
+                path = path.with_name(path.name + name)
+            endpoint = PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
+        elif first and first + len(lines) - 1 > LAST_PORT:
+            raise ValueError(f"{opened.device.title} needs {len(lines)} ports from {first} on")
+        else:
+            port = first and first + index  # 0 lets the system choose each one
+            endpoint = kind(args.listen, port, line.uart, allow_remote=args.allow_remote)
+        stack.callback(endpoint.close)
+        served.append((opened, line, endpoint))
+    return served

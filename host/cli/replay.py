@@ -12,8 +12,6 @@ examples:
   cubestack replay run.rec --trace run.vcd
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from contextlib import ExitStack, nullcontext

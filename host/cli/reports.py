@@ -1,8 +1,7 @@
 """Commands about particular devices, which the devices themselves declare."""
 
-from __future__ import annotations
-
 import argparse
+from dataclasses import dataclass, field
 
 from cubestack.host.cli.arguments import add_options
 from cubestack.host.cli.measure import add_board, run_experiment
@@ -11,9 +10,8 @@ from cubestack.host.devices.experiment import AnyExperiment
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import flag
 
-Found = tuple[AnyDevice, AnyExperiment]
 
-
+@dataclass
 class Reports:
     """One command: what the devices that have it say of themselves.
 
@@ -22,10 +20,8 @@ class Reports:
         found: the experiment of each device that has it, by the device's name.
     """
 
-    def __init__(self, summary: str) -> None:
-        """Of no device yet."""
-        self.summary = summary
-        self.found: dict[str, Found] = {}
+    summary: str
+    found: dict[str, tuple[AnyDevice, AnyExperiment]] = field(default_factory=dict)
 
     @property
     def description(self) -> str:
@@ -48,8 +44,8 @@ class Reports:
         device, experiment = self.found[args.device]
         own = experiment.options.declared()
         for other, theirs in self.found.values():
-            for name, field in theirs.options.declared().items():
-                if name not in own and getattr(args, name) != field.default:
+            for name, option in theirs.options.declared().items():
+                if name not in own and getattr(args, name) != option.default:
                     raise ValueError(
                         f"{flag(name)} has no effect for {device.name}; it is {other.name}'s"
                     )

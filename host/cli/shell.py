@@ -14,8 +14,6 @@ examples:
   cubestack shell /dev/ttyUSB0 --device {second} --record bench.rec
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

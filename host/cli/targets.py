@@ -1,7 +1,5 @@
 """Options that say how a target is opened."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

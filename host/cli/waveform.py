@@ -49,12 +49,10 @@ def find(folder: Path, name: str) -> Path:
     if not found:
         there = ", ".join(path.stem for path in kept) or "none: no test failed there"
         raise FileNotFoundError(f"{folder} has no waveform of {name!r}; there are {there}")
-    if len(found) > 1:
-        exact = [path for path in found if path.stem == name]
-        if len(exact) != 1:
-            raise ValueError(f"{name!r} fits {', '.join(path.stem for path in found)}; say which")
-        return exact[0]
-    return found[0]
+    exact = found if len(found) == 1 else [path for path in found if path.stem == name]
+    if len(exact) != 1:
+        raise ValueError(f"{name!r} fits {', '.join(path.stem for path in found)}; say which")
+    return exact[0]
 
 
 def show(path: Path, count: int, internal: bool, text: bool) -> Iterator[str]:
@@ -104,24 +102,18 @@ def read(path: Path, count: int = 20, internal: bool = False) -> Trace:
                 elif token.kind is TokenKind.CHANGE_TIME:
                     time, changes = token.time_change * unit, {}
                 elif token.kind in (TokenKind.CHANGE_SCALAR, TokenKind.CHANGE_VECTOR):
-                    change = (
-                        token.scalar_change
-                        if token.kind is TokenKind.CHANGE_SCALAR
-                        else token.vector_change
-                    )
+                    scalar = token.kind is TokenKind.CHANGE_SCALAR
+                    change = token.scalar_change if scalar else token.vector_change
                     if not changes and change.id_code in names:
                         moments.append((time, changes))
+                    value = change.value  # a number, or binary with unknown bits
                     for name in names.get(change.id_code, ()):
-                        levels[name] = changes[name] = _level(change.value)
+                        levels[name] = f"{value:x}" if isinstance(value, int) else value
+                        changes[name] = levels[name]
     except (VCDParseError, UnicodeDecodeError, IndexError) as error:
         raise ValueError(f"{path} is no VCD file: {error}") from None
     signals = [name for group in names.values() for name in group]
     return Trace(signals, levels, list(moments))
-
-
-def _level(value: int | str) -> str:
-    """Hexadecimal, or binary with unknown bits."""
-    return f"{value:x}" if isinstance(value, int) else value
 
 
 def _lines(trace: Trace) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """What can be done to an emulated device from outside of its ports, by shell or replay."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

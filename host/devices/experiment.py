@@ -1,9 +1,7 @@
 """What an experiment is: a device measured end to end, each result beside the truth."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from cubestack.host.options import Options
@@ -15,14 +13,6 @@ class Result:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return dict(vars(self))
-
-
-class Summary(ABC):
-    """What results are together; a frozen dataclass."""
-
-    @abstractmethod
-    def lines(self, wall_s: float) -> Iterator[str]:
-        """For a reader; the results took so long."""
 
 
 OpenerT = TypeVar("OpenerT")
@@ -66,8 +56,8 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
         raise NotImplementedError
 
     @abstractmethod
-    def summarise(self, results: Sequence[ResultT]) -> Summary:
-        """What the results are together."""
+    def summarise(self, results: Sequence[ResultT], wall_s: float) -> Iterable[str]:
+        """What the results, which took ``wall_s``, are together: lines for a reader."""
 
     def succeeded(self, results: Sequence[ResultT]) -> bool:
         """Whether the run was a success; to find nothing is one, unless an experiment says else."""

@@ -4,8 +4,6 @@ Another distribution registers a device by an entry point in the group ``cubesta
 name is the device's, its value leads to a ``Device``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.devices.experiment import Experiment, OpenerT, Result
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
 
@@ -182,44 +182,11 @@ class AttitudeResult(Result):
         return self.status
 
 
-@dataclass(frozen=True)
-class AttitudeSummary(Summary):
-    """Rates in percent of all frames; errors and times over the right ones.
-
-    The times are of devices that tell that of the whole measurement.
-    """
-
-    results: Sequence[AttitudeResult]
-
-    def lines(self, wall_s: float) -> Iterator[str]:
-        """Rates, then 95th percentiles of the errors, and the mean of the virtual time."""
-        right = [result for result in self.results if result.right]
-        solved = sum(result.solved for result in self.results)
-        count = max(1, len(self.results))
-        yield (
-            f"of {len(self.results)}: {100 * solved / count:.1f} % solved, "
-            f"{100 * len(right) / count:.1f} % right, {wall_s:.1f} s wall time"
-        )
-        if right:
-            times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
-            time = f"; mean time {np.mean(times):.0f} ms" if times else ""
-            yield (
-                f"95th percentile of the right ones: "
-                f"{arcsec(percentile_95(result.error_cross_deg for result in right))} arcsec "
-                f"across, {arcsec(percentile_95(result.error_roll_deg for result in right))} "
-                f"about the boresight{time}"
-            )
-
-
-OpenerT = TypeVar("OpenerT")
 SkyOptionsT = TypeVar("SkyOptionsT", bound=SkyOptions)
 AttitudeResultT = TypeVar("AttitudeResultT", bound=AttitudeResult)
 
 
-class AttitudeExperiment(
-    Experiment[OpenerT, SkyOptionsT, AttitudeResultT],
-    Generic[OpenerT, SkyOptionsT, AttitudeResultT],
-):
+class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
     """Attitudes of a star tracker, each beside the truth."""
 
     title = "attitude over the serial line, beside the truth; errors in arcsec"
@@ -243,9 +210,25 @@ class AttitudeExperiment(
             result.ending,
         )
 
-    def summarise(self, results: Sequence[AttitudeResultT]) -> AttitudeSummary:
-        """Rates over all frames, errors and times over the right ones."""
-        return AttitudeSummary(results)
+    def summarise(self, results: Sequence[AttitudeResultT], wall_s: float) -> Iterator[str]:
+        """Rates over all frames; over the right ones 95th percentiles of errors, mean time."""
+        right = [result for result in results if result.right]
+        solved = sum(result.solved for result in results)
+        count = max(1, len(results))
+        yield (
+            f"of {len(results)}: {100 * solved / count:.1f} % solved, "
+            f"{100 * len(right) / count:.1f} % right, {wall_s:.1f} s wall time"
+        )
+        if right:
+            # Some devices tell the time of the whole measurement.
+            times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
+            time = f"; mean time {np.mean(times):.0f} ms" if times else ""
+            yield (
+                f"95th percentile of the right ones: "
+                f"{arcsec(percentile_95(result.error_cross_deg for result in right))} arcsec "
+                f"across, {arcsec(percentile_95(result.error_roll_deg for result in right))} "
+                f"about the boresight{time}"
+            )
 
 
 def percentile_95(values: Iterator[float | None]) -> float | None:

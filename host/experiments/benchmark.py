@@ -1,7 +1,5 @@
 """What benchmarks of devices have in common."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What demonstrations share: a device served by another process, a client, and what is told."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

@@ -1,14 +1,12 @@
 """Experiments that look facts up, and need no device for it."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from cubestack.host.devices.device import Shown
-from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options
 
@@ -26,16 +24,10 @@ class Facts(Result):
         return self.facts
 
 
-@dataclass(frozen=True)
-class FactSummary(Summary):
-    """Facts by name, in their order, for a reader."""
-
-    facts: dict[str, Any]
-
-    def lines(self, wall_s: float) -> Iterator[str]:
-        """One for each fact."""
-        for name, value in self.facts.items():
-            yield f"{name.replace('_', ' '):>20}  {value}"
+def fact_lines(facts: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each fact, for a reader."""
+    for name, value in facts.items():
+        yield f"{name.replace('_', ' '):>20}  {value}"
 
 
 class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
@@ -52,6 +44,6 @@ class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
         """Yield them."""
         yield Facts(self.look_up(options, opened.shown))
 
-    def summarise(self, results: Sequence[Facts]) -> Summary:
+    def summarise(self, results: Sequence[Facts], wall_s: float) -> Iterable[str]:
         """Each fact on a line."""
-        return FactSummary(results[0].facts)
+        return fact_lines(results[0].facts)

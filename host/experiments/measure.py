@@ -1,7 +1,5 @@
 """Measure a registered device, from a program."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How a recorded device was made, from the options of commands and back."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager

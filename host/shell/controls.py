@@ -1,5 +1,6 @@
 """The shell's commands on an emulated device past its ports: scene, fault, power, time."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from cubestack.host.devices.controls import EmulatedControls
@@ -16,12 +17,11 @@ POWER = "power [CHANNEL on|off]"
 TIME = "time [SECONDS]"
 
 
+@dataclass
 class ControlCommands:
-    """The commands on one target."""
+    """The commands on one target, which stays its owner's."""
 
-    def __init__(self, target: Target) -> None:
-        """Use ``target``, which stays its owner's."""
-        self._target = target
+    target: Target
 
     def commands(self) -> list[ShellCommand]:
         """What they are called."""
@@ -67,5 +67,5 @@ class ControlCommands:
 
     @property
     def _controls(self) -> EmulatedControls:
-        assert self._target.controls is not None  # else the shell has refused
-        return self._target.controls
+        assert self.target.controls is not None  # else the shell has refused
+        return self.target.controls

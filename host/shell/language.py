@@ -6,12 +6,12 @@ sent; what a device does not do raises the client's errors.
 """
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from cubestack.firmware_model.interface.codec.field import suggestion
+from cubestack.firmware_model.interface.codec.message import Kind
 from cubestack.host.devices.targets import Target
-from cubestack.host.shell.completion import complete
-from cubestack.host.shell.controls import ControlCommands
+from cubestack.host.shell.controls import LOG, ON_OFF, ControlCommands
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.ports import PortCommands
 from cubestack.host.shell.registers import RegisterCommands
@@ -26,29 +26,21 @@ class Shell:
     Attributes:
         target: what they act on.
         commands: by name.
+        on_row: called with each result of ``watch`` as it comes.
     """
 
     def __init__(self, target: Target) -> None:
         """Use ``target``, which stays its owner's."""
         self.target = target
         self._names = Names(target)
-        self._registers = RegisterCommands(target, self._names)
+        self.on_row: Callable[[Result], None] = lambda _result: None
         commands = [
-            *self._registers.commands(),
+            *RegisterCommands(target, self._names, lambda row: self.on_row(row)).commands(),
             *PortCommands(target).commands(),
             *ControlCommands(target).commands(),
             ShellCommand("help", "this list", self._help),
         ]
         self.commands = {command.name: command for command in commands}
-
-    @property
-    def on_row(self) -> Callable[[Result], None]:
-        """Called with each result of ``watch`` as it comes."""
-        return self._registers.on_row
-
-    @on_row.setter
-    def on_row(self, tell: Callable[[Result], None]) -> None:
-        self._registers.on_row = tell
 
     def execute(self, line: str) -> Result | None:
         """Run one command; None for an empty line or a comment (#).
@@ -66,14 +58,16 @@ class Shell:
             raise ShellError(f"no command {name!r}; {suggestion(name, list(self.commands))}")
         command = self.commands[name]
         if command.emulated_only and self.target.controls is None:
-            raise ShellError(
-                f"{name}: {self.target.name} is not emulated here: use emulated:DEVICE"
-            )
+            where = f"{self.target.name} is not emulated here"
+            raise ShellError(f"{name}: {where}: use emulated:DEVICE")
         return command.run(arguments)
 
     def complete(self, line: str) -> list[str]:
         """Words that may stand where ``line`` ends, in the order of the tables."""
-        return complete(self.target, self._names, self.commands, line)
+        *before, word = line.split(" ")
+        before = [part for part in before if part]
+        known = _arguments(self.target, self._names, before) if before else list(self.commands)
+        return [found for found in known if found.lower().startswith(word.lower())]
 
     def _help(self, _words: list[str]) -> Result:
         rows = [
@@ -81,3 +75,39 @@ class Shell:
             for command in self.commands.values()
         ]
         return Result(rows, {"commands": list(self.commands)})
+
+
+def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
+    command, arguments = before[0], before[1:]
+    controls = target.controls
+    if command in ("read", "watch", "write", "list") and not arguments:
+        return names.of(command)
+    if command == "read" and len(arguments) == 1:
+        return [f.name for f in names.fields(arguments[0], Kind.TELEMETRY)]
+    if command == "write":
+        given = {word.partition("=")[0].lower() for word in arguments[1:]}
+        fields = names.fields(arguments[0], Kind.TELECOMMAND)
+        return [
+            f"{f.name}={v}"
+            for f in fields
+            if f.name.lower() not in given
+            for v in ([choice.name for choice in f.choices or ()] or [""])
+        ]
+    if command == "bench" and not arguments and target.interface.service_port is not None:
+        return [letter.letter for letter in target.interface.service_port.letters]
+    if command == "fault" and controls is not None:
+        parameters = controls.fault_parameters.get(arguments[0], ()) if arguments else ()
+        given = {word.partition("=")[0] for word in arguments[1:]}
+        words = _next_words((*controls.faults, LOG), arguments)
+        return words + [f"{name}=" for name in parameters if name not in given]
+    if command == "power" and controls is not None:
+        phrases = [f"{channel} {state}" for channel in controls.channels for state in ON_OFF]
+        return _next_words(phrases, arguments)
+    return []
+
+
+def _next_words(phrases: Iterable[str], before: list[str]) -> list[str]:
+    """Words that may follow ``before`` in one of ``phrases``."""
+    split = [phrase.split() for phrase in phrases]
+    fitting = [words for words in split if words[: len(before)] == before]
+    return list(dict.fromkeys(words[len(before)] for words in fitting if len(words) > len(before)))

@@ -3,6 +3,7 @@
 A number (``128``, ``0x80``) is that of a message, ``@0x05`` the address of a register.
 """
 
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 from cubestack.firmware_model.interface.codec.field import Field
@@ -26,12 +27,11 @@ def number_of(found: Found) -> str:
     return str(found.id) if isinstance(found, Message) else f"{ADDRESS}{found.address:#04x}"
 
 
+@dataclass
 class Names:
-    """Messages and registers within reach of one target."""
+    """Messages and registers within reach of one target, which stays its owner's."""
 
-    def __init__(self, target: Target) -> None:
-        """Look at ``target``, which stays its owner's."""
-        self._target = target
+    target: Target
 
     def of(self, command: str) -> list[str]:
         """All names that ``command`` (read, watch, write or list) takes, in the tables' order."""
@@ -39,7 +39,7 @@ class Names:
 
     def all_of(self, command: str) -> list[Found]:
         """What those names mean."""
-        interface = self._target.interface
+        interface = self.target.interface
         found: list[Found] = []
         if command != "write":
             found += [message for message in interface.telemetries if message.supported]
@@ -53,7 +53,7 @@ class Names:
     @property
     def registers(self) -> list[PointerRegister]:
         """Registers in the order of their addresses; none where they are not within reach."""
-        registers = self._target.registers
+        registers = self.target.registers
         return [] if registers is None else list(registers.registers)
 
     def find(self, word: str, *kinds: Kind) -> Found | None:
@@ -61,16 +61,11 @@ class Names:
         if word.startswith(ADDRESS):
             address = _integer(word.removeprefix(ADDRESS))
             return next((found for found in self.registers if found.address == address), None)
-        number = _integer(word)
-        for message in self._target.interface.messages:
-            if message.kind in kinds and (
-                message.id == number or message.name.lower() == word.lower()
-            ):
+        number, name = _integer(word), word.lower()
+        for message in self.target.interface.messages:
+            if message.kind in kinds and (message.id == number or message.name.lower() == name):
                 return message
-        for register in self.registers:
-            if register.name.lower() == word.lower():
-                return register
-        return None
+        return next((found for found in self.registers if found.name.lower() == name), None)
 
     def need(self, command: str, word: str, *kinds: Kind) -> Found:
         """As ``find``; ShellError, which suggests what is near, when there is nothing."""
@@ -95,7 +90,7 @@ class Names:
         return found.fields if isinstance(found, Message) else (found.field,)
 
     def _near_numbers(self, number: int, *kinds: Kind) -> str:
-        known = [m for m in self._target.interface.messages if m.kind in kinds and m.supported]
+        known = [m for m in self.target.interface.messages if m.kind in kinds and m.supported]
         nearest = sorted(known, key=lambda message: abs(message.id - number))[:NEAR]
         return "near: " + ", ".join(f"{number_of(m)} ({m.name})" for m in nearest)
 

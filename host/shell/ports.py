@@ -1,5 +1,6 @@
 """The shell's commands on a device's ports: image (download), bench (letters), raw (bytes)."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,12 +26,11 @@ BENCH = "bench LETTER"
 RAW = "raw HEX ..."
 
 
+@dataclass
 class PortCommands:
-    """The commands on one target."""
+    """The commands on one target, which stays its owner's."""
 
-    def __init__(self, target: Target) -> None:
-        """Use ``target``, which stays its owner's."""
-        self._target = target
+    target: Target
 
     def commands(self) -> list[ShellCommand]:
         """What they are called."""
@@ -48,24 +48,20 @@ class PortCommands:
         picture = self._download(words[1] if len(words) > 1 else None)
         save_picture(picture, path)
         rows, columns = picture.shape
-        return Result(
-            [("", f"{path}: {columns} x {rows}")],
-            {"file": str(path), "columns": columns, "rows": rows},
-        )
+        data = {"file": str(path), "columns": columns, "rows": rows}
+        return Result([("", f"{path}: {columns} x {rows}")], data)
 
     def _download(self, source: str | None) -> "NDArray[np.uint8]":
         """The picture in the device's memory, or in ``source``; TargetError where there is none."""
-        device, name = self._target.device, self._target.interface.name
+        device, name = self.target.device, self.target.interface.name
         if device is None:
             raise TargetError(f"image: {name} sends no picture")
-        client = device.client(self._target.node)
+        client = device.client(self.target.node)
         known = client.picture_sources
+        if source is not None and not known:
+            raise TargetError(f"image: {name} sends no picture {source!r}")
         if source is not None and source.lower() not in known:
-            raise TargetError(
-                f"image: no memory {source!r}; known: {', '.join(known)}"
-                if known
-                else f"image: {name} sends no picture {source!r}"
-            )
+            raise TargetError(f"image: no memory {source!r}; known: {', '.join(known)}")
         try:
             return client.picture(source and source.lower())
         except TargetError as error:
@@ -73,9 +69,9 @@ class PortCommands:
 
     def _bench(self, words: list[str]) -> Result:
         check_count(BENCH, words, 1, 1)
-        protocol, line = self._target.interface.service_port, self._target.service_port
+        protocol, line = self.target.interface.service_port, self.target.service_port
         if protocol is None:
-            raise ShellError(f"bench: {self._target.interface.name} has no bench protocol")
+            raise ShellError(f"bench: {self.target.interface.name} has no bench protocol")
         if line is None:
             raise ShellError("bench: no line with the bench protocol is open: give --bench TARGET")
         wanted = words[0].encode("utf-8")
@@ -94,9 +90,9 @@ class PortCommands:
         )
 
     def _raw(self, words: list[str]) -> Result:
-        line = self._target.line
+        line = self.target.line
         if line is None:
-            raise ShellError(f"raw: {self._target.name} is no serial line")
+            raise ShellError(f"raw: {self.target.name} is no serial line")
         try:
             data = bytes.fromhex("".join(words))
         except ValueError:
@@ -104,7 +100,5 @@ class PortCommands:
         if not data:
             raise ShellError(f"usage: {RAW}")
         line.write(data)
-        answer = bytearray()
-        while more := line.read(READ_BYTES, RAW_TIMEOUT_S):
-            answer += more
+        answer = b"".join(iter(lambda: line.read(READ_BYTES, RAW_TIMEOUT_S), b""))
         return Result([("", answer.hex(" ") or "(nothing)")], {"answer": answer.hex()})

@@ -1,24 +1,17 @@
 """The shell's commands on messages and registers: read, write, watch, dump, list."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import count
 
-from cubestack.firmware_model.interface.codec.field import Field, Value
-from cubestack.firmware_model.interface.codec.message import Kind
+from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
+from cubestack.firmware_model.interface.codec.message import Kind, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
 from cubestack.host.shell.names import Names, number_of
-from cubestack.host.shell.result import (
-    Result,
-    ShellCommand,
-    ShellError,
-    check_count,
-    plain,
-    to_number,
-)
-from cubestack.host.shell.values import parse_value, parse_values
+from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
 
 WATCH_PERIOD_S = 1.0
 WATCH_COUNT = 10
@@ -31,18 +24,18 @@ DUMP = "dump"
 LIST = "list [NAME]"
 
 
+@dataclass
 class RegisterCommands:
-    """The commands on one target.
+    """The commands on one target, which stays its owner's.
 
     Attributes:
+        names: what the target has.
         on_row: called with each result of ``watch`` as it comes.
     """
 
-    def __init__(self, target: Target, names: Names) -> None:
-        """Use ``target``, which stays its owner's."""
-        self.on_row: Callable[[Result], None] = lambda _result: None
-        self._target = target
-        self._names = names
+    target: Target
+    names: Names
+    on_row: Callable[[Result], None]
 
     def commands(self) -> list[ShellCommand]:
         """What they are called."""
@@ -56,49 +49,46 @@ class RegisterCommands:
 
     def _read(self, words: list[str]) -> Result:
         check_count(READ, words, 1, 2)
-        found = self._names.need("read", words[0], Kind.TELEMETRY)
+        found = self.names.need("read", words[0], Kind.TELEMETRY)
         if isinstance(found, PointerRegister):
             return self._read_register(found)
-        values = self._target.node.telemetry(found.name)
-        fields = found.fields
-        if len(words) == 2:
-            fields = (found.field(words[1]),)
+        values = self.target.node.telemetry(found.name)
+        fields = (found.field(words[1]),) if len(words) == 2 else found.fields
         return Result(
             [(f.name, f.label(values[f.name])) for f in fields],
-            {"name": found.name, "values": {f.name: plain(values[f.name]) for f in fields}},
+            {"name": found.name, "values": {f.name: _plain(values[f.name]) for f in fields}},
         )
 
     def _read_register(self, register: PointerRegister) -> Result:
-        assert self._target.registers is not None
+        assert self.target.registers is not None
         if register.streams:
-            data: Value = self._target.registers.read_stream(register.name)
+            data: Value = self.target.registers.read_stream(register.name)
             text = f"{register.length} bytes"
         else:
-            data = self._target.registers.read(register.name)
+            data = self.target.registers.read(register.name)
             text = register.field.label(data)
-        return Result(
-            [(register.name, text)], {"name": register.name, "values": {register.name: plain(data)}}
-        )
+        values = {register.name: _plain(data)}
+        return Result([(register.name, text)], {"name": register.name, "values": values})
 
     def _write(self, words: list[str]) -> Result:
         if not words:
             raise ShellError(f"usage: {WRITE}")
-        found = self._names.need("write", words[0], Kind.TELECOMMAND)
+        found = self.names.need("write", words[0], Kind.TELECOMMAND)
         values = words[1:]
         if isinstance(found, PointerRegister):
             check_count(f"write {found.name} VALUE", values, 1, 1)
-            assert self._target.registers is not None
+            assert self.target.registers is not None
             text = values[0].partition("=")[2] or values[0]
-            self._target.registers.write(found.name, parse_value(found.field, text))
+            self.target.registers.write(found.name, parse_value(found.field, text))
         else:
-            self._target.node.command(found.name, **parse_values(found, values))
-            if any(m.name == "TcmdProcessed" for m in self._target.interface.telemetries):
-                self._target.node.wait_processed(PROCESSING_TIMEOUT_S)
+            self.target.node.command(found.name, **parse_values(found, values))
+            if any(m.name == "TcmdProcessed" for m in self.target.interface.telemetries):
+                self.target.node.wait_processed(PROCESSING_TIMEOUT_S)
         return Result([("", f"{found.name}: done")], {"name": found.name, "done": True})
 
     def _watch(self, words: list[str]) -> Result:
         check_count(WATCH, words, 1, 3)
-        found = self._names.need("watch", words[0], Kind.TELEMETRY)
+        found = self.names.need("watch", words[0], Kind.TELEMETRY)
         times = to_number("watch", words[1], 1) if len(words) > 1 else WATCH_COUNT
         period_s = to_number("watch", words[2], 0) if len(words) > 2 else WATCH_PERIOD_S
         readings = []
@@ -108,7 +98,7 @@ class RegisterCommands:
             self.on_row(result)
             if number >= times:
                 return Result([], {"name": found.name, "readings": readings})
-            self._target.node.pause(period_s)
+            self.target.node.pause(period_s)
         raise AssertionError
 
     def _dump(self, words: list[str]) -> Result:
@@ -116,19 +106,20 @@ class RegisterCommands:
         result = Result()
         frames: dict[str, object] = {}
         registers: dict[str, object] = {}
-        for message in self._target.interface.telemetries:
+        for message in self.target.interface.telemetries:
             if not message.supported or message.has_side_effect:
                 continue
             try:
-                values = self._target.node.telemetry(message.name)
+                values = self.target.node.telemetry(message.name)
             except NodeError as error:
                 result.rows.append((message.name, f"({error})"))
                 frames[message.name] = None
                 continue
-            rows = [(f"{message.name}.{f.name}", f.label(values[f.name])) for f in message.fields]
-            result.rows += rows
-            frames[message.name] = {name: plain(value) for name, value in values.items()}
-        for register in self._names.registers:
+            result.rows += [
+                (f"{message.name}.{f.name}", f.label(values[f.name])) for f in message.fields
+            ]
+            frames[message.name] = {name: _plain(value) for name, value in values.items()}
+        for register in self.names.registers:
             if register.readable and not register.streams:
                 one = self._read_register(register)
                 result.rows += one.rows
@@ -140,12 +131,12 @@ class RegisterCommands:
         check_count(LIST, words, 0, 1)
         if words:
             return self._list_one(words[0])
-        found = self._names.all_of("list")
+        found = self.names.all_of("list")
         rows = [(number_of(one), one.name) for one in found]
         return Result(rows, {"names": [one.name for one in found]})
 
     def _list_one(self, name: str) -> Result:
-        found = self._names.need("list", name, Kind.TELEMETRY, Kind.TELECOMMAND)
+        found = self.names.need("list", name, Kind.TELEMETRY, Kind.TELECOMMAND)
         if isinstance(found, PointerRegister):
             what = f"register {found.address:#04x}, {found.access.value}"
             fields: tuple[Field, ...] = (found.field,)
@@ -154,3 +145,50 @@ class RegisterCommands:
             fields = found.fields
         rows = [(f.name, f"{field_type(f)}: {field_details(f)}") for f in fields]
         return Result([("", what), *rows], {"name": found.name, "fields": [f.name for f in fields]})
+
+
+def _plain(value: Value) -> object:
+    """A value as JSON takes it: bytes in hexadecimal."""
+    return value.hex() if isinstance(value, bytes) else value
+
+
+def parse_value(field: Field, text: str) -> object:
+    """A number (decimal, 0x, 0b), a choice's name, true or false, or hexadecimal bytes.
+
+    Raises InterfaceError.
+    """
+    if field.type.startswith("bytes"):
+        try:
+            return bytes.fromhex(text)
+        except ValueError:
+            raise InterfaceError(f"field {field.name}: {text!r} is not hexadecimal") from None
+    if text.lower() in ("true", "false", "on", "off"):
+        return int(text.lower() in ("true", "on"))
+    for convert in (lambda word: int(word, 0), float):
+        try:
+            return convert(text)
+        except ValueError:
+            continue
+    return text  # the name of a choice, or what ``pack`` refuses with the right words
+
+
+def parse_values(message: Message, words: Sequence[str]) -> dict[str, object]:
+    """Parameters of a telecommand: FIELD=VALUE in any order, or the values in the table's order.
+
+    A field that is not given keeps no value: InterfaceError, as for one that does not exist.
+    """
+    values: dict[str, object] = {}
+    for position, word in enumerate(words):
+        name, separator, text = word.partition("=")
+        if separator:
+            field = message.field(name)
+        elif position < len(message.fields):
+            field, text = message.fields[position], word
+        else:
+            raise InterfaceError(
+                f"{message.name} has {len(message.fields)} fields, not {len(words)}"
+            )
+        if field.name in values:
+            raise InterfaceError(f"{message.name}: {field.name} is given twice")
+        values[field.name] = parse_value(field, text)
+    return values

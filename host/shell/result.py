@@ -4,8 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from cubestack.firmware_model.interface.codec.field import Value
-
 GREATEST = 1e9
 """Of a number on a line."""
 
@@ -57,8 +55,3 @@ def to_number(command: str, text: str, least: float) -> float:
     if not least <= value < GREATEST:
         raise ShellError(f"{command}: {text!r} is not a number of at least {least:g}")
     return value
-
-
-def plain(value: Value) -> object:
-    """A value as JSON takes it: bytes in hexadecimal."""
-    return value.hex() if isinstance(value, bytes) else value

@@ -275,7 +275,7 @@ def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -
         assert result.power_mw == pytest.approx(result.energy_mj * result.rate_hz, rel=1e-3)
     for result in results:
         assert all(part for part in EXPERIMENT.row(0, result))
-    told = list(EXPERIMENT.summarise(results).lines(wall_s=1.0))
+    told = list(EXPERIMENT.summarise(results, wall_s=1.0))
     assert [line.split(": ")[1] for line in told[: len(results)]] == [r.published for r in results]
     (line,) = told[len(results) :]
     assert "layout 3 can not be built" in line

@@ -9,14 +9,14 @@ examples:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cubestack.host.devices.experiment import Experiment, Result, Summary
-from cubestack.host.experiments.facts import FactSummary
+from cubestack.host.devices.experiment import Experiment, Result
+from cubestack.host.experiments.facts import fact_lines
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.options import between, option
 from linear_sun_sensor.client import SunSlit
@@ -77,10 +77,10 @@ class _Experiment(Experiment["Opener[SunSlitBoard, SunSlit]", SunOptions, SunRes
         shown = ("-" if angle is None else f"{angle:.3f}" for angle in angles)
         return (*shown, str(result.peak), f"{result.duration_ms:.2f}", result.outcome)
 
-    def summarise(self, results: Sequence[SunResult]) -> Summary:
+    def summarise(self, results: Sequence[SunResult], wall_s: float) -> Iterable[str]:
         errors = [abs(result.error_deg) for result in results if result.error_deg is not None]
         worst = f"{max(errors, default=0):.3f} deg"
-        return FactSummary({"results": len(results), "found": len(errors), "worst": worst})
+        return fact_lines({"results": len(results), "found": len(errors), "worst": worst})
 
 
 EXPERIMENT: Experiment[Any, Any, Any] = _Experiment()

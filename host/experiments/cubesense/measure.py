@@ -24,7 +24,7 @@ import numpy as np
 from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.devices.emulated import EmulatedDevice
-from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
 
@@ -129,22 +129,8 @@ class SensorResult(Result):
     wall_ms: float
 
 
-@dataclass(frozen=True)
-class DirectionSummary(Summary):
-    """How many results detected their target; over those the errors, and the mean time."""
-
-    results: Sequence[SensorResult]
-
-    def lines(self, wall_s: float) -> Iterator[str]:
-        """One for each sensor that measured."""
-        for sensor in ("sun", "nadir"):
-            own = [result for result in self.results if result.sensor == sensor]
-            if own:
-                yield f"{sensor}: {_told(own)}"
-        yield f"{wall_s:.1f} s wall time"
-
-
 def _told(results: Sequence[SensorResult]) -> str:
+    """How many detected their target; over those the errors, and the mean time."""
     errors = [result.error_deg for result in results if result.error_deg is not None]
     times = [result.phase_ms["total"] for result in results if result.detected]
     text = f"{len(times)} of {len(results)} detected"
@@ -199,8 +185,12 @@ class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
             result.detect if result.capture.startswith("stored") else result.capture,
         )
 
-    def summarise(self, results: Sequence[SensorResult]) -> DirectionSummary:
-        return DirectionSummary(results)
+    def summarise(self, results: Sequence[SensorResult], wall_s: float) -> Iterator[str]:
+        for sensor in ("sun", "nadir"):
+            own = [result for result in results if result.sensor == sensor]
+            if own:
+                yield f"{sensor}: {_told(own)}"
+        yield f"{wall_s:.1f} s wall time"
 
 
 def _degrees(value: float | None, digits: int = 2) -> str:

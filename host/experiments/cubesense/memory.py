@@ -5,22 +5,12 @@ example:
   cubestack memory cubesense --json
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from cubestack.host.devices.device import Shown
-from cubestack.host.devices.experiment import Summary
 from cubestack.host.experiments.facts import Facts, Lookup
 from cubestack.host.options import Options
-
-
-class _Table(Summary):
-    def lines(self, wall_s: float) -> Iterator[str]:
-        from cubestack.firmware_model.cubesense.memory import report
-
-        yield report()
 
 
 class _Memory(Lookup[Options]):
@@ -41,13 +31,14 @@ class _Memory(Lookup[Options]):
             for memory, total in used(buffers).items()
         }
 
-    def summarise(self, results: Sequence[Facts]) -> Summary:
-        return _Table()
+    def summarise(self, results: Sequence[Facts], wall_s: float) -> Iterable[str]:
+        from cubestack.firmware_model.cubesense.memory import report
+
+        return [report()]
 
     def succeeded(self, results: Sequence[Facts]) -> bool:
         """No memory is too small."""
-        (result,) = results
-        return all(memory["used"] <= memory["bytes"] for memory in result.facts.values())
+        return all(memory["used"] <= memory["bytes"] for memory in results[0].facts.values())
 
 
 EXPERIMENT = _Memory()

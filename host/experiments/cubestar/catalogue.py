@@ -6,8 +6,6 @@ examples:
   cubestack catalogue cubestar --mag-limit 4 --json
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.clients.cubestar.client import CubeStar
-from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.attitude import errors, is_right
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import SCENE, Options, option, whole
@@ -90,21 +90,6 @@ class LayoutOptions(Options):
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
 
 
-@dataclass(frozen=True)
-class LayoutSummary(Summary):
-    """What is published of the layouts, and which can not be built."""
-
-    results: Sequence[LayoutResult]
-
-    def lines(self, wall_s: float) -> Iterator[str]:
-        """One for each."""
-        for result in self.results:
-            yield f"published for {result.layout}: {result.published}"
-        for result in self.results:
-            if not result.fits:
-                yield f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins"
-
-
 class _Layouts(Experiment["_Opener", LayoutOptions, LayoutResult]):
     options = LayoutOptions
     description = __doc__
@@ -133,8 +118,12 @@ class _Layouts(Experiment["_Opener", LayoutOptions, LayoutResult]):
             f"{each}{result.tiles}",
         )
 
-    def summarise(self, results: Sequence[LayoutResult]) -> LayoutSummary:
-        return LayoutSummary(results)
+    def summarise(self, results: Sequence[LayoutResult], wall_s: float) -> Iterator[str]:
+        for result in results:
+            yield f"published for {result.layout}: {result.published}"
+        for result in results:
+            if not result.fits:
+                yield f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins"
 
     def succeeded(self, results: Sequence[LayoutResult]) -> bool:
         """Each gave an attitude."""

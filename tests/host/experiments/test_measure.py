@@ -1,18 +1,18 @@
 """Measuring from a program: options as keywords, results as they come, and what is refused."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
 
 from cubestack.host.cli.arguments import add_options, chosen
-from cubestack.host.devices.experiment import Experiment, Result, Summary
+from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.devices.registry import device, devices
 from cubestack.host.errors import TargetError
 from cubestack.host.experiments import measure as measuring
-from cubestack.host.experiments.facts import FactSummary
+from cubestack.host.experiments.facts import fact_lines
 from cubestack.host.experiments.measure import measure
 from cubestack.host.options import ANGLE, CORNER, Options, option, whole
 
@@ -49,8 +49,8 @@ class Counting(Experiment[Any, Wanted, Number]):
     def run(self, opened: Any, options: Wanted) -> Iterator[Number]:
         yield from map(Number, range(options.frames))
 
-    def summarise(self, results: Sequence[Number]) -> Summary:
-        return FactSummary({"results": len(results)})
+    def summarise(self, results: Sequence[Number], wall_s: float) -> Iterable[str]:
+        return fact_lines({"results": len(results)})
 
 
 @pytest.fixture

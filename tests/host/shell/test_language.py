@@ -19,7 +19,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell, ShellError
-from cubestack.host.shell.values import parse_value, parse_values
+from cubestack.host.shell.registers import parse_value, parse_values
 
 from ..conftest import LetterLine
 
