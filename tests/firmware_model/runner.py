@@ -7,21 +7,8 @@ something at any time of it. What hangs on the pins is a subclass' to fake.
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from cubestack.firmware_model.mcu import requests
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
-from cubestack.firmware_model.mcu.requests import (
-    AwaitPin,
-    BusAccess,
-    CameraTransfer,
-    Pay,
-    ReadPin,
-    ReadTimer,
-    Request,
-    Reset,
-    Routine,
-    SetPin,
-    Sleep,
-    StrobeRead,
-)
 
 T = TypeVar("T")
 
@@ -45,8 +32,8 @@ class Runner:
         self.meter = Meter(table)
         self.now_ns = 0
         self.resets: list[int] = []
-        self.log: list[tuple[int, Request]] = []
-        self.on_request: Callable[[Request], object] = lambda _request: None
+        self.log: list[tuple[int, requests.Request]] = []
+        self.on_request: Callable[[requests.Request], object] = lambda _request: None
         self.on_sleep: Callable[[], object] = lambda: None
         self._woken = False
 
@@ -78,18 +65,18 @@ class Runner:
                 self._request = self._routine.send(self._answer)
                 self._pay()
                 self.on_request(self._request)
-            if isinstance(self._request, Reset):
+            if isinstance(self._request, requests.Reset):
                 self.resets.append(self._request.cause)
                 self._boot()
                 continue
-            if isinstance(self._request, Sleep):
+            if isinstance(self._request, requests.Sleep):
                 if not self._slept(self._request, until_us):
                     return
             else:
                 self._answer = self._perform(self._request)
             self._request = None
 
-    def perform(self, routine: Routine[T]) -> T:
+    def perform(self, routine: requests.Routine[T]) -> T:
         """Run a routine by itself, to its end; what it returns."""
         answer: Any = None
         while True:
@@ -101,7 +88,7 @@ class Runner:
                 return result
             self._pay()
             self.on_request(request)
-            if isinstance(request, Sleep):
+            if isinstance(request, requests.Sleep):
                 if request.wakeable:
                     self.on_sleep()
                 answer = request.wakeable and self._woken
@@ -114,7 +101,7 @@ class Runner:
 
     # --- what hangs on the pins -------------------------------------------------------------------
 
-    def start(self) -> Routine[None]:
+    def start(self) -> requests.Routine[None]:
         """A new life of the program."""
         raise AssertionError("there is no whole program here")
 
@@ -129,16 +116,16 @@ class Runner:
     def get_pin(self, pin: str) -> int:
         raise AssertionError(f"nothing hangs on {pin}")
 
-    def await_pin(self, request: AwaitPin) -> bool:
+    def await_pin(self, request: requests.AwaitPin) -> bool:
         raise AssertionError(f"nothing hangs on {request.pin}")
 
-    def strobe(self, request: StrobeRead) -> None:
+    def strobe(self, request: requests.StrobeRead) -> None:
         raise AssertionError(f"there is nothing for {request}")
 
-    def access(self, request: BusAccess) -> int:
+    def access(self, request: requests.BusAccess) -> int:
         raise AssertionError(f"there is nothing for {request}")
 
-    def transfer(self, request: CameraTransfer) -> bytes | None:
+    def transfer(self, request: requests.CameraTransfer) -> bytes | None:
         raise AssertionError(f"there is nothing for {request}")
 
     # --- time -------------------------------------------------------------------------------------
@@ -146,36 +133,36 @@ class Runner:
     def _boot(self) -> None:
         self.now_ns += 1000 * self.boot_us
         self._woken = False
-        self._request: Request | None = None
+        self._request: requests.Request | None = None
         self._answer: object = None
         self._routine = self.start()
 
     def _pay(self) -> None:
         self.now_ns += self.meter.take() * 1_000_000_000 // self.meter.table.clock_hz
 
-    def _perform(self, request: Request) -> object:
-        if not isinstance(request, Pay | ReadTimer):
+    def _perform(self, request: requests.Request) -> object:
+        if not isinstance(request, requests.Pay | requests.ReadTimer):
             self.log.append((self.now_us, request))
         match request:
-            case ReadTimer():
+            case requests.ReadTimer():
                 return self.now_us
-            case SetPin(pin, level):
+            case requests.SetPin(pin, level):
                 self.meter.charge(port_write=1)
                 self.set_pin(pin, level)
-            case ReadPin(pin):
+            case requests.ReadPin(pin):
                 self.meter.charge(port_read=1)
                 return self.get_pin(pin)
-            case AwaitPin():
+            case requests.AwaitPin():
                 return self.await_pin(request)
-            case StrobeRead():
+            case requests.StrobeRead():
                 self.strobe(request)
-            case BusAccess():
+            case requests.BusAccess():
                 return self.access(request)
-            case CameraTransfer():
+            case requests.CameraTransfer():
                 return self.transfer(request)
         return None
 
-    def _slept(self, request: Sleep, until_us: int | None) -> bool:
+    def _slept(self, request: requests.Sleep, until_us: int | None) -> bool:
         """Sleep as far as it goes; False when something else has to happen first."""
         woken = request.wakeable and self._woken
         deadline_us = self.now_us if woken else request.deadline_us

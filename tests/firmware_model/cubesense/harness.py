@@ -13,18 +13,9 @@ from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS
-from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense import INTERFACE, pins
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
-from cubestack.firmware_model.interface.cubesense.pins import (
-    CAMERA_POWER,
-    CAMERA_SCL,
-    CAMERA_SDA,
-    ENABLE,
-    MA_PER_COUNT,
-    SRAM_POWER,
-    Monitor,
-)
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import AwaitPin, Request, Routine, StrobeRead
 
@@ -130,7 +121,7 @@ class Harness(Runner, HostSide):
         dark = np.full((ROWS, COLUMNS), 34, np.uint8)
         self.scenes: dict[Camera, NDArray[np.uint8] | None] = dict.fromkeys(Camera, dark)
         self.wait_us = 17_500
-        self.supply_ma = {Monitor.SUPPLY_3V3: 31.4, Monitor.SUPPLY_5V: 12.0}
+        self.supply_ma = {pins.Monitor.SUPPLY_3V3: 31.4, pins.Monitor.SUPPLY_5V: 12.0}
         self.memory_ma = 5.0
         self.power_on()
 
@@ -147,12 +138,12 @@ class Harness(Runner, HostSide):
         self.run()
 
     def start(self) -> Routine[None]:
-        outputs = (*LINES, "CLK", "DATA_I", *CAMERA_SCL.values(), *CAMERA_SDA.values())
-        self.pins = {**dict.fromkeys(outputs, 0), **dict.fromkeys(ENABLE, 1)}
+        outputs = (*LINES, "CLK", "DATA_I", *pins.CAMERA_SCL.values(), *pins.CAMERA_SDA.values())
+        self.pins = {**dict.fromkeys(outputs, 0), **dict.fromkeys(pins.ENABLE, 1)}
         self._doing = actions(0, 0, 0, 1, 1)
         self._ack_ns: dict[Sram, int] = {}
         self._position = 0
-        for pin in (*CAMERA_POWER.values(), *SRAM_POWER.values()):
+        for pin in (*pins.CAMERA_POWER.values(), *pins.SRAM_POWER.values()):
             self.set_pin(pin, 0)
         self.program = CubeSenseProgram(self, self.meter)
         return self.program.main()
@@ -176,13 +167,13 @@ class Harness(Runner, HostSide):
     def uart_backlog(self, port: Port = Port.NODE) -> int:
         return self.backlog if port is Port.NODE else self.bench_backlog
 
-    def adc_counts(self, monitor: Monitor) -> int:
-        memory = {Monitor.SRAM1: Sram.SRAM1, Monitor.SRAM2: Sram.SRAM2}
+    def adc_counts(self, monitor: pins.Monitor) -> int:
+        memory = {pins.Monitor.SRAM1: Sram.SRAM1, pins.Monitor.SRAM2: Sram.SRAM2}
         if monitor not in memory:
-            return round(self.supply_ma[monitor] / MA_PER_COUNT)
+            return round(self.supply_ma[monitor] / pins.MA_PER_COUNT)
         sram = memory[monitor]
         drawn = LATCH_UP_MA if sram in self.latched else self.memory_ma
-        return round(drawn * self.pins[SRAM_POWER[sram]] / MA_PER_COUNT)
+        return round(drawn * self.pins[pins.SRAM_POWER[sram]] / pins.MA_PER_COUNT)
 
     # --- what a test uses -----------------------------------------------------------------------
 
@@ -219,35 +210,35 @@ class Harness(Runner, HostSide):
 
     def cut(self) -> set[Sram]:
         """Memories whose supply is off."""
-        return {sram for sram in Sram if not self.pins[SRAM_POWER[sram]]}
+        return {sram for sram in Sram if not self.pins[pins.SRAM_POWER[sram]]}
 
     # --- pins -----------------------------------------------------------------------------------
 
     def get_pin(self, pin: str) -> int:
-        return {name: self.cameras[c].sda for c, name in CAMERA_SDA.items()}[pin]
+        return {name: self.cameras[c].sda for c, name in pins.CAMERA_SDA.items()}[pin]
 
     def set_pin(self, pin: str, level: int) -> None:
         was, self.pins[pin] = self.pins.get(pin), level
         for camera in Camera:
-            powered = self.pins.get(CAMERA_POWER[camera])
-            if pin in (CAMERA_SCL[camera], CAMERA_SDA[camera]) and powered:
+            powered = self.pins.get(pins.CAMERA_POWER[camera])
+            if pin in (pins.CAMERA_SCL[camera], pins.CAMERA_SDA[camera]) and powered:
                 self.cameras[camera].set(pin[-3:], level, self.now_ns)
-            if pin == CAMERA_POWER[camera] and was != level:
+            if pin == pins.CAMERA_POWER[camera] and was != level:
                 self.cameras[camera].power_up()
         for sram in Sram:
-            if pin == SRAM_POWER[sram] and not level:
+            if pin == pins.SRAM_POWER[sram] and not level:
                 self.memories[sram] = np.full((ROWS, COLUMNS), LOST, np.uint8)
                 self.latched.discard(sram)
-        if was == level or pin not in (*LINES, *ENABLE, "CLK"):
+        if was == level or pin not in (*LINES, *pins.ENABLE, "CLK"):
             return
         if pin == "CLK":
             self._clock(level)
             return
-        enabled = not all(self.pins.get(name, 1) for name in ENABLE)
+        enabled = not all(self.pins.get(name, 1) for name in pins.ENABLE)
         if pin in LINES and enabled:
             addressing = pin == "SHIFT" and ADDRESSING & {*self._doing}
             assert addressing, f"{pin} set while an FPGA is enabled"
-        levels = [self.pins.get(name, 0) for name in (*LINES, *ENABLE)]
+        levels = [self.pins.get(name, 0) for name in (*LINES, *pins.ENABLE)]
         self._enter(actions(*levels, mcu_addressing=self.mcu_addressing))
 
     def _enter(self, doing: Any) -> None:
@@ -279,7 +270,7 @@ class Harness(Runner, HostSide):
         action = self._doing[half]
         picture = self.scenes[Camera(1 - half if action is Action.STORE_OTHER else half)]
         assert picture is not None
-        if self.pins[SRAM_POWER[half]]:
+        if self.pins[pins.SRAM_POWER[half]]:
             self.memories[half] = picture.copy()
         return True
 

@@ -21,15 +21,7 @@ from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import Result, State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    IMAGE_BYTES,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    Sram,
-)
-from cubestack.firmware_model.interface.cubesense.pins import Monitor
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
@@ -57,19 +49,19 @@ class Links(Runner, HostSide):
     def __init__(self, *, mcu_addressing: bool = False) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, PIC18F45K20)
-        self.pictures: NDArray[np.uint8] = np.zeros((2, IMAGE_BYTES), np.uint8)
-        self.off: set[Sram] = set()
+        self.pictures: NDArray[np.uint8] = np.zeros((2, codes.IMAGE_BYTES), np.uint8)
+        self.off: set[codes.Sram] = set()
         self.done: list[tuple[object, ...]] = []
-        self.opened: list[Sram] = []
+        self.opened: list[codes.Sram] = []
         self.read = self.skipped = 0
-        self.outcome = CaptureResult.STORED_OWN_SRAM
+        self.outcome = codes.CaptureResult.STORED_OWN_SRAM
         self.bench_sent = bytearray()
         self._free_us = 0
         self.woken = 0
-        self.amps = {monitor: 1.5 + index for index, monitor in enumerate(Monitor)}
+        self.amps = {monitor: 1.5 + index for index, monitor in enumerate(pins.Monitor)}
         self.mcu_addressing = mcu_addressing
         self.serial_number = "CS0042"
-        self._open: Sram | None = None
+        self._open: codes.Sram | None = None
         self._position = 0
 
         self.state = State()
@@ -112,15 +104,15 @@ class Links(Runner, HostSide):
     def wake(self) -> None:
         self.woken += 1
 
-    def adc_counts(self, monitor: Monitor) -> int:
+    def adc_counts(self, monitor: pins.Monitor) -> int:
         raise AssertionError("asked for through the supply")
 
     # --- supply, cameras, acquisition, measurement ------------------------------------------------
 
-    def currents(self) -> dict[Monitor, float]:
+    def currents(self) -> dict[pins.Monitor, float]:
         return self.amps
 
-    def clear_over_current(self, *memories: Sram) -> Routine[None]:
+    def clear_over_current(self, *memories: codes.Sram) -> Routine[None]:
         self.done.append(("clear", *memories))
         yield Pay()
 
@@ -132,7 +124,7 @@ class Links(Runner, HostSide):
     def picture_open(self) -> bool:
         return self._open is not None and self._open not in self.off
 
-    def open_picture(self, sram: Sram) -> Routine[bool]:
+    def open_picture(self, sram: codes.Sram) -> Routine[bool]:
         self.opened.append(sram)
         yield Pay()
         self._open, self._position = sram, 0
@@ -142,7 +134,7 @@ class Links(Runner, HostSide):
         yield Pay()
         assert self._open is not None
         end = self._position + len(target)
-        assert end <= IMAGE_BYTES
+        assert end <= codes.IMAGE_BYTES
         if self.picture_open:
             target[:] = self.pictures[self._open, self._position : end]
         self._position = end
@@ -153,10 +145,12 @@ class Links(Runner, HostSide):
         self._position += count
         self.skipped += count
 
-    def measure(self, camera: Camera, sram: Sram, *, detect: bool = True) -> Routine[None]:
+    def measure(
+        self, camera: codes.Camera, sram: codes.Sram, *, detect: bool = True
+    ) -> Routine[None]:
         self._open = None
         self.done.append(("measure", camera, sram, detect))
-        detected = DetectResult.SUCCESS if detect else DetectResult.NONE_SCHEDULED
+        detected = codes.DetectResult.SUCCESS if detect else codes.DetectResult.NONE_SCHEDULED
         yield Pay()
         self.state.results[camera] = Result(self.outcome, detected, 1234, -567, sram=sram)
 

@@ -6,21 +6,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EMPTY_FRAME,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ImageSize,
-    NadirSearch,
-    ResetTarget,
-    Sram,
-    SramSelection,
-    checksum,
-    split_coefficient,
-)
-from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.requests import SetPin
 
 from ..registry import registered_in
@@ -39,19 +25,19 @@ telecommand = registered_in(EFFECTS)
 
 def lit(unit: Harness) -> None:
     """Both cameras see what they look for, at (12, -7) deg."""
-    unit.scenes[Camera.SUN] = sun(place(12.0, -7.0, SUN_BORESIGHT), 5.0)
-    unit.scenes[Camera.NADIR] = earth(12.0, -7.0)
+    unit.scenes[codes.Camera.SUN] = sun(place(12.0, -7.0, SUN_BORESIGHT), 5.0)
+    unit.scenes[codes.Camera.NADIR] = earth(12.0, -7.0)
 
 
-def result(unit: Harness, camera: Camera) -> dict[str, float]:
+def result(unit: Harness, camera: codes.Camera) -> dict[str, float]:
     return unit.telemetry(f"Result{camera + 1}")
 
 
-def measured(unit: Harness, camera: Camera) -> tuple[DetectResult, float, float]:
+def measured(unit: Harness, camera: codes.Camera) -> tuple[codes.DetectResult, float, float]:
     """What a measurement finds."""
     unit.command("CaptureAndDetect", Camera=camera, Sram=camera)
     found = result(unit, camera)
-    return DetectResult(int(found["Detect"])), found["Alpha"], found["Beta"]
+    return codes.DetectResult(int(found["Detect"])), found["Alpha"], found["Beta"]
 
 
 def frame(unit: Harness) -> bytes:
@@ -71,51 +57,55 @@ def test_every_telecommand_has_an_effect_and_no_other_does(unit: Harness) -> Non
 @telecommand("Reset")
 def reset(unit: Harness) -> None:
     unit.command("DetectionThreshold1", Threshold=9)
-    unit.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    unit.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     unit.uart(b"noise")
-    unit.command("Reset", Target=ResetTarget.COMMUNICATION)
+    unit.command("Reset", Target=codes.ResetTarget.COMMUNICATION)
     counts = unit.telemetry("CommunicationStatus")
     assert counts == {**dict.fromkeys(counts, 0), "TlmCount": 1}
     assert unit.telemetry("TcmdProcessed") == {"LastTcmd": 0, "Processed": 1, "Error": 0}
-    assert unit.telemetry("ImageFrameInfo")["FrameNumber"] == EMPTY_FRAME
+    assert unit.telemetry("ImageFrameInfo")["FrameNumber"] == codes.EMPTY_FRAME
     assert unit.send("NextImageFrame") == 3
     assert unit.resets == []
 
     unit.log.clear()
-    unit.command("Reset", Target=ResetTarget.CAMERAS)
+    unit.command("Reset", Target=codes.ResetTarget.CAMERAS)
     requests = [request for _, request in unit.log]
-    for camera in Camera:
-        off, on = (requests.index(SetPin(CAMERA_POWER[camera], level)) for level in (0, 1))
+    for camera in codes.Camera:
+        off, on = (requests.index(SetPin(pins.CAMERA_POWER[camera], level)) for level in (0, 1))
         assert off < on
         assert unit.cameras[camera].registers["EXPOSURE"] > 0
     assert unit.telemetry("Configuration")["Threshold1"] == 9
 
-    unit.command("Reset", Target=ResetTarget.MCU)
+    unit.command("Reset", Target=codes.ResetTarget.MCU)
     assert unit.resets == [SOFTWARE_RESET]
     assert unit.telemetry("Configuration")["Threshold1"] == 225
 
 
 @telecommand("ClearOverCurrent")
 def clear_over_current(unit: Harness) -> None:
-    for selection in SramSelection:
-        memories = set(Sram) if selection is SramSelection.BOTH else {Sram(selection)}
-        unit.latched = set(Sram) - unit.cut()
+    for selection in codes.SramSelection:
+        memories = (
+            set(codes.Sram) if selection is codes.SramSelection.BOTH else {codes.Sram(selection)}
+        )
+        unit.latched = set(codes.Sram) - unit.cut()
         unit.run(until_us=unit.now_us + 20_000)
-        assert unit.cut() == set(Sram)
+        assert unit.cut() == set(codes.Sram)
         unit.command("ClearOverCurrent", Selection=selection)
-        assert unit.cut() == set(Sram) - memories
+        assert unit.cut() == set(codes.Sram) - memories
 
 
 @telecommand("CaptureAndDetect")
 def capture_and_detect(unit: Harness) -> None:
     lit(unit)
-    for camera in Camera:
-        for sram in Sram:
+    for camera in codes.Camera:
+        for sram in codes.Sram:
             unit.command("CaptureAndDetect", Camera=camera, Sram=sram)
             found = result(unit, camera)
-            own = CaptureResult.STORED_OWN_SRAM
-            assert found["Capture"] == (own if sram == camera else CaptureResult.STORED_OTHER_SRAM)
-            assert found["Detect"] == DetectResult.SUCCESS
+            own = codes.CaptureResult.STORED_OWN_SRAM
+            assert found["Capture"] == (
+                own if sram == camera else codes.CaptureResult.STORED_OTHER_SRAM
+            )
+            assert found["Detect"] == codes.DetectResult.SUCCESS
             assert (found["Alpha"], found["Beta"]) == pytest.approx((12.0, -7.0), abs=0.5)
             np.testing.assert_array_equal(unit.memories[sram], unit.scenes[camera])
 
@@ -123,29 +113,29 @@ def capture_and_detect(unit: Harness) -> None:
 @telecommand("CaptureOnly")
 def capture_only(unit: Harness) -> None:
     lit(unit)
-    for camera in Camera:
-        for sram in Sram:
+    for camera in codes.Camera:
+        for sram in codes.Sram:
             unit.command("CaptureOnly", Camera=camera, Sram=sram)
-            assert result(unit, camera)["Detect"] == DetectResult.NONE_SCHEDULED
+            assert result(unit, camera)["Detect"] == codes.DetectResult.NONE_SCHEDULED
             np.testing.assert_array_equal(unit.memories[sram], unit.scenes[camera])
 
 
 @telecommand("DetectionThreshold1", "DetectionThreshold2")
 def detection_threshold(unit: Harness) -> None:
     lit(unit)
-    unit.scenes[Camera.SUN] = np.minimum(unit.scenes[Camera.SUN], 240)  # type: ignore[type-var]
+    unit.scenes[codes.Camera.SUN] = np.minimum(unit.scenes[codes.Camera.SUN], 240)  # type: ignore[type-var]
     unit.command("DetectionThreshold1", Threshold=241)
-    assert measured(unit, Camera.SUN)[0] is DetectResult.SUN_NOT_FOUND
-    assert measured(unit, Camera.NADIR)[0] is DetectResult.SUCCESS
+    assert measured(unit, codes.Camera.SUN)[0] is codes.DetectResult.SUN_NOT_FOUND
+    assert measured(unit, codes.Camera.NADIR)[0] is codes.DetectResult.SUCCESS
     unit.command("DetectionThreshold1", Threshold=240)
-    assert measured(unit, Camera.SUN)[0] is DetectResult.SUCCESS
+    assert measured(unit, codes.Camera.SUN)[0] is codes.DetectResult.SUCCESS
     unit.command("DetectionThreshold2", Threshold=250)
-    assert measured(unit, Camera.NADIR)[0] is DetectResult.TOO_FEW_EDGES
+    assert measured(unit, codes.Camera.NADIR)[0] is codes.DetectResult.TOO_FEW_EDGES
 
 
 @telecommand("AutoAdjust1", "AutoAdjust2")
 def auto_adjust(unit: Harness) -> None:
-    for camera in Camera:
+    for camera in codes.Camera:
         assert unit.cameras[camera].registers["COMMON_B"] & 1 == 0
         unit.command(f"AutoAdjust{camera + 1}", Enabled=1)
         unit.command("CaptureOnly", Camera=camera)
@@ -155,7 +145,7 @@ def auto_adjust(unit: Harness) -> None:
 
 @telecommand("CameraSettings1", "CameraSettings2")
 def camera_settings(unit: Harness) -> None:
-    for camera, exposure in zip(Camera, (0x1F1F, 200), strict=True):
+    for camera, exposure in zip(codes.Camera, (0x1F1F, 200), strict=True):
         sent = {"Exposure": exposure, "Gain": 0x1F, "BlueGain": 0x81, "RedGain": 0x7E}
         unit.command(f"CameraSettings{camera + 1}", **sent)
         unit.command("CaptureOnly", Camera=camera)
@@ -170,7 +160,7 @@ def camera_settings(unit: Harness) -> None:
 @telecommand("Boresight1", "Boresight2")
 def boresight(unit: Harness) -> None:
     lit(unit)
-    for camera in Camera:
+    for camera in codes.Camera:
         reset_value = INTERFACE.telecommand(f"Boresight{camera + 1}").reset_values()
         x, y = float(reset_value["X"]), float(reset_value["Y"])
         before = measured(unit, camera)
@@ -178,21 +168,24 @@ def boresight(unit: Harness) -> None:
         after = measured(unit, camera)
         moved = (after[1] - before[1], after[2] - before[2])
         # Edges far from the axis move by more than the angle there.
-        tolerance = 0.1 if camera is Camera.SUN else 0.7
+        tolerance = 0.1 if camera is codes.Camera.SUN else 0.7
         assert moved == pytest.approx((1.0, -2.0), abs=tolerance)
 
 
 @telecommand("Mask1", "Mask2")
 def mask(unit: Harness) -> None:
     lit(unit)
-    missed = {Camera.SUN: DetectResult.SUN_NOT_FOUND, Camera.NADIR: DetectResult.TOO_FEW_EDGES}
-    for camera in Camera:
+    missed = {
+        codes.Camera.SUN: codes.DetectResult.SUN_NOT_FOUND,
+        codes.Camera.NADIR: codes.DetectResult.TOO_FEW_EDGES,
+    }
+    for camera in codes.Camera:
         name = f"Mask{camera + 1}"
         unit.command(name, Area=3, XMin=0, XMax=639, YMin=0, YMax=479)
         assert measured(unit, camera)[0] is missed[camera]
         unit.command(name, Area=3, XMin=0, XMax=0, YMin=0, YMax=0)
         unit.command(name, Area=5, XMin=0, XMax=1, YMin=2, YMax=3)
-        assert measured(unit, camera)[0] is DetectResult.SUCCESS
+        assert measured(unit, camera)[0] is codes.DetectResult.SUCCESS
         shown = unit.telemetry(f"Masks{camera + 1}")
         assert {key for key, value in shown.items() if value} == {"XMax5", "YMin5", "YMax5"}
 
@@ -200,20 +193,20 @@ def mask(unit: Harness) -> None:
 @telecommand("Distortion1", "Distortion2")
 def distortion(unit: Harness) -> None:
     lit(unit)
-    _, alpha, _ = measured(unit, Camera.SUN)
-    assert measured(unit, Camera.NADIR)[0] is DetectResult.SUCCESS
+    _, alpha, _ = measured(unit, codes.Camera.SUN)
+    assert measured(unit, codes.Camera.NADIR)[0] is codes.DetectResult.SUCCESS
     radius = unit.telemetry("Details2")["Radius"]
     factors: dict[str, int] = {}
     for power, factor in enumerate((0.0, 0.8, 0.0, 0.0, 0.0)):
-        mantissa, exponent = split_coefficient(factor)
+        mantissa, exponent = codes.split_coefficient(factor)
         factors |= {f"Mantissa{power}": mantissa, f"Exponent{power}": exponent}
     unit.command("Distortion1", **factors)
     # The lens is nearly straight near its axis, with a slope of 1.
-    assert measured(unit, Camera.SUN)[1] == pytest.approx(alpha / 0.8, rel=0.01)
-    assert measured(unit, Camera.NADIR)[0] is DetectResult.SUCCESS
+    assert measured(unit, codes.Camera.SUN)[1] == pytest.approx(alpha / 0.8, rel=0.01)
+    assert measured(unit, codes.Camera.NADIR)[0] is codes.DetectResult.SUCCESS
     assert unit.telemetry("Details2")["Radius"] == radius
     unit.command("Distortion2", **factors)
-    measured(unit, Camera.NADIR)
+    measured(unit, codes.Camera.NADIR)
     assert unit.telemetry("Details2")["Radius"] > 1.05 * radius
 
 
@@ -221,19 +214,19 @@ def distortion(unit: Harness) -> None:
 def set_nadir_search(_: Harness) -> None:
     unit = Harness(mcu_addressing=True)
     lit(unit)
-    detect, alpha, beta = measured(unit, Camera.NADIR)
+    detect, alpha, beta = measured(unit, codes.Camera.NADIR)
     lines = unit.telemetry("Details2")["PixelsRead"]
-    unit.command("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES)
-    assert unit.telemetry("NadirSearchMode")["Search"] == NadirSearch.AROUND_SAMPLES
-    again = measured(unit, Camera.NADIR)
-    assert again[0] is detect is DetectResult.SUCCESS
+    unit.command("SetNadirSearch", Search=codes.NadirSearch.AROUND_SAMPLES)
+    assert unit.telemetry("NadirSearchMode")["Search"] == codes.NadirSearch.AROUND_SAMPLES
+    again = measured(unit, codes.Camera.NADIR)
+    assert again[0] is detect is codes.DetectResult.SUCCESS
     assert again[1:] == pytest.approx((alpha, beta), abs=0.3)
     assert unit.telemetry("Details2")["PixelsRead"] < lines / 5
 
 
 def test_a_search_that_the_fpgas_are_not_built_for_is_refused(unit: Harness) -> None:
-    assert unit.send("SetNadirSearch", Search=NadirSearch.AROUND_SAMPLES) == 3
-    assert unit.send("SetNadirSearch", Search=NadirSearch.LINES) == 0
+    assert unit.send("SetNadirSearch", Search=codes.NadirSearch.AROUND_SAMPLES) == 3
+    assert unit.send("SetNadirSearch", Search=codes.NadirSearch.LINES) == 0
 
 
 def test_a_lens_without_table(unit: Harness, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -241,28 +234,28 @@ def test_a_lens_without_table(unit: Harness, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("cubestack.firmware_model.cubesense.links.node.invertible", lambda *_: True)
     unit.command("Distortion1", **{f"Mantissa{power}": 0 for power in range(5)})
     assert unit.telemetry("TcmdProcessed") == {"LastTcmd": 54, "Processed": 1, "Error": 3}
-    assert measured(unit, Camera.SUN)[0] is DetectResult.SUCCESS
+    assert measured(unit, codes.Camera.SUN)[0] is codes.DetectResult.SUCCESS
 
 
 @telecommand("StartImageDownload", "NextImageFrame")
 def image_download(unit: Harness) -> None:
     rng = np.random.default_rng(64)
-    for sram in Sram:
+    for sram in codes.Sram:
         picture = rng.integers(0, 256, (480, 640), np.uint8)
         unit.memories[sram] = picture
-        size = ImageSize.SIDE_128
+        size = codes.ImageSize.SIDE_128
         expected = thumbnail(picture, size).reshape(-1, 128)
         assert unit.send("StartImageDownload", Sram=sram, Size=size) == 0
-        assert unit.telemetry("ImageFrameInfo")["FrameNumber"] == EMPTY_FRAME
+        assert unit.telemetry("ImageFrameInfo")["FrameNumber"] == codes.EMPTY_FRAME
         unit.run()
         for number in (0, 40, 41, 90, 40):
             if number:
                 assert unit.send("NextImageFrame", Frame=number) == 0
-                assert unit.telemetry("ImageFrameInfo")["FrameNumber"] == EMPTY_FRAME
+                assert unit.telemetry("ImageFrameInfo")["FrameNumber"] == codes.EMPTY_FRAME
                 unit.run()
             data = frame(unit)
             assert data == expected[number].tobytes()
-            info = {"FrameNumber": number, "Checksum": checksum(data)}
+            info = {"FrameNumber": number, "Checksum": codes.checksum(data)}
             assert unit.telemetry("ImageFrameInfo") == info
 
 
@@ -276,7 +269,7 @@ def test_telecommands_are_executed_in_order(unit: Harness) -> None:
 
 @pytest.mark.parametrize("more", [False, True])
 def test_a_reset_drops_what_waits_and_is_not_processed_before(unit: Harness, more: bool) -> None:
-    unit.send("Reset", Target=ResetTarget.MCU)
+    unit.send("Reset", Target=codes.ResetTarget.MCU)
     seen: list[tuple[int, int]] = []
     unit.on_request = lambda _request: seen.append(
         (len(unit.resets), unit.telemetry("TcmdProcessed")["Processed"])

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EMPTY_FRAME,
-    IMAGE_BYTES,
-    ImageSize,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.requests import Request
 
 from .links_harness import Links
@@ -32,14 +27,14 @@ def shown(node: Links, number: int) -> bytes:
     return bytes(node.telemetry("ImageFrame")["Frame"])
 
 
-def expected(node: Links, sram: Sram, size: ImageSize) -> list[bytes]:
+def expected(node: Links, sram: codes.Sram, size: codes.ImageSize) -> list[bytes]:
     square = thumbnail(node.pictures[sram].reshape(480, 640), size)
     return [frame.tobytes() for frame in square.reshape(-1, 128)]
 
 
-@pytest.mark.parametrize("size", ImageSize)
-def test_a_download_reads_the_picture_once(node: Links, size: ImageSize) -> None:
-    sram = Sram(size % 2)
+@pytest.mark.parametrize("size", codes.ImageSize)
+def test_a_download_reads_the_picture_once(node: Links, size: codes.ImageSize) -> None:
+    sram = codes.Sram(size % 2)
     node.command("StartImageDownload", Sram=sram, Size=size)
     download = node.commands.download
     frames = [shown(node, 0)]
@@ -50,39 +45,41 @@ def test_a_download_reads_the_picture_once(node: Links, size: ImageSize) -> None
     assert frames == expected(node, sram, size)
     assert node.opened == [sram]
     assert node.read == (640 // size.step) * (480 // size.step)
-    assert node.read + node.skipped <= IMAGE_BYTES
+    assert node.read + node.skipped <= codes.IMAGE_BYTES
 
 
 def test_frames_in_any_order(node: Links) -> None:
-    size = ImageSize.SIDE_128
-    frames = expected(node, Sram.SRAM2, size)
-    node.command("StartImageDownload", Sram=Sram.SRAM2, Size=size)
+    size = codes.ImageSize.SIDE_128
+    frames = expected(node, codes.Sram.SRAM2, size)
+    node.command("StartImageDownload", Sram=codes.Sram.SRAM2, Size=size)
     for number in np.random.default_rng(6).permutation(size.frames):
         node.command("NextImageFrame", Frame=int(number))
         assert shown(node, int(number)) == frames[number]
 
 
 def test_going_back_begins_anew_and_going_on_does_not(node: Links) -> None:
-    node.command("StartImageDownload", Size=ImageSize.SIDE_256)
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_256)
     for number, begun in ((200, 1), (300, 1), (299, 2), (299, 3), (301, 3)):
         node.command("NextImageFrame", Frame=number)
         assert len(node.opened) == begun
 
 
 def test_a_measurement_in_between_costs_a_new_beginning_only(node: Links) -> None:
-    size = ImageSize.SIDE_64
-    frames = expected(node, Sram.SRAM1, size)
+    size = codes.ImageSize.SIDE_64
+    frames = expected(node, codes.Sram.SRAM1, size)
     node.command("StartImageDownload", Size=size)
     for number in range(10, 20):
         node.command("NextImageFrame", Frame=number)
         assert shown(node, number) == frames[number]
-        node.command("CaptureOnly", Sram=Sram.SRAM2)
+        node.command("CaptureOnly", Sram=codes.Sram.SRAM2)
     assert len(node.opened) == 10
 
 
 def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Links) -> None:
-    size = ImageSize.SIDE_64
-    for begun, (sram, number) in enumerate(((Sram.SRAM1, 10), (Sram.SRAM2, 15)), start=1):
+    size = codes.ImageSize.SIDE_64
+    for begun, (sram, number) in enumerate(
+        ((codes.Sram.SRAM1, 10), (codes.Sram.SRAM2, 15)), start=1
+    ):
         node.send("StartImageDownload", Sram=sram, Size=size)
         node.send("NextImageFrame", Frame=number)  # the first one is not read
         node.run()
@@ -91,27 +88,27 @@ def test_a_frame_further_on_in_the_other_memory_is_read_there(node: Links) -> No
 
 
 def test_no_frame_is_ready_from_the_request_on(node: Links) -> None:
-    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     seen: list[int] = []
     node.send("NextImageFrame", Frame=0)  # the one that is ready already
     node.on_request = lambda _request: seen.append(ready(node))
-    assert ready(node) == EMPTY_FRAME
+    assert ready(node) == codes.EMPTY_FRAME
     node.run()
-    assert EMPTY_FRAME in seen
+    assert codes.EMPTY_FRAME in seen
     assert ready(node) == 0
 
 
 def test_a_request_that_was_overtaken_while_it_waits_is_not_read(node: Links) -> None:
-    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=12)
     node.command("NextImageFrame", Frame=14)
-    assert shown(node, 14) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[14]
+    assert shown(node, 14) == expected(node, codes.Sram.SRAM1, codes.ImageSize.SIDE_64)[14]
     assert node.read == 80
     assert node.telemetry("TcmdProcessed")["Processed"] == 1
 
 
 def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Links) -> None:
-    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     node.send("NextImageFrame", Frame=14)
     seen = set()
     late = iter([12])
@@ -125,30 +122,30 @@ def test_a_request_that_was_overtaken_while_it_is_read_is_never_ready(node: Link
     node.on_request = look
     node.run()
     assert node.read == 160
-    assert seen <= {EMPTY_FRAME, 12}
-    assert shown(node, 12) == expected(node, Sram.SRAM1, ImageSize.SIDE_64)[12]
+    assert seen <= {codes.EMPTY_FRAME, 12}
+    assert shown(node, 12) == expected(node, codes.Sram.SRAM1, codes.ImageSize.SIDE_64)[12]
 
 
 @pytest.mark.parametrize("when", ["before", "meanwhile"])
 def test_a_memory_without_supply_has_no_frame(node: Links, when: str) -> None:
-    size = ImageSize.SIDE_64
+    size = codes.ImageSize.SIDE_64
     node.command("StartImageDownload", Size=size)
     node.send("NextImageFrame", Frame=15)
     if when == "before":
-        node.off = {Sram.SRAM1}
+        node.off = {codes.Sram.SRAM1}
     else:
-        node.on_request = lambda _: node.off.update({Sram.SRAM1} if node.read > 40 else ())
+        node.on_request = lambda _: node.off.update({codes.Sram.SRAM1} if node.read > 40 else ())
     node.run()
-    assert ready(node) == EMPTY_FRAME
+    assert ready(node) == codes.EMPTY_FRAME
     assert node.telemetry("TcmdProcessed")["Processed"] == 1
     node.off = set()
     node.on_request = lambda _request: None
     node.command("NextImageFrame", Frame=15)
-    assert shown(node, 15) == expected(node, Sram.SRAM1, size)[15]
+    assert shown(node, 15) == expected(node, codes.Sram.SRAM1, size)[15]
 
 
 def test_frames_beyond_the_picture_need_no_memory(node: Links) -> None:
-    node.off = {Sram.SRAM1}
-    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.off = {codes.Sram.SRAM1}
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     assert shown(node, 0) == bytes(128)
     assert node.opened == []

@@ -5,15 +5,7 @@ import pytest
 
 from cubestack.firmware_model.cubesense.program import DRAIN_US
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ResetTarget,
-    Sram,
-)
-from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER, SRAM_POWER
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.requests import Request, Reset, SetPin, Sleep
 
 from .harness import LOST, Harness
@@ -22,7 +14,7 @@ from .scenery import earth
 
 def test_memories_come_on_before_cameras_and_both_are_ready_soon(unit: Harness) -> None:
     switched = [r.pin for _, r in unit.log if isinstance(r, SetPin) and "POWER" in r.pin]
-    assert switched == [*SRAM_POWER.values(), *CAMERA_POWER.values()]
+    assert switched == [*pins.SRAM_POWER.values(), *pins.CAMERA_POWER.values()]
     assert unit.now_us - Harness.boot_us < 10_000
     assert unit.program.idle
 
@@ -36,7 +28,7 @@ def test_nothing_runs_by_itself(unit: Harness) -> None:
 
 
 def test_jobs_are_done_in_their_order(unit: Harness) -> None:
-    unit.scenes[Camera.NADIR] = earth(5, 5)
+    unit.scenes[codes.Camera.NADIR] = earth(5, 5)
     for camera, sram in ((0, 1), (1, 0), (1, 1), (0, 0)):
         assert unit.send("CaptureAndDetect", Camera=camera, Sram=sram) == 0
     unit.log.clear()
@@ -54,24 +46,24 @@ def test_jobs_are_done_in_their_order(unit: Harness) -> None:
 
 
 def test_a_program_reset_starts_anew(unit: Harness) -> None:
-    unit.scenes[Camera.NADIR] = earth(5, 5)
+    unit.scenes[codes.Camera.NADIR] = earth(5, 5)
     unit.command("DetectionThreshold2", Threshold=99)
-    unit.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2)
-    unit.latched.add(Sram.SRAM1)
+    unit.command("CaptureAndDetect", Camera=codes.Camera.NADIR, Sram=codes.Sram.SRAM2)
+    unit.latched.add(codes.Sram.SRAM1)
     unit.run(until_us=unit.now_us + 2 * SAMPLE_US)
-    assert unit.cut() == {Sram.SRAM1}
-    unit.command("Reset", Target=ResetTarget.MCU)
+    assert unit.cut() == {codes.Sram.SRAM1}
+    unit.command("Reset", Target=codes.ResetTarget.MCU)
     assert unit.resets == [1]
     assert unit.telemetry("Result2") == {
         "Alpha": 0,
         "Beta": 0,
-        "Capture": CaptureResult.START_UP,
-        "Detect": DetectResult.START_UP,
+        "Capture": codes.CaptureResult.START_UP,
+        "Detect": codes.DetectResult.START_UP,
     }
     assert unit.telemetry("Configuration")["Threshold2"] == 70
     assert unit.cut() == set()
-    assert (unit.memories[Sram.SRAM2] == LOST).all()  # its switch opened
-    assert unit.program.cameras.acknowledged(Camera.NADIR)
+    assert (unit.memories[codes.Sram.SRAM2] == LOST).all()  # its switch opened
+    assert unit.program.cameras.acknowledged(codes.Camera.NADIR)
 
 
 @pytest.mark.parametrize("stuck", [False, True])
@@ -88,18 +80,18 @@ def test_a_reset_lets_the_acknowledge_out_but_not_for_ever(unit: Harness, stuck:
 
     unit.on_request = send
     message = INTERFACE.telecommand("Reset")
-    unit.i2c_write(bytes([message.id]) + message.pack(Target=ResetTarget.MCU))
+    unit.i2c_write(bytes([message.id]) + message.pack(Target=codes.ResetTarget.MCU))
     unit.run()
     (waited_us,) = reset_us
     assert waited_us == pytest.approx(DRAIN_US if stuck else 4_500, abs=2_000)
 
 
 def test_two_lives_are_alike(unit: Harness) -> None:
-    unit.scenes[Camera.NADIR] = earth(-8, 3)
+    unit.scenes[codes.Camera.NADIR] = earth(-8, 3)
     results = []
     for _ in range(2):
-        unit.command("Reset", Target=ResetTarget.MCU)
-        unit.command("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM1)
+        unit.command("Reset", Target=codes.ResetTarget.MCU)
+        unit.command("CaptureAndDetect", Camera=codes.Camera.NADIR, Sram=codes.Sram.SRAM1)
         results.append((unit.telemetry("Result2"), unit.telemetry("Details2")))
     assert results[0] == results[1]
-    assert np.array_equal(unit.memories[Sram.SRAM1], unit.scenes[Camera.NADIR])
+    assert np.array_equal(unit.memories[codes.Sram.SRAM1], unit.scenes[codes.Camera.NADIR])

@@ -3,22 +3,15 @@
 import pytest
 
 from cubestack.firmware_model.cubesense.supply import OFF_TIME_US, OVER_CURRENT_MA, SAMPLE_US
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    ResetTarget,
-    Sram,
-    SramSelection,
-)
-from cubestack.firmware_model.interface.cubesense.pins import SRAM_POWER, Monitor
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.requests import Request, SetPin, Sleep
 
 from .harness import Harness
 
 
-def over_current(unit: Harness) -> set[Sram]:
+def over_current(unit: Harness) -> set[codes.Sram]:
     power = unit.telemetry("Power")
-    return {sram for sram in Sram if power[f"OverCurrent{sram + 1}"]}
+    return {sram for sram in codes.Sram if power[f"OverCurrent{sram + 1}"]}
 
 
 def test_both_memories_and_cameras_are_on_after_start_up(unit: Harness) -> None:
@@ -27,19 +20,23 @@ def test_both_memories_and_cameras_are_on_after_start_up(unit: Harness) -> None:
     assert over_current(unit) == set()
 
 
-@pytest.mark.parametrize("sram", Sram)
-def test_a_latch_up_while_idle_is_cut_within_one_sample_time(unit: Harness, sram: Sram) -> None:
+@pytest.mark.parametrize("sram", codes.Sram)
+def test_a_latch_up_while_idle_is_cut_within_one_sample_time(
+    unit: Harness, sram: codes.Sram
+) -> None:
     unit.log.clear()
     unit.latched.add(sram)
     start_us = unit.now_us
     unit.run(until_us=start_us + 2 * SAMPLE_US)
-    (cut_us,) = (us for us, request in unit.log if request == SetPin(SRAM_POWER[sram], 0))
+    (cut_us,) = (us for us, request in unit.log if request == SetPin(pins.SRAM_POWER[sram], 0))
     assert cut_us - start_us <= SAMPLE_US + 200
     assert unit.cut() == over_current(unit) == {sram}
 
 
-@pytest.mark.parametrize("target", [ResetTarget.CAMERAS, ResetTarget.MCU])
-def test_the_memories_are_watched_through_every_wait(unit: Harness, target: ResetTarget) -> None:
+@pytest.mark.parametrize("target", [codes.ResetTarget.CAMERAS, codes.ResetTarget.MCU])
+def test_the_memories_are_watched_through_every_wait(
+    unit: Harness, target: codes.ResetTarget
+) -> None:
     """A reset of the cameras waits for 100 ms; one of the program, for the UART."""
     unit.backlog = 200
     latched_us: list[int] = []
@@ -47,7 +44,7 @@ def test_the_memories_are_watched_through_every_wait(unit: Harness, target: Rese
     def latch(request: Request) -> None:
         if isinstance(request, Sleep) and not request.wakeable and not latched_us:
             latched_us.append(unit.now_us)
-            unit.latched.add(Sram.SRAM1)
+            unit.latched.add(codes.Sram.SRAM1)
 
     unit.log.clear()
     message = INTERFACE.telecommand("Reset")
@@ -59,21 +56,21 @@ def test_the_memories_are_watched_through_every_wait(unit: Harness, target: Rese
 
 
 def test_it_stays_off_until_the_host_clears_it(unit: Harness) -> None:
-    unit.latched.add(Sram.SRAM2)
+    unit.latched.add(codes.Sram.SRAM2)
     unit.run(until_us=unit.now_us + 1_000_000)
-    assert unit.cut() == {Sram.SRAM2}
-    unit.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
-    assert unit.cut() == over_current(unit) == {Sram.SRAM2}
-    unit.command("ClearOverCurrent", Selection=SramSelection.BOTH)
+    assert unit.cut() == {codes.Sram.SRAM2}
+    unit.command("ClearOverCurrent", Selection=codes.SramSelection.SRAM1)
+    assert unit.cut() == over_current(unit) == {codes.Sram.SRAM2}
+    unit.command("ClearOverCurrent", Selection=codes.SramSelection.BOTH)
     assert unit.cut() == over_current(unit) == set()
 
 
 @pytest.mark.parametrize("cleared_after_us", [20_000, 500_000])
 def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) -> None:
     unit.log.clear()
-    unit.latched.add(Sram.SRAM2)
+    unit.latched.add(codes.Sram.SRAM2)
     unit.run(until_us=unit.now_us + cleared_after_us)
-    unit.command("ClearOverCurrent", Selection=SramSelection.SRAM2)
+    unit.command("ClearOverCurrent", Selection=codes.SramSelection.SRAM2)
     (off_us, _), (on_us, last) = ((us, r) for us, r in unit.log if isinstance(r, SetPin))
     assert last == SetPin("SRAM2_POWER", 1)
     assert on_us - off_us == pytest.approx(max(OFF_TIME_US, cleared_after_us), abs=SAMPLE_US + 1000)
@@ -81,24 +78,24 @@ def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) ->
 
 
 def test_a_lasting_latch_up_is_cut_again(unit: Harness) -> None:
-    unit.latched.add(Sram.SRAM1)
-    unit.latch_on(SetPin(SRAM_POWER[Sram.SRAM1], 1), Sram.SRAM1)
+    unit.latched.add(codes.Sram.SRAM1)
+    unit.latch_on(SetPin(pins.SRAM_POWER[codes.Sram.SRAM1], 1), codes.Sram.SRAM1)
     unit.run(until_us=unit.now_us + 10_000)
     unit.log.clear()
-    unit.command("ClearOverCurrent", Selection=SramSelection.SRAM1)
+    unit.command("ClearOverCurrent", Selection=codes.SramSelection.SRAM1)
     unit.run(until_us=unit.now_us + 10_000)
     switched = [request for _, request in unit.log if isinstance(request, SetPin)]
     assert switched == [SetPin("SRAM1_POWER", 1), SetPin("SRAM1_POWER", 0)]
-    assert over_current(unit) == {Sram.SRAM1}
+    assert over_current(unit) == {codes.Sram.SRAM1}
 
 
 def test_clearing_does_not_touch_a_memory_that_works(unit: Harness) -> None:
-    unit.command("CaptureOnly", Camera=Camera.SUN, Sram=Sram.SRAM1)
-    kept = unit.memories[Sram.SRAM1].copy()
+    unit.command("CaptureOnly", Camera=codes.Camera.SUN, Sram=codes.Sram.SRAM1)
+    kept = unit.memories[codes.Sram.SRAM1].copy()
     unit.log.clear()
     start_us = unit.now_us
-    unit.command("ClearOverCurrent", Selection=SramSelection.BOTH)
-    assert (unit.memories[Sram.SRAM1] == kept).all()
+    unit.command("ClearOverCurrent", Selection=codes.SramSelection.BOTH)
+    assert (unit.memories[codes.Sram.SRAM1] == kept).all()
     assert not any(isinstance(request, SetPin) for _, request in unit.log)
     assert unit.now_us - start_us < SAMPLE_US + 1_000
 
@@ -107,19 +104,19 @@ def test_clearing_does_not_touch_a_memory_that_works(unit: Harness) -> None:
 def test_the_limit(unit: Harness, ma: float, cut: bool) -> None:
     unit.memory_ma = ma
     unit.run(until_us=unit.now_us + 10_000)
-    assert unit.cut() == (set(Sram) if cut else set())
+    assert unit.cut() == (set(codes.Sram) if cut else set())
 
 
 def test_currents_are_shown_to_a_tenth_within_the_converters_step(unit: Harness) -> None:
     power = unit.telemetry("Power")
     shown = {
-        Monitor.SUPPLY_3V3: power["Current3V3"],
-        Monitor.SRAM1: power["CurrentSram1"],
-        Monitor.SRAM2: power["CurrentSram2"],
-        Monitor.SUPPLY_5V: power["Current5V"],
+        pins.Monitor.SUPPLY_3V3: power["Current3V3"],
+        pins.Monitor.SRAM1: power["CurrentSram1"],
+        pins.Monitor.SRAM2: power["CurrentSram2"],
+        pins.Monitor.SUPPLY_5V: power["Current5V"],
     }
     for monitor, ma in shown.items():
         assert ma == pytest.approx(unit.supply_ma.get(monitor, unit.memory_ma), abs=0.16)
-    unit.latched.add(Sram.SRAM1)
+    unit.latched.add(codes.Sram.SRAM1)
     unit.run(until_us=unit.now_us + 10_000)
     assert unit.telemetry("Power")["CurrentSram1"] == 0

@@ -10,18 +10,7 @@ from cubestack.firmware_model.cubesense.state import Result
 from cubestack.firmware_model.cubesense.telemetry import NODE_TYPE
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EMPTY_FRAME,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ImageSize,
-    NadirSearch,
-    Sram,
-    checksum,
-)
-from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telemetry
 from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
 
 from .links_harness import Links
@@ -52,8 +41,8 @@ def no_two_alike(node: Links) -> None:
             for area in range(5)
         ]
         state.results[camera] = Result(
-            capture=CaptureResult.STORED_OTHER_SRAM,
-            detect=DetectResult(DetectResult.BAD_FIT + camera),
+            capture=codes.CaptureResult.STORED_OTHER_SRAM,
+            detect=codes.DetectResult(codes.DetectResult.BAD_FIT + camera),
             alpha=1000 + base,
             beta=-2000 - base,
             x=3000 + base,
@@ -61,7 +50,7 @@ def no_two_alike(node: Links) -> None:
             radius=40000 + base,
             points=base % 250,
             edges=np.arange(2 * 25, dtype=np.int16).reshape(25, 2) * 32 + base,
-            sram=Sram(1 - camera),
+            sram=codes.Sram(1 - camera),
             first=(base + 4, base + 5),
             pixels_read=OVER + base,
             wait_us=OVER + base + 1,
@@ -70,8 +59,8 @@ def no_two_alike(node: Links) -> None:
             centroid_us=OVER + base + 4,
             total_us=OVER + base + 5,
         )
-    state.over_current = {Sram.SRAM1: False, Sram.SRAM2: True}
-    state.nadir_search = NadirSearch.AROUND_SAMPLES
+    state.over_current = {codes.Sram.SRAM1: False, codes.Sram.SRAM2: True}
+    state.nadir_search = codes.NadirSearch.AROUND_SAMPLES
     state.telecommands, state.telemetries = 258, 514
     state.last_command, state.last_processed, state.last_error = 65, 0, AckError.BAD_PARAMETER
     download = node.commands.download
@@ -79,7 +68,7 @@ def no_two_alike(node: Links) -> None:
     download.number, download.checksum = 4097, 171
 
 
-def result(camera: Camera) -> Values:
+def result(camera: codes.Camera) -> Values:
     base = (camera + 1) * 100
     return {
         "Alpha": (1000 + base) / 100,
@@ -89,7 +78,7 @@ def result(camera: Camera) -> Values:
     }
 
 
-def masks(camera: Camera) -> Values:
+def masks(camera: codes.Camera) -> Values:
     base = (camera + 1) * 100
     names = ("XMin", "XMax", "YMin", "YMax")
     return {
@@ -99,7 +88,7 @@ def masks(camera: Camera) -> Values:
     }
 
 
-def details(camera: Camera) -> Values:
+def details(camera: codes.Camera) -> Values:
     base = (camera + 1) * 100
     return {
         "X": (3000 + base) / 100,
@@ -113,7 +102,7 @@ def details(camera: Camera) -> Values:
     }
 
 
-def times(camera: Camera) -> Values:
+def times(camera: codes.Camera) -> Values:
     start = OVER + (camera + 1) * 100
     phases = ("Wait", "Store", "Search", "Centroid", "Total")
     return {name: start + 1 + index for index, name in enumerate(phases)}
@@ -174,17 +163,17 @@ EXPECTED: dict[str, Callable[[], Values]] = {
     "Configuration": configuration,
     "ImageFrame": lambda: {"Frame": (np.arange(128) * 3).astype(np.uint8).tobytes()},
     "ImageFrameInfo": lambda: {"FrameNumber": 4097, "Checksum": 171},
-    "NadirSearchMode": lambda: {"Search": NadirSearch.AROUND_SAMPLES},
+    "NadirSearchMode": lambda: {"Search": codes.NadirSearch.AROUND_SAMPLES},
     "NadirEdges1": lambda: edges(0),
     "NadirEdges2": lambda: edges(1),
-    **{f"Masks{camera + 1}": lambda c=camera: masks(c) for camera in Camera},
-    **{f"Details{camera + 1}": lambda c=camera: details(c) for camera in Camera},
-    **{f"PhaseTimes{camera + 1}": lambda c=camera: times(c) for camera in Camera},
+    **{f"Masks{camera + 1}": lambda c=camera: masks(c) for camera in codes.Camera},
+    **{f"Details{camera + 1}": lambda c=camera: details(c) for camera in codes.Camera},
+    **{f"PhaseTimes{camera + 1}": lambda c=camera: times(c) for camera in codes.Camera},
     **{
         INTERFACE.telemetry(identifier).name: lambda c=camera: result(c)
         for camera, identifier in (
-            *RESULTS.items(),
-            *((target[0], key) for key, target in SCHEDULES.items()),
+            *telemetry.RESULTS.items(),
+            *((target[0], key) for key, target in telemetry.SCHEDULES.items()),
         )
     },
 }
@@ -216,7 +205,7 @@ def test_after_start_up(node: Links) -> None:
         values = node.telemetry(f"Result{number}")
         assert values == {"Alpha": 0, "Beta": 0, "Capture": 0, "Detect": 0}
         assert set(node.telemetry(f"Masks{number}").values()) == {0}
-    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": EMPTY_FRAME, "Checksum": 0}
+    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": codes.EMPTY_FRAME, "Checksum": 0}
     assert node.telemetry("TcmdProcessed") == {"LastTcmd": 0, "Processed": 1, "Error": 0}
     shown = node.telemetry("Configuration")
     for telecommand in ("DetectionThreshold", "AutoAdjust", "CameraSettings"):
@@ -243,8 +232,8 @@ def test_serial_numbers_are_six_bytes_of_ascii(node: Links, text: str, sent: byt
 
 def test_a_frame_and_its_checksum_belong_together(node: Links) -> None:
     node.pictures[:] = np.random.default_rng(3).integers(0, 256, node.pictures.shape)
-    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     node.command("NextImageFrame", Frame=12)
     data = node.telemetry("ImageFrame")["Frame"]
     assert any(data)
-    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": 12, "Checksum": checksum(data)}
+    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": 12, "Checksum": codes.checksum(data)}

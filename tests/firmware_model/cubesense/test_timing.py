@@ -8,13 +8,8 @@ from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLin
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun, window_bytes
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.mcu import pic18
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
-from cubestack.firmware_model.mcu.pic18 import (
-    FITTED_SUN_PIXELS,
-    FITTED_SUN_SECONDS,
-    PIC18F45K20,
-    pic18f45k20,
-)
 
 from .scenery import SUN_BORESIGHT, earth, feed, scan, sun, window
 
@@ -56,13 +51,13 @@ def published_nadir(meter: Meter) -> NadirConfig:
 
 
 def test_the_factor_is_the_fit_to_the_published_sun_program(published_sun: SunConfig) -> None:
-    measured = sun_seconds(PIC18F45K20, FITTED_SUN_PIXELS, published_sun)
-    assert measured == pytest.approx(FITTED_SUN_SECONDS, rel=0.005)
+    measured = sun_seconds(pic18.PIC18F45K20, pic18.FITTED_SUN_PIXELS, published_sun)
+    assert measured == pytest.approx(pic18.FITTED_SUN_SECONDS, rel=0.005)
 
 
 def test_the_number_of_sun_pixels_decides_the_fit(published_sun: SunConfig) -> None:
-    fewer = sun_seconds(PIC18F45K20, FITTED_SUN_PIXELS // 2, published_sun)
-    assert fewer < 0.65 * FITTED_SUN_SECONDS
+    fewer = sun_seconds(pic18.PIC18F45K20, pic18.FITTED_SUN_PIXELS // 2, published_sun)
+    assert fewer < 0.65 * pic18.FITTED_SUN_SECONDS
 
 
 def test_a_sun_of_7_px_has_the_pixels_of_the_fit(published_sun: SunConfig, meter: Meter) -> None:
@@ -73,7 +68,7 @@ def test_a_sun_of_7_px_has_the_pixels_of_the_fit(published_sun: SunConfig, meter
         ).pixels
         for _ in range(30)
     ]
-    assert np.mean(counts) == pytest.approx(FITTED_SUN_PIXELS, rel=0.05)
+    assert np.mean(counts) == pytest.approx(pic18.FITTED_SUN_PIXELS, rel=0.05)
 
 
 def fitted(pixels: int, config: SunConfig) -> CostTable:
@@ -81,16 +76,16 @@ def fitted(pixels: int, config: SunConfig) -> CostTable:
     low, high = 0.01, 2.0
     while high - low > 1e-4:
         middle = (low + high) / 2
-        if sun_seconds(pic18f45k20(middle), pixels, config) < FITTED_SUN_SECONDS:
+        if sun_seconds(pic18.pic18f45k20(middle), pixels, config) < pic18.FITTED_SUN_SECONDS:
             low = middle
         else:
             high = middle
-    return pic18f45k20(low)
+    return pic18.pic18f45k20(low)
 
 
 def test_the_nadir_time(published_sun: SunConfig, published_nadir: NadirConfig) -> None:
     whole_pixels = EdgeConfig(sub_pixel=False)
-    predicted = IMAGING_S + nadir_seconds(PIC18F45K20, published_nadir, whole_pixels)
+    predicted = IMAGING_S + nadir_seconds(pic18.PIC18F45K20, published_nadir, whole_pixels)
     # A quarter below the published 245 ms: the Sun pixels of the fit are a guess.
     assert predicted == pytest.approx(0.180, abs=0.005)
     # The published time is that of a fit to half of them.
@@ -106,11 +101,11 @@ def test_ours_takes_little_longer(
     equidistant: RadiusTable,
     stereographic: RadiusTable,
 ) -> None:
-    extra = nadir_seconds(PIC18F45K20, NadirConfig(stereographic), EdgeConfig()) - nadir_seconds(
-        PIC18F45K20, published_nadir, EdgeConfig(sub_pixel=False)
-    )
+    extra = nadir_seconds(
+        pic18.PIC18F45K20, NadirConfig(stereographic), EdgeConfig()
+    ) - nadir_seconds(pic18.PIC18F45K20, published_nadir, EdgeConfig(sub_pixel=False))
     assert 0 < extra < 0.012
-    extra = sun_seconds(PIC18F45K20, 109, SunConfig(equidistant)) - sun_seconds(
-        PIC18F45K20, 109, published_sun
+    extra = sun_seconds(pic18.PIC18F45K20, 109, SunConfig(equidistant)) - sun_seconds(
+        pic18.PIC18F45K20, 109, published_sun
     )
     assert 0 < extra < 0.002

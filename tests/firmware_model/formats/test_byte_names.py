@@ -4,12 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.formats.byte_names import (
-    name_answer_byte,
-    name_bus_byte,
-    name_request_byte,
-    payload_offset,
-)
+from cubestack.firmware_model.formats import byte_names
 from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -32,10 +27,10 @@ def test_offset_of_every_payload_byte(payload, before):
     wire, position = before + encode_frame(payload), len(before) + 2
     for offset, byte in enumerate(payload):
         for _ in range(2 if byte == 0x1F else 1):
-            assert payload_offset(wire, position) == offset
+            assert byte_names.payload_offset(wire, position) == offset
             position += 1
-    assert payload_offset(wire, position) is None
-    assert payload_offset(wire, len(before)) is None
+    assert byte_names.payload_offset(wire, position) is None
+    assert byte_names.payload_offset(wire, len(before)) is None
 
 
 def test_every_telemetry_field_is_found():
@@ -46,7 +41,7 @@ def test_every_telemetry_field_is_found():
         whole = recording((encode_frame(bytes([message.id])), answer))
         for field in message.fields:
             index = 2 + field.bit_offset // 8
-            name = name_answer_byte(INTERFACE, whole, "uart", index)
+            name = byte_names.name_answer_byte(INTERFACE, whole, "uart", index)
             assert f"telemetry {message.name}, field" in name
             assert field.name in name
 
@@ -56,23 +51,25 @@ def test_answers_belong_to_the_request_before_them():
         (encode_frame(b"\x80"), encode_frame(bytes(8))),
         (encode_frame(b"\x14\0\0"), encode_frame(b"\0")),
     )
-    assert name_answer_byte(INTERFACE, whole, "uart", 4).endswith(
+    assert byte_names.name_answer_byte(INTERFACE, whole, "uart", 4).endswith(
         "telemetry Identification, field FirmwareVersionMajor"
     )
-    assert name_answer_byte(INTERFACE, whole, "uart", 14).endswith(
+    assert byte_names.name_answer_byte(INTERFACE, whole, "uart", 14).endswith(
         "acknowledge of telecommand CaptureAndDetect, error code"
     )
-    assert name_answer_byte(INTERFACE, whole, "uart", 12).endswith("framing")
+    assert byte_names.name_answer_byte(INTERFACE, whole, "uart", 12).endswith("framing")
 
 
 def test_bench_letter_is_named():
     whole = recording((b"q", b"Y"), port="bench_uart")
-    assert name_answer_byte(INTERFACE, whole, "bench_uart", 0).endswith("answer to letter 'q'")
+    assert byte_names.name_answer_byte(INTERFACE, whole, "bench_uart", 0).endswith(
+        "answer to letter 'q'"
+    )
 
 
 def test_request_byte_is_named():
     wire = encode_frame(b"\x80") + encode_frame(bytes([20, 1, 0]))
-    names = [name_request_byte(INTERFACE, wire, index, "uart") for index in (7, 8, 9, 5)]
+    names = [byte_names.name_request_byte(INTERFACE, wire, index, "uart") for index in (7, 8, 9, 5)]
     assert names[0].endswith("the ID")
     assert names[1].endswith("telecommand CaptureAndDetect, field Camera")
     assert names[2].endswith("telecommand CaptureAndDetect, field Sram")
@@ -93,4 +90,4 @@ def test_bus_byte_is_named(address, pointer, index, name):
         BusMessage(address, bytes(8), read=True),
     )
     transfer = BusTransfer(0, "i2c", 1, messages)
-    assert name_bus_byte(INTERFACE, transfer, 1, index).endswith(name)
+    assert byte_names.name_bus_byte(INTERFACE, transfer, 1, index).endswith(name)

@@ -6,46 +6,40 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.formats.recording import (
-    BusMessage,
-    BusTransfer,
-    LineBytes,
-    LineError,
-    RecordingError,
-    RecordingWriter,
-    load_recording,
-)
+from cubestack.firmware_model.formats import recording
 
 TIMES = st.integers(0, 10**15)
 LINES = st.builds(
-    LineBytes,
+    recording.LineBytes,
     TIMES,
     st.just("uart"),
     st.sampled_from(["host", "device"]),
     st.binary(min_size=1, max_size=9),
     st.integers(1, 10**9),
 )
-MESSAGES = st.builds(BusMessage, st.integers(0, 127), st.binary(max_size=5), st.booleans())
+MESSAGES = st.builds(
+    recording.BusMessage, st.integers(0, 127), st.binary(max_size=5), st.booleans()
+)
 TRANSFERS = st.builds(
-    BusTransfer,
+    recording.BusTransfer,
     TIMES,
     st.just("i2c"),
     TIMES,
     st.lists(MESSAGES, max_size=3).map(tuple),
     st.integers(0, 130),
 )
-EVENTS = LINES | TRANSFERS | st.builds(LineError, TIMES, st.just("uart"))
+EVENTS = LINES | TRANSFERS | st.builds(recording.LineError, TIMES, st.just("uart"))
 
 
 @given(st.lists(EVENTS, max_size=8))
 def test_what_is_written_is_read(tmp_path_factory, events):
     stream = io.StringIO()
-    writer = RecordingWriter(stream, "cubestar", {"uart": 57_600})
+    writer = recording.RecordingWriter(stream, "cubestar", {"uart": 57_600})
     for event in events:
         writer.write(event)
     path = tmp_path_factory.getbasetemp() / "some.rec"
     path.write_text(stream.getvalue())
-    found = load_recording(path)
+    found = recording.load_recording(path)
     assert (found.device, found.bauds) == ("cubestar", {"uart": 57_600})
     assert list(found.events) == sorted(events, key=lambda event: event.time_ps)
 
@@ -75,7 +69,7 @@ def test_what_is_written_is_read(tmp_path_factory, events):
 def test_what_is_no_recording(tmp_path, text, reason):
     path = tmp_path / "some.rec"
     path.write_text(text)
-    with pytest.raises(RecordingError, match=reason) as raised:
-        load_recording(path)
+    with pytest.raises(recording.RecordingError, match=reason) as raised:
+        recording.load_recording(path)
     assert "\n" not in str(raised.value)
     assert "some.rec" in str(raised.value)

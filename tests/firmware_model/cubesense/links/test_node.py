@@ -5,15 +5,7 @@ import pytest
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.node import SEND_BYTES
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ImageSize,
-    Sram,
-)
-from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telemetry
 from cubestack.firmware_model.mcu.requests import Request
 
 from ..links_harness import Links
@@ -35,7 +27,7 @@ def test_identification_answers_eight_bytes(node: Links) -> None:
 def test_capture_and_detect_is_acknowledged(node: Links) -> None:
     assert node.wire(bytes.fromhex("1F7F 14 00 00 1FFF")) == OK
     node.run()
-    assert node.done == [("measure", Camera.SUN, Sram.SRAM1, True)]
+    assert node.done == [("measure", codes.Camera.SUN, codes.Sram.SRAM1, True)]
 
 
 @pytest.mark.parametrize(
@@ -47,7 +39,7 @@ def test_a_result_is_angles_and_two_codes(
 ) -> None:
     node.command("CaptureAndDetect")
     if alpha is not None:
-        node.state.results[Camera.SUN].alpha = alpha
+        node.state.results[codes.Camera.SUN].alpha = alpha
     found = node.wire(bytes.fromhex(f"1F7F {request_id} 1FFF"))
     assert found == bytes.fromhex(f"1F7F {answer} 1FFF")
 
@@ -55,13 +47,13 @@ def test_a_result_is_angles_and_two_codes(
 def test_escapes_in_settings_are_undone(node: Links) -> None:
     assert node.wire(bytes.fromhex("1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF")) == OK
     node.run()
-    settings = node.state.cameras[Camera.NADIR]
+    settings = node.state.cameras[codes.Camera.NADIR]
     assert (settings.exposure, settings.gain) == (0x1F1F, 0x1F)
     assert (settings.blue_gain, settings.red_gain) == (0x80, 0x80)
 
 
 def test_an_escape_in_a_frame_number_is_undone(node: Links) -> None:
-    node.command("StartImageDownload", Size=ImageSize.SIDE_64)
+    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     assert node.wire(bytes.fromhex("1F7F 41 1F1F 00 1FFF")) == OK
     node.run()
     assert node.telemetry("ImageFrameInfo")["FrameNumber"] == 31
@@ -104,8 +96,8 @@ def test_what_is_refused(node: Links, payload: str, error: AckError) -> None:
     assert not node.state.flags
 
 
-@pytest.mark.parametrize("size", ImageSize)
-def test_frames_exist_up_to_the_selected_size(node: Links, size: ImageSize) -> None:
+@pytest.mark.parametrize("size", codes.ImageSize)
+def test_frames_exist_up_to_the_selected_size(node: Links, size: codes.ImageSize) -> None:
     node.command("StartImageDownload", Size=size)
     assert node.send("NextImageFrame", Frame=size.frames - 1) == AckError.OK
     assert node.send("NextImageFrame", Frame=size.frames) == AckError.BAD_PARAMETER
@@ -117,47 +109,50 @@ def test_results_are_pending_before_the_acknowledge(node: Links) -> None:
     send = node.uart_send
 
     def spy(data: bytes, port: Port = Port.NODE) -> None:
-        result = node.state.results[Camera.SUN]
+        result = node.state.results[codes.Camera.SUN]
         at_send.append((result.capture, result.detect))
         send(data, port)
 
     node.uart_send = spy  # type: ignore[method-assign]
     node.send("CaptureAndDetect")
-    node.send("CaptureOnly", Sram=Sram.SRAM2)
+    node.send("CaptureOnly", Sram=codes.Sram.SRAM2)
     assert at_send == [
-        (CaptureResult.PENDING, DetectResult.PENDING),
-        (CaptureResult.PENDING, DetectResult.NONE_SCHEDULED),
+        (codes.CaptureResult.PENDING, codes.DetectResult.PENDING),
+        (codes.CaptureResult.PENDING, codes.DetectResult.NONE_SCHEDULED),
     ]
-    assert node.state.results[Camera.SUN].sram == Sram.SRAM2
+    assert node.state.results[codes.Camera.SUN].sram == codes.Sram.SRAM2
 
 
 def test_a_refused_capture_changes_no_result(node: Links) -> None:
     node.command("CaptureAndDetect")
-    node.command("CaptureOnly", Camera=Camera.NADIR)
+    node.command("CaptureOnly", Camera=codes.Camera.NADIR)
     assert node.frames(bytes.fromhex("15 00 00 01")) == [b"\x03"]
     for _ in range(4):
         node.send("ClearOverCurrent")
     assert node.send("CaptureAndDetect") == AckError.BUFFER_FULL
-    assert node.state.results[Camera.SUN].detect is DetectResult.SUCCESS
+    assert node.state.results[codes.Camera.SUN].detect is codes.DetectResult.SUCCESS
 
 
-@pytest.mark.parametrize("identifier", SCHEDULES)
+@pytest.mark.parametrize("identifier", telemetry.SCHEDULES)
 def test_reading_a_result_schedules_the_next(node: Links, identifier: int) -> None:
-    camera, sram = SCHEDULES[identifier]
+    camera, sram = telemetry.SCHEDULES[identifier]
     name = INTERFACE.telemetry(identifier).name
     values = node.telemetry(name)
     assert (values["Capture"], values["Detect"]) == (0, 0)
     again = node.telemetry(f"Result{camera + 1}")
-    assert (again["Capture"], again["Detect"]) == (CaptureResult.PENDING, DetectResult.PENDING)
+    assert (again["Capture"], again["Detect"]) == (
+        codes.CaptureResult.PENDING,
+        codes.DetectResult.PENDING,
+    )
     node.run()
     assert node.done == [("measure", camera, sram, True)]
     assert node.woken
 
 
-@pytest.mark.parametrize("identifier", SCHEDULES)
+@pytest.mark.parametrize("identifier", telemetry.SCHEDULES)
 def test_on_i2c_it_does_so_when_the_transfer_has_ended(node: Links, identifier: int) -> None:
-    camera, sram = SCHEDULES[identifier]
-    node.outcome = CaptureResult.STORED_OTHER_SRAM
+    camera, sram = telemetry.SCHEDULES[identifier]
+    node.outcome = codes.CaptureResult.STORED_OTHER_SRAM
     node.command("CaptureAndDetect", Camera=camera)
     node.done.clear()
     node.link.i2c_start(False)
@@ -175,15 +170,15 @@ def test_a_schedule_that_is_not_read_is_none(node: Links) -> None:
     node.i2c_write(bytes([0x96]))
     node.i2c_read(0)
     assert not node.queue
-    assert node.state.results[Camera.SUN].capture is CaptureResult.START_UP
+    assert node.state.results[codes.Camera.SUN].capture is codes.CaptureResult.START_UP
 
 
 def test_a_schedule_that_meets_a_full_queue_leaves_the_result(node: Links) -> None:
     node.command("CaptureAndDetect")
     for _ in range(4):
         node.send("ClearOverCurrent")
-    assert node.telemetry("Result1ThenSram1")["Detect"] == DetectResult.SUCCESS
-    assert node.telemetry("Result1")["Detect"] == DetectResult.SUCCESS
+    assert node.telemetry("Result1ThenSram1")["Detect"] == codes.DetectResult.SUCCESS
+    assert node.telemetry("Result1")["Detect"] == codes.DetectResult.SUCCESS
     assert node.telemetry("CommunicationStatus")["TcmdBufferOverrun"] == 1
     assert len(node.queue) == 4
 
@@ -225,7 +220,7 @@ def test_a_telecommand_on_i2c_is_polled(node: Links) -> None:
     assert node.i2c_write(b"\x14\x01\x00") == 3
     assert node.i2c_read(3, 0x83) == bytes([20, 0, AckError.OK])
     node.run()
-    assert node.done == [("measure", Camera.NADIR, Sram.SRAM1, True)]
+    assert node.done == [("measure", codes.Camera.NADIR, codes.Sram.SRAM1, True)]
     assert node.i2c_read(3, 0x83) == bytes([20, 1, AckError.OK])
     node.i2c_write(b"\x14\x02\x00")
     assert node.i2c_read(3, 0x83) == bytes([20, 1, AckError.BAD_PARAMETER])

@@ -8,16 +8,7 @@ import pytest
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.interface.codec.register_pointer import FILL
-from cubestack.firmware_model.interface.cubesense.codes import (
-    IMAGE_BYTES,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    Measurement,
-    NadirSearch,
-    Sram,
-    SramSelection,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
 from ..links_harness import Links
@@ -66,11 +57,11 @@ def test_a_setting_is_read_back_and_is_the_node_s_own(node: Links, register: obj
     assert {key for key in after if after[key] != before[key]} <= {name}
     assert after[name] == 1
     if name == "IMAGE_SRAM":
-        assert node.state.image_sram == Sram.SRAM2
+        assert node.state.image_sram == codes.Sram.SRAM2
     elif name == "NADIR_SEARCH":
         assert node.telemetry("NadirSearchMode")["Search"] == 1
     else:
-        camera = Camera[name.split("_")[0]]
+        camera = codes.Camera[name.split("_")[0]]
         shown = node.telemetry("Configuration")
         field = {
             "THRESHOLD": "Threshold",
@@ -88,23 +79,23 @@ def test_an_exposure_beyond_a_byte_reads_as_255(node: Links) -> None:
     assert value(node, "NADIR_EXPOSURE") == 255
 
 
-@pytest.mark.parametrize("target", Measurement)
+@pytest.mark.parametrize("target", codes.Measurement)
 @pytest.mark.parametrize("name", ["MEASURE", "CAPTURE"])
-def test_an_action_measures(node: Links, name: str, target: Measurement) -> None:
+def test_an_action_measures(node: Links, name: str, target: codes.Measurement) -> None:
     write(node, name, target)
     camera, detect = target.camera, name == "MEASURE"
-    pending = DetectResult.PENDING if detect else DetectResult.NONE_SCHEDULED
-    assert value(node, f"{camera.name}_CAPTURE") == CaptureResult.PENDING
+    pending = codes.DetectResult.PENDING if detect else codes.DetectResult.NONE_SCHEDULED
+    assert value(node, f"{camera.name}_CAPTURE") == codes.CaptureResult.PENDING
     assert value(node, f"{camera.name}_DETECT") == pending
     assert node.done == []
     node.run()
     assert node.done == [("measure", camera, target.sram, detect)]
-    assert value(node, f"{camera.name}_CAPTURE") == CaptureResult.STORED_OWN_SRAM
+    assert value(node, f"{camera.name}_CAPTURE") == codes.CaptureResult.STORED_OWN_SRAM
     assert node.woken
 
 
 def test_results_are_big_endian_and_signed(node: Links) -> None:
-    for camera in Camera:
+    for camera in codes.Camera:
         result = node.state.results[camera]
         result.x, result.y, result.points = 0x0102 + camera, -2 - camera, 28
         assert node.read_register(2, 0x40 + 8 * camera) == bytes([1, 2 + camera])
@@ -113,14 +104,16 @@ def test_results_are_big_endian_and_signed(node: Links) -> None:
         assert value(node, f"{camera.name}_POINTS") == 28
 
 
-@pytest.mark.parametrize("selection", SramSelection)
-def test_over_current_flags_are_seen_and_cleared(node: Links, selection: SramSelection) -> None:
+@pytest.mark.parametrize("selection", codes.SramSelection)
+def test_over_current_flags_are_seen_and_cleared(
+    node: Links, selection: codes.SramSelection
+) -> None:
     for bits in range(4):
-        node.state.over_current = {sram: bool(bits >> sram & 1) for sram in Sram}
+        node.state.over_current = {sram: bool(bits >> sram & 1) for sram in codes.Sram}
         assert value(node, "OVER_CURRENT") == bits
     write(node, "CLEAR_OVER_CURRENT", selection)
     node.run()
-    cleared = Sram if selection is SramSelection.BOTH else [Sram(selection)]
+    cleared = codes.Sram if selection is codes.SramSelection.BOTH else [codes.Sram(selection)]
     assert node.done == [("clear", *cleared)]
 
 
@@ -140,15 +133,15 @@ def test_a_value_that_is_not_allowed_is_ignored(node: Links) -> None:
 
 def test_a_search_that_the_fpgas_are_not_built_for_is_ignored() -> None:
     node = Links()
-    write(node, "NADIR_SEARCH", NadirSearch.AROUND_SAMPLES)
-    assert value(node, "NADIR_SEARCH") == NadirSearch.LINES
+    write(node, "NADIR_SEARCH", codes.NadirSearch.AROUND_SAMPLES)
+    assert value(node, "NADIR_SEARCH") == codes.NadirSearch.LINES
 
 
 def test_an_action_that_meets_a_full_queue_is_lost(node: Links) -> None:
     for _ in range(5):
-        write(node, "MEASURE", Measurement.SUN_SRAM1)
-    write(node, "MEASURE", Measurement.NADIR_SRAM2)
-    assert node.state.results[Camera.NADIR].capture is CaptureResult.START_UP
+        write(node, "MEASURE", codes.Measurement.SUN_SRAM1)
+    write(node, "MEASURE", codes.Measurement.NADIR_SRAM2)
+    assert node.state.results[codes.Camera.NADIR].capture is codes.CaptureResult.START_UP
     assert node.telemetry("CommunicationStatus")["TcmdBufferOverrun"] == 1
     node.run()
     assert len(node.done) == 4
@@ -156,7 +149,7 @@ def test_an_action_that_meets_a_full_queue_is_lost(node: Links) -> None:
 
 def test_an_action_is_no_telecommand(node: Links) -> None:
     node.send("CaptureOnly")
-    write(node, "CLEAR_OVER_CURRENT", SramSelection.BOTH)
+    write(node, "CLEAR_OVER_CURRENT", codes.SramSelection.BOTH)
     node.run(1)
     assert node.telemetry("TcmdProcessed") == {"LastTcmd": 21, "Processed": 1, "Error": 0}
     node.run()
@@ -164,7 +157,7 @@ def test_an_action_is_no_telecommand(node: Links) -> None:
 
 
 def test_a_value_is_latched_when_its_address_is_written(node: Links) -> None:
-    result = node.state.results[Camera.SUN]
+    result = node.state.results[codes.Camera.SUN]
     result.x = 0x0102
     assert node.write_register(0x40) == 1
     assert node.read_register(1) == b"\x01"
@@ -187,15 +180,15 @@ def test_a_read_before_any_pointer_gives_nothing(node: Links) -> None:
     assert node.read_register(3) == bytes([FILL] * 3)
 
 
-@pytest.mark.parametrize("sram", Sram)
-def test_the_picture_comes_in_several_reads_and_is_read_once(node: Links, sram: Sram) -> None:
+@pytest.mark.parametrize("sram", codes.Sram)
+def test_the_picture_comes_in_several_reads_and_is_read_once(node: Links, sram: codes.Sram) -> None:
     write(node, "IMAGE_SRAM", sram)
     data = node.read_register(8192, IMAGE)
-    while len(data) < IMAGE_BYTES:
-        data += node.read_register(min(8192, IMAGE_BYTES - len(data)))
+    while len(data) < codes.IMAGE_BYTES:
+        data += node.read_register(min(8192, codes.IMAGE_BYTES - len(data)))
     assert data == node.pictures[sram].tobytes()
     assert node.opened == [sram]
-    assert node.read == IMAGE_BYTES
+    assert node.read == codes.IMAGE_BYTES
     assert node.read_register(3) == bytes([FILL] * 3)
     assert not node.queue
 
@@ -239,14 +232,14 @@ def test_a_pointer_that_moves_while_the_picture_is_read_leaves_nothing(node: Lin
 
 def test_a_measurement_in_between_does_not_show(node: Links) -> None:
     data = node.read_register(1000, IMAGE)
-    node.command("CaptureOnly", Sram=Sram.SRAM2)
+    node.command("CaptureOnly", Sram=codes.Sram.SRAM2)
     data += node.read_register(1000)
     assert data == node.pictures[0, :2000].tobytes()
     assert len(node.opened) == 2
 
 
 def test_a_memory_without_supply_gives_nothing(node: Links) -> None:
-    node.off = {Sram.SRAM1}
+    node.off = {codes.Sram.SRAM1}
     assert node.read_register(200, IMAGE) == bytes([FILL] * 200)
     node.off = set()
     assert node.read_register(200, IMAGE) == node.pictures[0, :200].tobytes()
@@ -254,13 +247,13 @@ def test_a_memory_without_supply_gives_nothing(node: Links) -> None:
 
 def test_a_memory_cut_off_meanwhile_ends_the_picture(node: Links) -> None:
     assert node.read_register(READ_AHEAD_BYTES, IMAGE)
-    node.off = {Sram.SRAM1}
+    node.off = {codes.Sram.SRAM1}
     data = node.read_register(500)
     assert data.endswith(bytes([FILL] * 400))
 
 
 def test_a_download_at_the_same_time_leaves_both_whole(node: Links) -> None:
-    node.command("StartImageDownload", Sram=Sram.SRAM2, Size=0)
+    node.command("StartImageDownload", Sram=codes.Sram.SRAM2, Size=0)
     data = b""
     for number in range(2176, 2196):
         data += node.read_register(50, None if data else IMAGE)

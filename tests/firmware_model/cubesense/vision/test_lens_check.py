@@ -6,12 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.vision.distortion import (
-    DistortionError,
-    Projection,
-    byte_table,
-    fine_table,
-)
+from cubestack.firmware_model.cubesense.vision import distortion
 from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.interface.cubesense.codes import coefficient
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
@@ -23,10 +18,10 @@ def tables_exist(factors: Sequence[float]) -> bool:
     meter = Meter(PIC18F45K20)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            byte_table(meter, factors)
-            for projection in Projection:
-                fine_table(meter, projection, factors)
-    except DistortionError:
+            distortion.byte_table(meter, factors)
+            for projection in distortion.Projection:
+                distortion.fine_table(meter, projection, factors)
+    except distortion.DistortionError:
         return False
     return True
 
@@ -89,5 +84,5 @@ def test_a_dip_between_the_tried_radii_is_found() -> None:
 def test_it_is_quick() -> None:
     meter, table = Meter(PIC18F45K20), Meter(PIC18F45K20)
     assert invertible(DISTORTION, meter)
-    fine_table(table, Projection.STEREOGRAPHIC)
+    distortion.fine_table(table, distortion.Projection.STEREOGRAPHIC)
     assert meter.table.seconds(meter.total) < 0.03 < table.table.seconds(table.total) / 10

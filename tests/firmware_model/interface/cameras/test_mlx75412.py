@@ -1,8 +1,4 @@
-from cubestack.firmware_model.interface.cameras.mlx75412 import (
-    LONGEST_EXPOSURE,
-    REGISTERS,
-    SYNC_APPLY,
-)
+from cubestack.firmware_model.interface.cameras import mlx75412
 
 # CubeStar thesis, appendix D, typed from the text: name, first address, bytes.
 PUBLISHED = {
@@ -19,26 +15,26 @@ PUBLISHED = {
 
 
 def test_every_published_register_is_declared_where_it_is() -> None:
-    assert {r.name: (r.address, r.width) for r in REGISTERS} == PUBLISHED
-    assert REGISTERS.i2c_address == 0b0101100
-    assert REGISTERS.at(0x841F) is REGISTERS["LINEARITY"]
-    assert REGISTERS.at(0x8420) is None
+    assert {r.name: (r.address, r.width) for r in mlx75412.REGISTERS} == PUBLISHED
+    assert mlx75412.REGISTERS.i2c_address == 0b0101100
+    assert mlx75412.REGISTERS.at(0x841F) is mlx75412.REGISTERS["LINEARITY"]
+    assert mlx75412.REGISTERS.at(0x8420) is None
 
 
 def test_published_values() -> None:
-    assert REGISTERS["CLOCKS_PER_SECOND"].reset == 0x019BFCC0
-    assert REGISTERS["FRAMES_PER_SECOND"].reset == 0x001E
-    assert LONGEST_EXPOSURE.to_bytes(2, "big") == b"\x00\x02"
-    assert SYNC_APPLY == 0x03
-    mode = REGISTERS["MODE_SELECT"]
+    assert mlx75412.REGISTERS["CLOCKS_PER_SECOND"].reset == 0x019BFCC0
+    assert mlx75412.REGISTERS["FRAMES_PER_SECOND"].reset == 0x001E
+    assert mlx75412.LONGEST_EXPOSURE.to_bytes(2, "big") == b"\x00\x02"
+    assert mlx75412.SYNC_APPLY == 0x03
+    mode = mlx75412.REGISTERS["MODE_SELECT"]
     assert mode.field("ENABLE").mask == 0x01
     assert mode.field("OUTPUT_DEPTH").of(0x20) == 1  # bit 5 set, bit 6 clear: 8 bits
-    features = REGISTERS["FIRMWARE_FEATURES"]
+    features = mlx75412.REGISTERS["FIRMWARE_FEATURES"]
     assert features.field("AUTOVIEW").mask == 0x80
     assert features.field("AUTO_EXPOSURE").mask == 0x20
     assert features.field("BARRIER_UPDATE").mask | features.field("AUTO_DYNAMIC_RANGE").mask == 0x50
-    assert REGISTERS["HARDWARE_FEATURES"].field("HISTOGRAM_REMAP").mask == 0x40
+    assert mlx75412.REGISTERS["HARDWARE_FEATURES"].field("HISTOGRAM_REMAP").mask == 0x40
 
 
 def test_only_mode_select_and_sync_act_at_once() -> None:
-    assert {r.name for r in REGISTERS if not r.needs_sync} == {"MODE_SELECT", "SYNC"}
+    assert {r.name for r in mlx75412.REGISTERS if not r.needs_sync} == {"MODE_SELECT", "SYNC"}

@@ -1,15 +1,6 @@
 import pytest
 
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    COLUMNS,
-    FRAME_END_CLOCKS,
-    FRAME_START_CLOCKS,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    ROWS,
-    gain,
-    gain_register,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001
 
 # MT9M001 data sheet, register list, typed from the text: address, reset value.
 PUBLISHED = {
@@ -39,16 +30,16 @@ PUBLISHED = {
 
 
 def test_every_published_register_is_declared_where_it_is() -> None:
-    assert {r.name: (r.address, r.reset) for r in REGISTERS} == PUBLISHED
-    assert REGISTERS.i2c_address == 0xBA >> 1
-    assert REGISTERS.address_bytes == 1
-    assert all(r.unit_bits == 16 and r.width == 1 for r in REGISTERS)
+    assert {r.name: (r.address, r.reset) for r in mt9m001.REGISTERS} == PUBLISHED
+    assert mt9m001.REGISTERS.i2c_address == 0xBA >> 1
+    assert mt9m001.REGISTERS.address_bytes == 1
+    assert all(r.unit_bits == 16 and r.width == 1 for r in mt9m001.REGISTERS)
 
 
 def test_published_frame_time() -> None:
-    line = COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS
-    assert line / PIXEL_CLOCK_HZ == pytest.approx(31.75e-6)
-    assert (ROWS + 26) * line / PIXEL_CLOCK_HZ == pytest.approx(33.34e-3, abs=1e-5)
+    line = mt9m001.COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
+    assert line / mt9m001.PIXEL_CLOCK_HZ == pytest.approx(31.75e-6)
+    assert (mt9m001.ROWS + 26) * line / mt9m001.PIXEL_CLOCK_HZ == pytest.approx(33.34e-3, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -56,13 +47,13 @@ def test_published_frame_time() -> None:
     [(0x08, 1.0), (0x20, 4.0), (0x51, 4.25), (0x60, 8.0), (0x61, 9.0), (0x67, 15.0)],
 )
 def test_published_gains(register: int, amplification: float) -> None:
-    assert gain(register) == amplification
-    assert gain(gain_register(amplification)) == amplification
+    assert mt9m001.gain(register) == amplification
+    assert mt9m001.gain(mt9m001.gain_register(amplification)) == amplification
 
 
 def test_the_nearest_gain_is_found_and_others_refused() -> None:
-    assert gain(gain_register(5.1)) == 5.0
-    assert gain(gain_register(14.6)) == 15.0
+    assert mt9m001.gain(mt9m001.gain_register(5.1)) == 5.0
+    assert mt9m001.gain(mt9m001.gain_register(14.6)) == 15.0
     for wrong in (0.9, 15.1, float("nan")):
         with pytest.raises(ValueError, match=r"1\.\.15"):
-            gain_register(wrong)
+            mt9m001.gain_register(wrong)

@@ -1,14 +1,6 @@
 import pytest
 
-from cubestack.firmware_model.interface.cameras.ov7620 import (
-    CLOCKS_PER_LINE,
-    EXPOSURE_LINES,
-    LINES_PER_FRAME,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    window_column,
-    window_row,
-)
+from cubestack.firmware_model.interface.cameras import ov7620
 
 # Addresses of OV7620 product specifications, revision 1.3, typed from there.
 PUBLISHED = {
@@ -49,27 +41,27 @@ BITS = {
 
 
 def test_every_register_is_where_it_is_published() -> None:
-    assert {register.name: register.address for register in REGISTERS} == PUBLISHED
-    assert {register.width for register in REGISTERS} == {1}
-    assert (REGISTERS.i2c_address << 1, REGISTERS.address_bytes) == (0x42, 1)
+    assert {register.name: register.address for register in ov7620.REGISTERS} == PUBLISHED
+    assert {register.width for register in ov7620.REGISTERS} == {1}
+    assert (ov7620.REGISTERS.i2c_address << 1, ov7620.REGISTERS.address_bytes) == (0x42, 1)
 
 
 @pytest.mark.parametrize(("register", "field"), BITS)
 def test_bits_are_where_they_are_published(register: str, field: str) -> None:
-    assert REGISTERS[register].field(field).mask == BITS[register, field]
+    assert ov7620.REGISTERS[register].field(field).mask == BITS[register, field]
 
 
 def test_gain_has_six_bits() -> None:
-    assert REGISTERS["GAIN"].bits == 0x3F
+    assert ov7620.REGISTERS["GAIN"].bits == 0x3F
 
 
 def test_the_window_after_a_reset_is_the_whole_picture() -> None:
-    edges = [REGISTERS[name].reset for name in ("HSTART", "HSTOP", "VSTART", "VSTOP")]
+    edges = [ov7620.REGISTERS[name].reset for name in ("HSTART", "HSTOP", "VSTART", "VSTOP")]
     assert edges == [0x2F, 0xCF, 0x05, 0xF5]
-    assert (window_column(323), window_row(101)) == (0x2F + 80, 0x05 + 50)
+    assert (ov7620.window_column(323), ov7620.window_row(101)) == (0x2F + 80, 0x05 + 50)
 
 
 def test_timing_is_that_of_ccir_601() -> None:
-    line_s = CLOCKS_PER_LINE / PIXEL_CLOCK_HZ
-    assert LINES_PER_FRAME * line_s == pytest.approx(33.37e-3, rel=1e-3)
-    assert EXPOSURE_LINES * line_s == pytest.approx(127e-6, rel=1e-3)
+    line_s = ov7620.CLOCKS_PER_LINE / ov7620.PIXEL_CLOCK_HZ
+    assert ov7620.LINES_PER_FRAME * line_s == pytest.approx(33.37e-3, rel=1e-3)
+    assert ov7620.EXPOSURE_LINES * line_s == pytest.approx(127e-6, rel=1e-3)

@@ -4,65 +4,54 @@ from itertools import product
 
 import pytest
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    ADDRESSING_COMMANDS,
-    COMMANDS,
-    FULL_SIZE,
-    SUN_NOT_FOUND,
-    Action,
-    Actions,
-    ReadOut,
-    actions,
-    address_bytes,
-    link_shows_enables,
-)
+from cubestack.firmware_model.interface.cubesense import fpga
 
 # SHIFT EDGE RNW SUNEN NADEN, then what the sun's and the nadir's FPGA do.
 PRINTED = {
-    "00001": (Action.STORE, Action.STANDBY),
-    "00010": (Action.STANDBY, Action.STORE),
-    "00101": (Action.READ, Action.STANDBY),
-    "00110": (Action.STANDBY, Action.READ),
-    "01101": (Action.EDGE, Action.STANDBY),
-    "01110": (Action.STANDBY, Action.EDGE),
-    "10000": (Action.SEND_PICTURE, Action.STORE_OTHER),
-    "10100": (Action.STORE_OTHER, Action.SEND_PICTURE),
-    "11000": (Action.PASS_EDGE, Action.SEND_EDGE),
-    "11100": (Action.SEND_EDGE, Action.PASS_EDGE),
+    "00001": (fpga.Action.STORE, fpga.Action.STANDBY),
+    "00010": (fpga.Action.STANDBY, fpga.Action.STORE),
+    "00101": (fpga.Action.READ, fpga.Action.STANDBY),
+    "00110": (fpga.Action.STANDBY, fpga.Action.READ),
+    "01101": (fpga.Action.EDGE, fpga.Action.STANDBY),
+    "01110": (fpga.Action.STANDBY, fpga.Action.EDGE),
+    "10000": (fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER),
+    "10100": (fpga.Action.STORE_OTHER, fpga.Action.SEND_PICTURE),
+    "11000": (fpga.Action.PASS_EDGE, fpga.Action.SEND_EDGE),
+    "11100": (fpga.Action.SEND_EDGE, fpga.Action.PASS_EDGE),
 }
-OURS = {"00000": (Action.STORE, Action.STORE)}
+OURS = {"00000": (fpga.Action.STORE, fpga.Action.STORE)}
 ADDRESSING = {
-    "01001": (Action.TAKE_ADDRESS, Action.STANDBY),
-    "01010": (Action.STANDBY, Action.TAKE_ADDRESS),
-    "11001": (Action.READ_FROM, Action.STANDBY),
-    "11010": (Action.STANDBY, Action.READ_FROM),
+    "01001": (fpga.Action.TAKE_ADDRESS, fpga.Action.STANDBY),
+    "01010": (fpga.Action.STANDBY, fpga.Action.TAKE_ADDRESS),
+    "11001": (fpga.Action.READ_FROM, fpga.Action.STANDBY),
+    "11010": (fpga.Action.STANDBY, fpga.Action.READ_FROM),
 }
 
 
 def test_printed_rows_and_standby_in_all_others() -> None:
     listed = PRINTED | OURS
     for levels in product("01", repeat=5):
-        expected = listed.get("".join(levels), (Action.STANDBY, Action.STANDBY))
-        assert actions(*map(int, levels)) == expected, levels
+        expected = listed.get("".join(levels), (fpga.Action.STANDBY, fpga.Action.STANDBY))
+        assert fpga.actions(*map(int, levels)) == expected, levels
 
 
 def test_address_control_adds_rows_that_are_standby_without_it() -> None:
     listed = PRINTED | OURS | ADDRESSING
     for levels in product("01", repeat=5):
-        expected = listed.get("".join(levels), (Action.STANDBY, Action.STANDBY))
-        assert actions(*map(int, levels), mcu_addressing=True) == expected, levels
+        expected = listed.get("".join(levels), (fpga.Action.STANDBY, fpga.Action.STANDBY))
+        assert fpga.actions(*map(int, levels), mcu_addressing=True) == expected, levels
 
 
 def test_no_levels_are_listed_twice() -> None:
     for levels in product((0, 1), repeat=5):
-        commands = COMMANDS + ADDRESSING_COMMANDS
+        commands = fpga.COMMANDS + fpga.ADDRESSING_COMMANDS
         assert sum(command.fits(*levels) for command in commands) <= 1
 
 
 def test_address_control_sees_the_other_enable_and_moves_shift_only() -> None:
-    for command in ADDRESSING_COMMANDS:
-        assert link_shows_enables(command.shift or 0, command.edge or 0)
-    rows = {(c.edge, c.rnw) for c in ADDRESSING_COMMANDS}
+    for command in fpga.ADDRESSING_COMMANDS:
+        assert fpga.link_shows_enables(command.shift or 0, command.edge or 0)
+    rows = {(c.edge, c.rnw) for c in fpga.ADDRESSING_COMMANDS}
     assert len(rows) == 1
 
 
@@ -71,43 +60,46 @@ def test_address_control_sees_the_other_enable_and_moves_shift_only() -> None:
     [((0, 0), "000000"), ((639, 0), "00027f"), ((0, 1), "000400"), ((639, 479), "077e7f")],
 )
 def test_address_is_row_and_column_highest_byte_first(pixel: tuple[int, int], sent: str) -> None:
-    assert address_bytes(*pixel).hex() == sent
+    assert fpga.address_bytes(*pixel).hex() == sent
 
 
 @pytest.mark.parametrize("pixel", [(640, 0), (0, 480), (-1, 0), (0, -1)])
 def test_address_of_a_pixel_outside_is_refused(pixel: tuple[int, int]) -> None:
     with pytest.raises(ValueError, match="not inside of 640 x 480 pixels"):
-        address_bytes(*pixel)
+        fpga.address_bytes(*pixel)
 
 
 def test_a_picture_on_the_link_hides_the_enables() -> None:
-    hidden = [pair for pair in product((0, 1), repeat=2) if not link_shows_enables(*pair)]
+    hidden = [pair for pair in product((0, 1), repeat=2) if not fpga.link_shows_enables(*pair)]
     assert hidden == [(1, 0)]
-    crosses = {Action.SEND_PICTURE, Action.STORE_OTHER}
-    for command in COMMANDS:
+    crosses = {fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER}
+    for command in fpga.COMMANDS:
         assert ((command.shift, command.edge) in hidden) == (crosses == set(command.actions))
 
 
 def test_one_fpga_at_most_drives_the_microcontrollers_bus() -> None:
-    drivers = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
-    for command in COMMANDS + ADDRESSING_COMMANDS:
+    drivers = {fpga.Action.READ, fpga.Action.EDGE, fpga.Action.PASS_EDGE, fpga.Action.READ_FROM}
+    for command in fpga.COMMANDS + fpga.ADDRESSING_COMMANDS:
         driving = [action for action in command.actions if action in drivers]
         assert len(driving) <= 1
         assert command.shift or command.rnw or not driving, "the microcontroller may drive here"
 
 
 def test_both_ends_of_the_link_fit() -> None:
-    pairs = {Action.SEND_PICTURE: Action.STORE_OTHER, Action.SEND_EDGE: Action.PASS_EDGE}
-    for command in COMMANDS:
-        for one, other in (command.actions, Actions(*command.actions[::-1])):
+    pairs = {
+        fpga.Action.SEND_PICTURE: fpga.Action.STORE_OTHER,
+        fpga.Action.SEND_EDGE: fpga.Action.PASS_EDGE,
+    }
+    for command in fpga.COMMANDS:
+        for one, other in (command.actions, fpga.Actions(*command.actions[::-1])):
             assert one not in pairs or other is pairs[one]
 
 
 def test_full_size_scan() -> None:
-    assert list(FULL_SIZE.scan_rows) == [15, 79, 143, 207, 271, 335, 399, 463]
-    assert list(FULL_SIZE.scan_columns) == [63, 127, 191, 255, 319, 383, 447, 511, 575, 639]
-    pixels = list(FULL_SIZE.scan())
-    assert len(pixels) == FULL_SIZE.scan_clocks == 1 + 8 * 640 + 1 + 10 * 480
+    assert list(fpga.FULL_SIZE.scan_rows) == [15, 79, 143, 207, 271, 335, 399, 463]
+    assert list(fpga.FULL_SIZE.scan_columns) == [63, 127, 191, 255, 319, 383, 447, 511, 575, 639]
+    pixels = list(fpga.FULL_SIZE.scan())
+    assert len(pixels) == fpga.FULL_SIZE.scan_clocks == 1 + 8 * 640 + 1 + 10 * 480
     assert [index for index, pixel in enumerate(pixels) if pixel is None] == [0, 5121]
     assert pixels[1:3] == [(0, 15), (1, 15)]
     assert pixels[5120] == (639, 463)
@@ -124,11 +116,11 @@ def test_full_size_scan() -> None:
         ((6, 2), (1, 0)),
         ((630, 468), (625, 465)),
         ((637, 479), (625, 465)),
-        (SUN_NOT_FOUND, (625, 465)),
+        (fpga.SUN_NOT_FOUND, (625, 465)),
     ],
 )
 def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int, int]) -> None:
-    assert FULL_SIZE.window_origin(*sun) == origin
+    assert fpga.FULL_SIZE.window_origin(*sun) == origin
 
 
 @pytest.mark.parametrize(
@@ -143,4 +135,4 @@ def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int
 )
 def test_impossible_read_outs_are_refused(change: dict[str, int], error: str) -> None:
     with pytest.raises(ValueError, match=error):
-        ReadOut(**change)
+        fpga.ReadOut(**change)

@@ -9,28 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ImageLocation,
-    ImageSize,
-    Measurement,
-    ResetTarget,
-    Sram,
-    checksum,
-    coefficient,
-    split_coefficient,
-)
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, service_port, telemetry
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
-from cubestack.firmware_model.interface.cubesense.service_port import (
-    CAPTURES,
-    DOWNLOADS,
-    SERVICE_PORT,
-)
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
-from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 
 LAYOUTS = """
 TC 0 1 u8 H
@@ -136,14 +117,14 @@ def test_published_telemetry_bytes() -> None:
     assert encode_frame(data) == bytes.fromhex("1F7F D204 C9FD 02 07 1FFF")
     values = result.unpack(data)
     assert (values["Alpha"], values["Beta"]) == (12.34, -5.67)
-    assert DetectResult(int(values["Detect"])) is DetectResult.SUCCESS
-    assert CaptureResult(int(values["Capture"])) is CaptureResult.STORED_OWN_SRAM
+    assert codes.DetectResult(int(values["Detect"])) is codes.DetectResult.SUCCESS
+    assert codes.CaptureResult(int(values["Capture"])) is codes.CaptureResult.STORED_OWN_SRAM
 
 
 @pytest.mark.parametrize(
     ("name", "change", "wrong"),
     [
-        ("CaptureOnly", {"Location": ImageLocation.BOTTOM}, ["Location"]),
+        ("CaptureOnly", {"Location": codes.ImageLocation.BOTTOM}, ["Location"]),
         ("CaptureOnly", {"Camera": 2, "Sram": 2}, ["Camera", "Sram"]),
         ("StartImageDownload", {"Location": 1}, ["Location"]),
         ("StartImageDownload", {"Size": 5}, ["Size"]),
@@ -183,7 +164,7 @@ def test_published_reset_values() -> None:
 def test_the_distortion_that_is_set_is_the_measured_one() -> None:
     values = INTERFACE.telecommand("Distortion2").reset_values()
     factors = [
-        coefficient(int(values[f"Mantissa{power}"]), int(values[f"Exponent{power}"]))
+        codes.coefficient(int(values[f"Mantissa{power}"]), int(values[f"Exponent{power}"]))
         for power in range(5)
     ]
     assert factors == pytest.approx(list(DISTORTION), rel=1.6e-4)
@@ -193,48 +174,48 @@ def test_the_distortion_that_is_set_is_the_measured_one() -> None:
 
 @given(st.floats(-32767, 32767).filter(lambda value: value == 0 or abs(value) > 1e-200))
 def test_coefficients_keep_their_digits(value: float) -> None:
-    mantissa, exponent = split_coefficient(value)
+    mantissa, exponent = codes.split_coefficient(value)
     assert -32768 <= mantissa <= 32767
     assert 0 <= exponent <= 255
-    assert coefficient(mantissa, exponent) == pytest.approx(value, rel=1.6e-4)
+    assert codes.coefficient(mantissa, exponent) == pytest.approx(value, rel=1.6e-4)
 
 
 def test_coefficients_that_do_not_fit_are_told() -> None:
     for value in (32768.0, -1e9, math.inf, math.nan):
         with pytest.raises(ValueError, match="within \\+-32767"):
-            split_coefficient(value)
-    assert split_coefficient(1e-300) == (0, 255)
+            codes.split_coefficient(value)
+    assert codes.split_coefficient(1e-300) == (0, 255)
 
 
 def test_named_numbers() -> None:
-    assert [result.value for result in CaptureResult] == [0, 1, 2, 3, 4, 5]
-    assert [result.value for result in CaptureResult if result.stored] == [2, 3]
+    assert [result.value for result in codes.CaptureResult] == [0, 1, 2, 3, 4, 5]
+    assert [result.value for result in codes.CaptureResult if result.stored] == [2, 3]
     names = "START_UP NONE_SCHEDULED PENDING TOO_MANY_EDGES TOO_FEW_EDGES BAD_FIT SUN_NOT_FOUND"
-    assert [result.name for result in DetectResult] == [*names.split(), "SUCCESS"]
-    assert [target.value for target in ResetTarget] == [1, 2, 3]
-    assert [size.side for size in ImageSize] == [1024, 512, 256, 128, 64]
-    assert [size.frames for size in ImageSize] == [8192, 2048, 512, 128, 32]
+    assert [result.name for result in codes.DetectResult] == [*names.split(), "SUCCESS"]
+    assert [target.value for target in codes.ResetTarget] == [1, 2, 3]
+    assert [size.side for size in codes.ImageSize] == [1024, 512, 256, 128, 64]
+    assert [size.frames for size in codes.ImageSize] == [8192, 2048, 512, 128, 32]
 
 
 def test_results_schedule_the_four_combinations() -> None:
-    assert RESULTS == {Camera.SUN: 0x80 + 20, Camera.NADIR: 0x80 + 21}
-    assert SCHEDULES == {
-        0x80 + 22: (Camera.SUN, Sram.SRAM1),
-        0x80 + 23: (Camera.NADIR, Sram.SRAM2),
-        0x80 + 24: (Camera.SUN, Sram.SRAM2),
-        0x80 + 25: (Camera.NADIR, Sram.SRAM1),
+    assert telemetry.RESULTS == {codes.Camera.SUN: 0x80 + 20, codes.Camera.NADIR: 0x80 + 21}
+    assert telemetry.SCHEDULES == {
+        0x80 + 22: (codes.Camera.SUN, codes.Sram.SRAM1),
+        0x80 + 23: (codes.Camera.NADIR, codes.Sram.SRAM2),
+        0x80 + 24: (codes.Camera.SUN, codes.Sram.SRAM2),
+        0x80 + 25: (codes.Camera.NADIR, codes.Sram.SRAM1),
     }
-    assert [m.id for m in INTERFACE.messages if m.starts_measurement] == list(SCHEDULES)
-    assert {(m.camera, m.sram) for m in Measurement} == set(SCHEDULES.values())
+    assert [m.id for m in INTERFACE.messages if m.starts_measurement] == list(telemetry.SCHEDULES)
+    assert {(m.camera, m.sram) for m in codes.Measurement} == set(telemetry.SCHEDULES.values())
 
 
 def test_checksum_is_the_exclusive_or() -> None:
-    assert checksum(b"") == 0
-    assert checksum(bytes([0x0F, 0xF0, 0x3C])) == 0xC3
+    assert codes.checksum(b"") == 0
+    assert codes.checksum(bytes([0x0F, 0xF0, 0x3C])) == 0xC3
 
 
 def test_register_choices_are_those_of_the_interface() -> None:
-    assert Measurement in INTERFACE.choices  # only registers use it
+    assert codes.Measurement in INTERFACE.choices  # only registers use it
 
 
 def test_registers_are_one_byte_two_bytes_or_the_picture() -> None:
@@ -247,7 +228,7 @@ def test_registers_are_one_byte_two_bytes_or_the_picture() -> None:
 
 
 def test_registers_and_node_protocol_start_with_the_same_settings() -> None:
-    for camera in Camera:
+    for camera in codes.Camera:
         number = camera + 1
         settings = INTERFACE.telecommand(f"CameraSettings{number}").reset_values()
         threshold = INTERFACE.telecommand(f"DetectionThreshold{number}").reset_values()
@@ -260,13 +241,17 @@ def test_registers_and_node_protocol_start_with_the_same_settings() -> None:
 
 
 def test_bench_letters_are_the_published_ones() -> None:
-    assert SERVICE_PORT is INTERFACE.service_port
-    assert SERVICE_PORT.baud == 115_200
-    assert {letter.letter: (letter.length, letter.answer) for letter in SERVICE_PORT.letters} == {
-        "a": (1, b"Y"),
-        "q": (1, b"Y"),
-        "s": (307_200, None),
-        "w": (307_200, None),
-    }
-    assert (CAPTURES[Camera.NADIR].letter, DOWNLOADS[Camera.NADIR].letter) == ("a", "s")
-    assert (CAPTURES[Camera.SUN].letter, DOWNLOADS[Camera.SUN].letter) == ("q", "w")
+    assert service_port.SERVICE_PORT is INTERFACE.service_port
+    assert service_port.SERVICE_PORT.baud == 115_200
+    assert {
+        letter.letter: (letter.length, letter.answer)
+        for letter in service_port.SERVICE_PORT.letters
+    } == {"a": (1, b"Y"), "q": (1, b"Y"), "s": (307_200, None), "w": (307_200, None)}
+    assert (
+        service_port.CAPTURES[codes.Camera.NADIR].letter,
+        service_port.DOWNLOADS[codes.Camera.NADIR].letter,
+    ) == ("a", "s")
+    assert (
+        service_port.CAPTURES[codes.Camera.SUN].letter,
+        service_port.DOWNLOADS[codes.Camera.SUN].letter,
+    ) == ("q", "w")
