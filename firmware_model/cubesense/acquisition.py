@@ -8,7 +8,7 @@ With address control from the microcontroller (section 9.2.2) single pixels can 
 memory of the FPGA that is enabled only.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,12 +79,8 @@ class Acquisition:
         if not self._supply.available(sram):
             return codes.CaptureResult.SRAM_OVER_CURRENT
         own = sram is codes.Sram(camera)
-        if own:
-            yield from self._enter(_actions(camera, fpga.Action.STORE))
-        else:
-            yield from self._enter(
-                _actions(camera, fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER)
-            )
+        across = (fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER)
+        yield from self._enter(_actions(camera, *((fpga.Action.STORE,) if own else across)))
         stored = yield from self._await_ack(sram)
         yield from self._standby()
         if not self._supply.available(sram):
@@ -143,7 +139,8 @@ class Acquisition:
 
     def read_bytes(self, target: NDArray[np.uint8]) -> Routine[None]:
         """Read on into ``target`` (n,), for as long as ``picture_open``."""
-        yield from self._strobe_all(len(target), lambda at: target[at], self._scan_cycles)
+        chunks = (target[at : at + CHUNK] for at in range(0, len(target), CHUNK))
+        yield from self._strobe(chunks, self._scan_cycles)
 
     def skip_bytes(self, count: int) -> Routine[None]:
         """Pass ``count`` bytes: at once if the program can choose the address, else clocked."""
@@ -152,22 +149,17 @@ class Acquisition:
             yield SetPin(pins.SHIFT, 0)
             yield from self._send_address(self._position % codes.IMAGE_BYTES)
             return
-        buffer = self._buffer
-        yield from self._strobe_all(
-            count, lambda at: buffer[: at.stop - at.start], self._strobe_cycles
-        )
+        chunks = (self._buffer[: count - at] for at in range(0, count, CHUNK))
+        yield from self._strobe(chunks, self._strobe_cycles)
 
-    def _strobe_all(
-        self, count: int, target: Callable[[slice], NDArray[np.uint8]], cycles: int
-    ) -> Routine[None]:
-        """Clock ``count`` bytes in chunks, and look at the memories now and then."""
-        done = 0
-        while done < count and self.picture_open:
-            size = min(CHUNK, count - done)
-            yield StrobeRead(target(slice(done, done + size)), cycles)
-            done += size
-            self._position += size
-            self._unwatched += size
+    def _strobe(self, chunks: Iterable[NDArray[np.uint8]], cycles: int) -> Routine[None]:
+        """Clock bytes into ``chunks``, and look at the memories now and then."""
+        for chunk in chunks:
+            if not self.picture_open:
+                return
+            yield StrobeRead(chunk, cycles)
+            self._position += len(chunk)
+            self._unwatched += len(chunk)
             if self._unwatched >= SAMPLE_BYTES:
                 self._unwatched = 0
                 yield from self._supply.sample()
@@ -183,22 +175,20 @@ class Acquisition:
         FPGAs that ``can_address``.
         """
         yield from self._enter(_actions(sram, fpga.Action.TAKE_ADDRESS))
-        pixels = 0
-        pixel = self._buffer[:1]
+        pixels, pixel = 0, self._buffer[:1]
         found: EdgeList | None = None
-        asked: tuple[int, int] | None = next(search)
-        while asked is not None and self._supply.available(sram):
-            x, y = asked
-            yield from self._send_address(y * fpga.FULL_SIZE.columns + x)
-            yield StrobeRead(pixel, self._strobe_cycles)
-            yield SetPin(pins.SHIFT, 0)
-            pixels += 1
-            if pixels % SAMPLE_PIXELS == 0:
-                yield from self._supply.sample()
-            try:
-                asked = search.send(int(pixel[0]))
-            except StopIteration as end:
-                asked, found = None, end.value
+        try:
+            x, y = next(search)
+            while self._supply.available(sram):
+                yield from self._send_address(y * fpga.FULL_SIZE.columns + x)
+                yield StrobeRead(pixel, self._strobe_cycles)
+                yield SetPin(pins.SHIFT, 0)
+                pixels += 1
+                if pixels % SAMPLE_PIXELS == 0:
+                    yield from self._supply.sample()
+                x, y = search.send(int(pixel[0]))
+        except StopIteration as end:
+            found = end.value
         yield from self._standby()
         if found is None or not self._supply.available(sram):
             return None

@@ -27,21 +27,11 @@ EXPOSURE_SETTLE_US = _SETTLE_CLOCKS * 1_000_000 // ov7620.PIXEL_CLOCK_HZ + 100
 """From a write to when the FPGA may look for a frame: the frame that runs then, and the next one,
 still have the exposure of before. The latter's blanking must be over, or it would be stored."""
 
-_BITS = 8
-_LARGEST = dict.fromkeys(("EXPOSURE", "BLUE_GAIN", "RED_GAIN"), (1 << _BITS) - 1) | {
-    "GAIN": ov7620.REGISTERS["GAIN"].bits
-}
-
 
 def register_values(settings: CameraSettings) -> dict[str, int]:
     """What the camera's registers shall hold: the whole picture, one byte of grey for a pixel."""
     automatic = settings.auto_adjust
-    numbers = {
-        "EXPOSURE": settings.exposure,
-        "GAIN": settings.gain,
-        "BLUE_GAIN": settings.blue_gain,
-        "RED_GAIN": settings.red_gain,
-    }
+    numbers = ("EXPOSURE", "GAIN", "BLUE_GAIN", "RED_GAIN")
     return {
         "COMMON_A": _bits("COMMON_A", AUTO_WHITE_BALANCE=automatic, AUTO_GAIN=automatic),
         "COMMON_B": _bits("COMMON_B", AUTO_ADJUST=automatic),
@@ -52,15 +42,14 @@ def register_values(settings: CameraSettings) -> dict[str, int]:
         "HSTOP": ov7620.window_column(COLUMNS),
         "VSTART": ov7620.window_row(0),
         "VSTOP": ov7620.window_row(ROWS),
-        **{name: min(value, _LARGEST[name]) for name, value in numbers.items()},
+        **{n: min(getattr(settings, n.lower()), ov7620.REGISTERS[n].bits) for n in numbers},
     }
 
 
 def _bits(register: str, **fields: int) -> int:
     """Value of ``register`` with the named bit fields and all others 0."""
-    return sum(
-        value << ov7620.REGISTERS[register].field(name).lsb for name, value in fields.items()
-    )
+    field = ov7620.REGISTERS[register].field
+    return sum(value << field(name).lsb for name, value in fields.items())
 
 
 class CameraControl:
@@ -142,7 +131,7 @@ class CameraControl:
     def _send(self, scl: str, sda: str, byte: int) -> Routine[bool]:
         """Eight bits, highest first, and the answer; SCL is low before and after."""
         level = None
-        for bit in reversed(range(_BITS)):
+        for bit in reversed(range(8)):
             if level != byte >> bit & 1:
                 level = byte >> bit & 1
                 yield SetPin(sda, level)

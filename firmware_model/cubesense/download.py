@@ -10,6 +10,7 @@ telemetry 65 says when it is ready, 64 has it. Assumed: while a frame is being p
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -24,14 +25,13 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
 
+@dataclass(eq=False)
 class PictureReader:
     """Any pixels of a picture; in ascending order it is read once."""
 
-    def __init__(self, acquisition: Acquisition) -> None:
-        """Read with ``acquisition``, which others use too."""
-        self._acquisition = acquisition
-        self._sram = codes.Sram.SRAM1
-        self._next = 0
+    acquisition: Acquisition
+    _sram: codes.Sram = field(default=codes.Sram.SRAM1, init=False)
+    _next: int = field(default=0, init=False)
 
     def read(
         self, sram: codes.Sram, pixels: NDArray[np.int32], target: NDArray[np.uint8]
@@ -46,9 +46,9 @@ class PictureReader:
         for start, end in pairwise((0, *map(int, breaks), len(pixels))):
             if not (yield from self._seek(sram, int(pixels[start]))):
                 return False
-            yield from self._acquisition.read_bytes(target[start:end])
+            yield from self.acquisition.read_bytes(target[start:end])
             self._next += end - start
-        return self._acquisition.picture_open
+        return self.acquisition.picture_open
 
     def read_run(self, sram: codes.Sram, start: int, count: int) -> Routine[bytes | None]:
         """``count`` pixels from ``start`` on; None as where ``read`` gives False."""
@@ -59,14 +59,14 @@ class PictureReader:
 
     def _seek(self, sram: codes.Sram, pixel: int) -> Routine[bool]:
         """Go to ``pixel``; what lies behind is reached from the first one again."""
-        if not self._acquisition.picture_open or sram != self._sram or pixel < self._next:
+        if not self.acquisition.picture_open or sram != self._sram or pixel < self._next:
             self._sram, self._next = sram, 0
-            if not (yield from self._acquisition.open_picture(sram)):
+            if not (yield from self.acquisition.open_picture(sram)):
                 return False
         if pixel > self._next:
-            yield from self._acquisition.skip_bytes(pixel - self._next)
+            yield from self.acquisition.skip_bytes(pixel - self._next)
             self._next = pixel
-        return self._acquisition.picture_open
+        return self.acquisition.picture_open
 
 
 class Download:

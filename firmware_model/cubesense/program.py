@@ -49,9 +49,7 @@ class CubeSenseProgram:
         self.acquisition = acquisition = Acquisition(hardware, meter, self._supply)
         measurement = Measurement(meter, state, self.cameras, acquisition)
         self._jobs = jobs = JobQueue()
-        self.commands = Commands(
-            hardware, meter, state, self._supply, self.cameras, acquisition, measurement
-        )
+        self.commands = Commands(meter, state, self._supply, self.cameras, acquisition, measurement)
         reader, download = self.commands.reader, self.commands.download
         telemetry = Telemetry(hardware, meter, state, self._supply, download)
         self.node = NodeLink(hardware, meter, state, jobs, telemetry, download)

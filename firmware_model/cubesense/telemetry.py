@@ -1,6 +1,7 @@
 """Where the values of each telemetry frame come from; interrupt context, so nothing here waits."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -29,25 +30,22 @@ _HUNDREDTHS = 100
 Values = dict[str, Any]
 
 
+@dataclass(eq=False)
 class Telemetry:
     """Answers telemetry requests."""
 
-    def __init__(
-        self,
-        hardware: CubeSenseHardware,
-        meter: Meter,
-        state: State,
-        supply: Supply,
-        download: Download,
-    ) -> None:
-        """Report on the given parts of the program."""
-        self._hardware = hardware
-        self._meter = meter
-        self._state = state
-        self._supply = supply
-        self._download = download
+    hardware: CubeSenseHardware
+    meter: Meter
+    state: State
+    supply: Supply
+    download: Download
+
+    def __post_init__(self) -> None:
+        """List where each frame's values come from."""
         self._sources: dict[str, Callable[[], Values]] = {
-            "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
+            "Identification": lambda: identification(
+                INTERFACE, NODE_TYPE, self.hardware.uptime_us()
+            ),
             "SerialNumber": self._serial_number,
             "CommunicationStatus": self._communication,
             "TcmdProcessed": self._processed,
@@ -56,7 +54,7 @@ class Telemetry:
             "ImageFrame": self._frame,
             "ImageFrameInfo": self._frame_info,
             **{f"NadirEdges{part + 1}": partial(self._edges, part) for part in range(EDGE_FRAMES)},
-            "NadirSearchMode": lambda: {"Search": state.nadir_search},
+            "NadirSearchMode": lambda: {"Search": self.state.nadir_search},
         }
         for camera in codes.Camera:
             number = camera + 1
@@ -73,11 +71,11 @@ class Telemetry:
         return self._sources[message.name]()
 
     def _serial_number(self) -> Values:
-        text = self._hardware.serial_number.encode("ascii", "replace")
+        text = self.hardware.serial_number.encode("ascii", "replace")
         return {"SerialNumber": text[:SERIAL_BYTES].ljust(SERIAL_BYTES, b"\0")}
 
     def _communication(self) -> Values:
-        state = self._state
+        state = self.state
         return {
             "TcmdCount": state.telecommands % _COUNTER,
             "TlmCount": state.telemetries % _COUNTER,
@@ -85,7 +83,7 @@ class Telemetry:
         }
 
     def _processed(self) -> Values:
-        state = self._state
+        state = self.state
         return {
             "LastTcmd": state.last_command,
             "Processed": state.last_processed,
@@ -93,7 +91,7 @@ class Telemetry:
         }
 
     def _result(self, camera: codes.Camera) -> Values:
-        result = self._state.results[camera]
+        result = self.state.results[camera]
         return {
             "Alpha": result.alpha / _HUNDREDTHS,
             "Beta": result.beta / _HUNDREDTHS,
@@ -102,8 +100,8 @@ class Telemetry:
         }
 
     def _power(self) -> Values:
-        currents = self._supply.currents()
-        over = self._state.over_current
+        currents = self.supply.currents()
+        over = self.state.over_current
         return {
             "Current3V3": currents[pins.Monitor.SUPPLY_3V3],
             "CurrentSram1": currents[pins.Monitor.SRAM1],
@@ -115,7 +113,7 @@ class Telemetry:
 
     def _configuration(self) -> Values:
         values: Values = {}
-        for camera, settings in self._state.cameras.items():
+        for camera, settings in self.state.cameras.items():
             number = camera + 1
             values |= {
                 f"Threshold{number}": settings.threshold,
@@ -128,26 +126,21 @@ class Telemetry:
         return values
 
     def _frame(self) -> Values:
-        self._meter.charge(i8=len(self._download.data))
-        return {"Frame": self._download.data.tobytes()}
+        self.meter.charge(i8=len(self.download.data))
+        return {"Frame": self.download.data.tobytes()}
 
     def _frame_info(self) -> Values:
-        return {"FrameNumber": self._download.number, "Checksum": self._download.checksum}
+        return {"FrameNumber": self.download.number, "Checksum": self.download.checksum}
 
     def _masks(self, camera: codes.Camera) -> Values:
-        values: Values = {}
-        for index, mask in enumerate(self._state.cameras[camera].masks):
-            area = index + 1
-            values |= {
-                f"XMin{area}": mask.x_min,
-                f"XMax{area}": mask.x_max,
-                f"YMin{area}": mask.y_min,
-                f"YMax{area}": mask.y_max,
-            }
-        return values
+        return {
+            f"{name}{area}": limit
+            for area, mask in enumerate(self.state.cameras[camera].masks, start=1)
+            for name, limit in zip(("XMin", "XMax", "YMin", "YMax"), mask, strict=True)
+        }
 
     def _details(self, camera: codes.Camera) -> Values:
-        result = self._state.results[camera]
+        result = self.state.results[camera]
         return {
             "X": result.x / _HUNDREDTHS,
             "Y": result.y / _HUNDREDTHS,
@@ -160,22 +153,13 @@ class Telemetry:
         }
 
     def _times(self, camera: codes.Camera) -> Values:
-        result = self._state.results[camera]
-        return {
-            "Wait": result.wait_us,
-            "Store": result.store_us,
-            "Search": result.search_us,
-            "Centroid": result.centroid_us,
-            "Total": result.total_us,
-        }
+        phases = ("Wait", "Store", "Search", "Centroid", "Total")
+        return {name: getattr(self.state.results[camera], f"{name.lower()}_us") for name in phases}
 
     def _edges(self, part: int) -> Values:
-        edges = self._state.results[codes.Camera.NADIR].edges
-        shown = np.zeros((codes.EDGES_PER_FRAME, 2))
-        there = edges[part * codes.EDGES_PER_FRAME :][: codes.EDGES_PER_FRAME]
-        shown[: len(there)] = there / codes.EDGE_UNIT
-        first = part * codes.EDGES_PER_FRAME + 1
-        values: Values = {"Count": len(edges)}
-        for number, (x, y) in enumerate(shown, start=first):
-            values |= {f"X{number}": x, f"Y{number}": y}
-        return values
+        edges = self.state.results[codes.Camera.NADIR].edges
+        shown = np.zeros((MAX_EDGES, 2))
+        shown[: len(edges)] = edges / codes.EDGE_UNIT
+        numbers = range(codes.EDGES_PER_FRAME * part, codes.EDGES_PER_FRAME * (part + 1))
+        places = {f"{axis}{n + 1}": shown[n, "XY".index(axis)] for n in numbers for axis in "XY"}
+        return {"Count": len(edges)} | places

@@ -8,6 +8,7 @@ begin its own anew for every piece.
 """
 
 from collections import deque
+from dataclasses import dataclass
 
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
@@ -34,38 +35,32 @@ _CAMERAS: dict[Letter, codes.Camera] = {
 }
 
 
+@dataclass(eq=False)
 class BenchLink:
     """Answers letters."""
 
-    def __init__(
-        self,
-        hardware: CubeSenseHardware,
-        meter: Meter,
-        state: State,
-        queue: JobQueue,
-        reader: PictureReader,
-        measurement: Measurement,
-    ) -> None:
+    hardware: CubeSenseHardware
+    meter: Meter
+    state: State
+    queue: JobQueue
+    reader: PictureReader
+    measurement: Measurement
+
+    def __post_init__(self) -> None:
         """No letter waits."""
-        self._hardware = hardware
-        self._meter = meter
-        self._state = state
-        self._queue = queue
-        self._reader = reader
-        self._measurement = measurement
         self._letters: deque[Letter] = deque()
         self._work = Background(self._serve)
         self._sent = 0
 
     def uart_byte(self, byte: int) -> None:
         """Interrupt: a byte came."""
-        self._meter.charge(uart_interrupt=1)
+        self.meter.charge(uart_interrupt=1)
         letter = service_port.SERVICE_PORT.find(byte)
         if letter is None or len(self._letters) >= LETTERS:
             return
         self._letters.append(letter)
-        self._queue.request(self._work)
-        self._hardware.wake()
+        self.queue.request(self._work)
+        self.hardware.wake()
 
     def uart_silence(self) -> None:
         """Interrupt: nothing came for a while, which means nothing here."""
@@ -82,25 +77,25 @@ class BenchLink:
             self._letters.popleft()
             self._sent = 0
         if self._letters:
-            self._queue.request(self._work, next_turn=True)
+            self.queue.request(self._work, next_turn=True)
 
     def _capture(self, letter: Letter, camera: codes.Camera) -> Routine[bool]:
         sram = codes.Sram(camera)
-        self._state.schedule(camera, sram, detect=False)
-        yield from self._measurement.measure(camera, sram, detect=False)
-        if self._state.results[camera].capture.stored:
+        self.state.schedule(camera, sram, detect=False)
+        yield from self.measurement.measure(camera, sram, detect=False)
+        if self.state.results[camera].capture.stored:
             self._uart_send(letter.answer or b"")
         return True
 
     def _send(self, sram: codes.Sram) -> Routine[bool]:
         """Send what there is room for; True at the picture's end."""
-        too_many = self._hardware.uart_backlog(Port.BENCH) - CHUNK_BYTES
+        too_many = self.hardware.uart_backlog(Port.BENCH) - CHUNK_BYTES
         if too_many > 0:
             now_us: int = yield ReadTimer()
             yield Sleep(now_us + too_many * _BYTE_US)
             return False
         count = min(CHUNK_BYTES, codes.IMAGE_BYTES - self._sent)
-        data = yield from self._reader.read_run(sram, self._sent, count)
+        data = yield from self.reader.read_run(sram, self._sent, count)
         if data is None:
             return True
         self._uart_send(data)
@@ -108,5 +103,5 @@ class BenchLink:
         return self._sent == codes.IMAGE_BYTES
 
     def _uart_send(self, data: bytes) -> None:
-        self._meter.charge(uart_interrupt=len(data))
-        self._hardware.uart_send(data, Port.BENCH)
+        self.meter.charge(uart_interrupt=len(data))
+        self.hardware.uart_send(data, Port.BENCH)

@@ -10,6 +10,7 @@ stretched. A picture that can not be read, because its memory is off, is all ``F
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from cubestack.firmware_model.cubesense.download import PictureReader
@@ -25,16 +26,9 @@ READ_AHEAD_BYTES = 32
 """Bytes of the picture that wait for the host; new ones are fetched when half of them are left."""
 
 _SETTINGS = {
-    f"{camera.name}_{name}": (camera, attribute)
+    f"{camera.name}_{name}": (camera, "auto_adjust" if name == "AUTO" else name.lower())
     for camera in codes.Camera
-    for name, attribute in (
-        ("THRESHOLD", "threshold"),
-        ("EXPOSURE", "exposure"),
-        ("GAIN", "gain"),
-        ("BLUE_GAIN", "blue_gain"),
-        ("RED_GAIN", "red_gain"),
-        ("AUTO", "auto_adjust"),
-    )
+    for name in ("THRESHOLD", "EXPOSURE", "GAIN", "BLUE_GAIN", "RED_GAIN", "AUTO")
 }
 """Camera, and attribute of its settings, by register."""
 
@@ -46,14 +40,16 @@ _RESULTS: dict[str, tuple[codes.Camera, str, int]] = {
 """Camera, attribute of its result, and counts for a unit, by register."""
 
 
+@dataclass(eq=False)
 class ImageStream:
     """A picture that the host reads byte by byte."""
 
-    def __init__(self, hardware: CubeSenseHardware, queue: JobQueue, reader: PictureReader) -> None:
+    hardware: CubeSenseHardware
+    queue: JobQueue
+    reader: PictureReader
+
+    def __post_init__(self) -> None:
         """Nothing is streamed."""
-        self._hardware = hardware
-        self._queue = queue
-        self._reader = reader
         self._work = Background(self._fill)
         self._ahead = bytearray()
         self._sram: codes.Sram | None = None
@@ -75,8 +71,8 @@ class ImageStream:
     def next(self) -> int | None:
         """The next byte; None while it has to be waited for."""
         wanted = self._fetched < codes.IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2
-        if wanted and self._queue.request(self._work):
-            self._hardware.wake()
+        if wanted and self.queue.request(self._work):
+            self.hardware.wake()
         if self._ahead:
             return self._ahead.pop(0)
         return None if self._fetched < codes.IMAGE_BYTES else FILL
@@ -87,30 +83,26 @@ class ImageStream:
         count = min(READ_AHEAD_BYTES - len(self._ahead), codes.IMAGE_BYTES - start)
         if sram is None or count <= 0:
             return
-        data = yield from self._reader.read_run(sram, start, count)
+        data = yield from self.reader.read_run(sram, start, count)
         if turn != self._turn:  # the pointer moved meanwhile
             return
         self._ahead += data or b""
         self._fetched = codes.IMAGE_BYTES if data is None else start + count
 
 
+@dataclass(eq=False)
 class RegisterLink:
     """Registers behind the pointer."""
 
-    def __init__(
-        self,
-        hardware: CubeSenseHardware,
-        meter: Meter,
-        state: State,
-        queue: JobQueue,
-        reader: PictureReader,
-    ) -> None:
+    hardware: CubeSenseHardware
+    meter: Meter
+    state: State
+    queue: JobQueue
+    reader: PictureReader
+
+    def __post_init__(self) -> None:
         """The pointer is at no register until a host sets it."""
-        self._hardware = hardware
-        self._meter = meter
-        self._state = state
-        self._queue = queue
-        self._image = ImageStream(hardware, queue, reader)
+        self._image = ImageStream(self.hardware, self.queue, self.reader)
         self._register: PointerRegister | None = None
         self._latched = b""
         self._position = 0
@@ -118,7 +110,7 @@ class RegisterLink:
         self._actions: dict[str, Callable[[Any], None]] = {
             "MEASURE": lambda value: self._measure(codes.Measurement(value), detect=True),
             "CAPTURE": lambda value: self._measure(codes.Measurement(value), detect=False),
-            "IMAGE_SRAM": lambda value: setattr(state, "image_sram", codes.Sram(value)),
+            "IMAGE_SRAM": lambda value: setattr(self.state, "image_sram", codes.Sram(value)),
             "CLEAR_OVER_CURRENT": self._clear_over_current,
             "NADIR_SEARCH": self._search,
         }
@@ -129,7 +121,7 @@ class RegisterLink:
 
     def i2c_write(self, byte: int) -> bool:
         """Interrupt: the pointer, or a data byte; one beyond that is not acknowledged."""
-        self._meter.charge(i2c_interrupt=1)
+        self.meter.charge(i2c_interrupt=1)
         self._written += 1
         if self._written == 1:
             self._register = registers.REGISTERS.at(byte)
@@ -150,7 +142,7 @@ class RegisterLink:
         else:
             byte = FILL
         if byte is not None:
-            self._meter.charge(i2c_interrupt=1)
+            self.meter.charge(i2c_interrupt=1)
         return byte
 
     def i2c_stop(self) -> None:
@@ -162,24 +154,24 @@ class RegisterLink:
         register = self._register
         self._position = 0
         streams = register is not None and register.streams
-        self._image.begin(self._state.image_sram if streams else None)
+        self._image.begin(self.state.image_sram if streams else None)
         if register is None or not register.readable or streams:
             self._latched = b""
             return
-        self._meter.charge(host_message=1)
+        self.meter.charge(host_message=1)
         self._latched = register.encode(self._value(register.name))
 
     def _value(self, name: str) -> float:
         if name in _SETTINGS:
             camera, attribute = _SETTINGS[name]
-            return float(getattr(self._state.cameras[camera], attribute))
+            return float(getattr(self.state.cameras[camera], attribute))
         if name in _RESULTS:
             camera, attribute, scale = _RESULTS[name]
-            return float(getattr(self._state.results[camera], attribute)) / scale
+            return float(getattr(self.state.results[camera], attribute)) / scale
         others = {
-            "IMAGE_SRAM": self._state.image_sram,
-            "NADIR_SEARCH": self._state.nadir_search,
-            "OVER_CURRENT": sum(over << sram for sram, over in self._state.over_current.items()),
+            "IMAGE_SRAM": self.state.image_sram,
+            "NADIR_SEARCH": self.state.nadir_search,
+            "OVER_CURRENT": sum(over << sram for sram, over in self.state.over_current.items()),
         }
         return others[name]
 
@@ -190,29 +182,29 @@ class RegisterLink:
         value = register.field.decode(byte)
         if not register.allows(value):
             return
-        self._meter.charge(host_message=1)
+        self.meter.charge(host_message=1)
         if register.name in _SETTINGS:
             camera, attribute = _SETTINGS[register.name]
-            setattr(self._state.cameras[camera], attribute, byte)
+            setattr(self.state.cameras[camera], attribute, byte)
         else:
             self._actions[register.name](byte)
 
     def _measure(self, target: codes.Measurement, *, detect: bool) -> None:
         if self._put(Measure(target.camera, target.sram, detect)):
-            self._state.schedule(target.camera, target.sram, detect=detect)
+            self.state.schedule(target.camera, target.sram, detect=detect)
 
     def _clear_over_current(self, selection: int) -> None:
         message = INTERFACE.telecommand("ClearOverCurrent")
         self._put(TelecommandJob(message, {"Selection": selection}))
 
     def _search(self, value: int) -> None:
-        if value == codes.NadirSearch.LINES or self._hardware.mcu_addressing:
-            self._state.nadir_search = codes.NadirSearch(value)
+        if value == codes.NadirSearch.LINES or self.hardware.mcu_addressing:
+            self.state.nadir_search = codes.NadirSearch(value)
 
     def _put(self, job: Measure | TelecommandJob) -> bool:
-        accepted = self._queue.put(job)
+        accepted = self.queue.put(job)
         if accepted:
-            self._hardware.wake()
+            self.hardware.wake()
         else:
-            self._state.raise_flag("TcmdBufferOverrun")
+            self.state.raise_flag("TcmdBufferOverrun")
         return accepted

@@ -67,7 +67,6 @@ class Links(Runner, HostSide):
         self.state = State()
         self.queue = JobQueue()
         self.commands = Commands(
-            self,
             self.meter,
             self.state,
             cast(Supply, self),
