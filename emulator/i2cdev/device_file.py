@@ -12,23 +12,8 @@ from cubestack.emulator.bus.i2c import I2cMessage
 from cubestack.emulator.i2cdev.adapter import FUNCTIONS, I2cAdapter
 from cubestack.emulator.i2cdev.smbus import Transaction
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
-from cubestack.firmware_model.formats.linux_i2c import (
-    MAX_BLOCK_BYTES,
-    MAX_MESSAGE_BYTES,
-    MAX_MESSAGES,
-    Call,
-    Ioctl,
-    MessageFlag,
-    RdwrMessage,
-    SmbusCall,
-    SmbusSize,
-    reply,
-    smbus_data_bytes,
-    unpack_ioctl,
-    unpack_rdwr,
-    unpack_read,
-    unpack_smbus,
-)
+from cubestack.firmware_model.formats import linux_i2c as linux
+from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, MessageFlag, SmbusSize
 
 Reply = Callable[[bytes], None]
 
@@ -65,19 +50,19 @@ class DeviceFile:
         try:
             match call:
                 case Call.OPEN:
-                    done(reply(0))
+                    done(linux.reply(0))
                 case Call.IOCTL:
-                    done(self._ioctl(*unpack_ioctl(body)))
+                    done(self._ioctl(*linux.unpack_ioctl(body)))
                 case Call.RDWR:
-                    self._rdwr(unpack_rdwr(body), done)
+                    self._rdwr(linux.unpack_rdwr(body), done)
                 case Call.SMBUS:
-                    self._smbus(unpack_smbus(body), done)
+                    self._smbus(linux.unpack_smbus(body), done)
                 case Call.READ:
-                    self._read(unpack_read(body), done)
+                    self._read(linux.unpack_read(body), done)
                 case Call.WRITE:
                     self._write(body, done)
         except OSError as error:
-            done(reply(-(error.errno or errno.EIO)))
+            done(_failed(error))
 
     def close(self) -> None:
         """Close; nothing is left behind."""
@@ -86,39 +71,35 @@ class DeviceFile:
         match number:
             case Ioctl.SLAVE | Ioctl.SLAVE_FORCE:
                 if argument > (_LAST_10_BIT if self.ten_bit else _LAST_7_BIT):
-                    return reply(-errno.EINVAL)
+                    return linux.reply(-errno.EINVAL)
                 self.address = argument
             case Ioctl.TENBIT:
                 self.ten_bit = bool(argument)
             case Ioctl.PEC:
                 self.checksums = bool(argument)
             case Ioctl.FUNCS:
-                return reply(0, _U64.pack(FUNCTIONS))
+                return linux.reply(0, _U64.pack(FUNCTIONS))
             case Ioctl.RETRIES | Ioctl.TIMEOUT if argument > _INT_MAX:
-                return reply(-errno.EINVAL)
+                return linux.reply(-errno.EINVAL)
             case Ioctl.RETRIES:
                 self._adapter.retries = argument
             case Ioctl.TIMEOUT:
                 self._adapter.timeout_ps = argument * TIMEOUT_UNIT_PS
             case _:
-                return reply(-errno.ENOTTY)
-        return reply(0)
+                return linux.reply(-errno.ENOTTY)
+        return linux.reply(0)
 
-    def _rdwr(self, wanted: list[RdwrMessage], done: Reply) -> None:
-        if not 1 <= len(wanted) <= MAX_MESSAGES:
-            raise OSError(errno.EINVAL, f"1..{MAX_MESSAGES} messages, not {len(wanted)}")
+    def _rdwr(self, wanted: list[linux.RdwrMessage], done: Reply) -> None:
+        if not 1 <= len(wanted) <= linux.MAX_MESSAGES:
+            raise OSError(errno.EINVAL, f"1..{linux.MAX_MESSAGES} messages, not {len(wanted)}")
         messages = [_plain(message) for message in wanted]
 
-        def end(result: int) -> None:
-            if result < 0:
-                done(reply(result))
-                return
-            read = b"".join(m.data for m in messages if m.reading)
-            done(reply(len(messages), read))
+        def answer() -> bytes:
+            return linux.reply(len(messages), b"".join(m.data for m in messages if m.reading))
 
-        self._adapter.submit(messages, end)
+        self._transfer(messages, answer, done)
 
-    def _smbus(self, call: SmbusCall, done: Reply) -> None:
+    def _smbus(self, call: linux.SmbusCall, done: Reply) -> None:
         if call.direction not in (0, 1) or not 0 <= call.size <= SmbusSize.I2C_BLOCK_DATA:
             raise OSError(errno.EINVAL, "no such SMBus transaction")
         plain = call.size == SmbusSize.QUICK or (call.size == SmbusSize.BYTE and not call.direction)
@@ -127,46 +108,47 @@ class DeviceFile:
         self._check_address()
         transaction = Transaction(self.address, call, with_checksum=self.checksums)
 
-        def end(result: int) -> None:
-            if result < 0:
-                done(reply(result))
-                return
-            try:
-                data = transaction.answer()
-            except OSError as error:
-                done(reply(-(error.errno or errno.EIO)))
-                return
-            done(reply(0, data[: smbus_data_bytes(call.size)] if transaction.answers else b""))
+        def answer() -> bytes:
+            data = transaction.answer()[: linux.smbus_data_bytes(call.size)]
+            return linux.reply(0, data if transaction.answers else b"")
 
-        self._adapter.submit(transaction.messages, end)
+        self._transfer(transaction.messages, answer, done)
 
     def _read(self, count: int, done: Reply) -> None:
         self._check_address()
-        count = min(count, MAX_MESSAGE_BYTES)
+        count = min(count, linux.MAX_MESSAGE_BYTES)
         message = I2cMessage(self.address, read=count, probe_read=not count)
-
-        def end(result: int) -> None:
-            done(reply(result) if result < 0 else reply(count, bytes(message.data)))
-
-        self._adapter.submit([message], end)
+        self._transfer([message], lambda: linux.reply(count, bytes(message.data)), done)
 
     def _write(self, data: bytes, done: Reply) -> None:
         self._check_address()
-        data = data[:MAX_MESSAGE_BYTES]
+        message = I2cMessage(self.address, bytearray(data[: linux.MAX_MESSAGE_BYTES]))
+        self._transfer([message], lambda: linux.reply(len(message.data)), done)
 
+    def _transfer(
+        self, messages: list[I2cMessage], answer: Callable[[], bytes], done: Reply
+    ) -> None:
         def end(result: int) -> None:
-            done(reply(result if result < 0 else len(data)))
+            try:
+                packed = linux.reply(result) if result < 0 else answer()
+            except OSError as error:
+                packed = _failed(error)
+            done(packed)
 
-        self._adapter.submit([I2cMessage(self.address, bytearray(data))], end)
+        self._adapter.submit(messages, end)
 
     def _check_address(self) -> None:
         if self.ten_bit:
             raise OSError(errno.EOPNOTSUPP, "10-bit addresses are not supported")
 
 
-def _plain(message: RdwrMessage) -> I2cMessage:
-    if message.length > MAX_MESSAGE_BYTES:
-        raise OSError(errno.EINVAL, f"a message has {MAX_MESSAGE_BYTES} bytes at most")
+def _failed(error: OSError) -> bytes:
+    return linux.reply(-(error.errno or errno.EIO))
+
+
+def _plain(message: linux.RdwrMessage) -> I2cMessage:
+    if message.length > linux.MAX_MESSAGE_BYTES:
+        raise OSError(errno.EINVAL, f"a message has {linux.MAX_MESSAGE_BYTES} bytes at most")
     if message.flags & ~_KNOWN_FLAGS:
         raise OSError(errno.EOPNOTSUPP, f"flags {message.flags:#06x}: only reading is supported")
     if message.address > _LAST_7_BIT:
@@ -174,7 +156,7 @@ def _plain(message: RdwrMessage) -> I2cMessage:
     reads = bool(message.flags & MessageFlag.READ)
     if message.flags & MessageFlag.RECEIVE_LENGTH:
         extra = message.data[0] if message.data else 0
-        if not reads or not 1 <= extra <= message.length - MAX_BLOCK_BYTES:
+        if not reads or not 1 <= extra <= message.length - linux.MAX_BLOCK_BYTES:
             raise OSError(errno.EINVAL, "the buffer of such a read has 32 bytes beyond its first")
         return I2cMessage(message.address, read=extra, block=True)
     if reads:

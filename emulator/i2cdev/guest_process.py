@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Literal
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
-from cubestack.emulator.i2cdev.preload.elf import is_static
+from cubestack.emulator.i2cdev.preload.shim import is_static
 from cubestack.emulator.i2cdev.seccomp.filter import make_filter, native_abi
 from cubestack.emulator.i2cdev.seccomp.notify import Listener, read_memory
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor, descriptor_range

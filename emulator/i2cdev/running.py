@@ -7,17 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from cubestack.emulator.i2cdev import guest_process
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.i2cdev.device_node import DeviceNode
-from cubestack.emulator.i2cdev.guest_process import (
-    GuestProcess,
-    Route,
-    RouteError,
-    bus_environment,
-    start_filtered,
-    start_preloaded,
-)
 from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers
 from cubestack.emulator.i2cdev.preload.shim import shim_library
 from cubestack.emulator.i2cdev.remote import RemoteBus
@@ -58,14 +51,8 @@ def emulated_bus(
     kernel: Kernel, busy: Callable[[], bool], adapter: I2cAdapter, path: Path
 ) -> HostBus:
     """The bus of an emulation in this process, served at ``path`` as well; raises PortError."""
-    return HostBus(
-        kernel,
-        busy,
-        adapter,
-        server := I2cServer(path, adapter),
-        lambda: DeviceFile(adapter),
-        server.name,
-    )
+    server = I2cServer(path, adapter)
+    return HostBus(kernel, busy, adapter, server, lambda: DeviceFile(adapter), server.name)
 
 
 def attached_bus(path: Path) -> HostBus:
@@ -80,7 +67,7 @@ def run_program(
     bus: HostBus,
     *,
     pace: Literal["real", "fast"],
-    route: Route | None = None,
+    route: guest_process.Route | None = None,
     say: Callable[[str], None] = lambda _text: None,
 ) -> int:
     """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit code.
@@ -108,11 +95,7 @@ def run_program(
         for each in early:
             run.signalled(each)
         say(f"/dev/i2c-{number} by way of {reason}")
-        if bus.adapter is None:
-            sharpen_timers()
-            _serve([bus.port, *run.ports], run)
-        else:
-            _emulate(bus, bus.adapter, run, pace=pace, say=say)
+        _serve(bus, run, pace=pace, say=say)
     finally:
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
@@ -121,21 +104,27 @@ def run_program(
     return program.exit_code
 
 
-def _emulate(
-    bus: HostBus,
-    adapter: I2cAdapter,
-    run: "_Run",
-    *,
-    pace: Literal["real", "fast"],
-    say: Callable[[str], None],
+def _serve(
+    bus: HostBus, run: "_Run", *, pace: Literal["real", "fast"], say: Callable[[str], None]
 ) -> None:
+    """Serve ``run`` until it ends; no scheduler where the bus is in another process."""
+    ports = [bus.port, *run.ports]
+    if bus.adapter is None:
+        sharpen_timers()
+        watch = Watch(ports)
+        while not run.ended:
+            ready = watch.wait(TURNAROUND_NS, awake=True) or watch.wait(IDLE_NS)
+            for port in ready or ports:
+                port.exchange(0)
+        watch.close()
+        return
     with open_scheduler(
         bus.kernel,
         [run],
         bus.busy,
         pace=pace,
-        i2c=adapter,
-        i2c_ports=[bus.port, *run.ports],
+        i2c=bus.adapter,
+        i2c_ports=ports,
         always_asleep=run.hands_over,
         report=say,
     ) as scheduler:
@@ -147,16 +136,6 @@ def _emulate(
             gc.unfreeze()
 
 
-def _serve(ports: Sequence[Endpoint], run: "_Run") -> None:
-    """Serve without a scheduler: the bus is in another process."""
-    watch = Watch(ports)
-    while not run.ended:
-        ready = watch.wait(TURNAROUND_NS, awake=True) or watch.wait(IDLE_NS)
-        for port in ready or ports:
-            port.exchange(0)
-    watch.close()
-
-
 class _Run(Endpoint):
     """A program under way; as a port of the scheduler it notices the end.
 
@@ -166,7 +145,7 @@ class _Run(Endpoint):
         on_end: called when there is nobody left to serve.
     """
 
-    def __init__(self, program: GuestProcess, supervisor: Supervisor | None) -> None:
+    def __init__(self, program: guest_process.GuestProcess, supervisor: Supervisor | None) -> None:
         self.name = program.name
         self.ports: list[Endpoint] = [supervisor, program] if supervisor else [program]
         self.on_end: Callable[[], None] = lambda: None
@@ -207,25 +186,25 @@ class _Run(Endpoint):
 
 
 def _start(
-    command: Sequence[str], number: int, bus: HostBus, route: Route | None
-) -> tuple[GuestProcess, Supervisor | None, str]:
+    command: Sequence[str], number: int, bus: HostBus, route: guest_process.Route | None
+) -> tuple[guest_process.GuestProcess, Supervisor | None, str]:
     """The program, its supervisor if it has one, and the route with the reason for it."""
-    environment = bus_environment(number, bus.path)
+    environment = guest_process.bus_environment(number, bus.path)
     refused = ""
     if route != "preload":
         try:
-            program, supervisor = start_filtered(
+            program, supervisor = guest_process.start_filtered(
                 command, environment, DeviceNode(number), bus.files
             )
-        except RouteError as error:
+        except guest_process.RouteError as error:
             if route == "seccomp":
-                raise RouteError(f"seccomp: {error}; try --route preload") from None
+                raise guest_process.RouteError(f"seccomp: {error}; try --route preload") from None
             refused = f", as seccomp is not there: {error}"
         else:
             asked = "as asked" if route else "which any program can take"
             return program, supervisor, f"seccomp, {asked}"
     try:
-        program = start_preloaded(command, environment, shim_library())
-    except RouteError as error:
-        raise RouteError(f"preload: {error}{refused}") from None
+        program = guest_process.start_preloaded(command, environment, shim_library())
+    except guest_process.RouteError as error:
+        raise guest_process.RouteError(f"preload: {error}{refused}") from None
     return program, None, f"preload{refused or ', as asked'}"

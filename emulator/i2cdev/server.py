@@ -19,14 +19,7 @@ from pathlib import Path
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
 from cubestack.emulator.ports.endpoint import Endpoint, PortError
-from cubestack.firmware_model.formats.linux_i2c import (
-    LENGTH,
-    MAX_REQUEST_BYTES,
-    Call,
-    reply,
-    split_request,
-    take_packet,
-)
+from cubestack.firmware_model.formats import linux_i2c as linux
 
 MAX_CLIENTS = 64
 """Connections at one time; a program takes one, and one for each device file it has open."""
@@ -180,18 +173,18 @@ class _Client:
     def _take_call(self) -> bool:
         """Start the oldest whole call; returns whether there was one."""
         try:
-            data = take_packet(self._received, MAX_REQUEST_BYTES)
+            data = linux.take_packet(self._received, linux.MAX_REQUEST_BYTES)
             if data is None:
                 return False
             self._waiting = True
-            key, call, body = split_request(data)
-            if call is Call.OPEN:
+            key, call, body = linux.split_request(data)
+            if call is linux.Call.OPEN:
                 self._key = key
                 self._files[key] = self._file
                 key = 0
             file = self._files.get(key) if key else self._file
             if file is None:
-                self._answer(reply(-errno.EBADF))
+                self._answer(linux.reply(-errno.EBADF))
             else:
                 file.perform(call, body, self._answer)
         except ValueError:
@@ -201,7 +194,7 @@ class _Client:
     def _answer(self, data: bytes) -> None:
         self._waiting = False
         if not self.gone:
-            self._send(LENGTH.pack(len(data)) + data)
+            self._send(linux.LENGTH.pack(len(data)) + data)
             # There is room to write, so with a further call here it is looked at again at once.
             more = self._unsent or self._received
             self._watch_for(select.EPOLLOUT if more else select.EPOLLIN)

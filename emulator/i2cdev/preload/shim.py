@@ -1,4 +1,4 @@
-"""Builds the library for LD_PRELOAD once, and keeps it in the user's cache folder."""
+"""Builds the library for LD_PRELOAD once, in the user's cache folder; and what can not load it."""
 
 import hashlib
 import importlib.util
@@ -6,6 +6,7 @@ import os
 import platform
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,14 @@ SOURCE = Path(__file__).with_name("shim.c")
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-Wall")
 LIBRARIES = ("-ldl", "-lpthread")
 """Before glibc 2.34 these two are libraries of their own."""
+
+PT_INTERP = 3
+CLASS_64 = 2
+LITTLE_ENDIAN = 1
+
+_TABLE = struct.Struct("<Q14xHH")  # at 32: e_phoff; at 54: e_phentsize, e_phnum
+_TABLE_AT = 32
+_TYPE = struct.Struct("<I")
 
 
 def find_c_compiler() -> list[str] | None:
@@ -89,3 +98,24 @@ def _compile(compiler: list[str], library: Path, log: Path) -> None:
         done = subprocess.run(command, stdout=output, stderr=subprocess.STDOUT)
     if done.returncode != 0 or not library.exists():
         raise CompilerError(f"{shlex.join(compiler)} failed; its log is {log}")
+
+
+def is_static(program: Path) -> bool:
+    """Whether a 64-bit ``program`` has no interpreter (System V ABI, chapter 5: PT_INTERP).
+
+    False for scripts, and for whatever can not be read: the kernel will say what it thinks of it.
+    """
+    try:
+        with program.open("rb") as file:
+            head = file.read(64)
+            if len(head) < 64 or head[:6] != b"\x7fELF" + bytes((CLASS_64, LITTLE_ENDIAN)):
+                return False
+            start, size, count = _TABLE.unpack_from(head, _TABLE_AT)
+            file.seek(start)
+            table = file.read(size * count)
+    except (OSError, ValueError, OverflowError):
+        return False
+    if size < _TYPE.size or len(table) < size * count:
+        return False
+    types = [_TYPE.unpack_from(table, size * index)[0] for index in range(count)]
+    return PT_INTERP not in types

@@ -41,49 +41,21 @@ class Abi:
     compact_stat: bool
 
 
-_X86_64 = {
-    "read": 0,
-    "write": 1,
-    "open": 2,
-    "stat": 4,
-    "fstat": 5,
-    "lstat": 6,
-    "ioctl": 16,
-    "readv": 19,
-    "writev": 20,
-    "access": 21,
-    "dup": 32,
-    "fcntl": 72,
-    "readlink": 89,
-    "getxattr": 191,
-    "lgetxattr": 192,
-    "openat": 257,
-    "newfstatat": 262,
-    "readlinkat": 267,
-    "faccessat": 269,
-    "statx": 332,
-    "openat2": 437,
-    "faccessat2": 439,
-}
-_GENERIC = {
-    "getxattr": 8,
-    "lgetxattr": 9,
-    "dup": 23,
-    "fcntl": 25,
-    "ioctl": 29,
-    "faccessat": 48,
-    "openat": 56,
-    "read": 63,
-    "write": 64,
-    "readv": 65,
-    "writev": 66,
-    "readlinkat": 78,
-    "newfstatat": 79,
-    "fstat": 80,
-    "statx": 291,
-    "openat2": 437,
-    "faccessat2": 439,
-}
+def _calls(table: str) -> dict[str, int]:
+    """System call numbers by name, of a text of both."""
+    words = table.split()
+    return {name: int(number) for name, number in zip(words[::2], words[1::2], strict=True)}
+
+
+_X86_64 = _calls("""
+    read 0 write 1 open 2 stat 4 fstat 5 lstat 6 ioctl 16 readv 19 writev 20 access 21 dup 32
+    fcntl 72 readlink 89 getxattr 191 lgetxattr 192 openat 257 newfstatat 262 readlinkat 267
+    faccessat 269 statx 332 openat2 437 faccessat2 439
+""")
+_GENERIC = _calls("""
+    getxattr 8 lgetxattr 9 dup 23 fcntl 25 ioctl 29 faccessat 48 openat 56 read 63 write 64 readv 65
+    writev 66 readlinkat 78 newfstatat 79 fstat 80 statx 291 openat2 437 faccessat2 439
+""")
 
 #: By the name that the kernel gives the machine.
 ABIS = {

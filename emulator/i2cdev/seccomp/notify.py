@@ -140,17 +140,10 @@ class _Part(ctypes.Structure):
 
 
 _libc = ctypes.CDLL(None, use_errno=True)
-_types = (
-    ctypes.c_int,
-    ctypes.c_void_p,
-    ctypes.c_ulong,
-    ctypes.c_void_p,
-    ctypes.c_ulong,
-    ctypes.c_ulong,
-)
+_VECTOR = (ctypes.c_void_p, ctypes.c_ulong)
 _readv, _writev = _libc.process_vm_readv, _libc.process_vm_writev
 for _function in (_readv, _writev):
-    _function.argtypes = _types
+    _function.argtypes = (ctypes.c_int, *_VECTOR, *_VECTOR, ctypes.c_ulong)
     _function.restype = ctypes.c_ssize_t
 
 
@@ -167,12 +160,16 @@ class _Window:
         self._parts = ctypes.byref(self._here), ctypes.byref(self._there)
 
     def read(self, pid: int, address: int, count: int) -> bytes:
-        self._move(_readv, pid, address, count)
+        """``count`` bytes of a process, at most ``SIZE``; raises OSError, EFAULT without them."""
+        if count:
+            self._move(_readv, pid, address, count)
         return self._view[:count].tobytes()
 
     def write(self, pid: int, address: int, data: bytes) -> None:
-        self._view[: len(data)] = data
-        self._move(_writev, pid, address, len(data))
+        """Put ``data``, at most ``SIZE`` bytes, into a process; raises OSError as ``read``."""
+        if data:
+            self._view[: len(data)] = data
+            self._move(_writev, pid, address, len(data))
 
     def _move(self, function: Callable[..., int], pid: int, address: int, count: int) -> None:
         self._here.length = self._there.length = count
@@ -187,17 +184,7 @@ class _Window:
 
 
 _window = _Window()
-
-
-def read_memory(pid: int, address: int, count: int) -> bytes:
-    """``count`` bytes of a process, at most 16384; raises OSError, EFAULT where it has none."""
-    return _window.read(pid, address, count) if count else b""
-
-
-def write_memory(pid: int, address: int, data: bytes) -> None:
-    """Put ``data``, at most 16384 bytes, into a process; raises OSError, EFAULT if it can not."""
-    if data:
-        _window.write(pid, address, data)
+read_memory, write_memory = _window.read, _window.write
 
 
 def read_text(pid: int, address: int, limit: int) -> bytes:

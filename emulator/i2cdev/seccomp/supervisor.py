@@ -137,21 +137,24 @@ class Supervisor(Endpoint):
     def _by_path(self) -> dict[str, Handler]:
         here = partial(self._on_path, folder=None, path=0)
         there = partial(self._on_path, folder=0, path=1)
+        exists, no_link, no_attribute = (
+            partial(self._end, result=result) for result in (0, -errno.EINVAL, -errno.EOPNOTSUPP)
+        )
         return {
-            "open": partial(here, handle=partial(self._open, flags=1)),
-            "openat": partial(there, handle=partial(self._open, flags=2)),
-            "openat2": partial(there, handle=self._open_how),
+            "open": partial(here, handle=partial(self._open, place=1)),
+            "openat": partial(there, handle=partial(self._open, place=2)),
+            "openat2": partial(there, handle=partial(self._open, place=2, how=True)),
             "stat": partial(here, handle=partial(self._stat, buffer=1)),
             "lstat": partial(here, handle=partial(self._stat, buffer=1)),
             "newfstatat": partial(self._stat_at, flags=3, handle=partial(self._stat, buffer=2)),
             "statx": partial(self._stat_at, flags=2, handle=self._statx),
-            "access": partial(here, handle=self._exists),
-            "faccessat": partial(there, handle=self._exists),
-            "faccessat2": partial(there, handle=self._exists),
-            "readlink": partial(here, handle=self._no_link),
-            "readlinkat": partial(there, handle=self._no_link),
-            "getxattr": partial(here, handle=self._no_attribute),
-            "lgetxattr": partial(here, handle=self._no_attribute),
+            "access": partial(here, handle=exists),
+            "faccessat": partial(there, handle=exists),
+            "faccessat2": partial(there, handle=exists),
+            "readlink": partial(here, handle=no_link),
+            "readlinkat": partial(there, handle=no_link),
+            "getxattr": partial(here, handle=no_attribute),
+            "lgetxattr": partial(here, handle=no_attribute),
         }
 
     def _on_path(
@@ -175,14 +178,11 @@ class Supervisor(Endpoint):
         else:
             handle(call, found)
 
-    def _open_how(self, call: Notification, found: Found) -> None:
-        (flags,) = _FLAGS.unpack(read_memory(call.pid, call.arguments[2], _FLAGS.size))
-        self._open_with(call, found, flags)
-
-    def _open(self, call: Notification, found: Found, flags: int) -> None:
-        self._open_with(call, found, call.arguments[flags])
-
-    def _open_with(self, call: Notification, found: Found, flags: int) -> None:
+    def _open(self, call: Notification, found: Found, place: int, *, how: bool = False) -> None:
+        """Argument number ``place`` has the flags, or says ``how``: where they are."""
+        flags = call.arguments[place]
+        if how:
+            (flags,) = _FLAGS.unpack(read_memory(call.pid, flags, _FLAGS.size))
         if flags & os.O_DIRECTORY:
             raise OSError(errno.ENOTDIR, f"{self.name} is no folder")
         close_on_exec = bool(flags & os.O_CLOEXEC)
@@ -211,11 +211,10 @@ class Supervisor(Endpoint):
             )
 
     def _free_number(self, pid: int) -> int:
-        used = {int(name) for name in os.listdir(f"/proc/{pid}/fd")}
-        for number in self._descriptors:
-            if number not in used:
-                return number
-        raise OSError(errno.EMFILE, f"{DESCRIPTORS} device files are open already")
+        free = set(self._descriptors) - {int(name) for name in os.listdir(f"/proc/{pid}/fd")}
+        if not free:
+            raise OSError(errno.EMFILE, f"{DESCRIPTORS} device files are open already")
+        return min(free)
 
     def _stat(self, call: Notification, found: Found, buffer: int) -> None:
         data = self._node.stat(compact=self._abi.compact_stat)
@@ -242,24 +241,18 @@ class Supervisor(Endpoint):
                     return
         self._on_path(call, folder=0, path=1, handle=handle)
 
-    def _exists(self, call: Notification, _found: Found) -> None:
-        self._listener.answer(call, 0)
-
-    def _no_link(self, call: Notification, _found: Found) -> None:
-        self._listener.answer(call, -errno.EINVAL)
-
-    def _no_attribute(self, call: Notification, _found: Found) -> None:
-        self._listener.answer(call, -errno.EOPNOTSUPP)
+    def _end(self, call: Notification, _found: Found, result: int) -> None:
+        self._listener.answer(call, result)
 
     # --- by descriptor ------------------------------------------------------------------------
 
     def _by_descriptor(self) -> dict[str, Handler]:
-        calls = {
+        calls: dict[str, Callable[[Notification], marshal.Marshalled]] = {
             "ioctl": marshal.ioctl,
             "read": marshal.read,
             "write": marshal.write,
-            "readv": marshal.readv,
-            "writev": marshal.writev,
+            "readv": partial(marshal.read, vector=True),
+            "writev": partial(marshal.write, vector=True),
         }
         named: dict[str, Handler] = {
             name: partial(self._on_file, handle=partial(self._perform, fetch=fetch))

@@ -8,23 +8,10 @@ import pytest
 
 from cubestack.emulator.i2cdev.adapter import FUNCTIONS, I2cAdapter
 from cubestack.emulator.i2cdev.device_file import DeviceFile
-from cubestack.firmware_model.formats.linux_i2c import (
-    Call,
-    Ioctl,
-    MessageFlag,
-    RdwrMessage,
-    SmbusCall,
-    SmbusSize,
-    pack_ioctl,
-    pack_rdwr,
-    pack_read,
-    pack_smbus,
-    split_rdwr,
-    split_reply,
-)
+from cubestack.firmware_model.formats import linux_i2c as linux
 
-READ = int(MessageFlag.READ)
-Ask = Callable[[Call, bytes], tuple[int, bytes]]
+READ = int(linux.MessageFlag.READ)
+Ask = Callable[[linux.Call, bytes], tuple[int, bytes]]
 
 
 @pytest.fixture
@@ -38,47 +25,47 @@ def file(adapter: I2cAdapter) -> DeviceFile:
 def ask(file: DeviceFile, kernel: Any) -> Ask:
     """Does a call and waits for its end."""
 
-    def call(call: Call, body: bytes) -> tuple[int, bytes]:
+    def call(call: linux.Call, body: bytes) -> tuple[int, bytes]:
         replies: list[bytes] = []
         file.perform(call, body, replies.append)
         while not replies:
             kernel.step()
-        return split_reply(replies[0])
+        return linux.split_reply(replies[0])
 
     return call
 
 
 def ioctl(ask: Ask, number: int, argument: int = 0) -> tuple[int, bytes]:
-    return ask(Call.IOCTL, pack_ioctl(number, argument))
+    return ask(linux.Call.IOCTL, linux.pack_ioctl(number, argument))
 
 
-def rdwr(ask: Ask, *messages: RdwrMessage) -> tuple[int, list[bytes]]:
-    result, data = ask(Call.RDWR, pack_rdwr(messages))
-    return result, split_rdwr(messages, data) if result >= 0 else []
+def rdwr(ask: Ask, *messages: linux.RdwrMessage) -> tuple[int, list[bytes]]:
+    result, data = ask(linux.Call.RDWR, linux.pack_rdwr(messages))
+    return result, linux.split_rdwr(messages, data) if result >= 0 else []
 
 
 # --- settings -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [Ioctl.SLAVE, Ioctl.SLAVE_FORCE])
+@pytest.mark.parametrize("number", [linux.Ioctl.SLAVE, linux.Ioctl.SLAVE_FORCE])
 @pytest.mark.parametrize(
     ("ten_bit", "address", "result"),
     [(0, 0x7F, 0), (0, 0x80, -errno.EINVAL), (1, 0x3FF, 0), (1, 0x400, -errno.EINVAL)],
 )
 def test_address(ask: Ask, file: DeviceFile, number, ten_bit, address, result):
-    ioctl(ask, Ioctl.TENBIT, ten_bit)
+    ioctl(ask, linux.Ioctl.TENBIT, ten_bit)
     assert ioctl(ask, number, address) == (result, b"")
     assert file.address == (0x1A if result else address)
 
 
-@pytest.mark.parametrize("number", [Ioctl.RETRIES, Ioctl.TIMEOUT])
+@pytest.mark.parametrize("number", [linux.Ioctl.RETRIES, linux.Ioctl.TIMEOUT])
 def test_limits_of_retries_and_timeout(ask: Ask, number):
     assert ioctl(ask, number, 2**31 - 1) == (0, b"")
     assert ioctl(ask, number, 2**31) == (-errno.EINVAL, b"")
 
 
 def test_functions(ask: Ask):
-    result, data = ioctl(ask, Ioctl.FUNCS)
+    result, data = ioctl(ask, linux.Ioctl.FUNCS)
     assert (result, int.from_bytes(data, "little")) == (0, FUNCTIONS)
 
 
@@ -91,32 +78,32 @@ def test_unknown_request(ask: Ask, number):
 
 
 def test_write_then_read(ask: Ask, registers):
-    assert ask(Call.WRITE, b"\x20\xaa\xbb") == (3, b"")
-    assert ask(Call.WRITE, b"\x1f") == (1, b"")
-    assert ask(Call.READ, pack_read(4)) == (4, b"\x1f\xaa\xbb\x22")
+    assert ask(linux.Call.WRITE, b"\x20\xaa\xbb") == (3, b"")
+    assert ask(linux.Call.WRITE, b"\x1f") == (1, b"")
+    assert ask(linux.Call.READ, linux.pack_read(4)) == (4, b"\x1f\xaa\xbb\x22")
     assert registers.log == [[0x20, 0xAA, 0xBB], -1, [0x1F], -1, 4, -1]
 
 
 def test_long_ones_are_cut(ask: Ask, registers):
-    result, data = ask(Call.READ, pack_read(2**63))
+    result, data = ask(linux.Call.READ, linux.pack_read(2**63))
     assert (result, len(data)) == (8192, 8192)
     registers.pointer = -8191  # the first byte sets it, so nothing is refused
     registers.i2c_write = lambda byte: registers.log[-1].append(byte) or True
-    assert ask(Call.WRITE, bytes(9000)) == (8192, b"")
+    assert ask(linux.Call.WRITE, bytes(9000)) == (8192, b"")
     assert len(registers.log[-2]) == 8192
 
 
 def test_nothing_to_transfer_is_a_probe(ask: Ask, registers):
-    assert ask(Call.WRITE, b"") == (0, b"")
-    assert ask(Call.READ, pack_read(0)) == (0, b"")
+    assert ask(linux.Call.WRITE, b"") == (0, b"")
+    assert ask(linux.Call.READ, linux.pack_read(0)) == (0, b"")
     assert registers.log == [[], -1, 0, -1]
 
 
 def test_refusals(ask: Ask, file: DeviceFile):
-    assert ask(Call.WRITE, b"\xf1\x00") == (-errno.EIO, b"")
+    assert ask(linux.Call.WRITE, b"\xf1\x00") == (-errno.EIO, b"")
     file.address = 0x30
-    assert ask(Call.WRITE, b"\x00") == (-errno.ENXIO, b"")
-    assert ask(Call.READ, pack_read(1)) == (-errno.ENXIO, b"")
+    assert ask(linux.Call.WRITE, b"\x00") == (-errno.ENXIO, b"")
+    assert ask(linux.Call.READ, linux.pack_read(1)) == (-errno.ENXIO, b"")
 
 
 def test_errors_of_another_driver(kernel, bus):
@@ -124,30 +111,30 @@ def test_errors_of_another_driver(kernel, bus):
         I2cAdapter(kernel, bus, address_errno=errno.EREMOTEIO, data_errno=errno.EBUSY)
     )
     replies: list[bytes] = []
-    file.perform(Call.READ, pack_read(1), replies.append)
+    file.perform(linux.Call.READ, linux.pack_read(1), replies.append)
     file.address = 0x1A
-    file.perform(Call.WRITE, b"\xf1\x00", replies.append)
+    file.perform(linux.Call.WRITE, b"\xf1\x00", replies.append)
     kernel.run()
-    assert [split_reply(reply)[0] for reply in replies] == [-errno.EREMOTEIO, -errno.EBUSY]
+    assert [linux.split_reply(reply)[0] for reply in replies] == [-errno.EREMOTEIO, -errno.EBUSY]
 
 
 def test_ten_bit_addresses(ask: Ask):
-    ioctl(ask, Ioctl.TENBIT, 1)
-    assert ask(Call.READ, pack_read(1)) == (-errno.EOPNOTSUPP, b"")
-    assert ask(Call.WRITE, b"x") == (-errno.EOPNOTSUPP, b"")
+    ioctl(ask, linux.Ioctl.TENBIT, 1)
+    assert ask(linux.Call.READ, linux.pack_read(1)) == (-errno.EOPNOTSUPP, b"")
+    assert ask(linux.Call.WRITE, b"x") == (-errno.EOPNOTSUPP, b"")
 
 
 def test_stretched_clock_delays(ask: Ask, kernel, registers):
-    ask(Call.READ, pack_read(1))
+    ask(linux.Call.READ, linux.pack_read(1))
     plain = kernel.now
     registers.busy_reads = 7
-    ask(Call.READ, pack_read(1))
+    ask(linux.Call.READ, linux.pack_read(1))
     assert kernel.now - plain == plain + 7 * 2_500_000
 
 
 def test_clock_held_for_ever(ask: Ask, registers):
     registers.busy_reads = 10**9
-    assert ask(Call.READ, pack_read(1)) == (-errno.ETIMEDOUT, b"")
+    assert ask(linux.Call.READ, linux.pack_read(1)) == (-errno.ETIMEDOUT, b"")
 
 
 # --- combined transfers -------------------------------------------------------------------------
@@ -155,10 +142,10 @@ def test_clock_held_for_ever(ask: Ask, registers):
 
 def test_combined(ask: Ask, registers):
     messages = (
-        RdwrMessage(0x1A, 0, 2, b"\x10\x99"),
-        RdwrMessage(0x1A, 0, 1, b"\x10"),
-        RdwrMessage(0x1A, READ, 2),
-        RdwrMessage(0x1A, READ, 1),
+        linux.RdwrMessage(0x1A, 0, 2, b"\x10\x99"),
+        linux.RdwrMessage(0x1A, 0, 1, b"\x10"),
+        linux.RdwrMessage(0x1A, READ, 2),
+        linux.RdwrMessage(0x1A, READ, 1),
     )
     assert rdwr(ask, *messages) == (4, [b"", b"", b"\x99\x11", b"\x12"])
     assert registers.log == [[0x10, 0x99], [0x10], 2, 1, -1]  # one stop
@@ -168,14 +155,14 @@ def test_combined(ask: Ask, registers):
     ("messages", "code"),
     [
         ([], errno.EINVAL),
-        ([RdwrMessage(0x1A, READ, 1)] * 43, errno.EINVAL),
-        ([RdwrMessage(0x1A, READ, 8193)], errno.EINVAL),
-        ([RdwrMessage(0x1A, 0, 8193)], errno.EINVAL),
-        ([RdwrMessage(0x80, READ, 1)], errno.EINVAL),
-        ([RdwrMessage(0x1A, READ | 0x4000, 1)], errno.EOPNOTSUPP),
-        ([RdwrMessage(0x1A, READ | MessageFlag.TEN_BIT, 1)], errno.EOPNOTSUPP),
-        ([RdwrMessage(0x1A, READ, 1), RdwrMessage(0x30, READ, 1)], errno.ENXIO),
-        ([RdwrMessage(0x1A, 0, 2, b"\xf1\x00")], errno.EIO),
+        ([linux.RdwrMessage(0x1A, READ, 1)] * 43, errno.EINVAL),
+        ([linux.RdwrMessage(0x1A, READ, 8193)], errno.EINVAL),
+        ([linux.RdwrMessage(0x1A, 0, 8193)], errno.EINVAL),
+        ([linux.RdwrMessage(0x80, READ, 1)], errno.EINVAL),
+        ([linux.RdwrMessage(0x1A, READ | 0x4000, 1)], errno.EOPNOTSUPP),
+        ([linux.RdwrMessage(0x1A, READ | linux.MessageFlag.TEN_BIT, 1)], errno.EOPNOTSUPP),
+        ([linux.RdwrMessage(0x1A, READ, 1), linux.RdwrMessage(0x30, READ, 1)], errno.ENXIO),
+        ([linux.RdwrMessage(0x1A, 0, 2, b"\xf1\x00")], errno.EIO),
     ],
 )
 def test_combined_errors(ask: Ask, messages, code):
@@ -183,18 +170,18 @@ def test_combined_errors(ask: Ask, messages, code):
 
 
 def test_limits_are_reached(ask: Ask):
-    assert rdwr(ask, *[RdwrMessage(0x1A, READ, 1)] * 42)[0] == 42
-    assert len(rdwr(ask, RdwrMessage(0x1A, READ, 8192))[1][0]) == 8192
+    assert rdwr(ask, *[linux.RdwrMessage(0x1A, READ, 1)] * 42)[0] == 42
+    assert len(rdwr(ask, linux.RdwrMessage(0x1A, READ, 8192))[1][0]) == 8192
 
 
-LENGTH_FROM_DEVICE = READ | MessageFlag.RECEIVE_LENGTH
+LENGTH_FROM_DEVICE = READ | linux.MessageFlag.RECEIVE_LENGTH
 
 
 def test_length_from_the_device(ask: Ask):
     messages = (
-        RdwrMessage(0x1A, 0, 1, b"\x05"),
-        RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\x01"),
-        RdwrMessage(0x1A, READ, 1),
+        linux.RdwrMessage(0x1A, 0, 1, b"\x05"),
+        linux.RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\x01"),
+        linux.RdwrMessage(0x1A, READ, 1),
     )
     assert rdwr(ask, *messages) == (3, [b"", bytes([5, 6, 7, 8, 9, 10]), b"\x0b"])
 
@@ -209,13 +196,13 @@ def test_length_from_the_device(ask: Ask):
     ],
 )
 def test_length_from_the_device_needs_room(ask: Ask, flags, length, first):
-    assert rdwr(ask, RdwrMessage(0x1A, flags, length, first)) == (-errno.EINVAL, [])
+    assert rdwr(ask, linux.RdwrMessage(0x1A, flags, length, first)) == (-errno.EINVAL, [])
 
 
 def test_length_from_the_device_that_is_none(ask: Ask):
     messages = (
-        RdwrMessage(0x1A, 0, 1, b"\x00"),
-        RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\x01"),
+        linux.RdwrMessage(0x1A, 0, 1, b"\x00"),
+        linux.RdwrMessage(0x1A, LENGTH_FROM_DEVICE, 33, b"\x01"),
     )
     assert rdwr(ask, *messages) == (-errno.EPROTO, [])
 
@@ -226,42 +213,50 @@ def test_length_from_the_device_that_is_none(ask: Ask):
 @pytest.mark.parametrize(
     ("direction", "size", "data"),
     [
-        (2, SmbusSize.BYTE_DATA, bytes(34)),
+        (2, linux.SmbusSize.BYTE_DATA, bytes(34)),
         (1, 9, bytes(34)),
-        (1, SmbusSize.BYTE_DATA, None),
-        (1, SmbusSize.I2C_BLOCK_DATA, bytes([33]) + bytes(33)),
-        (0, SmbusSize.I2C_BLOCK_DATA, bytes([33]) + bytes(33)),
-        (0, SmbusSize.BLOCK_DATA, bytes([33]) + bytes(33)),
-        (0, SmbusSize.BLOCK_PROCESS_CALL, bytes([33]) + bytes(33)),
+        (1, linux.SmbusSize.BYTE_DATA, None),
+        (1, linux.SmbusSize.I2C_BLOCK_DATA, bytes([33]) + bytes(33)),
+        (0, linux.SmbusSize.I2C_BLOCK_DATA, bytes([33]) + bytes(33)),
+        (0, linux.SmbusSize.BLOCK_DATA, bytes([33]) + bytes(33)),
+        (0, linux.SmbusSize.BLOCK_PROCESS_CALL, bytes([33]) + bytes(33)),
     ],
 )
 def test_smbus_arguments(ask: Ask, direction, size, data):
-    body = pack_smbus(SmbusCall(direction, 0, size, data))
-    assert ask(Call.SMBUS, body) == (-errno.EINVAL, b"")
+    body = linux.pack_smbus(linux.SmbusCall(direction, 0, size, data))
+    assert ask(linux.Call.SMBUS, body) == (-errno.EINVAL, b"")
 
 
 def test_smbus_reply_has_what_the_transaction_uses(ask: Ask):
-    for size, count in ((SmbusSize.BYTE_DATA, 1), (SmbusSize.WORD_DATA, 2)):
-        result, data = ask(Call.SMBUS, pack_smbus(SmbusCall(1, 0x40, size, bytes(34))))
+    for size, count in ((linux.SmbusSize.BYTE_DATA, 1), (linux.SmbusSize.WORD_DATA, 2)):
+        result, data = ask(
+            linux.Call.SMBUS, linux.pack_smbus(linux.SmbusCall(1, 0x40, size, bytes(34)))
+        )
         assert (result, len(data)) == (0, count)
-    assert ask(Call.SMBUS, pack_smbus(SmbusCall(0, 0x40, SmbusSize.BYTE, None))) == (0, b"")
+    assert ask(
+        linux.Call.SMBUS, linux.pack_smbus(linux.SmbusCall(0, 0x40, linux.SmbusSize.BYTE, None))
+    ) == (0, b"")
 
 
 def test_checksums_are_switched(ask: Ask, registers):
-    write = pack_smbus(SmbusCall(0, 0x40, SmbusSize.BYTE_DATA, bytes([7]) + bytes(33)))
-    ask(Call.SMBUS, write)
-    ioctl(ask, Ioctl.PEC, 1)
-    ask(Call.SMBUS, write)
+    write = linux.pack_smbus(
+        linux.SmbusCall(0, 0x40, linux.SmbusSize.BYTE_DATA, bytes([7]) + bytes(33))
+    )
+    ask(linux.Call.SMBUS, write)
+    ioctl(ask, linux.Ioctl.PEC, 1)
+    ask(linux.Call.SMBUS, write)
     assert [len(entry) for entry in registers.log if isinstance(entry, list)] == [2, 3]
     # Reading, the device's next byte is no checksum of those before it.
-    read = pack_smbus(SmbusCall(1, 0x40, SmbusSize.BYTE_DATA, bytes(34)))
-    assert ask(Call.SMBUS, read) == (-errno.EBADMSG, b"")
+    read = linux.pack_smbus(linux.SmbusCall(1, 0x40, linux.SmbusSize.BYTE_DATA, bytes(34)))
+    assert ask(linux.Call.SMBUS, read) == (-errno.EBADMSG, b"")
 
 
 # --- nonsense -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("call", [Call.IOCTL, Call.RDWR, Call.SMBUS, Call.READ])
+@pytest.mark.parametrize(
+    "call", [linux.Call.IOCTL, linux.Call.RDWR, linux.Call.SMBUS, linux.Call.READ]
+)
 @pytest.mark.parametrize("body", [b"x", b"\xff" * 13])
 def test_nonsense_is_a_value_error(file: DeviceFile, call, body):
     with pytest.raises(ValueError, match=r"must be|breaks off"):

@@ -7,15 +7,7 @@ import pytest
 
 from cubestack.emulator.i2cdev.remote import RemoteBus
 from cubestack.emulator.ports.endpoint import PortError
-from cubestack.firmware_model.formats.linux_i2c import (
-    Call,
-    Ioctl,
-    RdwrMessage,
-    pack_ioctl,
-    pack_rdwr,
-    pack_read,
-    split_reply,
-)
+from cubestack.firmware_model.formats import linux_i2c as linux
 
 
 class Remote:
@@ -25,13 +17,13 @@ class Remote:
         self.served = served
         self.bus = RemoteBus(Path(served.server.name))
 
-    def ask(self, file, call: Call, body: bytes) -> tuple[int, bytes]:
+    def ask(self, file, call: linux.Call, body: bytes) -> tuple[int, bytes]:
         replies: list[bytes] = []
         file.perform(call, body, replies.append)
         while not replies:
             self.served.serve()
             self.bus.exchange(0)
-        return split_reply(replies[0])
+        return linux.split_reply(replies[0])
 
 
 @pytest.fixture
@@ -43,16 +35,21 @@ def remote(served):
 
 def test_files(remote):
     first, second = remote.bus.open(), remote.bus.open()
-    assert remote.ask(first, Call.IOCTL, pack_ioctl(Ioctl.SLAVE, 0x1A)) == (0, b"")
-    assert remote.ask(first, Call.READ, pack_read(2)) == (2, b"\0\1")
-    assert remote.ask(second, Call.READ, pack_read(2)) == (-errno.ENXIO, b"")
+    assert remote.ask(first, linux.Call.IOCTL, linux.pack_ioctl(linux.Ioctl.SLAVE, 0x1A)) == (
+        0,
+        b"",
+    )
+    assert remote.ask(first, linux.Call.READ, linux.pack_read(2)) == (2, b"\0\1")
+    assert remote.ask(second, linux.Call.READ, linux.pack_read(2)) == (-errno.ENXIO, b"")
 
 
 def test_large_both_ways(remote, registers):
     registers.i2c_write = lambda _byte: True
     file = remote.bus.open()
-    messages = [RdwrMessage(0x1A, 0, 8192, bytes(8192))] * 21 + [RdwrMessage(0x1A, 1, 8192)] * 21
-    result, data = remote.ask(file, Call.RDWR, pack_rdwr(messages))
+    messages = [linux.RdwrMessage(0x1A, 0, 8192, bytes(8192))] * 21 + [
+        linux.RdwrMessage(0x1A, 1, 8192)
+    ] * 21
+    result, data = remote.ask(file, linux.Call.RDWR, linux.pack_rdwr(messages))
     assert (result, len(data)) == (42, 21 * 8192)
 
 
@@ -61,9 +58,11 @@ def test_answers_come_in_the_order_of_the_calls(remote):
     results: dict[int, int] = {}
     for argument in (0x80, 0x1A, 0x1B):
         file.perform(
-            Call.IOCTL,
-            pack_ioctl(Ioctl.SLAVE, argument),
-            lambda reply, argument=argument: results.update({argument: split_reply(reply)[0]}),
+            linux.Call.IOCTL,
+            linux.pack_ioctl(linux.Ioctl.SLAVE, argument),
+            lambda reply, argument=argument: results.update(
+                {argument: linux.split_reply(reply)[0]}
+            ),
         )
     while len(results) < 3:
         remote.served.serve()
@@ -74,11 +73,11 @@ def test_answers_come_in_the_order_of_the_calls(remote):
 def test_the_emulation_goes(remote):
     file = remote.bus.open()
     replies: list[bytes] = []
-    file.perform(Call.READ, pack_read(1), replies.append)
+    file.perform(linux.Call.READ, linux.pack_read(1), replies.append)
     remote.served.server.close()
     remote.bus.exchange(0)
-    file.perform(Call.READ, pack_read(1), replies.append)
-    assert [split_reply(reply)[0] for reply in replies] == [-errno.EIO] * 2
+    file.perform(linux.Call.READ, linux.pack_read(1), replies.append)
+    assert [linux.split_reply(reply)[0] for reply in replies] == [-errno.EIO] * 2
     remote.bus.exchange(0)
     file.close()
 

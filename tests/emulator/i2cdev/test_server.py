@@ -13,63 +13,55 @@ from hypothesis import strategies as st
 
 from cubestack.emulator.i2cdev.server import MAX_CLIENTS, _Client
 from cubestack.emulator.ports.endpoint import PortError
-from cubestack.firmware_model.formats.linux_i2c import (
-    LENGTH,
-    MAX_REQUEST_BYTES,
-    Call,
-    Ioctl,
-    RdwrMessage,
-    pack_ioctl,
-    pack_rdwr,
-    pack_read,
-    request,
-)
+from cubestack.firmware_model.formats import linux_i2c as linux
 
-SLAVE = pack_ioctl(Ioctl.SLAVE, 0x1A)
+SLAVE = linux.pack_ioctl(linux.Ioctl.SLAVE, 0x1A)
 
 
 def test_a_client_has_a_device_file(served):
     client = served.connect()
-    assert served.ask(client, Call.IOCTL, SLAVE) == (0, b"")
-    assert served.ask(client, Call.WRITE, b"\x41") == (1, b"")
-    assert served.ask(client, Call.READ, pack_read(3)) == (3, b"ABC")
+    assert served.ask(client, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(client, linux.Call.WRITE, b"\x41") == (1, b"")
+    assert served.ask(client, linux.Call.READ, linux.pack_read(3)) == (3, b"ABC")
 
 
 def test_each_client_has_its_own(served):
     first, second = served.connect(), served.connect()
-    served.ask(first, Call.IOCTL, SLAVE)
-    assert served.ask(second, Call.READ, pack_read(1)) == (-errno.ENXIO, b"")
-    assert served.ask(first, Call.READ, pack_read(1)) == (1, b"\0")
+    served.ask(first, linux.Call.IOCTL, SLAVE)
+    assert served.ask(second, linux.Call.READ, linux.pack_read(1)) == (-errno.ENXIO, b"")
+    assert served.ask(first, linux.Call.READ, linux.pack_read(1)) == (1, b"\0")
 
 
 def test_a_file_under_its_key(served):
     opener, caller = served.connect(), served.connect()
-    assert served.ask(opener, Call.OPEN, key=77) == (0, b"")
-    assert served.ask(caller, Call.IOCTL, SLAVE, key=77) == (0, b"")
-    assert served.ask(caller, Call.READ, pack_read(1), key=77) == (1, b"\0")
-    assert served.ask(caller, Call.READ, pack_read(1), key=78) == (-errno.EBADF, b"")
+    assert served.ask(opener, linux.Call.OPEN, key=77) == (0, b"")
+    assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=77) == (0, b"")
+    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=77) == (1, b"\0")
+    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=78) == (-errno.EBADF, b"")
     opener.socket.close()
     served.serve()
-    assert served.ask(caller, Call.READ, pack_read(1), key=77) == (-errno.EBADF, b"")
+    assert served.ask(caller, linux.Call.READ, linux.pack_read(1), key=77) == (-errno.EBADF, b"")
 
 
 def test_a_key_that_is_used_again(served):
     """The kernel gives an inode's number anew before we hear of the end of the old one."""
     old, new, caller = served.connect(), served.connect(), served.connect()
-    served.ask(old, Call.OPEN, key=77)
-    served.ask(new, Call.OPEN, key=77)
+    served.ask(old, linux.Call.OPEN, key=77)
+    served.ask(new, linux.Call.OPEN, key=77)
     old.socket.close()
     served.serve()
-    assert served.ask(caller, Call.IOCTL, SLAVE, key=77) == (0, b"")
+    assert served.ask(caller, linux.Call.IOCTL, SLAVE, key=77) == (0, b"")
 
 
 def test_clients_take_turns_by_whole_transfers(served, registers):
     clients = [served.connect() for _ in range(4)]
     for client in clients:
-        served.ask(client, Call.IOCTL, SLAVE)
+        served.ask(client, linux.Call.IOCTL, SLAVE)
     registers.log.clear()
     for number, client in enumerate(clients):
-        client.send(Call.RDWR, pack_rdwr([RdwrMessage(0x1A, 0, 1, bytes([number]))] * 3))
+        client.send(
+            linux.Call.RDWR, linux.pack_rdwr([linux.RdwrMessage(0x1A, 0, 1, bytes([number]))] * 3)
+        )
     served.serve()
     assert [client.receive()[0] for client in clients] == [3] * 4
     transfers = [registers.log[start : start + 4] for start in range(0, len(registers.log), 4)]
@@ -80,44 +72,44 @@ def test_clients_take_turns_by_whole_transfers(served, registers):
 def test_calls_that_come_together(served):
     """All but the first are read before their turn."""
     client = served.connect()
-    served.ask(client, Call.IOCTL, SLAVE)
-    data = request(0, Call.READ, pack_read(1))
-    client.socket.sendall((LENGTH.pack(len(data)) + data) * 3)
+    served.ask(client, linux.Call.IOCTL, SLAVE)
+    data = linux.request(0, linux.Call.READ, linux.pack_read(1))
+    client.socket.sendall((linux.LENGTH.pack(len(data)) + data) * 3)
     served.serve()
     assert [client.receive() for _ in range(3)] == [(1, b"\0"), (1, b"\1"), (1, b"\2")]
 
 
 def test_largest_transfer(served):
     client = served.connect()
-    messages = [RdwrMessage(0x1A, 1, 8192)] * 42
-    client.send(Call.RDWR, pack_rdwr(messages))
+    messages = [linux.RdwrMessage(0x1A, 1, 8192)] * 42
+    client.send(linux.Call.RDWR, linux.pack_rdwr(messages))
     served.serve()
     client.socket.setblocking(False)  # the rest of the answer waits for room
     received = bytearray()
-    while len(received) < LENGTH.size + 4 + 42 * 8192:
+    while len(received) < linux.LENGTH.size + 4 + 42 * 8192:
         try:
             received += client.socket.recv(1 << 20)
         except BlockingIOError:
             served.serve()
-    assert LENGTH.unpack_from(received)[0] == 4 + 42 * 8192
+    assert linux.LENGTH.unpack_from(received)[0] == 4 + 42 * 8192
 
 
 def test_a_client_that_does_not_read_holds_up_nobody(served):
     stuck, other = served.connect(), served.connect()
-    body = pack_rdwr([RdwrMessage(0x1A, 1, 8192)] * 42)
+    body = linux.pack_rdwr([linux.RdwrMessage(0x1A, 1, 8192)] * 42)
     for _ in range(3):
-        stuck.send(Call.RDWR, body)
+        stuck.send(linux.Call.RDWR, body)
     served.serve()
-    served.ask(other, Call.IOCTL, SLAVE)
-    assert served.ask(other, Call.READ, pack_read(1))[0] == 1
+    served.ask(other, linux.Call.IOCTL, SLAVE)
+    assert served.ask(other, linux.Call.READ, linux.pack_read(1))[0] == 1
 
 
 class Babbler:
     """A connection whose client asks again before the last answer is out."""
 
     def __init__(self) -> None:
-        data = request(0, Call.IOCTL, SLAVE)
-        self.frame = LENGTH.pack(len(data)) + data
+        data = linux.request(0, linux.Call.IOCTL, SLAVE)
+        self.frame = linux.LENGTH.pack(len(data)) + data
         self.looks = 0
 
     def setblocking(self, _flag: bool) -> None: ...
@@ -142,8 +134,8 @@ def test_a_client_that_never_pauses_is_left_for_the_next(adapter):
 def test_a_flood_waits_in_the_operating_system(served, registers):
     client = served.connect()
     client.socket.setblocking(False)
-    data = request(0, Call.IOCTL, SLAVE)
-    frame = LENGTH.pack(len(data)) + data
+    data = linux.request(0, linux.Call.IOCTL, SLAVE)
+    frame = linux.LENGTH.pack(len(data)) + data
     sent = 0
     try:
         while True:
@@ -153,7 +145,7 @@ def test_a_flood_waits_in_the_operating_system(served, registers):
     assert sent < 1 << 20
     client.socket.setblocking(True)
     other = served.connect()
-    assert served.ask(other, Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
     for _ in range(sent // len(frame)):
         assert client.receive() == (0, b"")
         served.serve()
@@ -162,22 +154,22 @@ def test_a_flood_waits_in_the_operating_system(served, registers):
 @pytest.mark.parametrize("cut", [1, 4, 5, 12])
 def test_a_client_that_dies_in_a_message(served, cut):
     client, other = served.connect(), served.connect()
-    data = request(0, Call.READ, pack_read(1))
-    client.socket.sendall((LENGTH.pack(len(data)) + data)[:cut])
+    data = linux.request(0, linux.Call.READ, linux.pack_read(1))
+    client.socket.sendall((linux.LENGTH.pack(len(data)) + data)[:cut])
     served.serve()
     client.reset()
-    assert served.ask(other, Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
     assert served.server.clients == 1
 
 
 def test_a_client_that_dies_in_its_transfer(served, registers):
     client, other = served.connect(), served.connect()
-    client.send(Call.RDWR, pack_rdwr([RdwrMessage(0x1A, 0, 3, b"\x20\xaa\xbb")]))
+    client.send(linux.Call.RDWR, linux.pack_rdwr([linux.RdwrMessage(0x1A, 0, 3, b"\x20\xaa\xbb")]))
     served.server.exchange(0)
     assert served.adapter.busy
     client.socket.close()
     served.server.exchange(0)
-    assert served.ask(other, Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
     assert registers.memory[0x20:0x22] == b"\xaa\xbb"  # the bus goes on
     assert served.server.clients == 1
 
@@ -185,11 +177,11 @@ def test_a_client_that_dies_in_its_transfer(served, registers):
 @pytest.mark.parametrize(
     "data",
     [
-        LENGTH.pack(MAX_REQUEST_BYTES + 1),
-        LENGTH.pack(0),
-        LENGTH.pack(9) + bytes(8) + b"\x63",
-        LENGTH.pack(10) + bytes(8) + bytes([Call.IOCTL]) + b"x",
-        LENGTH.pack(20) + bytes(8) + bytes([Call.RDWR]) + b"\xff" * 11,
+        linux.LENGTH.pack(linux.MAX_REQUEST_BYTES + 1),
+        linux.LENGTH.pack(0),
+        linux.LENGTH.pack(9) + bytes(8) + b"\x63",
+        linux.LENGTH.pack(10) + bytes(8) + bytes([linux.Call.IOCTL]) + b"x",
+        linux.LENGTH.pack(20) + bytes(8) + bytes([linux.Call.RDWR]) + b"\xff" * 11,
     ],
 )
 def test_nonsense_is_hung_up_on(served, data):
@@ -197,14 +189,14 @@ def test_nonsense_is_hung_up_on(served, data):
     client.socket.sendall(data)
     served.serve()
     assert client.hung_up()
-    assert served.ask(other, Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
 @given(st.binary(min_size=1, max_size=200))
 def test_no_bytes_harm(served, data):
     client = served.connect()
-    client.socket.sendall(LENGTH.pack(len(data)) + data)
+    client.socket.sendall(linux.LENGTH.pack(len(data)) + data)
     served.serve()
     client.socket.close()
     served.serve()
@@ -216,7 +208,7 @@ def test_more_clients_than_room_wait(served):
     clients = [served.connect() for _ in range(MAX_CLIENTS + 1)]
     late = clients[-1]
     assert served.server.clients == MAX_CLIENTS
-    late.send(Call.IOCTL, SLAVE)
+    late.send(linux.Call.IOCTL, SLAVE)
     served.serve()
     assert not select.select([late.socket], [], [], 0)[0]
     clients[0].socket.close()
@@ -227,7 +219,7 @@ def test_more_clients_than_room_wait(served):
 def test_a_waiting_server_wakes_up(served):
     client = served.connect()
     served.wait(0.0)
-    client.send(Call.IOCTL, SLAVE)
+    client.send(linux.Call.IOCTL, SLAVE)
     served.wait(20.0)  # returns at once
     served.serve()
     assert client.receive() == (0, b"")

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cubestack.emulator.i2cdev.preload.elf import is_static
-from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
+from cubestack.emulator.i2cdev.preload.shim import find_c_compiler, is_static
 
 TIMEOUT_S = 120
 
