@@ -25,20 +25,8 @@ from typing import Any
 
 from cubestack.emulator.camera.common.optics import Distortion, Optics
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+from cubestack.emulator.scene import file
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
-from cubestack.emulator.scene.file import (
-    Readers,
-    SceneError,
-    flag,
-    number,
-    read_scene_file,
-    read_table,
-    several,
-    subtable,
-    text,
-    values_for,
-    whole,
-)
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
 
 
@@ -51,81 +39,83 @@ def load_scene(path: Path, condition: SkyCondition) -> SkyView:
         "sky": lambda table: _sky(table, condition),
         "picture": lambda table: _picture(table, Path(path).parent, condition),
     }
-    return read_scene_file(path, kinds, '"sky" or "picture"')
+    return file.read_scene_file(path, kinds, '"sky" or "picture"')
 
 
 def _distortion(value: Any) -> Distortion:
     try:
         return Distortion(value)
     except ValueError:
-        raise SceneError(f"must be one of {[d.value for d in Distortion]}, not {value!r}") from None
+        raise file.SceneError(
+            f"must be one of {[d.value for d in Distortion]}, not {value!r}"
+        ) from None
 
 
 #: Keys of the table "optics"; the sensor's size is the device's.
-_OPTICS: Readers = {
-    f.name: _distortion if f.name == "distortion" else number
+_OPTICS: file.Readers = {
+    f.name: _distortion if f.name == "distortion" else file.number
     for f in fields(Optics)
     if f.name not in ("columns", "rows")
 }
-_POSE: Readers = {
-    "ra_deg": number,
-    "dec_deg": number,
-    "roll_deg": number,
-    "quaternion": several(4, number),
-    "rate_deg_s": several(3, number),
+_POSE: file.Readers = {
+    "ra_deg": file.number,
+    "dec_deg": file.number,
+    "roll_deg": file.number,
+    "quaternion": file.several(4, file.number),
+    "rate_deg_s": file.several(3, file.number),
 }
-_SKY: Readers = _POSE | {
+_SKY: file.Readers = _POSE | {
     "poses": lambda value: value,
-    "epoch": number,
-    "mag_limit": number,
-    "false_stars": whole,
-    "false_star_mag": several(2, number),
-    "noise": flag,
-    "seed": whole,
-    "temperature_c": number,
-    "hot_pixels": whole,
+    "epoch": file.number,
+    "mag_limit": file.number,
+    "false_stars": file.whole,
+    "false_star_mag": file.several(2, file.number),
+    "noise": file.flag,
+    "seed": file.whole,
+    "temperature_c": file.number,
+    "hot_pixels": file.whole,
 }
-_PICTURE: Readers = {
-    "file": text,
-    "crop": several(2, whole),
-    "exposure_ms": number,
-    "quaternion": several(4, number),
-    "temperature_c": number,
+_PICTURE: file.Readers = {
+    "file": file.text,
+    "crop": file.several(2, file.whole),
+    "exposure_ms": file.number,
+    "quaternion": file.several(4, file.number),
+    "temperature_c": file.number,
 }
 
 
 def _sky(table: Mapping[str, Any], condition: SkyCondition) -> SkyView:
     def lens(value: Any) -> Optics:
-        return replace(condition.optics, **subtable(_OPTICS)(value))
+        return replace(condition.optics, **file.subtable(_OPTICS)(value))
 
-    values = read_table(table, _SKY | {"optics": lens})
+    values = file.read_table(table, _SKY | {"optics": lens})
     later = values.pop("poses", [])
     if not isinstance(later, list) or not all(isinstance(pose, dict) for pose in later):
-        raise SceneError("poses must be tables, each under [[poses]]")
-    poses = tuple(_pose(read_table(pose, _POSE | {"start_s": number})) for pose in later)
+        raise file.SceneError("poses must be tables, each under [[poses]]")
+    poses = tuple(_pose(file.read_table(pose, _POSE | {"start_s": file.number})) for pose in later)
     first = _pose({key: values.pop(key) for key in _POSE if key in values})
-    scene = SkyScene(first.quaternion, first.rate_deg_s, poses, **values_for(SkyScene, values))
-    return SkyView(scene, replace(condition, **values_for(condition, values)))
+    scene = SkyScene(first.quaternion, first.rate_deg_s, poses, **file.values_for(SkyScene, values))
+    return SkyView(scene, replace(condition, **file.values_for(condition, values)))
 
 
 def _pose(values: dict[str, Any]) -> Pose:
     angles = {"ra_deg", "dec_deg", "roll_deg"} & values.keys()
     if ("quaternion" in values) == bool(angles):
-        raise SceneError("a pose needs either quaternion, or ra_deg and dec_deg")
+        raise file.SceneError("a pose needs either quaternion, or ra_deg and dec_deg")
     if angles:
         if not {"ra_deg", "dec_deg"} <= angles:
-            raise SceneError("a pose with angles needs both ra_deg and dec_deg")
+            raise file.SceneError("a pose with angles needs both ra_deg and dec_deg")
         ra, dec, roll = (values.pop(k, 0.0) for k in ("ra_deg", "dec_deg", "roll_deg"))
         values["quaternion"] = quaternion_from_pointing(ra, dec, roll)
     return Pose(**values)
 
 
 def _picture(table: Mapping[str, Any], folder: Path, condition: SkyCondition) -> SkyView:
-    values = read_table(table, _PICTURE)
+    values = file.read_table(table, _PICTURE)
     if "file" not in values:
-        raise SceneError("a picture needs the key file")
-    condition = replace(condition, **values_for(condition, values))
+        raise file.SceneError("a picture needs the key file")
+    condition = replace(condition, **file.values_for(condition, values))
     values["file"] = folder / values["file"]
-    scene = PictureScene(**values_for(PictureScene, values))
+    scene = PictureScene(**file.values_for(PictureScene, values))
     scene.part(condition.optics.columns, condition.optics.rows)
     return SkyView(scene, condition)

@@ -27,13 +27,7 @@ from cubestack.emulator.camera.mlx75412.frame_timing import LINE_CLOCKS, exposur
 from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.sky import Scene
-from cubestack.firmware_model.interface.cameras.mlx75412 import (
-    COLUMNS,
-    CRYSTAL_HZ,
-    REGISTERS,
-    ROWS,
-    SYNC_APPLY,
-)
+from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 
 IDLE_CLOCKS = 4096 * LINE_CLOCKS
 """Length in which the endless blanking of the disabled sensor is handed out."""
@@ -41,7 +35,7 @@ IDLE_CLOCKS = 4096 * LINE_CLOCKS
 REMEMBERED = 8
 """Spans and frames kept: more than anybody looks ahead or back."""
 
-_ENABLE = REGISTERS["MODE_SELECT"].field("ENABLE")
+_ENABLE = chip.REGISTERS["MODE_SELECT"].field("ENABLE")
 
 
 @dataclass(frozen=True)
@@ -79,9 +73,9 @@ class Mlx75412(StarSensor):
         active_columns: those of them with HSync high.
     """
 
-    columns, rows, word_bytes = COLUMNS, ROWS, 1
+    columns, rows, word_bytes = chip.COLUMNS, chip.ROWS, 1
     line_clocks = LINE_CLOCKS
-    active_columns = COLUMNS
+    active_columns = chip.COLUMNS
 
     def __init__(
         self,
@@ -89,7 +83,7 @@ class Mlx75412(StarSensor):
         *,
         condition: SkyCondition = CONDITION,
         seed: int = 0,
-        crystal_hz: int = CRYSTAL_HZ,
+        crystal_hz: int = chip.CRYSTAL_HZ,
         vsync_before_first_frame: bool = False,
     ) -> None:
         """Power up with the reset pin high.
@@ -102,7 +96,7 @@ class Mlx75412(StarSensor):
             vsync_before_first_frame: whether VSync goes low between the undefined and the first
                 good frame.
         """
-        super().__init__(scene, condition, REGISTERS, crystal_hz)
+        super().__init__(scene, condition, chip.REGISTERS, crystal_hz)
         self._seed = seed
         self._vsync_before_first_frame = vsync_before_first_frame
         self._imager = Mlx75412Imager(seed)
@@ -123,9 +117,9 @@ class Mlx75412(StarSensor):
         was_enabled, stale = self.enabled, False
         for byte in words:
             register = self._registers.write(byte)
-            if register is REGISTERS["SYNC"]:
+            if register is chip.REGISTERS["SYNC"]:
                 self._registers.store("SYNC", 0)
-                if byte == SYNC_APPLY:
+                if byte == chip.SYNC_APPLY:
                     self._registers.sync()
                     stale = True
         if self.enabled != was_enabled or stale:
@@ -175,7 +169,7 @@ class Mlx75412(StarSensor):
             return self._read_out(clock, last.end, last.frame)
         undefined = last.frame.number == 0
         vsync = int(undefined and not self._vsync_before_first_frame)
-        clocks = (last.frame.lines - ROWS) * LINE_CLOCKS
+        clocks = (last.frame.lines - chip.ROWS) * LINE_CLOCKS
         return _Span(last.end, clocks, vsync, last.frame)
 
     def _read_out(self, clock: PixelClock, first: int, before: _Frame | None) -> _Span:
@@ -193,13 +187,13 @@ class Mlx75412(StarSensor):
         )
         number = 0 if before is None else before.number + 1
         frame = _Frame(number, shutter, self._corrections(), lines, next_exposure=programmed)
-        return _Span(first, ROWS * LINE_CLOCKS, 1, frame, ROWS)
+        return _Span(first, chip.ROWS * LINE_CLOCKS, 1, frame, chip.ROWS)
 
     def _corrections(self) -> Corrections:
         value = self._registers.active("HARDWARE_FEATURES")
 
         def on(name: str) -> bool:
-            return bool(REGISTERS["HARDWARE_FEATURES"].field(name).of(value))
+            return bool(chip.REGISTERS["HARDWARE_FEATURES"].field(name).of(value))
 
         return Corrections(on("DEFECT_CORRECTION"), on("FPN_CORRECTION"), on("DARK_SUBTRACTION"))
 

@@ -11,16 +11,7 @@ import numpy as np
 from cubestack.emulator.camera.common.imager import Grey, Imager, Light, hot_pixels
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
-from cubestack.emulator.camera.mt9m001.noise import (
-    BACKGROUND_ELECTRONS_PER_S,
-    BLACK_LEVEL,
-    FULL_SCALE,
-    FULL_WELL_ELECTRONS,
-    HOT_SHARE,
-    READ_NOISE_ELECTRONS,
-    NoiseTerms,
-    dark_electrons_per_s,
-)
+from cubestack.emulator.camera.mt9m001 import noise as physics
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
@@ -32,8 +23,8 @@ class Mt9m001Imager(Imager[SensorSettings]):
     def __init__(
         self,
         seed: int = 0,
-        noise: NoiseTerms | None = None,
-        background_electrons_per_s: float = BACKGROUND_ELECTRONS_PER_S,
+        noise: physics.NoiseTerms | None = None,
+        background_electrons_per_s: float = physics.BACKGROUND_ELECTRONS_PER_S,
     ) -> None:
         """Make the imager with the sensor that ``seed`` stands for.
 
@@ -43,7 +34,7 @@ class Mt9m001Imager(Imager[SensorSettings]):
             background_electrons_per_s: light from elsewhere in each pixel.
         """
         self._seed = seed
-        self._noise = noise or NoiseTerms()
+        self._noise = noise or physics.NoiseTerms()
         self._background = background_electrons_per_s
 
     def picture(
@@ -68,17 +59,17 @@ class Mt9m001Imager(Imager[SensorSettings]):
         generator: np.random.Generator | None,
     ) -> Grey:
         """Grey values, same shape as ``light``; see ``Imager``."""
-        terms = NoiseTerms.none() if generator is None else self._noise
+        terms = physics.NoiseTerms.none() if generator is None else self._noise
         surplus = self._background * exposure_s if terms.background else 0.0
-        dark = dark_electrons_per_s(condition.temperature_c) * exposure_s
+        dark = physics.dark_electrons_per_s(condition.temperature_c) * exposure_s
         if terms.dark:
             surplus += dark
         mean = light + np.float32(surplus)
         if terms.dark and condition.hot_pixels:
             seed = condition.seed + self._seed
-            places, share = hot_pixels(seed, condition.hot_pixels, light.size, HOT_SHARE)
+            places, share = hot_pixels(seed, condition.hot_pixels, light.size, physics.HOT_SHARE)
             mean.ravel()[places] += share * np.float32(dark)
-        steady = READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
+        steady = physics.READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
         variance = (mean if terms.shot else mean - light) + np.float32(steady)
         signal = mean
         if generator is not None and (terms.shot or surplus or steady):
@@ -88,12 +79,16 @@ class Mt9m001Imager(Imager[SensorSettings]):
         # The dark rows' mean, which holds the mean dark current, is subtracted on the chip.
         if terms.dark:
             signal -= np.float32(dark)
-        signal *= _gain(settings) * np.float32((FULL_SCALE + 1) / FULL_WELL_ELECTRONS)
-        signal += np.float32(BLACK_LEVEL)
+        signal *= _gain(settings) * np.float32(
+            (physics.FULL_SCALE + 1) / physics.FULL_WELL_ELECTRONS
+        )
+        signal += np.float32(physics.BLACK_LEVEL)
         if not terms.quantisation:
-            nearest: Light = np.clip(signal / np.float32(4) + np.float32(0.5), 0, FULL_SCALE // 4)
+            nearest: Light = np.clip(
+                signal / np.float32(4) + np.float32(0.5), 0, physics.FULL_SCALE // 4
+            )
             return nearest.astype(np.uint8)
-        whole: Light = np.clip(signal + np.float32(0.5), 0, FULL_SCALE)
+        whole: Light = np.clip(signal + np.float32(0.5), 0, physics.FULL_SCALE)
         return (whole.astype(np.uint16) >> 2).astype(np.uint8)
 
 
@@ -113,7 +108,7 @@ def _window(full: Grey, settings: SensorSettings) -> Grey:
         settings.columns,
     ):
         return full
-    window = np.full((settings.rows, settings.columns), BLACK_LEVEL >> 2, np.uint8)
+    window = np.full((settings.rows, settings.columns), physics.BLACK_LEVEL >> 2, np.uint8)
     top, left = max(0, settings.row), max(0, settings.column)
     bottom = min(ROWS, settings.row + settings.rows)
     right = min(COLUMNS, settings.column + settings.columns)

@@ -7,16 +7,7 @@ OUTPUT_CONTROL show the same two bits, RESET brings all reset values back, RESTA
 from dataclasses import dataclass, replace
 
 from cubestack.emulator.camera.common.register_file import RegisterFile
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    ARRAY_COLUMN,
-    ARRAY_ROW,
-    FEWEST_BLANK_CLOCKS,
-    FEWEST_BLANK_ROWS,
-    FRAME_END_CLOCKS,
-    FRAME_START_CLOCKS,
-    REGISTERS,
-    gain,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001 as chip
 
 GAINS = ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")
 
@@ -61,7 +52,7 @@ class SensorSettings:
 
 def read_settings(registers: RegisterFile, before: SensorSettings | None = None) -> SensorSettings:
     """Settings that the registers ask for; while they are held, those of ``before``."""
-    output = REGISTERS["OUTPUT_CONTROL"]
+    output = chip.REGISTERS["OUTPUT_CONTROL"]
     control = registers.active("OUTPUT_CONTROL")
     resetting = registers.active("RESET") & 1
     enabled = bool(output.field("CHIP_ENABLE").of(control)) and not resetting
@@ -69,17 +60,17 @@ def read_settings(registers: RegisterFile, before: SensorSettings | None = None)
         return replace(before, enabled=enabled)
     value = registers.active
     columns = (value("COLUMN_SIZE") & 0x7FF | 1) + 1
-    blank_clocks = max(value("HORIZONTAL_BLANKING") & 0x7FF, FEWEST_BLANK_CLOCKS)
-    blank_clocks += FRAME_START_CLOCKS + FRAME_END_CLOCKS - FEWEST_BLANK_CLOCKS
-    even, odd_row, odd_column, odd = (gain(value(name)) for name in GAINS)
+    blank_clocks = max(value("HORIZONTAL_BLANKING") & 0x7FF, chip.FEWEST_BLANK_CLOCKS)
+    blank_clocks += chip.FRAME_START_CLOCKS + chip.FRAME_END_CLOCKS - chip.FEWEST_BLANK_CLOCKS
+    even, odd_row, odd_column, odd = (chip.gain(value(name)) for name in GAINS)
     return SensorSettings(
         enabled=enabled,
-        row=(value("ROW_START") & 0x7FF) - ARRAY_ROW,
-        column=(value("COLUMN_START") & 0x7FE) - ARRAY_COLUMN,
+        row=(value("ROW_START") & 0x7FF) - chip.ARRAY_ROW,
+        column=(value("COLUMN_START") & 0x7FE) - chip.ARRAY_COLUMN,
         rows=max(value("ROW_SIZE") & 0x7FF, 2) + 1,
         columns=columns,
         row_clocks=columns + blank_clocks,
-        blank_rows=max(value("VERTICAL_BLANKING") & 0x7FF, FEWEST_BLANK_ROWS) + 1,
+        blank_rows=max(value("VERTICAL_BLANKING") & 0x7FF, chip.FEWEST_BLANK_ROWS) + 1,
         exposure_rows=max(value("SHUTTER_WIDTH") & 0x3FFF, 1),
         gains=(even, odd_row, odd_column, odd),
     )

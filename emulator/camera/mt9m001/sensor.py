@@ -26,13 +26,7 @@ from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings, read_settings, write_word
 from cubestack.emulator.scene.sky import Scene
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    COLUMNS,
-    FRAME_START_CLOCKS,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    ROWS,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001 as chip
 
 IDLE_CLOCKS = 4_800_000
 """Length in which the endless blanking of the stopped sensor is handed out."""
@@ -69,7 +63,7 @@ class Mt9m001(StarSensor):
         line_clocks: pixel clocks of a line, in the segment handed out last.
     """
 
-    columns, rows, word_bytes = COLUMNS, ROWS, 2
+    columns, rows, word_bytes = chip.COLUMNS, chip.ROWS, 2
 
     def __init__(
         self,
@@ -77,7 +71,7 @@ class Mt9m001(StarSensor):
         *,
         condition: SkyCondition = CONDITION,
         seed: int = 0,
-        clock_hz: int = PIXEL_CLOCK_HZ,
+        clock_hz: int = chip.PIXEL_CLOCK_HZ,
         noise: NoiseTerms | None = None,
     ) -> None:
         """Power up with the reset pin high.
@@ -89,12 +83,12 @@ class Mt9m001(StarSensor):
             clock_hz: master clock; PIXCLK has the same frequency.
             noise: which terms of noise there are in a condition that has noise, all unless given.
         """
-        super().__init__(scene, condition, REGISTERS, clock_hz)
+        super().__init__(scene, condition, chip.REGISTERS, clock_hz)
         self._imager = Mt9m001Imager(seed, noise)
         self._settings = read_settings(self._registers)
         self._since = 0  # edge of the last start or change: exposing anew begins there
         self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)
-        self.active_columns = COLUMNS
+        self.active_columns = chip.COLUMNS
         self.line_clocks = self._settings.row_clocks
 
     @property
@@ -151,9 +145,9 @@ class Mt9m001(StarSensor):
         before_last = frame.settings.rows - 1
         # Rows and clocks of each part of a frame while FRAME_VALID is high.
         for rows, clocks in (
-            (0, FRAME_START_CLOCKS),
+            (0, chip.FRAME_START_CLOCKS),
             (before_last, before_last * row_clocks),
-            (1, row_clocks - FRAME_START_CLOCKS),
+            (1, row_clocks - chip.FRAME_START_CLOCKS),
         ):
             if clock.end_ps(first, clocks) > time_ps:
                 self.active_columns = frame.settings.columns
@@ -202,7 +196,7 @@ class Mt9m001(StarSensor):
                 first = last.first + settings.frame_rows * settings.row_clocks
             else:
                 first += max(0, last.valid_until - self._since)
-        row_0 = clock.edge_ps(first + FRAME_START_CLOCKS)
+        row_0 = clock.edge_ps(first + chip.FRAME_START_CLOCKS)
         exposure = settings.exposure_rows
         shutter = RollingShutter(row_0, settings.row_clocks * self.period, exposure, exposure)
         return _Frame(first, settings, shutter)

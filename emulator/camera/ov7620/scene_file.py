@@ -26,87 +26,80 @@ from typing import Any
 
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene import file
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
-from cubestack.emulator.scene.file import (
-    Readers,
-    SceneError,
-    flag,
-    number,
-    read_scene_file,
-    read_table,
-    several,
-    subtable,
-    values_for,
-    whole,
-)
 
 
 def load_earth_sun_scene(path: Path) -> EarthSunView:
     """What the TOML file ``path`` gives; SceneError names the key that is wrong."""
-    return read_scene_file(path, {"earth-sun": _view}, '"earth-sun" for a sun and nadir sensor')
+    return file.read_scene_file(
+        path, {"earth-sun": _view}, '"earth-sun" for a sun and nadir sensor'
+    )
 
 
 def _view(table: dict[str, Any]) -> EarthSunView:
-    values = read_table(table, _SCENE)
+    values = file.read_table(table, _SCENE)
     angles = {f"{name}_deg": values.pop(f"{name}_deg", None) for name in ("sun", "nadir")}
     for name in ("sun", "nadir"):
         if name in values and angles[f"{name}_deg"]:
-            raise SceneError(f"give either {name} or {name}_deg, not both")
-    condition = FisheyeCondition(**values_for(FisheyeCondition, values))
-    scene = EarthSunScene.facing(**angles, **values_for(EarthSunScene, values))
+            raise file.SceneError(f"give either {name} or {name}_deg, not both")
+    condition = FisheyeCondition(**file.values_for(FisheyeCondition, values))
+    scene = EarthSunScene.facing(**angles, **file.values_for(EarthSunScene, values))
     return EarthSunView(scene, condition)
 
 
 def _mounting(value: Any) -> Mounting:
-    values = subtable({"boresight": several(3, number), "right": several(3, number)})(value)
+    values = file.subtable(
+        {"boresight": file.several(3, file.number), "right": file.several(3, file.number)}
+    )(value)
     if "boresight" not in values:
-        raise SceneError("needs the key boresight")
+        raise file.SceneError("needs the key boresight")
     return Mounting(**values)
 
 
 def _camera(value: Any) -> Target:
     names = {camera.name.lower(): camera for camera in Target}
     if value not in names:
-        raise SceneError(f"must be one of {list(names)}, not {value!r}")
+        raise file.SceneError(f"must be one of {list(names)}, not {value!r}")
     return names[value]
 
 
 def _reflections(value: Any) -> tuple[Reflection, ...]:
     if not isinstance(value, list):
-        raise SceneError("must be tables, each under [[reflections]]")
-    return tuple(_reflection(subtable(_REFLECTION)(item)) for item in value)
+        raise file.SceneError("must be tables, each under [[reflections]]")
+    return tuple(_reflection(file.subtable(_REFLECTION)(item)) for item in value)
 
 
 def _reflection(values: dict[str, Any]) -> Reflection:
     if missing := _REFLECTION.keys() - values.keys():
-        raise SceneError(f"needs the keys {', '.join(sorted(missing))}")
+        raise file.SceneError(f"needs the keys {', '.join(sorted(missing))}")
     alpha, beta = values.pop("at_deg")
     check_field(alpha, beta)
     return Reflection(alpha_deg=alpha, beta_deg=beta, **values)
 
 
-_REFLECTION: Readers = {
+_REFLECTION: file.Readers = {
     "camera": _camera,
-    "at_deg": several(2, number),
-    "radius_px": number,
-    "level": number,
+    "at_deg": file.several(2, file.number),
+    "radius_px": file.number,
+    "level": file.number,
 }
-_SCENE: Readers = {
-    "nadir": several(3, number),
-    "nadir_deg": several(2, number),
-    "sun": several(3, number),
-    "sun_deg": several(2, number),
-    "moon": several(3, number),
-    "altitude_km": number,
-    "rate_deg_s": several(3, number),
+_SCENE: file.Readers = {
+    "nadir": file.several(3, file.number),
+    "nadir_deg": file.several(2, file.number),
+    "sun": file.several(3, file.number),
+    "sun_deg": file.several(2, file.number),
+    "moon": file.several(3, file.number),
+    "altitude_km": file.number,
+    "rate_deg_s": file.several(3, file.number),
     "nadir_camera": _mounting,
     "sun_camera": _mounting,
-    "bloom_px": number,
-    "unevenness": number,
-    "glow_km": number,
+    "bloom_px": file.number,
+    "unevenness": file.number,
+    "glow_km": file.number,
     "reflections": _reflections,
-    "hot_pixels": whole,
-    "hot_pairs": whole,
-    "noise": flag,
-    "seed": whole,
+    "hot_pixels": file.whole,
+    "hot_pairs": file.whole,
+    "noise": file.flag,
+    "seed": file.whole,
 }

@@ -30,20 +30,10 @@ from cubestack.emulator.camera.ov7620.luminance import BLACK, luminance, stuck_p
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
-from cubestack.firmware_model.interface.cameras.ov7620 import (
-    CLOCKS_PER_LINE,
-    COLUMNS,
-    EXPOSURE_LINES,
-    LINES_PER_FRAME,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    ROWS,
-    window_column,
-    window_row,
-)
+from cubestack.firmware_model.interface.cameras import ov7620 as chip
 
-FRAME_CLOCKS = LINES_PER_FRAME * CLOCKS_PER_LINE
-LINES_BEFORE = LINES_PER_FRAME - ROWS
+FRAME_CLOCKS = chip.LINES_PER_FRAME * chip.CLOCKS_PER_LINE
+LINES_BEFORE = chip.LINES_PER_FRAME - chip.ROWS
 """Blanking before the picture's first row: all of the frame's."""
 
 AUTO_LEVEL = 100.0
@@ -86,7 +76,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     scene_types = (EarthSunScene,)
     sees = "a Sun and nadir sensor sees Earth and Sun"
-    line_clocks = CLOCKS_PER_LINE
+    line_clocks = chip.CLOCKS_PER_LINE
 
     def __init__(
         self,
@@ -95,10 +85,12 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         condition: FisheyeCondition | None = None,
     ) -> None:
         """Power up; ``condition`` is what lens and sensor are like, unless ``scene`` says."""
-        super().__init__(scene, condition or FisheyeCondition(), REGISTERS, PIXEL_CLOCK_HZ)
+        super().__init__(
+            scene, condition or FisheyeCondition(), chip.REGISTERS, chip.PIXEL_CLOCK_HZ
+        )
         self.camera = camera
-        self.active_columns = COLUMNS
-        self._sccb = SccbSlave(REGISTERS.i2c_address, self._write)
+        self.active_columns = chip.COLUMNS
+        self._sccb = SccbSlave(chip.REGISTERS.i2c_address, self._write)
         self._frames: OrderedDict[int, _Frame] = OrderedDict()
         self._light: tuple[EarthSunScene, float, int, Light] | None = None
 
@@ -109,7 +101,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     def _restarted(self, now_ps: int) -> None:
         del now_ps
-        self._sccb = SccbSlave(REGISTERS.i2c_address, self._write)
+        self._sccb = SccbSlave(chip.REGISTERS.i2c_address, self._write)
         self._frames.clear()
 
     # --- control lines --------------------------------------------------------------------------
@@ -131,7 +123,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         begun = self._frame(clock, max(0, clock.first_edge(now_ps + 1) - 1) // FRAME_CLOCKS)
         self._registers.select(address)
         self._registers.write(value)
-        common_a = REGISTERS["COMMON_A"]
+        common_a = chip.REGISTERS["COMMON_A"]
         if common_a.field("RESET").of(self._registers.active("COMMON_A")):
             self._registers.reset()
         stale = [number for number in self._frames if number > begun.number]
@@ -152,7 +144,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             frame = self._frame(clock, number)
             first = number * FRAME_CLOCKS
             for rows, lines in self._stretches(frame.settings):
-                clocks = lines * CLOCKS_PER_LINE
+                clocks = lines * chip.CLOCKS_PER_LINE
                 if clock.end_ps(first, clocks) > time_ps:
                     self.active_columns = len(frame.settings.columns)
                     pixels = partial(self._pixels, frame) if rows else None
@@ -167,7 +159,9 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         """
         clock = self._clock
         assert clock is not None
-        number = max(0, clock.first_edge(time_ps) - LINES_BEFORE * CLOCKS_PER_LINE) // FRAME_CLOCKS
+        number = (
+            max(0, clock.first_edge(time_ps) - LINES_BEFORE * chip.CLOCKS_PER_LINE) // FRAME_CLOCKS
+        )
         while (shutter := self._frame(clock, number).shutter).readout_ps < time_ps:
             number += 1
         return shutter
@@ -176,7 +170,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def _stretches(settings: _Settings) -> list[tuple[int, int]]:
         """Rows sent, and lines, of each part of a frame."""
         before = LINES_BEFORE + settings.rows.start
-        after = LINES_PER_FRAME - before - len(settings.rows)
+        after = chip.LINES_PER_FRAME - before - len(settings.rows)
         parts = [(0, before), (len(settings.rows), len(settings.rows)), (0, after)]
         return [(rows, lines) for rows, lines in parts if lines]
 
@@ -184,11 +178,11 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         if number in self._frames:
             return self._frames[number]
         # A frame row's time is that of its line, so row 0 counts even if it is not sent.
-        readout_ps = clock.edge_ps(number * FRAME_CLOCKS + LINES_BEFORE * CLOCKS_PER_LINE)
+        readout_ps = clock.edge_ps(number * FRAME_CLOCKS + LINES_BEFORE * chip.CLOCKS_PER_LINE)
         settings = self._settings(readout_ps)
         before = self._frames.get(number - 1)
         exposure = settings.exposure_lines if before is None else before.settings.exposure_lines
-        shutter = RollingShutter(readout_ps, CLOCKS_PER_LINE * self.period, exposure, exposure)
+        shutter = RollingShutter(readout_ps, chip.CLOCKS_PER_LINE * self.period, exposure, exposure)
         self._frames[number] = frame = _Frame(number, settings, shutter)
         while len(self._frames) > REMEMBERED:
             self._frames.popitem(last=False)
@@ -198,21 +192,23 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         active = self._registers.active
 
         def bit(register: str, field: str) -> bool:
-            return bool(REGISTERS[register].field(field).of(active(register)))
+            return bool(chip.REGISTERS[register].field(field).of(active(register)))
 
         exposure, gain = max(active("EXPOSURE"), 1), _gain(active("GAIN"))
         automatic = bit("COMMON_B", "AUTO_ADJUST")
         if automatic and not bit("COMMON_I", "MANUAL_EXPOSURE"):
-            counts = self._wanted(time_ps) / (EXPOSURE_LINES * gain)
+            counts = self._wanted(time_ps) / (chip.EXPOSURE_LINES * gain)
             exposure = round(min(max(counts, 1), LONGEST_EXPOSURE))
         if automatic and bit("COMMON_A", "AUTO_GAIN"):
-            gain = self._wanted(time_ps) / (EXPOSURE_LINES * exposure)
+            gain = self._wanted(time_ps) / (chip.EXPOSURE_LINES * exposure)
             gain = min(max(gain, 1.0), HIGHEST_GAIN)
         return _Settings(
-            _window(active("HSTART") - window_column(0), active("HSTOP") - window_column(0), 4),
-            _window(active("VSTART") - window_row(0), active("VSTOP") - window_row(0), 2),
+            _window(
+                active("HSTART") - chip.window_column(0), active("HSTOP") - chip.window_column(0), 4
+            ),
+            _window(active("VSTART") - chip.window_row(0), active("VSTOP") - chip.window_row(0), 2),
             gain,
-            EXPOSURE_LINES * exposure,
+            chip.EXPOSURE_LINES * exposure,
             bit("COMMON_A", "MIRROR"),
             bit("COMMON_H", "BLACK_AND_WHITE"),
         )
@@ -224,7 +220,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     def _picture(self, frame: _Frame) -> Grey:
         condition, settings, shutter = self.condition, frame.settings, frame.shutter
-        light = self._light_at(shutter.mid_exposure_ps((ROWS - 1) / 2))
+        light = self._light_at(shutter.mid_exposure_ps((chip.ROWS - 1) / 2))
         light = light * np.float32(shutter.exposure_lines)
         if not settings.monochrome:
             light[:-1] = (light[:-1] + light[1:]) / 2
@@ -256,13 +252,13 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
 def _gain(value: int) -> float:
     """Amplification by register GAIN (OV7620 product specifications, section 1.13)."""
-    register = REGISTERS["GAIN"]
+    register = chip.REGISTERS["GAIN"]
     fine, double, again = (register.field(f).of(value) for f in ("FINE", "DOUBLE", "DOUBLE_AGAIN"))
     return (1 + fine / 16) * (1 + double) * (1 + again)
 
 
 def _window(start: int, stop: int, step: int) -> range:
     """Columns or rows sent, by the window registers less their offset."""
-    limit = COLUMNS if step == 4 else ROWS
+    limit = chip.COLUMNS if step == 4 else chip.ROWS
     first = min(max(start * step, 0), limit - step)
     return range(first, min(max(stop * step, first + step), limit))

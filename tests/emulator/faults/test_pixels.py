@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.pixels import FaultySource
-from cubestack.emulator.faults.table import (
-    Blooming,
-    CameraDead,
-    ClockExtra,
-    ClockLost,
-    ColumnDefect,
-    LineMissing,
-    PixelDead,
-    PixelHot,
-)
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 
 ROWS, COLUMNS, LINE = 5, 6, 9
@@ -90,13 +81,13 @@ CLEAN = list(clocks(Camera(), 3 * FRAME_PS))
 
 def test_without_faults_nothing_changes() -> None:
     assert list(clocks(faulty()[0], 3 * FRAME_PS)) == CLEAN
-    near(list(clocks(faulty(ClockLost(rate=0.0, row=1))[0], 3 * FRAME_PS)), CLEAN)
+    near(list(clocks(faulty(table.ClockLost(rate=0.0, row=1))[0], 3 * FRAME_PS)), CLEAN)
 
 
 @pytest.mark.parametrize("column", range(COLUMNS))
 @pytest.mark.parametrize("row", [0, 2, ROWS - 1])
 def test_a_lost_clock_is_one_edge_less(row: int, column: int) -> None:
-    source, log = faulty(ClockLost(row=row, column=column))
+    source, log = faulty(table.ClockLost(row=row, column=column))
     lost = {n * (ROWS * LINE + BLANK) + row * LINE + column for n in range(3)}
     expected = [clock for number, clock in enumerate(CLEAN) if number not in lost]
     near(list(clocks(source, 3 * FRAME_PS)), expected)
@@ -105,7 +96,7 @@ def test_a_lost_clock_is_one_edge_less(row: int, column: int) -> None:
 
 @pytest.mark.parametrize("column", range(COLUMNS))
 def test_an_extra_clock_is_half_a_period_later(column: int) -> None:
-    source, _ = faulty(ClockExtra(row=2, column=column))
+    source, _ = faulty(table.ClockExtra(row=2, column=column))
     expected = list(CLEAN)
     for n in reversed(range(3)):
         place = n * (ROWS * LINE + BLANK) + 2 * LINE + column
@@ -115,7 +106,7 @@ def test_an_extra_clock_is_half_a_period_later(column: int) -> None:
 
 
 def test_a_missing_line_is_blank() -> None:
-    source, _ = faulty(LineMissing(row=3))
+    source, _ = faulty(table.LineMissing(row=3))
     expected = []
     for number, clock in enumerate(CLEAN):
         line = number % (ROWS * LINE + BLANK) // LINE
@@ -125,7 +116,9 @@ def test_a_missing_line_is_blank() -> None:
 
 def test_faults_of_several_lines_add_up() -> None:
     source, log = faulty(
-        ClockLost(row=1, column=1), LineMissing(row=3), ClockExtra(row=4, column=0)
+        table.ClockLost(row=1, column=1),
+        table.LineMissing(row=3),
+        table.ClockExtra(row=4, column=0),
     )
     found = [clock for clock in clocks(source, FRAME_PS) if clock[0] < FRAME_PS]
     assert len(found) == ROWS * LINE + BLANK
@@ -135,7 +128,7 @@ def test_faults_of_several_lines_add_up() -> None:
 def test_drawn_places_repeat_with_the_seed() -> None:
     logs = []
     for seed in (1, 1, 2):
-        source, log = faulty(ClockLost(), seed=seed)
+        source, log = faulty(table.ClockLost(), seed=seed)
         list(clocks(source, 9 * FRAME_PS))
         logs.append(log)
     assert logs[0] == logs[1] != logs[2]
@@ -153,7 +146,9 @@ def test_pixels() -> None:
     clean = Camera().picture
     expected = clean.copy()
     expected[1, 2], expected[3, 4], expected[:, 5] = 255, 0, 9
-    found = rendered(PixelHot(x=2, y=1), PixelDead(x=4, y=3), ColumnDefect(x=5, level=9))
+    found = rendered(
+        table.PixelHot(x=2, y=1), table.PixelDead(x=4, y=3), table.ColumnDefect(x=5, level=9)
+    )
     np.testing.assert_array_equal(found, expected)
     assert clean[1, 2] == 8  # the camera's own picture is not touched
 
@@ -161,11 +156,11 @@ def test_pixels() -> None:
 def test_blooming_goes_along_the_column() -> None:
     expected = Camera().picture.copy()
     expected[2:, 5] = 255
-    np.testing.assert_array_equal(rendered(Blooming(threshold=29, length=2)), expected)
+    np.testing.assert_array_equal(rendered(table.Blooming(threshold=29, length=2)), expected)
 
 
 def test_lines_outside_of_the_time_are_good() -> None:
-    source, _ = faulty(ColumnDefect(x=0))
+    source, _ = faulty(table.ColumnDefect(x=0))
     source.injections[0].start_ps = int(LINE * PERIOD)
     source.injections[0].end_ps = int(3 * LINE * PERIOD)
     segment = source.segment_at(0)
@@ -175,5 +170,5 @@ def test_lines_outside_of_the_time_are_good() -> None:
 
 
 def test_a_dead_camera_has_no_clock() -> None:
-    source, _ = faulty(CameraDead())
+    source, _ = faulty(table.CameraDead())
     assert source.segment_at(0) is None

@@ -2,17 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.scene.attitude import (
-    attitude_error_deg,
-    matrix_from_pointing,
-    matrix_from_quaternion,
-    pointing_from_matrix,
-    propagate,
-    quaternion_from_matrix,
-    quaternion_from_pointing,
-    random_quaternion,
-    unit_quaternion,
-)
+from cubestack.emulator.scene import attitude
 
 
 @pytest.fixture
@@ -20,26 +10,26 @@ def quaternions() -> list[np.ndarray]:
     generator = np.random.default_rng(1)
     special = [np.eye(4)[i] for i in range(4)]  # half turns and identity
     near = [np.array([1, 1e-9, 0, 1e-9]), np.array([1e-12, 0, 1, -1e-12])]
-    return special + near + [random_quaternion(generator) for _ in range(200)]
+    return special + near + [attitude.random_quaternion(generator) for _ in range(200)]
 
 
 def test_matrix_is_scipys(quaternions: list[np.ndarray]) -> None:
     for q in quaternions:
         expected = Rotation.from_quat(q).as_matrix()
-        np.testing.assert_allclose(matrix_from_quaternion(q), expected, atol=1e-14)
+        np.testing.assert_allclose(attitude.matrix_from_quaternion(q), expected, atol=1e-14)
 
 
 def test_quaternion_of_matrix_comes_back(quaternions: list[np.ndarray]) -> None:
     for q in quaternions:
         unit = q / np.linalg.norm(q)
-        back = quaternion_from_matrix(matrix_from_quaternion(q))
+        back = attitude.quaternion_from_matrix(attitude.matrix_from_quaternion(q))
         assert back[3] >= 0
         assert min(np.abs(back - unit).max(), np.abs(back + unit).max()) < 1e-14
 
 
 def test_pointing_at_orion() -> None:
     # Looking at the celestial equator at 6 h with north up: east is left, so west is camera x.
-    a = matrix_from_pointing(90.0, 0.0, 0.0)
+    a = attitude.matrix_from_pointing(90.0, 0.0, 0.0)
     np.testing.assert_allclose(a @ [0, 1, 0], [0, 0, 1], atol=1e-15)  # boresight
     np.testing.assert_allclose(a @ [0, 0, 1], [0, -1, 0], atol=1e-15)  # north is up, -y
     np.testing.assert_allclose(a @ [-1, 0, 0], [-1, 0, 0], atol=1e-15)  # east is left, -x
@@ -47,72 +37,78 @@ def test_pointing_at_orion() -> None:
 
 
 def test_roll_turns_up_to_the_east() -> None:
-    a = matrix_from_pointing(90.0, 0.0, 90.0)
+    a = attitude.matrix_from_pointing(90.0, 0.0, 90.0)
     np.testing.assert_allclose(a @ [-1, 0, 0], [0, -1, 0], atol=1e-15)  # east is up
 
 
 def test_pointing_comes_back() -> None:
     generator = np.random.default_rng(2)
     for ra, dec, roll in generator.uniform([0, -89.9, -180], [360, 89.9, 180], (200, 3)):
-        a = matrix_from_pointing(ra, dec, roll)
+        a = attitude.matrix_from_pointing(ra, dec, roll)
         np.testing.assert_allclose(a @ a.T, np.eye(3), atol=1e-14)
-        assert pointing_from_matrix(a) == pytest.approx((ra, dec, roll), abs=1e-9)
+        assert attitude.pointing_from_matrix(a) == pytest.approx((ra, dec, roll), abs=1e-9)
         np.testing.assert_allclose(
-            matrix_from_quaternion(quaternion_from_pointing(ra, dec, roll)), a, atol=1e-14
+            attitude.matrix_from_quaternion(attitude.quaternion_from_pointing(ra, dec, roll)),
+            a,
+            atol=1e-14,
         )
 
 
 @pytest.mark.parametrize("dec", [90.0, -90.0])
 def test_pole_still_gives_the_same_attitude(dec: float) -> None:
-    a = matrix_from_pointing(30.0, dec, 20.0)
-    np.testing.assert_allclose(matrix_from_pointing(*pointing_from_matrix(a)), a, atol=1e-14)
+    a = attitude.matrix_from_pointing(30.0, dec, 20.0)
+    np.testing.assert_allclose(
+        attitude.matrix_from_pointing(*attitude.pointing_from_matrix(a)), a, atol=1e-14
+    )
 
 
 def test_stars_move_against_the_camera() -> None:
     # Turning about +x lifts the view (z towards -y, up), so a star sinks: its y grows.
-    q = propagate([0, 0, 0, 1], [1.0, 0, 0], 2.0)
-    star = matrix_from_quaternion(q) @ [0, 0, 1]
+    q = attitude.propagate([0, 0, 0, 1], [1.0, 0, 0], 2.0)
+    star = attitude.matrix_from_quaternion(q) @ [0, 0, 1]
     np.testing.assert_allclose(star, [0, np.sin(np.radians(2)), np.cos(np.radians(2))], atol=1e-15)
 
 
 def test_propagation_against_many_small_steps() -> None:
     generator = np.random.default_rng(3)
     for _ in range(20):
-        q, rate = random_quaternion(generator), generator.normal(0, 5, 3)
+        q, rate = attitude.random_quaternion(generator), generator.normal(0, 5, 3)
         a = Rotation.from_quat(q)
         step = Rotation.from_rotvec(-np.radians(rate) * 0.01)
         for _ in range(100):
             a = step * a
         np.testing.assert_allclose(
-            matrix_from_quaternion(propagate(q, rate, 1.0)), a.as_matrix(), atol=1e-12
+            attitude.matrix_from_quaternion(attitude.propagate(q, rate, 1.0)),
+            a.as_matrix(),
+            atol=1e-12,
         )
 
 
 def test_no_rate_no_motion() -> None:
-    q = unit_quaternion([1, 2, 3, 4])
-    np.testing.assert_allclose(propagate(q, [0, 0, 0], 1e6), q, atol=1e-15)
+    q = attitude.unit_quaternion([1, 2, 3, 4])
+    np.testing.assert_allclose(attitude.propagate(q, [0, 0, 0], 1e6), q, atol=1e-15)
 
 
 def test_errors_of_known_turns() -> None:
     generator = np.random.default_rng(4)
     for _ in range(50):
-        truth = random_quaternion(generator)
+        truth = attitude.random_quaternion(generator)
         roll = float(generator.uniform(-170, 170))
-        assert attitude_error_deg(propagate(truth, [0, 0, roll], 1), truth) == pytest.approx(
-            (0, roll), abs=1e-10
-        )
+        assert attitude.attitude_error_deg(
+            attitude.propagate(truth, [0, 0, roll], 1), truth
+        ) == pytest.approx((0, roll), abs=1e-10)
         direction = generator.uniform(0, 2 * np.pi)
         rate = 1e-5 * np.array([np.cos(direction), np.sin(direction), 0])
-        cross, about = attitude_error_deg(propagate(truth, rate, 1), truth)
+        cross, about = attitude.attitude_error_deg(attitude.propagate(truth, rate, 1), truth)
         assert cross == pytest.approx(1e-5, rel=1e-6)
         assert about == pytest.approx(0, abs=1e-9)
 
 
 def test_sign_and_length_of_quaternions_do_not_matter() -> None:
-    assert attitude_error_deg([0, 0, 0, -3], [0, 0, 0, 1]) == (0, 0)
+    assert attitude.attitude_error_deg([0, 0, 0, -3], [0, 0, 0, 1]) == (0, 0)
 
 
 @pytest.mark.parametrize("bad", [[0, 0, 0, 0], [1, 2, 3], [np.nan, 0, 0, 1], [np.inf, 0, 0, 1]])
 def test_what_is_no_attitude_is_refused(bad: list[float]) -> None:
     with pytest.raises(ValueError, match="a quaternion"):
-        unit_quaternion(bad)
+        attitude.unit_quaternion(bad)

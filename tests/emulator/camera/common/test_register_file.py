@@ -4,24 +4,19 @@ import pytest
 
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.firmware_model.interface.cameras import mt9m001
-from cubestack.firmware_model.interface.cameras.registers import (
-    BitField,
-    CameraRegister,
-    CameraRegisterMap,
-    RegisterAccess,
-)
+from cubestack.firmware_model.interface.cameras import registers as table
 
-MODE = CameraRegister(0x10, "MODE", 1, "").of(
-    BitField("ON", 0, 1, ""), BitField("ODD", 1, 1, "", False)
+MODE = table.CameraRegister(0x10, "MODE", 1, "").of(
+    table.BitField("ON", 0, 1, ""), table.BitField("ODD", 1, 1, "", False)
 )
-RATE = CameraRegister(0x11, "RATE", 0x0203, "", width=2, needs_sync=True)
-FANCY = CameraRegister(0x13, "FANCY", 0, "", modelled=False)
-CHIP = CameraRegister(0x14, "CHIP", 0x42, "", access=RegisterAccess.READ_ONLY)
+RATE = table.CameraRegister(0x11, "RATE", 0x0203, "", width=2, needs_sync=True)
+FANCY = table.CameraRegister(0x13, "FANCY", 0, "", modelled=False)
+CHIP = table.CameraRegister(0x14, "CHIP", 0x42, "", access=table.RegisterAccess.READ_ONLY)
 
 
 @pytest.fixture
 def registers() -> RegisterFile:
-    return RegisterFile(CameraRegisterMap("TEST1", 0x21, 1, (MODE, RATE, FANCY, CHIP)))
+    return RegisterFile(table.CameraRegisterMap("TEST1", 0x21, 1, (MODE, RATE, FANCY, CHIP)))
 
 
 def test_reset_values_can_be_read_in_order(registers: RegisterFile) -> None:

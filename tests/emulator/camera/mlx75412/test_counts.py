@@ -4,21 +4,11 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.common.imager import hot_pixels
-from cubestack.emulator.camera.mlx75412.imager import (
-    DN12_PER_DN8,
-    ELECTRONS_PER_DN12,
-    FACTORY_DEAD,
-    FACTORY_HOT,
-    READ_NOISE_ELECTRONS,
-    Corrections,
-    Mlx75412Imager,
-    dark_dn12_per_second,
-    ideal_counts,
-)
+from cubestack.emulator.camera.mlx75412 import imager as chip
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 
-RAW = Corrections(defects=False, fixed_pattern=False, dark=False)
-BITS = DN12_PER_DN8 * ELECTRONS_PER_DN12  # electrons per count of 8 bits
+RAW = chip.Corrections(defects=False, fixed_pattern=False, dark=False)
+BITS = chip.DN12_PER_DN8 * chip.ELECTRONS_PER_DN12  # electrons per count of 8 bits
 
 
 def flat(electrons: float) -> np.ndarray:
@@ -27,7 +17,7 @@ def flat(electrons: float) -> np.ndarray:
 
 def frame(
     electrons: np.ndarray,
-    corrections: Corrections = Corrections(),  # noqa: B008 - frozen
+    corrections: chip.Corrections = chip.Corrections(),  # noqa: B008 - frozen
     exposure_s: float = 0.3,
     temperature_c: float = 20.0,
     seed: int = 1,
@@ -35,26 +25,33 @@ def frame(
     hot: int = 0,
 ) -> np.ndarray:
     condition = replace(CONDITION, temperature_c=temperature_c, hot_pixels=hot, seed=9)
-    imager, generator = Mlx75412Imager(part), np.random.default_rng(seed)
+    imager, generator = chip.Mlx75412Imager(part), np.random.default_rng(seed)
     return imager.counts(electrons, exposure_s, condition, corrections, generator).astype(float)
 
 
 def test_ideal_counts_are_the_upper_bits() -> None:
     # Counts of 12 bits 0, 7.4, 15.6 (rounds to 16), 31.4, 4095, beyond.
     dn12 = np.array([0, 7.4, 15.6, 31.4, 4095, 9000], np.float32)
-    assert list(ideal_counts(dn12 * np.float32(ELECTRONS_PER_DN12))) == [0, 0, 1, 1, 255, 255]
+    assert list(chip.ideal_counts(dn12 * np.float32(chip.ELECTRONS_PER_DN12))) == [
+        0,
+        0,
+        1,
+        1,
+        255,
+        255,
+    ]
 
 
 def test_every_count_of_12_bits() -> None:
     dn12 = np.arange(4096, dtype=np.float32)
     np.testing.assert_array_equal(
-        ideal_counts(dn12 * np.float32(ELECTRONS_PER_DN12)), np.arange(4096) >> 4
+        chip.ideal_counts(dn12 * np.float32(chip.ELECTRONS_PER_DN12)), np.arange(4096) >> 4
     )
 
 
 def test_dark_signal_is_published_at_65_degrees() -> None:
-    assert dark_dn12_per_second(65) == 1008
-    assert dark_dn12_per_second(57) == pytest.approx(504)
+    assert chip.dark_dn12_per_second(65) == 1008
+    assert chip.dark_dn12_per_second(57) == pytest.approx(504)
     # Uncorrected, at 65 C, 0.3 s: 302 counts of 12 bits.
     counts = frame(flat(0), RAW, temperature_c=65)
     assert counts.mean() == pytest.approx(302 / 16 - 0.5, abs=0.2)
@@ -75,18 +72,20 @@ def test_noise_is_poisson_plus_read_noise(level: float) -> None:
     electrons = level * BITS
     first, second = (frame(flat(electrons), exposure_s=0.0, seed=s) for s in (1, 2))
     # Quantisation adds 1/12 of a squared step of 8 bits per frame.
-    expected = (electrons + READ_NOISE_ELECTRONS**2) / BITS**2 + 1 / 12
+    expected = (electrons + chip.READ_NOISE_ELECTRONS**2) / BITS**2 + 1 / 12
     inside = (first > 0) & (first < 255) & (second > 0) & (second < 255)
     assert np.var(first[inside] - second[inside]) / 2 == pytest.approx(expected, rel=0.02)
 
 
 def test_normal_noise_is_near_the_sum_of_poisson_and_normal() -> None:
     # The worst case for the approximation is a mean of twice the squared read noise.
-    mean = 2 * READ_NOISE_ELECTRONS**2
-    counts = frame(flat(mean), Corrections(), exposure_s=0.0)
+    mean = 2 * chip.READ_NOISE_ELECTRONS**2
+    counts = frame(flat(mean), chip.Corrections(), exposure_s=0.0)
     generator = np.random.default_rng(3)
-    exact = generator.poisson(mean, 500_000) + generator.normal(0, READ_NOISE_ELECTRONS, 500_000)
-    reference = ideal_counts(exact.astype(np.float32)).astype(float)
+    exact = generator.poisson(mean, 500_000) + generator.normal(
+        0, chip.READ_NOISE_ELECTRONS, 500_000
+    )
+    reference = chip.ideal_counts(exact.astype(np.float32)).astype(float)
     for level in range(4, 12):
         assert np.mean(counts >= level) == pytest.approx(np.mean(reference >= level), abs=0.01)
 
@@ -95,16 +94,16 @@ def test_dark_sky_is_nearly_black() -> None:
     # At room temperature the noise alone must not look like stars: threshold 6, thesis 5.3.3.
     counts = frame(flat(0))
     assert np.mean(counts > 0) < 0.005
-    assert np.sum(counts > 6) <= FACTORY_HOT
+    assert np.sum(counts > 6) <= chip.FACTORY_HOT
 
 
 def test_fixed_pattern_and_its_correction() -> None:
-    def columns(corrections: Corrections) -> float:
+    def columns(corrections: chip.Corrections) -> float:
         frames = [frame(flat(100 * BITS), corrections, 0.0, seed=s) for s in range(4)]
         return float(np.mean(frames, axis=0).mean(axis=0).std())
 
-    raw = columns(Corrections(fixed_pattern=False))
-    corrected = columns(Corrections())
+    raw = columns(chip.Corrections(fixed_pattern=False))
+    corrected = columns(chip.Corrections())
     assert raw == pytest.approx(4 / 16, rel=0.15)  # 4 counts of 12 bits between columns
     assert corrected < 0.2 * raw
 
@@ -112,10 +111,10 @@ def test_fixed_pattern_and_its_correction() -> None:
 def test_defects_and_their_correction() -> None:
     bright = flat(100 * BITS)
     raw, corrected = frame(bright, RAW, exposure_s=0.4), frame(bright, exposure_s=0.4)
-    assert np.sum(raw < 20) == FACTORY_DEAD
+    assert np.sum(raw < 20) == chip.FACTORY_DEAD
     assert np.sum(corrected < 50) == 0
     dark = frame(flat(0), RAW, exposure_s=0.4)
-    assert 5 < np.sum(dark > 20) <= FACTORY_HOT  # mean strength 37 counts, exponential
+    assert 5 < np.sum(dark > 20) <= chip.FACTORY_HOT  # mean strength 37 counts, exponential
     assert np.sum(frame(flat(0), exposure_s=0.4) > 20) == 0
 
 
@@ -141,7 +140,7 @@ def test_seeds_repeat_a_sensor_and_a_frame() -> None:
 
 
 def test_saturation() -> None:
-    assert frame(flat(5000 * ELECTRONS_PER_DN12))[100:110].min() == 255
+    assert frame(flat(5000 * chip.ELECTRONS_PER_DN12))[100:110].min() == 255
 
 
 def test_light_is_not_written_to() -> None:

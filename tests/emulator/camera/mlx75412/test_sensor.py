@@ -11,11 +11,7 @@ from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
-from cubestack.firmware_model.interface.cameras.mlx75412 import (
-    LONGEST_EXPOSURE,
-    REGISTERS,
-    SYNC_APPLY,
-)
+from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 
 from ..streams import segments
 
@@ -26,15 +22,15 @@ ADDRESS = 0x2C
 
 
 def write(camera: Mlx75412, name: str, value: int, now_ps: int = 0) -> None:
-    register = REGISTERS[name]
+    register = chip.REGISTERS[name]
     message = register.address.to_bytes(2, "big") + value.to_bytes(register.width, "big")
     assert camera.i2c_write(ADDRESS, message, now_ps)
 
 
 def configure(camera: Mlx75412, rate: int = 7, now_ps: int = 0) -> None:
     write(camera, "FRAMES_PER_SECOND", rate, now_ps)
-    write(camera, "EXPOSURE_RULE", LONGEST_EXPOSURE, now_ps)
-    write(camera, "SYNC", SYNC_APPLY, now_ps)
+    write(camera, "EXPOSURE_RULE", chip.LONGEST_EXPOSURE, now_ps)
+    write(camera, "SYNC", chip.SYNC_APPLY, now_ps)
 
 
 def enable(camera: Mlx75412, now_ps: int, on: bool = True) -> None:
@@ -159,7 +155,7 @@ def test_values_wait_for_sync_and_for_the_next_frame(camera: Mlx75412) -> None:
     assert segments(camera, 20 * MS, 2)[1] == blanking
     write(camera, "SYNC", 0x01, 10 * MS)  # not the value that applies
     assert segments(camera, 20 * MS, 4)[3].clocks == blanking.clocks
-    write(camera, "SYNC", SYNC_APPLY, 20 * MS)
+    write(camera, "SYNC", chip.SYNC_APPLY, 20 * MS)
     found = segments(camera, 20 * MS, 6)
     assert found[0].start_ps == first.start_ps  # the running read-out goes on
     assert found[1].clocks == blanking.clocks  # its frame keeps its length
@@ -172,7 +168,7 @@ def test_values_wait_for_sync_and_for_the_next_frame(camera: Mlx75412) -> None:
 def test_exposure_register_is_limited_by_the_frame(camera: Mlx75412) -> None:
     write(camera, "EXPOSURE_RULE", 0)
     write(camera, "EXPOSURE", 0xFFFF)
-    write(camera, "SYNC", SYNC_APPLY)
+    write(camera, "SYNC", chip.SYNC_APPLY)
     enable(camera, 0)
     second = segments(camera, 0, 3)[2]
     shutter = camera.frame_from(second.start_ps)
@@ -320,13 +316,13 @@ def test_features_reach_the_pixels() -> None:
 
     def mean(features: int, now_ps: int) -> float:
         write(camera, "HARDWARE_FEATURES", features, now_ps)
-        write(camera, "SYNC", SYNC_APPLY, now_ps)
+        write(camera, "SYNC", chip.SYNC_APPLY, now_ps)
         enable(camera, now_ps)
         segment = segments(camera, now_ps, 3)[2]
         enable(camera, segment.start_ps, on=False)
         return float(segment.pixels().mean())
 
-    dark = REGISTERS["HARDWARE_FEATURES"].field("DARK_SUBTRACTION").mask
+    dark = chip.REGISTERS["HARDWARE_FEATURES"].field("DARK_SUBTRACTION").mask
     assert mean(0, 0) > 3  # 69 counts of 12 bits of dark signal
     assert mean(dark, 2000 * MS) < 1
 

@@ -8,27 +8,20 @@ import pytest
 from cubestack.emulator.camera.common.imager import hot_pixels
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mt9m001 import noise
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
-from cubestack.emulator.camera.mt9m001.noise import (
-    BLACK_LEVEL,
-    FULL_WELL_ELECTRONS,
-    HOT_SHARE,
-    READ_NOISE_ELECTRONS,
-    NoiseTerms,
-    dark_electrons_per_s,
-)
 from cubestack.emulator.camera.mt9m001.registers import read_settings
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 
 SHAPE = (400, 500)
 QUIET = replace(CONDITION, hot_pixels=0)
-LSB8 = FULL_WELL_ELECTRONS / 256  # electrons of a count of 8 bits at gain 1
+LSB8 = noise.FULL_WELL_ELECTRONS / 256  # electrons of a count of 8 bits at gain 1
 
 
 def frame(
     light: float | np.ndarray,
-    terms: NoiseTerms,
+    terms: noise.NoiseTerms,
     gain: float = 1.0,
     condition: SkyCondition = QUIET,
     background: float = 15.0,
@@ -42,12 +35,12 @@ def frame(
 
 def quantisation_sigma(gain: float, bits: int = 10) -> float:
     """Standard deviation of the quantisation in electrons, equations 3.5 and 3.6."""
-    return FULL_WELL_ELECTRONS / gain / 2**bits / np.sqrt(12)
+    return noise.FULL_WELL_ELECTRONS / gain / 2**bits / np.sqrt(12)
 
 
-def only(**terms: bool) -> NoiseTerms:
+def only(**terms: bool) -> noise.NoiseTerms:
     names = ("shot", "dark", "background", "quantisation", "readout")
-    return NoiseTerms(**(dict.fromkeys(names, False) | terms))
+    return noise.NoiseTerms(**(dict.fromkeys(names, False) | terms))
 
 
 def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
@@ -55,13 +48,15 @@ def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
 
 
 def test_the_data_sheet_s_ratios_come_out() -> None:
-    assert 20 * np.log10(np.sqrt(FULL_WELL_ELECTRONS)) == pytest.approx(45)
-    assert 20 * np.log10(FULL_WELL_ELECTRONS / READ_NOISE_ELECTRONS) == pytest.approx(68.2)
+    assert 20 * np.log10(np.sqrt(noise.FULL_WELL_ELECTRONS)) == pytest.approx(45)
+    assert 20 * np.log10(noise.FULL_WELL_ELECTRONS / noise.READ_NOISE_ELECTRONS) == pytest.approx(
+        68.2
+    )
 
 
 def test_without_noise_there_is_one_value() -> None:
-    picture = frame(10_000, NoiseTerms.none())
-    expected = 10_000 / LSB8 + BLACK_LEVEL / 4
+    picture = frame(10_000, noise.NoiseTerms.none())
+    expected = 10_000 / LSB8 + noise.BLACK_LEVEL / 4
     assert np.unique(picture).tolist() == [int(expected + 0.5)]
 
 
@@ -76,13 +71,13 @@ def test_read_out_noise() -> None:
     gain = 8.0
     rounding = LSB8 / gain / np.sqrt(12)
     measured = electrons_sigma(frame(2_000, only(readout=True), gain), gain)
-    assert measured == pytest.approx(np.hypot(READ_NOISE_ELECTRONS, rounding), rel=0.02)
+    assert measured == pytest.approx(np.hypot(noise.READ_NOISE_ELECTRONS, rounding), rel=0.02)
 
 
 def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
-    assert dark_electrons_per_s(33) / dark_electrons_per_s(25) == pytest.approx(2)
+    assert noise.dark_electrons_per_s(33) / noise.dark_electrons_per_s(25) == pytest.approx(2)
     gain, warm = 8.0, 65.0
-    dark = dark_electrons_per_s(warm)
+    dark = noise.dark_electrons_per_s(warm)
     condition = replace(QUIET, temperature_c=warm)
     picture = frame(1_500, only(dark=True), gain, condition)
     rounding = LSB8 / gain / np.sqrt(12)
@@ -104,8 +99,8 @@ def test_quantisation_follows_its_formula() -> None:
     rng = np.random.default_rng(2)
     light = rng.uniform(5_000, 25_000, SHAPE).astype(np.float32)
 
-    def error(terms: NoiseTerms) -> np.ndarray:
-        return light - (frame(light, terms) - BLACK_LEVEL / 4) * LSB8
+    def error(terms: noise.NoiseTerms) -> np.ndarray:
+        return light - (frame(light, terms) - noise.BLACK_LEVEL / 4) * LSB8
 
     wired = error(only(quantisation=True))
     # The upper 8 of 10 bits: the error of 8 bits, and on the average what is cut off.
@@ -116,19 +111,19 @@ def test_quantisation_follows_its_formula() -> None:
 
 def test_the_terms_add_up_as_variances() -> None:
     light, gain = 800.0, 8.0
-    everything = NoiseTerms()
-    dark, background = dark_electrons_per_s(20.0), 15.0
-    variance = light + dark + background + READ_NOISE_ELECTRONS**2
+    everything = noise.NoiseTerms()
+    dark, background = noise.dark_electrons_per_s(20.0), 15.0
+    variance = light + dark + background + noise.READ_NOISE_ELECTRONS**2
     variance += quantisation_sigma(gain, bits=8) ** 2
     measured = electrons_sigma(frame(light, everything, gain), gain)
     assert measured == pytest.approx(np.sqrt(variance), rel=0.02)
 
 
 def test_hot_pixels_shine_where_they_are_and_scale_with_the_dark_current() -> None:
-    places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1], HOT_SHARE)
+    places, shares = hot_pixels(7, 10, SHAPE[0] * SHAPE[1], noise.HOT_SHARE)
     picture = frame(0, only(dark=True), condition=replace(CONDITION, hot_pixels=10, seed=7))
     bright = set(np.flatnonzero(picture > 10).tolist())
-    strong = set(places[shares * dark_electrons_per_s(20.0) > 12 * LSB8].tolist())
+    strong = set(places[shares * noise.dark_electrons_per_s(20.0) > 12 * LSB8].tolist())
     assert strong
     assert strong <= bright <= set(places.tolist())
     repeated = hot_pixels.__wrapped__(7, 10, SHAPE[0] * SHAPE[1])

@@ -12,17 +12,11 @@ from cubestack.emulator.camera.mt9m001.lens import CONDITION, double_gauss
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    COLUMNS,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    ROWS,
-    gain_register,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001 as chip
 
-ADDRESS = REGISTERS.i2c_address
+ADDRESS = chip.REGISTERS.i2c_address
 ROW_CLOCKS = 1524
-ROW_S = ROW_CLOCKS / PIXEL_CLOCK_HZ
+ROW_S = ROW_CLOCKS / chip.PIXEL_CLOCK_HZ
 
 
 QUIET = replace(CONDITION, noise=False)
@@ -39,11 +33,11 @@ def camera() -> Mt9m001:
 
 def put(camera: Mt9m001, name: str, *words: int, now_ps: int = 0) -> None:
     data = b"".join(word.to_bytes(2, "big") for word in words)
-    assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]) + data, now_ps)
+    assert camera.i2c_write(ADDRESS, bytes([chip.REGISTERS[name].address]) + data, now_ps)
 
 
 def get(camera: Mt9m001, name: str) -> int:
-    assert camera.i2c_write(ADDRESS, bytes([REGISTERS[name].address]), 0)
+    assert camera.i2c_write(ADDRESS, bytes([chip.REGISTERS[name].address]), 0)
     answer = camera.i2c_read(ADDRESS, 2, 0)
     return int.from_bytes(answer, "big")
 
@@ -93,7 +87,7 @@ def test_segments_leave_no_gap_and_no_overlap(camera: Mt9m001) -> None:
     put(camera, "SHUTTER_WIDTH", 1500)
     segments = stream(camera, 0, 300 * PS_PER_MS)
     for (start, clocks, *_), (following, *_) in pairwise(segments):
-        assert following - (start + clocks * PS_PER_S // PIXEL_CLOCK_HZ) in (0, 1)
+        assert following - (start + clocks * PS_PER_S // chip.PIXEL_CLOCK_HZ) in (0, 1)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +99,9 @@ def test_a_long_exposure_makes_the_frame_longer(camera: Mt9m001, shutter: int, r
     assert np.diff(starts) == pytest.approx(rows * ROW_S * PS_PER_S)
     exposure = camera.frame_from(starts[-1])
     assert exposure.exposure_s == pytest.approx(shutter * ROW_S)
-    assert exposure.readout_ps == pytest.approx(starts[-1] + 242 / PIXEL_CLOCK_HZ * PS_PER_S, abs=1)
+    assert exposure.readout_ps == pytest.approx(
+        starts[-1] + 242 / chip.PIXEL_CLOCK_HZ * PS_PER_S, abs=1
+    )
 
 
 def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(camera: Mt9m001) -> None:
@@ -138,7 +134,7 @@ def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:
 
 
 def test_registers_answer_as_declared(camera: Mt9m001) -> None:
-    for register in REGISTERS:
+    for register in chip.REGISTERS:
         assert get(camera, register.name) == register.reset, register.name
     put(camera, "GLOBAL_GAIN", 0x51)
     assert {get(camera, n) for n in ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")} == {
@@ -205,7 +201,7 @@ def test_a_window_is_a_part_of_the_picture() -> None:
     camera = Mt9m001(still)
     put(camera, "SHUTTER_WIDTH", 6000)
     whole = frame(camera, 0)
-    assert whole.shape == (ROWS, COLUMNS)
+    assert whole.shape == (chip.ROWS, chip.COLUMNS)
     small = Mt9m001(still)
     put(small, "ROW_START", 12 + 300, 20 + 200, 399, 517)  # lines of half the length
     put(small, "SHUTTER_WIDTH", 12_000)
@@ -225,12 +221,12 @@ def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
     bright = Mt9m001(scene(), condition=wide)
     put(bright, "SHUTTER_WIDTH", 6000)
     once = frame(bright, 0).astype(int) - 1.5
-    put(bright, "GLOBAL_GAIN", gain_register(8.0), now_ps=PS_PER_S)
+    put(bright, "GLOBAL_GAIN", chip.gain_register(8.0), now_ps=PS_PER_S)
     eight = frame(bright, PS_PER_S).astype(int) - 1.5
     clear = (eight < 250) & (once > 5)
     assert clear.any()
     assert np.median(eight[clear] / once[clear]) == pytest.approx(8, rel=0.1)
-    put(bright, "RED_GAIN", gain_register(1.0), now_ps=2 * PS_PER_S)
+    put(bright, "RED_GAIN", chip.gain_register(1.0), now_ps=2 * PS_PER_S)
     mixed = frame(bright, 2 * PS_PER_S).astype(int) - 1.5
     np.testing.assert_array_equal(mixed[0::2, 1::2], once[0::2, 1::2])
     np.testing.assert_array_equal(mixed[1::2, 1::2], eight[1::2, 1::2])
@@ -264,9 +260,9 @@ def test_a_turning_camera_smears_along_its_motion() -> None:
         """Variances of the brightest star along the columns and along the rows, px^2."""
         camera = Mt9m001(sky, condition=QUIET)
         put(camera, "SHUTTER_WIDTH", 315)
-        put(camera, "GLOBAL_GAIN", gain_register(4.0))
+        put(camera, "GLOBAL_GAIN", chip.gain_register(4.0))
         picture = frame(camera, 0)
-        row, column = divmod(int(np.argmax(picture)), COLUMNS)
+        row, column = divmod(int(np.argmax(picture)), chip.COLUMNS)
         around = picture[row - 12 : row + 13, column - 12 : column + 13].astype(float) - 2
         y, x = np.mgrid[:25, :25]
         total = around.sum()

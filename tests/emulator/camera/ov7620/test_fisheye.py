@@ -2,13 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.camera.ov7620.fisheye import (
-    FIELD_DEG,
-    LENSES,
-    PIXELS_PER_DEGREE,
-    distorted,
-    undistorted,
-)
+from cubestack.emulator.camera.ov7620 import fisheye
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import Target
 from cubestack.firmware_model.interface.cubesense import codes
@@ -22,29 +16,29 @@ def towards(theta_deg: float, phi_deg: float) -> np.ndarray:
 
 
 def test_published_radii_of_the_test_ball() -> None:
-    assert distorted(182.0) == pytest.approx(168, abs=0.5)
-    assert undistorted(168.0) == pytest.approx(182, abs=0.5)
+    assert fisheye.distorted(182.0) == pytest.approx(168, abs=0.5)
+    assert fisheye.undistorted(168.0) == pytest.approx(182, abs=0.5)
 
 
 def test_the_firmware_knows_the_lens_and_the_picture() -> None:
-    assert codes.PIXELS_PER_DEGREE == PIXELS_PER_DEGREE
+    assert codes.PIXELS_PER_DEGREE == fisheye.PIXELS_PER_DEGREE
     assert [camera.name for camera in codes.Camera] == [target.name for target in Target]
     assert list(map(int, codes.Camera)) == list(map(int, Target))
 
 
 def test_rim_is_where_the_field_ends() -> None:
-    assert distorted(2.9 * 95) == pytest.approx(226, abs=0.7)
+    assert fisheye.distorted(2.9 * 95) == pytest.approx(226, abs=0.7)
 
 
 @pytest.mark.parametrize("radius", [0.2, 1.0, 50.0, 168.0, 226.0])
 def test_undistorting_finds_the_root_of_the_cubic(radius: float) -> None:
     roots = np.roots([-2.5572e-6, 7.6076e-5, 0.9953, 0.1036 - radius])
     inside = [r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real < 276]
-    assert inside == [pytest.approx(float(undistorted(radius)), abs=1e-9)]
+    assert inside == [pytest.approx(float(fisheye.undistorted(radius)), abs=1e-9)]
 
 
 def test_nothing_is_below_the_smallest_distorted_radius() -> None:
-    np.testing.assert_array_equal(undistorted([0.0, 0.05, 0.1]), 0)
+    np.testing.assert_array_equal(fisheye.undistorted([0.0, 0.05, 0.1]), 0)
 
 
 def test_angles_are_a_turn_away_from_the_boresight() -> None:
@@ -60,29 +54,32 @@ def test_angles_are_a_turn_away_from_the_boresight() -> None:
     ("camera", "centre"), [(Target.SUN, (369, 250)), (Target.NADIR, (371, 236))]
 )
 def test_published_boresights(camera: Target, centre: tuple[float, float]) -> None:
-    lens = LENSES[camera]
+    lens = fisheye.LENSES[camera]
     np.testing.assert_array_equal(lens.project([0, 0, 2.0]), centre)
     np.testing.assert_array_equal(lens.unproject([centre]), [[0, 0, 1]])
 
 
 def test_right_is_right_and_down_is_down() -> None:
-    lens = LENSES[Target.NADIR]
+    lens = fisheye.LENSES[Target.NADIR]
     x, y = lens.project(towards(63.48, 0))
-    assert (x, y) == (pytest.approx(371 + float(distorted(63.48 * 2.9))), pytest.approx(236))
+    assert (x, y) == (
+        pytest.approx(371 + float(fisheye.distorted(63.48 * 2.9))),
+        pytest.approx(236),
+    )
     x, y = lens.project(towards(10.0, 90))
-    assert (x, y) == (pytest.approx(371), pytest.approx(236 + float(distorted(29.0))))
+    assert (x, y) == (pytest.approx(371), pytest.approx(236 + float(fisheye.distorted(29.0))))
 
 
 def test_projecting_is_undone() -> None:
-    lens = LENSES[Target.SUN]
+    lens = fisheye.LENSES[Target.SUN]
     generator = np.random.default_rng(5)
-    for theta, phi in generator.uniform([0, -180], [FIELD_DEG, 180], (200, 2)):
+    for theta, phi in generator.uniform([0, -180], [fisheye.FIELD_DEG, 180], (200, 2)):
         pixel = lens.project(towards(theta, phi))
         np.testing.assert_allclose(lens.unproject([pixel])[0], towards(theta, phi), atol=1e-9)
 
 
 def test_what_is_outside_the_field_is_not_projected() -> None:
-    lens = LENSES[Target.SUN]
+    lens = fisheye.LENSES[Target.SUN]
     assert lens.project(towards(95.001, 20)) is None
     assert lens.project([0, 0, -1.0]) is None
     assert lens.project(towards(94.999, 20)) is not None
@@ -90,7 +87,7 @@ def test_what_is_outside_the_field_is_not_projected() -> None:
 
 @pytest.mark.parametrize("camera", list(Target))
 def test_field_of_view(camera: Target) -> None:
-    lens = LENSES[camera]
+    lens = fisheye.LENSES[camera]
     field = lens.field
     y, x = np.divmod(field.index, 640)
     assert np.all(np.diff(field.index) > 0)
@@ -112,7 +109,7 @@ def test_field_of_view(camera: Target) -> None:
 
 
 def test_pixel_angle_is_that_between_neighbours() -> None:
-    lens = LENSES[Target.NADIR]
+    lens = fisheye.LENSES[Target.NADIR]
     field = lens.field
     for x, y in [(380, 240), (471, 336), (371, 36), (160, 236)]:
         here, right, down = lens.unproject(
