@@ -83,12 +83,11 @@ class Client(Closable):
 
         Returns that frame's fields. Raises NoAnswerError after ``timeout_s``.
         """
-        late = f"telecommand not processed within {timeout_s:g} s"
         return self.poll(
             lambda: self.telemetry("TcmdProcessed"),
             lambda values: bool(values["Processed"]),
             timeout_s,
-            late,
+            f"telecommand not processed within {timeout_s:g} s",
         )
 
     def poll(

@@ -8,16 +8,18 @@ before it is sent.
 
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from smbus2 import i2c_msg
 
 from cubestack.firmware_model.interface.codec.field import Value
-from cubestack.firmware_model.interface.codec.message import Interface, Message
+from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.contract import Client
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
 
 RETRY_PERIOD_S = 0.01
+
+T = TypeVar("T")
 
 
 class I2cBus(Protocol):
@@ -25,6 +27,23 @@ class I2cBus(Protocol):
 
     def i2c_rdwr(self, *i2c_msgs: Any) -> None:
         """One combined transfer; raises OSError when a message is not acknowledged."""
+
+
+def acknowledged(
+    transfer: Callable[[], T], attempts: int, wait: Callable[[float], None], what: str
+) -> T:
+    """Result of a ``transfer`` that is tried so many times; NoAnswerError ``what`` after them."""
+    failure = None
+    for attempt in range(attempts):
+        if attempt:
+            wait(RETRY_PERIOD_S)
+        try:
+            return transfer()
+        except TransportError:
+            raise
+        except OSError as error:
+            failure = error
+    raise NoAnswerError(what) from failure
 
 
 class I2cClient(Client):
@@ -56,36 +75,29 @@ class I2cClient(Client):
         """Send a telecommand and wait until the node has processed it; errors as ``Client``'s."""
         message = self.interface.telecommand(name)
         data = message.pack(**parameters)
-        self._check(message, data)
-        try:
-            self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([message.id]) + data))
-        except TransportError:
-            raise
-        except OSError as error:
-            raise NoAnswerError(
-                f"telecommand {message.name} not acknowledged at I2C address {self._address:#04x}"
-            ) from error
+        wrong = message.violations(message.unpack(data))
+        if wrong:
+            code = self.interface.ack_errors["BAD_PARAMETER"]
+            raise CommandRefusedError(message.name, code, f", {wrong[0][0].name} is out of range")
+        what = f"telecommand {message.name} not acknowledged at I2C address {self._address:#04x}"
+        write = i2c_msg.write(self._address, bytes([message.id]) + data)
+        acknowledged(lambda: self._bus.i2c_rdwr(write), 1, self._wait, what)
         values = self.wait_processed(self._processing_timeout_s)
         self._check_error(message, int(values.get("Error", 0)))
 
     def telemetry(self, name: str) -> dict[str, Value]:
         """Read a telemetry frame; one that steps may skip a record when a transfer broke off."""
         message = self.interface.telemetry(name)
-        for attempt in range(1 + self._retries):
-            if attempt:
-                self._wait(RETRY_PERIOD_S)
+
+        def read() -> bytes:
             answer = i2c_msg.read(self._address, message.length)
-            try:
-                self._bus.i2c_rdwr(i2c_msg.write(self._address, [message.id]), answer)
-            except TransportError:
-                raise
-            except OSError:
-                continue
-            return message.unpack(bytes(answer))
-        raise NoAnswerError(
-            f"telemetry {message.name} not acknowledged at I2C address {self._address:#04x} "
-            f"in {1 + self._retries} attempts"
-        )
+            self._bus.i2c_rdwr(i2c_msg.write(self._address, [message.id]), answer)
+            return bytes(answer)
+
+        attempts = 1 + self._retries
+        where = f"I2C address {self._address:#04x} in {attempts} attempts"
+        what = f"telemetry {message.name} not acknowledged at {where}"
+        return message.unpack(acknowledged(read, attempts, self._wait, what))
 
     def pause(self, seconds: float) -> None:
         """Let time pass on the node's side."""
@@ -93,9 +105,3 @@ class I2cClient(Client):
 
     def close(self) -> None:
         """Leave the bus to its owner, who opened it."""
-
-    def _check(self, message: Message, data: bytes) -> None:
-        wrong = message.violations(message.unpack(data))
-        if wrong:
-            code = self.interface.ack_errors["BAD_PARAMETER"]
-            raise CommandRefusedError(message.name, code, f", {wrong[0][0].name} is out of range")

@@ -12,8 +12,7 @@ from smbus2 import i2c_msg
 from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 from cubestack.host.clients.contract import Progress
-from cubestack.host.clients.i2c import RETRY_PERIOD_S, I2cBus
-from cubestack.host.errors import NoAnswerError, TransportError
+from cubestack.host.clients.i2c import I2cBus, T, acknowledged
 
 #: Longest read that the Linux kernel's I2C_RDWR takes.
 CHUNK_BYTES = 8192
@@ -48,14 +47,14 @@ class RegisterClient:
         Raises InterfaceError for a name that the map lacks or can not be read, NoAnswerError.
         """
         register = self._readable(name)
-        return register.decode(self._attempt(register, None))
+        return register.decode(self._fetch(register, None))
 
     def read_stream(self, name: str, progress: Progress | None = None) -> bytes:
         """All bytes of a streaming register, in reads of at most 8192 bytes.
 
         ``progress`` is called with (bytes done, bytes in all). Raises as ``read`` does.
         """
-        return self._attempt(self._readable(name), progress)
+        return self._fetch(self._readable(name), progress)
 
     def write(self, name: str, value: object) -> None:
         """Write a register: a number, or the name of a choice.
@@ -68,12 +67,7 @@ class RegisterClient:
         data = register.encode(value, saturate=False)
         if not register.allows(register.decode(data)):
             raise InterfaceError(f"register {register.name}: {value!r} is out of range")
-        try:
-            self._bus.i2c_rdwr(i2c_msg.write(self._address, bytes([register.address]) + data))
-        except TransportError:
-            raise
-        except OSError as error:
-            raise self._silence(register, 1) from error
+        self._attempt(lambda: self.write_raw(register.address, data), register, 1)
 
     def read_raw(self, address: int, count: int) -> bytes:
         """Bytes behind any address, declared or not, in one transfer; raises OSError."""
@@ -91,35 +85,26 @@ class RegisterClient:
             raise InterfaceError(f"register {register.name} is write-only")
         return register
 
-    def _attempt(self, register: PointerRegister, progress: Progress | None) -> bytes:
-        """All bytes of a register, from the beginning again when a transfer breaks off."""
-        for attempt in range(1 + self._retries):
-            if attempt:
-                self._wait(RETRY_PERIOD_S)
-            try:
-                return self._fetch(register, progress)
-            except TransportError:
-                raise
-            except OSError:
-                continue
-        raise self._silence(register, 1 + self._retries)
-
     def _fetch(self, register: PointerRegister, progress: Progress | None) -> bytes:
-        data = bytearray()
-        while len(data) < register.length:
-            answer = i2c_msg.read(self._address, min(CHUNK_BYTES, register.length - len(data)))
-            if data:  # without the pointer, a read goes on where the last one stopped
-                self._bus.i2c_rdwr(answer)
-            else:
-                self._bus.i2c_rdwr(i2c_msg.write(self._address, [register.address]), answer)
-            data += bytes(answer)
-            if progress is not None:
-                progress(len(data), register.length)
-        return bytes(data)
+        """All bytes of a register, from the beginning again when a transfer breaks off."""
 
-    def _silence(self, register: PointerRegister, attempts: int) -> NoAnswerError:
-        times = "1 attempt" if attempts == 1 else f"{attempts} attempts"
-        return NoAnswerError(
-            f"register {register.name} not acknowledged at I2C address {self._address:#04x} "
-            f"in {times}"
-        )
+        def fetch() -> bytes:
+            data = bytearray()
+            while len(data) < register.length:
+                answer = i2c_msg.read(self._address, min(CHUNK_BYTES, register.length - len(data)))
+                if data:  # without the pointer, a read goes on where the last one stopped
+                    self._bus.i2c_rdwr(answer)
+                else:
+                    self._bus.i2c_rdwr(i2c_msg.write(self._address, [register.address]), answer)
+                data += bytes(answer)
+                if progress is not None:
+                    progress(len(data), register.length)
+            return bytes(data)
+
+        return self._attempt(fetch, register, 1 + self._retries)
+
+    def _attempt(self, transfer: Callable[[], T], register: PointerRegister, attempts: int) -> T:
+        times = f"{attempts} attempt" + ("s" if attempts > 1 else "")
+        where = f"I2C address {self._address:#04x} in {times}"
+        what = f"register {register.name} not acknowledged at {where}"
+        return acknowledged(transfer, attempts, self._wait, what)

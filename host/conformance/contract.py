@@ -136,12 +136,12 @@ class CheckRun:
         self.checks.append(result)
         self.on_check(result)
 
-    def request(self, payload: bytes) -> bytes | None:
-        """Any payload in a frame; SkippedError where there are no frames."""
-        node = self.target.node
-        if not isinstance(node, NodeClient):
+    @property
+    def node(self) -> NodeClient:
+        """Client on a serial line; SkippedError where there is none."""
+        if not isinstance(self.target.node, NodeClient):
             raise SkippedError("needs a serial line")
-        return node.request(payload)
+        return self.target.node
 
     def perform(self, name: str, values: Mapping[str, Value]) -> None:
         """Send a telecommand and wait until it is processed; after a restart, for an answer."""
@@ -150,17 +150,13 @@ class CheckRun:
         try:
             node.wait_processed(PROCESSING_TIMEOUT_S)
         except NoAnswerError:
-            self._wait_restarted(name)
-
-    def _wait_restarted(self, name: str) -> None:
-        node, first = self.target.node, self.target.interface.telemetries[0].name
-        for _ in range(int(RESTART_TIMEOUT_S / RESTART_POLL_S)):
-            try:
-                node.telemetry(first)
-                return
-            except NodeError:
-                node.pause(RESTART_POLL_S)
-        raise FailedError(f"no answer for {RESTART_TIMEOUT_S:g} s after {name}")
+            for _ in range(int(RESTART_TIMEOUT_S / RESTART_POLL_S)):
+                try:
+                    node.telemetry(self.target.interface.telemetries[0].name)
+                    return
+                except NodeError:
+                    node.pause(RESTART_POLL_S)
+            raise FailedError(f"no answer for {RESTART_TIMEOUT_S:g} s after {name}") from None
 
     def telemetry(self, message: Message) -> dict[str, Value]:
         """A telemetry frame, its time taken: the best of three, as hosts have hiccups."""

@@ -146,7 +146,7 @@ def _expect_shown(run: CheckRun, message: Message, wanted: Mapping[str, Value]) 
 
 def _expect_error(run: CheckRun, payload: bytes, error: str, what: str) -> None:
     codes = run.target.interface.ack_errors
-    answer = run.request(payload)
+    answer = run.node.request(payload)
     if answer is None:
         raise FailedError(f"{what}: no acknowledge, declared {error}")
     if answer != bytes([codes[error]]):

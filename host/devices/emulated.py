@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
-import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias
 
@@ -35,6 +36,7 @@ PORT = "{port}"
 """What ``run`` replaces in a command by the path of the serial port."""
 
 
+@dataclass(eq=False)
 class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     """A powered-up device.
 
@@ -44,20 +46,17 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         seed: of everything random.
     """
 
-    def __init__(self, device: Device[BoardT_co, ClientT_co], board: BoardT_co, seed: int) -> None:
-        """Take over ``board``."""
-        self.device = device
-        self.board = board
-        self.seed = seed
-        self._client: ClientT_co | None = None
+    device: Device[BoardT_co, ClientT_co]
+    board: BoardT_co
+    seed: int
+    _client: ClientT_co | None = field(default=None, init=False, repr=False)
 
     @property
     def client(self) -> ClientT_co:
         """This project's client on the serial line; plugged in again after any other host."""
         if self._client is None:
-            self._client = self.device.client(
-                NodeClient(self.board.serial(), self.device.interface)
-            )
+            node = NodeClient(self.board.serial(), self.device.interface)
+            self._client = self.device.client(node)
         return self._client
 
     @property
@@ -119,9 +118,10 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
                     program = subprocess.Popen(
                         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
                     )
-                    watch = _Watch(program, timeout_s, scheduler)
-                    scheduler.run()
-                    return watch.result()
+                    with ThreadPoolExecutor(1) as threads:
+                        done = threads.submit(_watch, program, timeout_s, scheduler)
+                        scheduler.run()
+                        return done.result()
             finally:
                 endpoint.close()
 
@@ -148,39 +148,19 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 AnyEmulated: TypeAlias = "EmulatedDevice[Board, DeviceClient]"
 
 
-class _Watch:
-    """Waits for a program in a thread of its own, and ends the scheduler after it."""
-
-    def __init__(
-        self, program: subprocess.Popen[str], timeout_s: float, scheduler: RealtimeScheduler
-    ) -> None:
-        self._program = program
-        self._timeout_s = timeout_s
-        self._scheduler = scheduler
-        self._outcome: subprocess.CompletedProcess[str] | Exception | None = None
-        self._thread = threading.Thread(target=self._wait, daemon=True)
-        self._thread.start()
-
-    def _wait(self) -> None:
-        program = self._program
-        try:
-            output, errors = program.communicate(timeout=self._timeout_s)
-            words: Sequence[Any] = program.args  # type: ignore[assignment]
-            self._outcome = subprocess.CompletedProcess(words, program.returncode, output, errors)
-        except subprocess.TimeoutExpired as error:
-            with program:  # closes the pipes unread, as a child of it may hold them for ever
-                program.kill()
-            self._outcome = error
-        finally:
-            self._scheduler.stop()
-
-    def result(self) -> subprocess.CompletedProcess[str]:
-        """What became of it."""
-        self._thread.join()
-        if isinstance(self._outcome, Exception):
-            raise self._outcome
-        assert self._outcome is not None
-        return self._outcome
+def _watch(
+    program: subprocess.Popen[str], timeout_s: float, scheduler: RealtimeScheduler
+) -> subprocess.CompletedProcess[str]:
+    """Wait for a program, and end the scheduler after it."""
+    try:
+        output, errors = program.communicate(timeout=timeout_s)
+        return subprocess.CompletedProcess(program.args, program.returncode, output, errors)
+    except subprocess.TimeoutExpired:
+        with program:  # closes the pipes unread, as a child of it may hold them for ever
+            program.kill()
+        raise
+    finally:
+        scheduler.stop()
 
 
 def check_options(device: AnyDevice, options: Mapping[str, object]) -> None:

@@ -11,10 +11,10 @@ def get(what: str) -> Callable[[], Any]:
     return partial(resolve_name, what)
 
 
-def call(what: str) -> Callable[..., Any]:
-    """A callable that calls it."""
+def call(what: str, *first: Any, **always: Any) -> Callable[..., Any]:
+    """A callable that calls it with these arguments, and those that are given then."""
 
     def called(*given: Any, **options: Any) -> Any:
-        return resolve_name(what)(*given, **options)
+        return resolve_name(what)(*first, *given, **always, **options)
 
     return called

@@ -154,14 +154,18 @@ def _open_emulated(
             stack.callback(recorder.close)
             controls.on_act = lambda words, said: recorder.control(board.kernel.now, words, said)
         lines = [board.serial(line.name) for line in board.lines]
-        target = Target(text, interface, NodeClient(lines[0], interface), lines[0])
         bus = board.i2c()
-        target.registers = with_i2c(target, bus, bus.wait)
-        if interface.service_port is not None and len(lines) > 1:
-            target.service_port = lines[1]
-        target.controls, target.device = controls, emulated.device
-        target.on_close.append(stack.pop_all().close)
-        return target
+        return Target(
+            text,
+            interface,
+            NodeClient(lines[0], interface),
+            lines[0],
+            registers=_registers(interface, bus, bus.wait),
+            service_port=lines[1] if interface.service_port and len(lines) > 1 else None,
+            controls=controls,
+            device=emulated.device,
+            on_close=[stack.pop_all().close],
+        )
 
 
 def _open_real(
@@ -181,9 +185,8 @@ def _open_real(
         line = open_transport(text, baud)
         if tape is not None:
             line = tape.line(line, "uart", baud)
-        target = Target(text, found.interface, NodeClient(line, found.interface), line)
-        target.device = found
-        target.on_close.append(line.close)
+        node = NodeClient(line, found.interface)
+        target = Target(text, found.interface, node, line, device=found, on_close=[line.close])
         bauds = {"uart": baud}
     if service_port is not None:
         bauds["bench_uart"] = _open_service_port(target, service_port, tape)
@@ -218,11 +221,11 @@ def connect(text: str, device: str | None = None, *, baud: int | None = None) ->
     return client
 
 
-def with_i2c(
-    target: Target, bus: I2cBus, wait: Callable[[float], None] = time.sleep
+def _registers(
+    interface: Interface, bus: I2cBus, wait: Callable[[float], None]
 ) -> RegisterClient | None:
-    """Client of the registers of ``target``'s device on ``bus``; None where it has none."""
-    registers = target.interface.registers
+    """Client of a device's registers on ``bus``; None where it has none."""
+    registers = interface.registers
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 
 
@@ -235,19 +238,15 @@ def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
         number, address = -1, None
     if number < 0 or (address is not None and not 0x08 <= address <= 0x77):
         raise TargetError(f"{text}: must be i2c:BUS:ADDR, as in i2c:7:0x1a (0x08 to 0x77)")
-    if name is None:
-        found = [known.name for known in devices() if address in _addresses(known.interface)]
-        name = found[0] if found else None
-    owner = device_of(name, text)
+    found = (known.name for known in devices() if address in _addresses(known.interface))
+    owner = device_of(name or next(found, None), text)
     interface = owner.interface
     opened = _open_bus(number)
     bus: I2cBus = opened if tape is None else tape.bus(opened)
     own = None if address in _addresses(interface)[1:] else address
-    target = Target(text, interface, I2cClient(bus, interface, own))
-    target.registers = with_i2c(target, bus)
-    target.device = owner
-    target.on_close.append(opened.close)
-    return target
+    node, registers = I2cClient(bus, interface, own), _registers(interface, bus, time.sleep)
+    on_close = [opened.close]
+    return Target(text, interface, node, registers=registers, device=owner, on_close=on_close)
 
 
 def _open_bus(number: int) -> SMBus:
@@ -283,14 +282,13 @@ def _open_recorded(text: str) -> Target:
     owner = device_of(recording.device, text)
     interface = owner.interface
     bus = RecordedI2c(recording, interface)
-    spoken = [port for port in recording.bauds if recording.sent(port, "host")[0]]
-    if "uart" in spoken or (not recording.transfers and "uart" in recording.bauds):
+    spoken = "uart" in recording.bauds and recording.sent("uart", "host")[0]
+    if spoken or (not recording.transfers and "uart" in recording.bauds):
         line = RecordedTransport(recording, interface)
         target = Target(text, interface, NodeClient(line, interface), line)
     else:
-        client = I2cClient(bus, interface, wait=_no_wait)
-        target = Target(text, interface, client)
-    target.registers = with_i2c(target, bus, _no_wait)
+        target = Target(text, interface, I2cClient(bus, interface, wait=_no_wait))
+    target.registers = _registers(interface, bus, _no_wait)
     target.device = owner
     if "bench_uart" in recording.bauds:
         target.service_port = RecordedTransport(recording, interface, "bench_uart")

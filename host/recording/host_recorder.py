@@ -8,15 +8,10 @@ tools (``recorded:FILE``) such a recording is as good.
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import IO, Any
 
-from cubestack.firmware_model.formats.recording import (
-    BusMessage,
-    BusTransfer,
-    LineBytes,
-    RecordingWriter,
-    Side,
-)
+from cubestack.firmware_model.formats import recording
 from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.clients.i2c import I2cBus
 from cubestack.host.transport.streams import Transport
@@ -45,11 +40,11 @@ class HostRecorder:
         self._setup = setup
         self._clock_ns = clock_ns
         self._start_ns = clock_ns()
-        self._writer: RecordingWriter | None = None
+        self._writer: recording.RecordingWriter | None = None
 
     def begin(self, device: str, bauds: Mapping[str, int]) -> None:
         """Write the header: name of the device, baud rate by port."""
-        self._writer = RecordingWriter(self._stream, device, dict(bauds), self._setup)
+        self._writer = recording.RecordingWriter(self._stream, device, dict(bauds), self._setup)
 
     def line(self, transport: Transport, port: str, baud: int) -> Transport:
         """``transport``, with its bytes recorded."""
@@ -63,56 +58,56 @@ class HostRecorder:
         """Time since the beginning."""
         return (self._clock_ns() - self._start_ns) * PS_PER_NS
 
-    def write(self, event: LineBytes | BusTransfer) -> None:
+    def write(self, event: recording.LineBytes | recording.BusTransfer) -> None:
         """Record an event."""
         assert self._writer is not None
         self._writer.write(event)
 
 
+@dataclass
 class _RecordingLine:
-    def __init__(
-        self, recorder: HostRecorder, transport: Transport, port: str, byte_ps: int
-    ) -> None:
-        self._recorder = recorder
-        self._transport = transport
-        self._port = port
-        self._byte_ps = byte_ps
-        self._last_ps = 0
+    recorder: HostRecorder
+    transport: Transport
+    port: str
+    byte_ps: int
+    last_ps: int = 0
 
     def write(self, data: bytes) -> None:
-        self._put("host", data, self._recorder.now_ps())
-        self._transport.write(data)
+        self._put("host", data, self.recorder.now_ps())
+        self.transport.write(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        data = self._transport.read(max_bytes, timeout_s)
-        self._put("device", data, self._recorder.now_ps())
+        data = self.transport.read(max_bytes, timeout_s)
+        self._put("device", data, self.recorder.now_ps())
         return data
 
     def close(self) -> None:
-        self._transport.close()
+        self.transport.close()
 
-    def _put(self, side: Side, data: bytes, now_ps: int) -> None:
+    def _put(self, side: recording.Side, data: bytes, now_ps: int) -> None:
         """In the order of the calls: what was read was there before what is written next."""
         if data:
-            first_ps = max(self._last_ps, now_ps - (side == "device") * len(data) * self._byte_ps)
-            self._recorder.write(LineBytes(first_ps, self._port, side, data, self._byte_ps))
-            self._last_ps = first_ps + len(data) * self._byte_ps
+            first_ps = max(self.last_ps, now_ps - (side == "device") * len(data) * self.byte_ps)
+            self.recorder.write(recording.LineBytes(first_ps, self.port, side, data, self.byte_ps))
+            self.last_ps = first_ps + len(data) * self.byte_ps
 
 
+@dataclass
 class _RecordingBus:
-    def __init__(self, recorder: HostRecorder, bus: I2cBus) -> None:
-        self._recorder = recorder
-        self._bus = bus
+    recorder: HostRecorder
+    wrapped: I2cBus
 
     def i2c_rdwr(self, *messages: Any) -> None:
-        start_ps, errno = self._recorder.now_ps(), 0
+        start_ps, errno = self.recorder.now_ps(), 0
         try:
-            self._bus.i2c_rdwr(*messages)
+            self.wrapped.i2c_rdwr(*messages)
         except OSError as error:
             errno = error.errno or 0
             raise
         finally:
-            found = tuple(BusMessage(m.addr, bytes(m), bool(m.flags & I2C_M_RD)) for m in messages)
-            self._recorder.write(
-                BusTransfer(start_ps, "i2c", self._recorder.now_ps(), found, errno)
+            found = tuple(
+                recording.BusMessage(m.addr, bytes(m), bool(m.flags & I2C_M_RD)) for m in messages
+            )
+            self.recorder.write(
+                recording.BusTransfer(start_ps, "i2c", self.recorder.now_ps(), found, errno)
             )

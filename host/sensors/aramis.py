@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
-from cubestack.host.conformance.effects import check_camera_register, check_stream
-from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report, Shown
+from cubestack.host.conformance import effects
+from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report
 from cubestack.host.devices.lazily import call, get
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cubestack.host.clients.aramis.client import Aramis
 
 EXPERIMENTS = "cubestack.host.experiments.aramis"
+BOARD = "cubestack.emulator.boards.aramis"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 
@@ -42,18 +43,6 @@ def _load_scene(path: Path) -> SkyView:
     return load_scene(path, CONDITION)
 
 
-def _default_scene() -> Scene:
-    from cubestack.emulator.scene.sky import SkyScene
-
-    return SkyScene.pointing(*POINTING_DEG)
-
-
-def _prepare(shown: Shown) -> None:
-    from cubestack.emulator.boards.aramis.catalogue import onboard_database
-
-    onboard_database(progress=shown)
-
-
 DEVICE: Device[AramisBoard, Aramis] = Device(
     name="aramis",
     title="AraMiS",
@@ -62,7 +51,7 @@ DEVICE: Device[AramisBoard, Aramis] = Device(
     client=call("cubestack.host.clients.aramis.client:Aramis"),
     open_board=_open_board,
     load_scene=_load_scene,
-    default_scene=_default_scene,
+    default_scene=call("cubestack.emulator.scene.sky:SkyScene.pointing", *POINTING_DEG),
     default_scene_title="Orion",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
     reports=(
@@ -75,12 +64,12 @@ DEVICE: Device[AramisBoard, Aramis] = Device(
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     has_fpga=False,
-    prepare=_prepare,
+    prepare=lambda shown: call(f"{BOARD}.catalogue:onboard_database", progress=shown)(),
     conformance=ConformanceNotes(
         effects={
-            "StreamDownImage": partial(check_stream, picture_bytes=IMAGE_BYTES),
+            "StreamDownImage": partial(effects.check_stream, picture_bytes=IMAGE_BYTES),
             "WriteCameraRegister": partial(
-                check_camera_register, address=REGISTERS["SHUTTER_WIDTH"].address
+                effects.check_camera_register, address=REGISTERS["SHUTTER_WIDTH"].address
             ),
         },
         ended_by={"StartLoop": "StopLoop"},

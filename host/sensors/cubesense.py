@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 EXPERIMENTS = "cubestack.host.experiments.cubesense"
 
-SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
-
 
 def _open_board(
     scene: EarthSunScene | EarthSunView, *, baud: int | None = None, **common: Any
@@ -25,12 +23,6 @@ def _open_board(
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
     return CubeSenseBoard(scene, baud=baud or INTERFACE.baud, **common)
-
-
-def _default_scene() -> EarthSunScene:
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
-
-    return EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
 
 
 DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
@@ -41,7 +33,11 @@ DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
     client=call("cubestack.host.clients.cubesense.client:CubeSense"),
     open_board=_open_board,
     load_scene=call("cubestack.emulator.camera.ov7620.scene_file:load_earth_sun_scene"),
-    default_scene=_default_scene,
+    default_scene=call(
+        "cubestack.emulator.scene.earth_sun:EarthSunScene.facing",
+        sun_deg=(20.0, 10.0),
+        nadir_deg=(-8.0, 12.0),
+    ),
     default_scene_title="Earth and Sun",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
     reports=(

@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.conformance.effects import (
-    check_camera_register,
-    check_stream,
-    check_upload,
-    check_watchdog,
-)
+from cubestack.host.conformance import effects
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
 
@@ -114,11 +109,11 @@ DEVICE: Device[CubeStarBoard, CubeStar] = Device(
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     conformance=ConformanceNotes(
         effects={
-            "StreamDownImage": partial(check_stream, picture_bytes=IMAGE_BYTES),
-            "UploadBlock": check_upload,
-            "TestWDG": check_watchdog,
+            "StreamDownImage": partial(effects.check_stream, picture_bytes=IMAGE_BYTES),
+            "UploadBlock": effects.check_upload,
+            "TestWDG": effects.check_watchdog,
             "WriteCameraRegister": partial(
-                check_camera_register,
+                effects.check_camera_register,
                 address=REGISTERS["EXPOSURE"].address + 1,  # its lower byte
             ),
         },

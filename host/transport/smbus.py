@@ -20,24 +20,8 @@ from typing import Any, Protocol
 from smbus2 import SMBus
 from smbus2.smbus2 import I2cFunc
 
-from cubestack.firmware_model.formats.linux_i2c import (
-    LENGTH,
-    MAX_BLOCK_BYTES,
-    SMBUS_DATA_BYTES,
-    Call,
-    Ioctl,
-    MessageFlag,
-    RdwrMessage,
-    SmbusCall,
-    SmbusSize,
-    pack_ioctl,
-    pack_rdwr,
-    pack_smbus,
-    request,
-    socket_path,
-    split_rdwr,
-    split_reply,
-)
+from cubestack.firmware_model.formats import linux_i2c as linux
+from cubestack.firmware_model.formats.linux_i2c import Call, Ioctl, MessageFlag, SmbusSize
 from cubestack.host.errors import PortClosedError, PortOpenError
 
 READ, WRITE = 1, 0
@@ -159,11 +143,10 @@ class CubeSMBus(SMBus):
         self, i2c_addr: int, register: int, length: int, force: bool | None = None
     ) -> list[int]:
         """Read ``length`` bytes of a register, at most 32; ValueError for more."""
-        if length > MAX_BLOCK_BYTES:
-            raise ValueError(f"a block has at most {MAX_BLOCK_BYTES} bytes, not {length}")
-        size = SmbusSize.I2C_BLOCK_DATA
-        data = self._transact(i2c_addr, force, READ, register, size, bytes([length]))
-        return _block(data)
+        if length > linux.MAX_BLOCK_BYTES:
+            raise ValueError(f"a block has at most {linux.MAX_BLOCK_BYTES} bytes, not {length}")
+        size, count = SmbusSize.I2C_BLOCK_DATA, bytes([length])
+        return _block(self._transact(i2c_addr, force, READ, register, size, count))
 
     def write_i2c_block_data(
         self, i2c_addr: int, register: int, data: Sequence[int], force: bool | None = None
@@ -174,8 +157,8 @@ class CubeSMBus(SMBus):
     def i2c_rdwr(self, *i2c_msgs: Any) -> None:
         """One combined transfer of smbus2's ``i2c_msg``s, which take what is read."""
         messages = [_plain(message) for message in i2c_msgs]
-        data = self._call(Call.RDWR, pack_rdwr(messages))
-        for message, part in zip(i2c_msgs, split_rdwr(messages, data), strict=True):
+        data = self._call(Call.RDWR, linux.pack_rdwr(messages))
+        for message, part in zip(i2c_msgs, linux.split_rdwr(messages, data), strict=True):
             for index, byte in enumerate(part):
                 message.buf[index] = bytes([byte])
             if message.flags & MessageFlag.RECEIVE_LENGTH:
@@ -193,10 +176,9 @@ class CubeSMBus(SMBus):
         data: bytes = b"",
     ) -> bytes:
         self._set_address(address, force)
-        filled = data.ljust(SMBUS_DATA_BYTES, b"\0")
-        return self._call(
-            Call.SMBUS, pack_smbus(SmbusCall(direction, command & 0xFF, size, filled))
-        )
+        filled = data.ljust(linux.SMBUS_DATA_BYTES, b"\0")
+        call = linux.SmbusCall(direction, command & 0xFF, size, filled)
+        return self._call(Call.SMBUS, linux.pack_smbus(call))
 
     def _set_address(self, address: int, force: bool | None = None) -> None:
         force = self.force if force is None else force
@@ -210,7 +192,7 @@ class CubeSMBus(SMBus):
         return I2cFunc(value)
 
     def _ioctl(self, number: Ioctl, argument: int) -> bytes:
-        return self._call(Call.IOCTL, pack_ioctl(number, argument & 0xFFFF_FFFF_FFFF_FFFF))
+        return self._call(Call.IOCTL, linux.pack_ioctl(number, argument & 0xFFFF_FFFF_FFFF_FFFF))
 
     def _call(self, call: Call, body: bytes) -> bytes:
         if self._link is None:
@@ -239,11 +221,11 @@ class _SocketLink:
         return self._socket.fileno()
 
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        data = request(0, call, body)
+        data = linux.request(0, call, body)
         try:
-            self._socket.sendall(LENGTH.pack(len(data)) + data)
-            (length,) = LENGTH.unpack(self._receive(LENGTH.size))
-            return split_reply(self._receive(length))
+            self._socket.sendall(linux.LENGTH.pack(len(data)) + data)
+            (length,) = linux.LENGTH.unpack(self._receive(linux.LENGTH.size))
+            return linux.split_reply(self._receive(length))
         except OSError as error:
             raise PortClosedError("the emulation has gone") from error
 
@@ -268,15 +250,15 @@ def _find_socket(bus: int | str) -> Path:
     path = os.environ.get("CUBESTACK_I2C_SOCKET")
     if path and os.environ.get("CUBESTACK_I2C_BUS") == text:
         return Path(path)
-    return socket_path(int(text))
+    return linux.socket_path(int(text))
 
 
-def _plain(message: Any) -> RdwrMessage:
+def _plain(message: Any) -> linux.RdwrMessage:
     """A message of smbus2; of a read whose length comes from the device, the first byte counts."""
     content = bytes(message)
     if message.flags & MessageFlag.READ:
         content = content[:1] if message.flags & MessageFlag.RECEIVE_LENGTH else b""
-    return RdwrMessage(message.addr, message.flags, message.len, content)
+    return linux.RdwrMessage(message.addr, message.flags, message.len, content)
 
 
 def _bytes(word: int) -> bytes:
@@ -288,8 +270,8 @@ def _word(data: bytes) -> int:
 
 
 def _counted(data: Sequence[int]) -> bytes:
-    if len(data) > MAX_BLOCK_BYTES:
-        raise ValueError(f"a block has at most {MAX_BLOCK_BYTES} bytes, not {len(data)}")
+    if len(data) > linux.MAX_BLOCK_BYTES:
+        raise ValueError(f"a block has at most {linux.MAX_BLOCK_BYTES} bytes, not {len(data)}")
     return bytes([len(data), *data])
 
 

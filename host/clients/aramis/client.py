@@ -12,17 +12,8 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.firmware_model.interface.aramis import (
-    BLOCK_BYTES,
-    IMAGE_BYTES,
-    MS_PER_DAY,
-    CatalogueState,
-    LatchUpStep,
-    MeasurementMode,
-    MeasurementOutcome,
-    Reason,
-    SensorState,
-)
+from cubestack.firmware_model.interface import aramis
+from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, MS_PER_DAY, CatalogueState
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.clients.contract import DeviceClient, Progress
@@ -50,9 +41,9 @@ class Attitude:
 
     quaternion: NDArray[np.float64] | None
     valid: bool
-    outcome: MeasurementOutcome
-    reason: Reason
-    mode: MeasurementMode
+    outcome: aramis.MeasurementOutcome
+    reason: aramis.Reason
+    mode: aramis.MeasurementMode
     matched: int
     detected: int
     frame: int
@@ -94,8 +85,8 @@ class Aramis(DeviceClient):
         """
         self._perform("Activate")
         status = self.client.telemetry("SensorStatus")
-        state = SensorState(int(status["State"]))
-        if state is not SensorState.READY:
+        state = aramis.SensorState(int(status["State"]))
+        if state is not aramis.SensorState.READY:
             raise StepFailedError(f"the star tracker is not ready after Activate: {state.name}")
         return CatalogueState(int(status["Catalogue"]))
 
@@ -142,9 +133,9 @@ class Aramis(DeviceClient):
         return Attitude(
             quaternion=_quaternion(values),
             valid=bool(values["Valid"]),
-            outcome=MeasurementOutcome(int(values["Outcome"])),
-            reason=Reason(int(values["Reason"])),
-            mode=MeasurementMode(int(values["Mode"])),
+            outcome=aramis.MeasurementOutcome(int(values["Outcome"])),
+            reason=aramis.Reason(int(values["Reason"])),
+            mode=aramis.MeasurementMode(int(values["Mode"])),
             matched=int(values["Matched"]),
             detected=int(values["Detected"]),
             frame=int(values["FrameCounter"]),
@@ -163,9 +154,9 @@ class Aramis(DeviceClient):
 
     def latch_up_action(self, off_s: float = 0.1) -> None:
         """Turn the camera unit off, wait, and turn it on again."""
-        self._send("LatchUpAction", Step=LatchUpStep.OFF)
+        self._send("LatchUpAction", Step=aramis.LatchUpStep.OFF)
         self.client.pause(off_s)
-        self._perform("LatchUpAction", Step=LatchUpStep.ON)
+        self._perform("LatchUpAction", Step=aramis.LatchUpStep.ON)
 
     def load_catalogue(self, image: bytes, progress: Progress | None = None) -> CatalogueState:
         """Load a catalogue's ``image``, write it to flash and use it; returns its state.
@@ -220,7 +211,9 @@ class Aramis(DeviceClient):
         A lost block can not be asked for again: raises BadAnswerError or NoAnswerError then, and
         TypeError on I2C.
         """
-        data = self._stream("StreamDownImage", IMAGE_BYTES // BLOCK_BYTES, BLOCK_BYTES, progress)
+        data = self._stream(
+            "StreamDownImage", aramis.IMAGE_BYTES // BLOCK_BYTES, BLOCK_BYTES, progress
+        )
         return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
     def picture(self, source: str | None = None) -> NDArray[np.uint8]:

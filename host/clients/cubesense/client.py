@@ -7,38 +7,19 @@ first pixel.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.codec.field import Value
-from cubestack.firmware_model.interface.cubesense.codes import (
-    EDGES_PER_FRAME,
-    MASK_AREAS,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ImageLocation,
-    ImageSize,
-    ResetTarget,
-    Sram,
-    SramSelection,
-    split_coefficient,
-)
+from cubestack.firmware_model.interface.cubesense import codes
+from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
 from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.clients.cubesense.download import download_image, picture_of
-from cubestack.host.clients.cubesense.values import (
-    CameraSettings,
-    Mask,
-    Measurement,
-    Power,
-    direction,
-)
 from cubestack.host.errors import BadAnswerError, NoAnswerError
-
-__all__ = ["CameraSettings", "CubeSense", "Mask", "Measurement", "Power", "direction"]
 
 #: Time between two polls of a result.
 POLL_PERIOD_S = 0.04
@@ -48,6 +29,82 @@ CAPTURE_TIMEOUT_S = 1.0
 
 #: What a detection is given after its capture; assumed, a good ten times the published 245 ms.
 DETECT_TIMEOUT_S = 3.0
+
+
+def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:
+    """Unit vector (3,) in camera axes of a measurement's two angles.
+
+    Both are parts of the field angle: it is their root of squares, towards (alpha, beta).
+    """
+    theta = math.radians(math.hypot(alpha_deg, beta_deg))
+    phi = math.atan2(beta_deg, alpha_deg)
+    return np.array(
+        [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
+    )
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a camera measured.
+
+    Attributes:
+        camera: the camera.
+        alpha_deg, beta_deg: parts of the field angle along x and y; they count when ``detected``.
+        capture: what became of the capture.
+        detect: what became of the detection.
+    """
+
+    camera: Camera
+    alpha_deg: float
+    beta_deg: float
+    capture: CaptureResult
+    detect: codes.DetectResult
+
+    @property
+    def detected(self) -> bool:
+        """Whether the angles are a measurement."""
+        return self.detect is codes.DetectResult.SUCCESS
+
+    @property
+    def pending(self) -> bool:
+        """Whether the node still works on it."""
+        return self.capture is CaptureResult.PENDING or self.detect is codes.DetectResult.PENDING
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """Unit vector (3,) in camera axes."""
+        return direction(self.alpha_deg, self.beta_deg)
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """Exposure in units of two line times (127 us), gain, and gains of the two colours."""
+
+    exposure: int
+    gain: int = 0
+    blue_gain: int = 0x80
+    red_gain: int = 0x80
+
+
+@dataclass(frozen=True)
+class Mask:
+    """A rectangle of pixels, ends included."""
+
+    x_min: int
+    x_max: int
+    y_min: int
+    y_max: int
+
+
+@dataclass(frozen=True)
+class Power:
+    """Supply currents in mA, and whether each memory drew too much since its flag was cleared."""
+
+    current_3v3_ma: float
+    current_sram_ma: tuple[float, float]
+    current_5v_ma: float
+    over_current: tuple[bool, bool]
+
 
 #: What an area without a mask reads as.
 _NO_MASK = Mask(0, 0, 0, 0)
@@ -61,7 +118,7 @@ class CubeSense(DeviceClient):
     def picture(self, source: str | None = None) -> NDArray[np.uint8]:
         """The picture (480, 640) in memory ``source``; default: the Sun camera's, sram1."""
         sram = Sram[(source or Sram.SRAM1.name).upper()]
-        return picture_of(download_image(self.client, sram, ImageSize.SIDE_1024))
+        return picture_of(download_image(self.client, sram, codes.ImageSize.SIDE_1024))
 
     def capture_and_detect(self, camera: Camera, sram: Sram | None = None) -> Measurement:
         """Take a picture into ``sram`` (default: the camera's own) and measure in it.
@@ -75,7 +132,7 @@ class CubeSense(DeviceClient):
     def capture(self, camera: Camera, sram: Sram | None = None) -> CaptureResult:
         """Take a picture into ``sram`` (default: the camera's own); returns what became of it."""
         self.client.command(
-            "CaptureOnly", Camera=camera, Sram=_own(camera, sram), Location=ImageLocation.TOP
+            "CaptureOnly", Camera=camera, Sram=_own(camera, sram), Location=codes.ImageLocation.TOP
         )
         return self._wait_captured(camera).capture
 
@@ -136,7 +193,7 @@ class CubeSense(DeviceClient):
             raise ValueError(f"a distortion has {DISTORTION_TERMS} factors, not {len(factors)}")
         parameters: dict[str, int] = {}
         for power, factor in enumerate(factors):
-            mantissa, exponent = split_coefficient(factor)
+            mantissa, exponent = codes.split_coefficient(factor)
             parameters |= {f"Mantissa{power}": mantissa, f"Exponent{power}": exponent}
         self.client.command(f"Distortion{camera + 1}", **parameters)
 
@@ -157,7 +214,7 @@ class CubeSense(DeviceClient):
         values = self.client.telemetry(f"Masks{camera + 1}")
         areas = [
             Mask(*(int(values[f"{name}{area}"]) for name in ("XMin", "XMax", "YMin", "YMax")))
-            for area in range(1, MASK_AREAS + 1)
+            for area in range(1, codes.MASK_AREAS + 1)
         ]
         return [None if area == _NO_MASK else area for area in areas]
 
@@ -185,11 +242,11 @@ class CubeSense(DeviceClient):
             over_current=(bool(values["OverCurrent1"]), bool(values["OverCurrent2"])),
         )
 
-    def clear_over_current(self, selection: SramSelection = SramSelection.BOTH) -> None:
+    def clear_over_current(self, selection: codes.SramSelection = codes.SramSelection.BOTH) -> None:
         """Clear over-current flags, so that the node switches those memories on again."""
         self.client.command("ClearOverCurrent", Selection=selection)
 
-    def reset(self, target: ResetTarget) -> None:
+    def reset(self, target: codes.ResetTarget) -> None:
         """Restart a part of the node."""
         self.client.command("Reset", Target=target)
 
@@ -224,7 +281,7 @@ class CubeSense(DeviceClient):
         Raises BadAnswerError when there are more than both frames hold.
         """
         parts = [self.client.telemetry(f"NadirEdges{part}") for part in (1, 2)]
-        count, most = int(parts[0]["Count"]), len(parts) * EDGES_PER_FRAME
+        count, most = int(parts[0]["Count"]), len(parts) * codes.EDGES_PER_FRAME
         if count > most:
             raise BadAnswerError(f"telemetry NadirEdges1: {count} edges, where {most} have room")
         values = {name: value for part in parts for name, value in part.items()}
@@ -236,7 +293,7 @@ class CubeSense(DeviceClient):
         values = self.client.telemetry(message.name)
         try:
             capture = CaptureResult(int(values["Capture"]))
-            detect = DetectResult(int(values["Detect"]))
+            detect = codes.DetectResult(int(values["Detect"]))
         except ValueError as error:
             raise BadAnswerError(f"telemetry {message.name}: {error}") from None
         return Measurement(camera, float(values["Alpha"]), float(values["Beta"]), capture, detect)

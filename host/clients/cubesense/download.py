@@ -10,15 +10,8 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    FRAME_BYTES,
-    ROWS,
-    ImageLocation,
-    ImageSize,
-    Sram,
-    checksum,
-)
+from cubestack.firmware_model.interface.cubesense import codes
+from cubestack.firmware_model.interface.cubesense.codes import ImageSize, Sram
 from cubestack.host.clients.contract import Client, Progress
 from cubestack.host.errors import BadAnswerError, HostError, NoAnswerError
 
@@ -37,8 +30,8 @@ def download_image(
     ``picture_of`` cuts the picture out. Raises NoAnswerError when a frame is not ready in time,
     BadAnswerError when it comes damaged three times, and the errors of ``client``.
     """
-    client.command("StartImageDownload", Sram=sram, Location=ImageLocation.TOP, Size=size)
-    square = np.empty((size.frames, FRAME_BYTES), np.uint8)
+    client.command("StartImageDownload", Sram=sram, Location=codes.ImageLocation.TOP, Size=size)
+    square = np.empty((size.frames, codes.FRAME_BYTES), np.uint8)
     for number in range(size.frames):
         if number:
             _prepare(client, number)
@@ -55,7 +48,7 @@ def picture_of(square: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """
     for size in ImageSize:
         if square.shape == (size.side, size.side):
-            rows, columns = ROWS // size.step, COLUMNS // size.step
+            rows, columns = codes.ROWS // size.step, codes.COLUMNS // size.step
             return square[size.top : size.top + rows, size.left : size.left + columns]
     sides = ", ".join(str(size.side) for size in ImageSize)
     raise ValueError(f"a downloaded square has a side of {sides}, not the shape {square.shape}")
@@ -78,7 +71,7 @@ def _read(client: Client, number: int, sram: Sram) -> bytes:
     for _ in range(ATTEMPTS):
         frame = client.telemetry("ImageFrame")["Frame"]
         assert isinstance(frame, bytes)
-        found = checksum(frame)
+        found = codes.checksum(frame)
         if found == expected:
             return frame
     raise BadAnswerError(

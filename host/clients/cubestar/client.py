@@ -12,14 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.interface import cubestar
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
-from cubestack.firmware_model.interface.cubestar import (
-    IMAGE_BYTES,
-    UPLOAD_BLOCK_BYTES,
-    ImageBlockSize,
-    MatchMode,
-    TaskStatus,
-)
+from cubestack.firmware_model.interface.cubestar import ImageBlockSize, MatchMode, TaskStatus
 from cubestack.host.clients.contract import DeviceClient, Progress
 from cubestack.host.clients.quaternions import unit_quaternion
 from cubestack.host.errors import BadAnswerError, StepFailedError
@@ -135,7 +130,7 @@ class CubeStar(DeviceClient):
         again, which blocks of 256 bytes with their two reads would not allow.
         """
         size = ImageBlockSize.BYTES_128
-        image = np.empty((IMAGE_BYTES // size.length, size.length), np.uint8)
+        image = np.empty((cubestar.IMAGE_BYTES // size.length, size.length), np.uint8)
         for number in range(len(image)):
             self._perform("ImageBlockSet", BlockNumber=number, BlockSize=size)
             block = self.client.telemetry("ImageBlock")["Block"]
@@ -152,7 +147,7 @@ class CubeStar(DeviceClient):
         TypeError on I2C.
         """
         length = ImageBlockSize.BYTES_128.length
-        data = self._stream("StreamDownImage", IMAGE_BYTES // length, length, progress)
+        data = self._stream("StreamDownImage", cubestar.IMAGE_BYTES // length, length, progress)
         return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
     def upload_image(self, image: NDArray[np.uint8], progress: Progress | None = None) -> None:
@@ -166,7 +161,7 @@ class CubeStar(DeviceClient):
                 f"an uploaded picture is uint8 {(ROWS, COLUMNS)}, not {image.dtype} {image.shape}"
             )
         self._perform("UploadImage")
-        blocks = image.reshape(-1, UPLOAD_BLOCK_BYTES)
+        blocks = image.reshape(-1, cubestar.UPLOAD_BLOCK_BYTES)
         lit = np.flatnonzero(blocks.any(axis=1))
         for done, number in enumerate(lit, start=1):
             self._send("UploadBlock", BlockNumber=int(number), Data=blocks[number].tobytes())

@@ -27,23 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.aramis import OnOff, SpikeMethod
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    COLUMNS,
-    FRAME_END_CLOCKS,
-    FRAME_START_CLOCKS,
-    PIXEL_CLOCK_HZ,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.devices.emulated import EmulatedDevice
-from cubestack.host.experiments.attitude import (
-    AttitudeExperiment,
-    AttitudeResult,
-    SkyOptions,
-    compare,
-    count_wrong,
-    random_view,
-    rough_boresight,
-)
+from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
 
@@ -57,7 +44,8 @@ FIELD_DEG = 21.53463888888889
 """Of the published simulations; the lens that was expected to be built has 18."""
 
 NOISE_TERMS = ("shot", "dark", "background", "quantisation", "readout")
-ROW_S = (COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS) / PIXEL_CLOCK_HZ
+ROW_CLOCKS = mt9m001.COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
+ROW_S = ROW_CLOCKS / mt9m001.PIXEL_CLOCK_HZ
 PHASE_S = 0.2
 """Measurements start at a random time within so long after each other."""
 
@@ -73,7 +61,7 @@ MAGNITUDES = Kind(
 
 
 @dataclass(frozen=True, kw_only=True)
-class AramisOptions(SkyOptions):
+class AramisOptions(attitudes.SkyOptions):
     """Options of `cubestack measure aramis`."""
 
     mode: str = option(
@@ -135,7 +123,7 @@ _KEYS = (
 
 
 @dataclass(frozen=True)
-class AramisResult(AttitudeResult):
+class AramisResult(attitudes.AttitudeResult):
     """Attributes are those of the JSON output.
 
     Attributes:
@@ -165,7 +153,7 @@ class AramisResult(AttitudeResult):
         return {key: getattr(self, key) for key in _KEYS}
 
 
-class _Experiment(AttitudeExperiment["_Opener", AramisOptions, AramisResult]):
+class _Experiment(attitudes.AttitudeExperiment["_Opener", AramisOptions, AramisResult]):
     options = AramisOptions
     description = __doc__
 
@@ -216,7 +204,9 @@ def _view(options: AramisOptions, condition: SkyCondition, rng: np.random.Genera
         return SkyView(PictureScene(options.image, crop=options.crop), condition)
     along = rng.random() * 2 * np.pi
     rate = (options.rate * np.cos(along), options.rate * np.sin(along), options.roll_rate)
-    return random_view(options, condition, rng, rate_deg_s=rate, false_star_mag=options.false_mags)
+    return attitudes.random_view(
+        options, condition, rng, rate_deg_s=rate, false_star_mag=options.false_mags
+    )
 
 
 def _configure(aramis: Aramis, options: AramisOptions) -> None:
@@ -252,14 +242,14 @@ def _measure(
         known = emulated.scene.truth(board.kernel.now)
         if known is None:
             raise ValueError("--mode assisted needs a scene whose attitude is known")
-        hint = rough_boresight(known, options.hint_error, rng)
+        hint = attitudes.rough_boresight(known, options.hint_error, rng)
     found = aramis.measure(hint)
     truth = board.truth(found.frame)
     summary = client.telemetry("IdentificationSummary")
     catalogue = client.telemetry("CatalogueStatus")
     flags = client.telemetry("ErrorFlags")
     return AramisResult(
-        **compare(found.quaternion if found.valid else None, truth),
+        **attitudes.compare(found.quaternion if found.valid else None, truth),
         outcome=found.outcome.name.lower(),
         reason=found.reason.name.lower(),
         centroids=found.detected,
@@ -291,7 +281,7 @@ def _count_wrong(
     named = [star for star in emulated.client.stars() if star.hipparcos is not None]
     places = np.array([[star.x_px, star.y_px] for star in named]).reshape(-1, 2)
     hipparcos = [star.hipparcos or 0 for star in named]
-    return count_wrong(hipparcos, camera.condition.optics.unproject(places), truth)
+    return attitudes.count_wrong(hipparcos, camera.condition.optics.unproject(places), truth)
 
 
 EXPERIMENT = _Experiment()

@@ -15,19 +15,15 @@ if TYPE_CHECKING:
 
 
 def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:
-    from cubestack.emulator.boards.cubesense.benchmark import (
-        STORES,
-        pair_scan_ms,
-        pair_store_ms,
-        pair_with_cameras,
-    )
+    from cubestack.emulator.boards.cubesense import benchmark
     from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
     from cubestack.emulator.rtl.benchmark import cold_build_s
 
     figures = {"sensors_ratio": _loop_ratio(device)}
-    for way in STORES:
-        figures[f"pair_{way}_ms"] = round(pair_store_ms(pair_with_cameras(), way), 1)
-    figures["pair_scan_ms"] = round(pair_scan_ms(pair_with_cameras()), 1)
+    for way in benchmark.STORES:
+        stored_ms = benchmark.pair_store_ms(benchmark.pair_with_cameras(), way)
+        figures[f"pair_{way}_ms"] = round(stored_ms, 1)
+    figures["pair_scan_ms"] = round(benchmark.pair_scan_ms(benchmark.pair_with_cameras()), 1)
     figures["pair_build_s"] = round(cold_build_s(cubesense_wiring()), 1)
     return figures
 

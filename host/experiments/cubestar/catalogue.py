@@ -28,15 +28,11 @@ class _Catalogue(Lookup[CatalogueOptions]):
     description = __doc__
 
     def look_up(self, options: CatalogueOptions, shown: Shown) -> dict[str, Any]:
-        from cubestack.emulator.boards.cubestar.catalogue import (
-            MAG_LIMIT,
-            PAIR_LIMIT_DEG,
-            onboard_catalogue,
-        )
+        from cubestack.emulator.boards.cubestar import catalogue as flown
 
-        mag_limit = MAG_LIMIT if options.mag_limit is None else options.mag_limit
-        pair_limit = PAIR_LIMIT_DEG if options.pair_limit is None else options.pair_limit
-        catalogue = onboard_catalogue(mag_limit, pair_limit, options.epoch)
+        mag_limit = flown.MAG_LIMIT if options.mag_limit is None else options.mag_limit
+        pair_limit = flown.PAIR_LIMIT_DEG if options.pair_limit is None else options.pair_limit
+        catalogue = flown.onboard_catalogue(mag_limit, pair_limit, options.epoch)
         return {
             "mag_limit": mag_limit,
             "pair_limit_deg": pair_limit,

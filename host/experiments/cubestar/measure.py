@@ -34,15 +34,7 @@ from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.errors import CameraFileError
-from cubestack.host.experiments.attitude import (
-    AttitudeExperiment,
-    AttitudeResult,
-    SkyOptions,
-    compare,
-    count_wrong,
-    random_view,
-    rough_boresight,
-)
+from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, PATH, option
 
@@ -63,7 +55,7 @@ UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class CubeStarOptions(SkyOptions):
+class CubeStarOptions(attitudes.SkyOptions):
     """Options of `cubestack measure cubestar`."""
 
     mode: str = option(
@@ -98,11 +90,13 @@ class CubeStarOptions(SkyOptions):
             )
 
 
-class _Experiment(AttitudeExperiment["_Opener", CubeStarOptions, AttitudeResult]):
+class _Experiment(
+    attitudes.AttitudeExperiment["_Opener", CubeStarOptions, attitudes.AttitudeResult]
+):
     options = CubeStarOptions
     description = __doc__
 
-    def run(self, opened: _Opener, options: CubeStarOptions) -> Iterator[AttitudeResult]:
+    def run(self, opened: _Opener, options: CubeStarOptions) -> Iterator[attitudes.AttitudeResult]:
         from cubestack.emulator.camera.mlx75412.lens import CONDITION
         from cubestack.emulator.scene.sky import PictureScene
 
@@ -115,7 +109,7 @@ class _Experiment(AttitudeExperiment["_Opener", CubeStarOptions, AttitudeResult]
             scene = PictureScene(options.image, crop=options.crop)
             picture_truth = _picture_truth(options.image, options.camera)
         elif options.is_random:
-            scene = random_view(options, CONDITION, rng)
+            scene = attitudes.random_view(options, CONDITION, rng)
         with opened(scene, seed=options.seed, faults=options.faults) as emulated:
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
@@ -123,7 +117,7 @@ class _Experiment(AttitudeExperiment["_Opener", CubeStarOptions, AttitudeResult]
                 find_threshold(emulated.client)
             for number in range(options.frames):
                 if number and options.is_random:
-                    emulated.scene = random_view(options, CONDITION, rng)
+                    emulated.scene = attitudes.random_view(options, CONDITION, rng)
                 yield _measure(emulated, options, picture_truth, rng)
 
 
@@ -147,7 +141,7 @@ def _measure(
     options: CubeStarOptions,
     picture_truth: NDArray[np.float64] | None,
     rng: np.random.Generator,
-) -> AttitudeResult:
+) -> attitudes.AttitudeResult:
     started = time.perf_counter()
     cubestar, client = emulated.client, emulated.client.client
     client.command("ClearErrorFlags")
@@ -161,7 +155,9 @@ def _measure(
             raise ValueError(f"--mode {options.mode} needs a scene whose attitude is known")
         client.command("setIDMode", IdMode=IdMode.TRACKING)
         tracking = options.mode == "tracking"
-        give_hint(cubestar, rough_boresight(known, 0.0 if tracking else options.hint_error, rng))
+        give_hint(
+            cubestar, attitudes.rough_boresight(known, 0.0 if tracking else options.hint_error, rng)
+        )
         if tracking:
             _prime_tracking(emulated, scene, options.hint_error, rng)
     status = cubestar.capture_and_process()
@@ -174,8 +170,8 @@ def _measure(
     phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
     # The flags say why a task ended as its status tells.
     flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]
-    return AttitudeResult(
-        **compare(attitude.quaternion if solved else None, known),
+    return attitudes.AttitudeResult(
+        **attitudes.compare(attitude.quaternion if solved else None, known),
         centroids=centroids,
         matched=attitude.matched if solved else 0,
         wrong=wrong,
@@ -226,7 +222,7 @@ def _count_wrong(cubestar: CubeStar, truth: NDArray[np.float64] | None) -> int |
     for _ in range(count):
         record = client.telemetry("BodyUnitVectors")
         vectors[int(record["StarNumber"])] = [record[f"Vb{axis}"] for axis in "XYZ"]
-    return count_wrong(list(stars.values()), [vectors[number] for number in stars], truth)
+    return attitudes.count_wrong(list(stars.values()), [vectors[number] for number in stars], truth)
 
 
 EXPERIMENT = _Experiment()
