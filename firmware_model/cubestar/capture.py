@@ -5,9 +5,11 @@ fpgaWriteToRam and imageTransfer. The previous image is processed while the FPGA
 frame (section 5.3.6).
 """
 
+from dataclasses import dataclass
+
+from cubestack.firmware_model.cubestar import phases
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
-from cubestack.firmware_model.cubestar.phases import Phases
-from cubestack.firmware_model.cubestar.pictures.contract import Pictures
+from cubestack.firmware_model.cubestar.pictures import Pictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
@@ -20,23 +22,14 @@ ACK_TIMEOUT_US = 2_000_000
 """More than two frames at the lowest frame rate; the sources give no limit."""
 
 
+@dataclass(eq=False)
 class ImageCapture:
-    """The capture functions.
+    """The capture functions, as the settings in ``state`` say."""
 
-    Attributes:
-        sensor: the image sensor.
-        pictures: where the newest picture lies.
-    """
-
-    def __init__(
-        self, state: State, phases: Phases, supply: SupplyMonitor, pictures: Pictures
-    ) -> None:
-        """Capture into ``pictures`` as the settings in ``state`` say."""
-        self._state = state
-        self._phases = phases
-        self._supply = supply
-        self.sensor = ImageSensor(state, phases)
-        self.pictures = pictures
+    state: State
+    supply: SupplyMonitor
+    sensor: ImageSensor
+    pictures: Pictures
 
     def get_image(self, meanwhile: Routine[bool] | None = None) -> Routine[bool]:
         """Capture a picture; False, with a flag raised, when it failed.
@@ -44,7 +37,7 @@ class ImageCapture:
         ``meanwhile`` runs while the FPGA waits for the frame, or at once when there will be none.
         After a failure there is no picture to process.
         """
-        state = self._state
+        state = self.state
         state.task_status = TaskStatus.CAPTURING
         failure = yield from self._enable_sensor()
         if failure is None:
@@ -52,8 +45,10 @@ class ImageCapture:
         elif meanwhile is not None:
             yield from meanwhile
         if failure is None:
-            yield from self._image_transfer()
-            if self._supply.cut:  # while the picture was on its way
+            started_us: int = yield ReadTimer()
+            if (yield from self.pictures.fetch()):
+                yield from phases.end(self.state, "transfer_us", started_us)
+            if self.supply.cut:  # while the picture was on its way
                 failure = "ImageCaptureError"
         if failure is not None:
             state.raise_flag(failure)
@@ -69,9 +64,9 @@ class ImageCapture:
     def replaced(self) -> Routine[None]:
         """The picture was made by other means than a capture."""
         now_us: int = yield ReadTimer()
-        self._state.retained.image_ms = now_us // 1000
-        self._state.retained.image_present = 1
-        self._state.retained.frame += 1
+        self.state.retained.image_ms = now_us // 1000
+        self.state.retained.image_present = 1
+        self.state.retained.frame += 1
 
     def _enable_sensor(self) -> Routine[str | None]:
         """Start the sensor and let its first, invalid frame pass; returns a failure's flag."""
@@ -80,11 +75,11 @@ class ImageCapture:
             return failure
         if not (yield from self.sensor.enable(True)):
             return "ISEnableError"
-        self._phases.begin_capture()
+        phases.begin_capture(self.state)
         enabled_us: int = yield ReadTimer()
-        delay_us = 1000 * self._state.settings.get("SetDiscardDelay", "Delay")
-        yield Sleep(enabled_us + delay_us, wakeable=False)
-        yield from self._phases.end("discard_us", enabled_us)
+        delay_ms = self.state.settings.get("SetDiscardDelay", "Delay")
+        yield Sleep(enabled_us + 1000 * delay_ms, wakeable=False)
+        yield from phases.end(self.state, "discard_us", enabled_us)
         return None
 
     def _store_frame(self, meanwhile: Routine[bool] | None) -> Routine[str | None]:
@@ -95,22 +90,16 @@ class ImageCapture:
         """
         started_us: int = yield ReadTimer()
         yield from self.pictures.begin()
-        self._supply.sample()
+        self.supply.sample()
         if meanwhile is not None:
             yield from meanwhile
-        acknowledge = self.pictures.acknowledge
-        stored: bool = yield AwaitPin(acknowledge, 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
+        pin = self.pictures.acknowledge
+        stored: bool = yield AwaitPin(pin, 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
         yield from self.pictures.end(stored)
-        yield from self._phases.end("capture_us", started_us)
+        yield from phases.end(self.state, "capture_us", started_us)
         ended_us: int = yield ReadTimer()
-        self._state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
+        self.state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
         if not (yield from self.sensor.enable(False)):
-            self._state.raise_flag("ISDisableError")  # the picture is good all the same
+            self.state.raise_flag("ISDisableError")  # the picture is good all the same
             self.sensor.forget_set_up()
         return None if stored else "ImageCaptureError"
-
-    def _image_transfer(self) -> Routine[None]:
-        """Copy the frame to where the program works on it (imageTransfer)."""
-        started_us: int = yield ReadTimer()
-        if (yield from self.pictures.fetch()):
-            yield from self._phases.end("transfer_us", started_us)

@@ -46,21 +46,6 @@ class PairList:
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedCatalogue:
-    """The part of a catalogue near one direction, as assisted matching and tracking use it.
-
-    Attributes:
-        stars: (k,) indices into the full star list, rising.
-        pairs: pairs with both stars among them; indices still count in the full list.
-        radius_deg: radius of the cut.
-    """
-
-    stars: NDArray[np.uint16]
-    pairs: PairList
-    radius_deg: float
-
-
-@dataclass(frozen=True, eq=False)
 class StarCatalogue:
     """Star list and pair list for one magnitude limit, pair limit and epoch.
 
@@ -181,8 +166,8 @@ class StarCatalogue:
 
     def reduced(
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter
-    ) -> ReducedCatalogue:
-        """Cut both lists to the stars within `radius_deg` of a unit vector (3,).
+    ) -> tuple[NDArray[np.uint16], PairList]:
+        """The stars within `radius_deg` of a unit vector (3,), as `near` gives them; their pairs.
 
         One pass over the star list marks the stars, one over the pair list copies the pairs of
         marked stars to RAM, still sorted (CubeStar thesis, section 4.3.4).
@@ -201,7 +186,7 @@ class StarCatalogue:
             ram_write=3 * copies,
         )
         pairs = PairList(self.pairs.first[kept], self.pairs.second[kept], self.pairs.angle[kept])
-        return ReducedCatalogue(stars, pairs, radius_deg)
+        return stars, pairs
 
 
 def _companions(vectors: NDArray[np.float64], v_mag: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -3,16 +3,12 @@
 CubeStar thesis, appendix D; register names and addresses are those of the sensor's own table.
 """
 
-from cubestack.firmware_model.cubestar.phases import Phases
+from dataclasses import dataclass
+
+from cubestack.firmware_model.cubestar import phases
 from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.interface.cameras.mlx75412 import (
-    CRYSTAL_HZ,
-    LINE_CLOCKS,
-    LONGEST_EXPOSURE,
-    REGISTERS,
-    ROWS,
-    SYNC_APPLY,
-)
+from cubestack.firmware_model.interface.cameras import mlx75412
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, pause
 
 SETTLE_US = 2_000
@@ -36,23 +32,22 @@ _ALL_BUT_SHARPENING = _bits(
 _AUTOVIEW_ONLY = _bits("FIRMWARE_FEATURES", AUTOVIEW=1)
 
 
+@dataclass(eq=False)
 class ImageSensor:
     """Register access over the camera's own control bus.
 
     Attributes:
+        state: its settings say how to set the sensor up.
         selected_register: address and value of the register read last; None: no answer.
     """
 
-    def __init__(self, state: State, phases: Phases) -> None:
-        """Set the sensor up as the settings in ``state`` say."""
-        self._state = state
-        self._phases = phases
-        self.selected_register: tuple[int, int | None] = (0, None)
+    state: State
+    selected_register: tuple[int, int | None] = (0, None)
 
     def power_up(self) -> Routine[None]:
         """Wait after power-up; the registers are at their reset values."""
         yield from pause(SETTLE_US)
-        self._state.retained.camera_setup = 0
+        self.state.retained.camera_setup = 0
 
     def forget_set_up(self) -> None:
         """Something failed, so the sensor may have lost its supply: set it up again.
@@ -60,11 +55,11 @@ class ImageSensor:
         Appendix D sets the registers up before pictures, and the software reset of section 5.3.6
         leaves the published program no memory of having done so.
         """
-        self._state.retained.camera_setup = 0
+        self.state.retained.camera_setup = 0
 
     def configure(self) -> Routine[str | None]:
         """Set up for stars, unless that is done already; the flag of an unanswered write."""
-        retained, settings = self._state.retained, self._state.settings
+        retained, settings = self.state.retained, self.state.settings
         rate = settings.get("SetFrameRate", "FrameRate")
         exposure = settings.get("Exposure", "exposure")
         wanted = rate << 16 | exposure
@@ -80,9 +75,9 @@ class ImageSensor:
             "FIRMWARE_FEATURES": _AUTOVIEW_ONLY,
         }
         exposing = {
-            "EXPOSURE_RULE": 0 if exposure else LONGEST_EXPOSURE,
+            "EXPOSURE_RULE": 0 if exposure else mlx75412.LONGEST_EXPOSURE,
             "EXPOSURE": exposure,
-            "SYNC": SYNC_APPLY,
+            "SYNC": mlx75412.SYNC_APPLY,
         }
         started_us: int = yield ReadTimer()
         if not (yield from self._write_all(set_up)):
@@ -90,8 +85,8 @@ class ImageSensor:
         exposing_us: int = yield ReadTimer()
         if not (yield from self._write_all(exposing)):
             return failure
-        yield from self._phases.end("exposure_setup_us", exposing_us)
-        yield from self._phases.end("camera_setup_us", started_us)
+        yield from phases.end(self.state, "exposure_setup_us", exposing_us)
+        yield from phases.end(self.state, "camera_setup_us", started_us)
         retained.camera_setup = wanted
         return None
 
@@ -115,7 +110,7 @@ class ImageSensor:
         The next capture sets the sensor up again only when a setting changed.
         """
         if not (yield from self._transfer(address, bytes([value]))):
-            self._state.raise_flag("ConfigChangeError")
+            self.state.raise_flag("ConfigChangeError")
 
     def _transfer(self, address: int, data: bytes) -> Routine[bool]:
         head = address.to_bytes(REGISTERS.address_bytes, "big")
@@ -127,15 +122,16 @@ class ImageSensor:
         answer: bytes | None = yield CameraTransfer(head, read=1)
         self.selected_register = (address, None if answer is None else answer[0])
         if answer is None:
-            self._state.raise_flag("ISSetupError")
+            self.state.raise_flag("ISSetupError")
 
     def age_at_frame_end_us(self) -> int:
         """From the mid-exposure of the middle row to the end of a frame's read-out, in us.
 
         The sensor shortens an exposure that does not fit the frame.
         """
-        rate = self._state.settings.get("SetFrameRate", "FrameRate")
-        exposure = self._state.settings.get("Exposure", "exposure")
-        longest = round(REGISTERS["CLOCKS_PER_SECOND"].reset / (rate * LINE_CLOCKS)) - 1
-        lines = ROWS / 2 + min(exposure or longest, longest) / 2
-        return int(lines * LINE_CLOCKS * 1_000_000 / CRYSTAL_HZ)
+        rate = self.state.settings.get("SetFrameRate", "FrameRate")
+        exposure = self.state.settings.get("Exposure", "exposure")
+        line = mlx75412.LINE_CLOCKS
+        longest = round(REGISTERS["CLOCKS_PER_SECOND"].reset / (rate * line)) - 1
+        lines = mlx75412.ROWS / 2 + min(exposure or longest, longest) / 2
+        return int(lines * line * 1_000_000 / mlx75412.CRYSTAL_HZ)

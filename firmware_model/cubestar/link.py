@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
@@ -30,14 +29,12 @@ class CubeStarLink(QueueingLink):
     """Decodes what the host sends and answers it."""
 
     def __init__(
-        self,
-        hardware: CubeStarHardware,
-        meter: Meter,
-        state: State,
-        telemetry: Callable[[Message], dict[str, Any] | None],
+        self, meter: Meter, state: State, telemetry: Callable[[Message], dict[str, Any] | None]
     ) -> None:
         """Serve; ``telemetry`` gives a message's values, or None when it is not supported."""
-        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry)
+        super().__init__(
+            state.hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry
+        )
         self._state = state
 
     @property

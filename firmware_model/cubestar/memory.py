@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
-from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
+from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
@@ -102,7 +102,7 @@ def _largest_reduction(catalogue: StarCatalogue) -> int:
     """Pairs that the reduced catalogue holds where it holds most, of evenly spread directions."""
     meter = Meter(CORTEX_M3)
     return max(
-        len(catalogue.reduced(direction, CUT_RADIUS_DEG, meter).pairs)
+        len(catalogue.reduced(direction, CUT_RADIUS_DEG, meter)[1])
         for direction in _even_directions(DIRECTIONS)
     )
 

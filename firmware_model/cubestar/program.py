@@ -7,13 +7,14 @@ Assumed: the reset waits until shortly before the next iteration, so that result
 then, and leaves out a turn when the host is in the middle of a message.
 """
 
+from cubestack.firmware_model.cubestar import phases
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.link import CubeStarLink
-from cubestack.firmware_model.cubestar.phases import Phases
-from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
+from cubestack.firmware_model.cubestar.pictures import pictures_of
 from cubestack.firmware_model.cubestar.processing import Processing
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
@@ -48,43 +49,33 @@ class CubeStarProgram:
         layout: Layout = Layout.COPIED,
     ) -> None:
         """Reset: set up RAM from the retention registers and flash."""
-        self._hardware = hardware
         self.state = state = State(hardware)
-        self._phases = Phases(state)
-        self.supply = SupplyMonitor(hardware, state)
-        self._pictures = pictures_of(layout, hardware, state, meter, self.supply)
-        self._capture = ImageCapture(state, self._phases, self.supply, self._pictures)
-        self._processing = Processing(meter, state, self._capture, self._phases, catalogue)
-        self.commands = Commands(
-            hardware, meter, state, self._capture, self._processing, self.supply
-        )
-        telemetry = Telemetry(
-            hardware,
-            meter,
-            state,
-            self._capture,
-            self._processing,
-            self.supply,
-            self.commands,
-            lambda: bool(self.link.queue),
-        )
-        self.link = CubeStarLink(hardware, meter, state, telemetry.values)
+        self.supply = SupplyMonitor(state)
+        self._pictures = pictures_of(layout, state, meter, self.supply)
+        self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)
+        self._processing = Processing(meter, state, self._capture, catalogue)
+        self.commands = Commands(self._processing)
+        telemetry = Telemetry(self.commands, lambda: bool(self.link.queue))
+        self.link = CubeStarLink(meter, state, telemetry.values)
         if hardware.reset_cause == ResetCause.WATCHDOG:
             state.retained.watchdog_resets += 1
 
     def main(self) -> Routine[None]:
         """Run until a reset."""
-        yield from self._phases.started()
+        yield from phases.started(self.state)
         yield from self._pictures.start()
         retained = self.state.retained
-        if self._hardware.reset_cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
+        if (
+            self.state.hardware.reset_cause != ResetCause.SYSTEM_REQUEST
+            or not retained.camera_setup
+        ):
             yield from self._capture.sensor.power_up()
         while True:
             served = yield from self._serve()
             if retained.looping:
                 yield from self._iteration()
             elif not served:
-                yield from self._phases.idle(None)
+                yield from phases.idle(self.state, None)
 
     def _serve(self) -> Routine[bool]:
         """Restore a supply and execute a telecommand, if any waits; False when none does."""
@@ -120,12 +111,10 @@ class CubeStarProgram:
         if self._pictures.while_storing:
             previous = self._processing.process() if retained.image_present else None
             yield from self._capture.get_image(meanwhile=previous)
-        elif (yield from self._capture.get_image()):
-            yield from self._processing.process()
         else:
-            self._processing.discard_results()
+            yield from self._processing.capture_and_process()
         retained.iterations += 1
-        yield from self._phases.end("loop_us", started_us)
+        yield from phases.end(self.state, "loop_us", started_us)
         retained.longest_loop_us = max(retained.longest_loop_us, retained.loop_us)
 
         yield from self._wait_until(retained.loop_due_us - RESET_LEAD_US)
@@ -144,4 +133,4 @@ class CubeStarProgram:
             if now_us >= due_us and not self.link.queue:
                 return
             if not served:
-                yield from self._phases.idle(due_us)
+                yield from phases.idle(self.state, due_us)

@@ -3,7 +3,7 @@
 CubeStar thesis, sections 5.3.4 to 5.3.6: the software reset that ends every iteration clears the
 RAM; only the newest image and the newest good attitude survive, the attitude and the mode flag in
 flash. Settings, flags and counters are kept as well (an extension); they live in the retention
-registers.
+registers (appendix E: "retention registers in backup power domain").
 
 A page of this part's flash stands 20 000 erasures. The published firmware writes the attitude each
 second, which erases a page of 4 kB that often if each write takes a whole page: 5.6 hours. The
@@ -17,11 +17,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS, SETTINGS_BYTES
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskStatus
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
+
+#: Telecommands whose parameters are kept.
+SETTING_COMMANDS = (
+    "setDelayTimerTimeout",
+    "Exposure",
+    "setFocalLength",
+    "setFocalLengthComponents",
+    "setPrincipalPoint",
+    "setRadialDistortionGains",
+    "setTangentalDistortionGains",
+    "ImageBlockSet",
+    "setDetectionRegion",
+    "setDetectionThresholds",
+    "setStarPixels",
+    "setDetectionVariables",
+    "setIDMode",
+    "setTrackingMode",
+    "setIDMargin",
+    "SelectImageBank",
+    "SetFrameRate",
+    "SetDiscardDelay",
+    "SetCameraRegisterPage",
+)
+
+_SETTINGS_BYTES = sum(INTERFACE.telecommand(name).length for name in SETTING_COMMANDS)
 
 CONFIG_PAGE = "config"
 ATTITUDE_PAGE = "attitude"
@@ -112,6 +136,7 @@ class State(NodeState):
     """RAM of the program, restored from the retention registers at boot.
 
     Attributes:
+        hardware: what the program runs on.
         settings: parameters of the setting telecommands.
         retained: counters that survive resets.
         task_status: value of telemetry TaskStatus.
@@ -122,11 +147,11 @@ class State(NodeState):
     _COUNTERS = struct.Struct(f"<{len(fields(Retained))}Q")
 
     #: Retention registers in use, in bytes.
-    RETENTION_SIZE = len(_MAGIC) + SETTINGS_BYTES + _FLAGS.length + _COUNTERS.size
+    RETENTION_SIZE = len(_MAGIC) + _SETTINGS_BYTES + _FLAGS.length + _COUNTERS.size
 
     def __init__(self, hardware: CubeStarHardware) -> None:
         """Restore from ``hardware``: retention registers, else the configuration in flash."""
-        self._hardware = hardware
+        self.hardware = hardware
         super().__init__(field.name for field in _FLAGS.fields)
         self.settings = Settings(INTERFACE, SETTING_COMMANDS)
         self.retained = Retained()
@@ -134,16 +159,13 @@ class State(NodeState):
         self.startup_us = 0
         magic = len(self._MAGIC)
         if hardware.retention[:magic] == self._MAGIC:
-            self._restore(bytes(hardware.retention[magic : self.RETENTION_SIZE]))
+            data = bytes(hardware.retention[magic : self.RETENTION_SIZE])
+            self.settings.unpack(data[:_SETTINGS_BYTES])
+            flags = _FLAGS.unpack(data[_SETTINGS_BYTES : -self._COUNTERS.size])
+            self.flags = {name for name, raised in flags.items() if raised}
+            self.retained = Retained(*self._COUNTERS.unpack(data[-self._COUNTERS.size :]))
         else:
             self.load_config()
-
-    def _restore(self, data: bytes) -> None:
-        self.settings.unpack(data[:SETTINGS_BYTES])
-        data = data[SETTINGS_BYTES:]
-        flags = _FLAGS.unpack(data[: _FLAGS.length])
-        self.flags = {name for name, raised in flags.items() if raised}
-        self.retained = Retained(*self._COUNTERS.unpack(data[_FLAGS.length :]))
 
     def retain(self) -> None:
         """Write the retention registers, at the instant of a reset.
@@ -153,7 +175,7 @@ class State(NodeState):
         """
         counters = [getattr(self.retained, field.name) & _U64 for field in fields(Retained)]
         data = self._MAGIC + self.settings.pack() + _FLAGS.pack(**self.flag_values())
-        self._hardware.retention[: self.RETENTION_SIZE] = data + self._COUNTERS.pack(*counters)
+        self.hardware.retention[: self.RETENTION_SIZE] = data + self._COUNTERS.pack(*counters)
 
     def forget(self) -> None:
         """Return to the values after power-up; supplies that were cut are still to be restored."""
@@ -164,31 +186,31 @@ class State(NodeState):
     @property
     def mode(self) -> MatchMode:
         """The firmware's mode flag, in flash; lost in space when it was never written."""
-        page = self._hardware.flash.read(MODE_PAGE)
+        page = self.hardware.flash.read(MODE_PAGE)
         return MatchMode.LOST_IN_SPACE if page is None else MatchMode(page[0])
 
     @mode.setter
     def mode(self, mode: MatchMode) -> None:
         if mode != self.mode:
-            self._hardware.flash.write(MODE_PAGE, bytes([mode]))
+            self.hardware.flash.write(MODE_PAGE, bytes([mode]))
 
     @property
     def attitude(self) -> Attitude | None:
         """The latest good attitude, in flash; each new one is a write."""
-        page = self._hardware.flash.read(ATTITUDE_PAGE)
+        page = self.hardware.flash.read(ATTITUDE_PAGE)
         return None if page is None else Attitude.unpack(page)
 
     @attitude.setter
     def attitude(self, attitude: Attitude) -> None:
-        self._hardware.flash.write(ATTITUDE_PAGE, attitude.pack())
+        self.hardware.flash.write(ATTITUDE_PAGE, attitude.pack())
 
     def save_config(self) -> None:
         """Write the settings to flash."""
-        self._hardware.flash.write(CONFIG_PAGE, self.settings.pack())
+        self.hardware.flash.write(CONFIG_PAGE, self.settings.pack())
 
     def load_config(self) -> None:
         """Read the settings from flash; without any, the declared reset values."""
-        page = self._hardware.flash.read(CONFIG_PAGE)
+        page = self.hardware.flash.read(CONFIG_PAGE)
         if page is None:
             self.settings.clear()
         else:
@@ -196,5 +218,5 @@ class State(NodeState):
 
     def erase_config(self) -> None:
         """Erase the settings in flash, and return to the declared reset values."""
-        self._hardware.flash.erase(CONFIG_PAGE)
+        self.hardware.flash.erase(CONFIG_PAGE)
         self.settings.clear()

@@ -3,7 +3,8 @@
 CubeStar thesis, section 5.2.3. The main loop later powers the channel up again.
 """
 
-from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from dataclasses import dataclass
+
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.mcu.requests import Routine, pause
 
@@ -17,29 +18,27 @@ UNDER_CURRENT_MA = 0.5
 """Less than any working part behind a switch draws: assumed, a quarter of an SRAM in standby."""
 
 
+@dataclass(eq=False)
 class SupplyMonitor:
     """Cuts, counts and restores the two monitored supplies."""
 
-    def __init__(self, hardware: CubeStarHardware, state: State) -> None:
-        """Watch the channels of ``hardware``."""
-        self._hardware = hardware
-        self._state = state
+    state: State
 
     def overcurrent(self, channel: str) -> None:
         """Interrupt: the comparator of ``channel`` tripped."""
-        self._hardware.switch_supply(channel, False)
-        retained = self._state.retained
+        self.state.hardware.switch_supply(channel, False)
+        retained = self.state.retained
         retained.cut |= 1 << CHANNELS.index(channel)
         retained.latch_ups += 1
         if channel == "memory":
             retained.image_present = 0
-        self._state.raise_flag("OverCurrent")
-        self._hardware.wake()
+        self.state.raise_flag("OverCurrent")
+        self.state.hardware.wake()
 
     @property
     def cut(self) -> list[str]:
         """Channels that a comparator cut off and that wait for ``restore``."""
-        return [name for bit, name in enumerate(CHANNELS) if self._state.retained.cut >> bit & 1]
+        return [name for bit, name in enumerate(CHANNELS) if self.state.retained.cut >> bit & 1]
 
     @property
     def imager_on(self) -> bool:
@@ -51,10 +50,10 @@ class SupplyMonitor:
 
         A closed switch with next to no current behind it raises UnderCurrent.
         """
-        currents = {channel: self._hardware.supply_current_ma(channel) for channel in CHANNELS}
+        currents = {channel: self.state.hardware.supply_current_ma(channel) for channel in CHANNELS}
         if any(self._is_on(name) and ma < UNDER_CURRENT_MA for name, ma in currents.items()):
-            self._state.raise_flag("UnderCurrent")
-        retained, present_ua = self._state.retained, round(1000 * currents["imager"])
+            self.state.raise_flag("UnderCurrent")
+        retained, present_ua = self.state.retained, round(1000 * currents["imager"])
         first = retained.highest_ua == 0
         retained.lowest_ua = present_ua if first else min(retained.lowest_ua, present_ua)
         retained.highest_ua = max(retained.highest_ua, present_ua)
@@ -62,10 +61,10 @@ class SupplyMonitor:
 
     def toggle_imager(self) -> bool:
         """Open or close the switch of FPGA and imager; whether it is closed now."""
-        retained = self._state.retained
+        retained = self.state.retained
         retained.imager_off ^= 1
         retained.cut &= ~(1 << CHANNELS.index("imager"))
-        self._hardware.switch_supply("imager", not retained.imager_off)
+        self.state.hardware.switch_supply("imager", not retained.imager_off)
         return not retained.imager_off
 
     def restore(self) -> Routine[bool]:
@@ -76,11 +75,11 @@ class SupplyMonitor:
         channels = self.cut
         yield from pause(OFF_TIME_US)
         for channel in channels:
-            self._state.retained.cut &= ~(1 << CHANNELS.index(channel))
-            self._state.retained.power_cycles += 1
-            self._hardware.switch_supply(channel, True)
+            self.state.retained.cut &= ~(1 << CHANNELS.index(channel))
+            self.state.retained.power_cycles += 1
+            self.state.hardware.switch_supply(channel, True)
         return "imager" in channels
 
     def _is_on(self, channel: str) -> bool:
-        off = self._state.retained.imager_off if channel == "imager" else 0
+        off = self.state.retained.imager_off if channel == "imager" else 0
         return not off and channel not in self.cut

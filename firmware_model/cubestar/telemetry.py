@@ -1,63 +1,108 @@
 """Values of every telemetry frame, taken when it is asked for."""
 
 from collections.abc import Callable
-from typing import Any
 
-from cubestack.firmware_model.cubestar.capture import ImageCapture
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.attitude.geometry import angles_of
+from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar.commands import Commands
-from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.cubestar.processing import Processing
-from cubestack.firmware_model.cubestar.reports.attitude import AttitudeReports
-from cubestack.firmware_model.cubestar.reports.stars import StarReports
-from cubestack.firmware_model.cubestar.reports.tables import SETTINGS_SHOWN, TIMES_SHOWN
-from cubestack.firmware_model.cubestar.state import State
-from cubestack.firmware_model.cubestar.supply import SupplyMonitor
+from cubestack.firmware_model.cubestar.star_reports import StarReports, Values, named
+from cubestack.firmware_model.cubestar.state import Attitude
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize, SwitchState
+from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize, SwitchState
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
-from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
 
 NODE_TYPE = 5
 
-Values = dict[str, Any]
+PROCESSING_LIMIT_MS = 500
+"""CubeStar thesis, section 5.3.6."""
+
+
+def _of(command: str, *fields: str, **renamed: str) -> dict[str, tuple[str, str]]:
+    """Parameters of ``command`` by the telemetry field that shows them, ``renamed`` or not."""
+    shown = {field: field for field in fields} | renamed
+    return {name: (command, field) for name, field in shown.items()}
+
+
+#: Telemetry that shows settings: of each field the setting telecommand and its parameter.
+SETTINGS_SHOWN = {
+    "Exposure": _of("Exposure", "exposure"),
+    "FocalLengthDetails": _of("setFocalLength", "FocalLength")
+    | _of("setFocalLengthComponents", "Fx", "Fy"),
+    "PrincipalPoint": _of("setPrincipalPoint", "Cx", "Cy"),
+    "DistortionCoef": _of("setRadialDistortionGains", "K1", "K2")
+    | _of("setTangentalDistortionGains", "P1", "P2"),
+    "DetectionRegion": _of("setDetectionRegion", "StepSize", "Xstart", "Xend", "Ystart", "Yend"),
+    "StarPixels": _of("setStarPixels", "MinPixels", "MaxPixels"),
+    "StarGrid": _of("setDetectionVariables", "GridSize"),
+    "MaxStars": _of(
+        "setDetectionVariables",
+        maxStars="MaxStars",
+        maxInvalidStars="MaxInvalidStars",
+        maxNoise="MaxNoise",
+    ),
+    "IDMode": _of("setIDMode", Mode="IdMode"),
+    "IDMargin": _of("setIDMargin", "Margin"),
+    "DelayTime": _of("setDelayTimerTimeout", Timeout="Time"),
+}
+
+#: Telemetry that shows times in ms: of each field the step of ``Processing``. It is the longest one
+#: where the field's name begins with Max, else the latest.
+TIMES_SHOWN = {
+    "DetectionTimingOne": {
+        "MaxStarSearchTime": "search",
+        "MaxCentroidFindTime": "centroid",
+        "MaxCorrectionTime": "correction",
+        "MaxVectorCalTime": "vectors",
+    },
+    "DetectionTimingTwo": dict.fromkeys(("StarDetectionTime", "MaxStarDetectionTime"), "detection"),
+    "IDTimingOne": {
+        "MaxModeSelectionTime": "reduction",
+        "MaxDistanceCalTime": "distances",
+        "MaxVoteRoundOneTime": "votes",
+        "MaxFindIDTime": "identities",
+    },
+    "IDTimingTwo": {
+        "MaxVoteRoundTwoTime": "verification",
+        "MaxSelectID": "selection",
+        "MaxAlgoCompletionTime": "identification",
+    },
+    "IDTimingThree": {
+        "StarIdentificationTime": "identification",
+        "MaxStarIdentificationTime": "identification",
+    },
+    "BestStarSelectionTime": {"LatestTime": "best", "MaxTime": "best"},
+    "AttitudeTiming": {"LatestTime": "attitude", "MaxTime": "attitude"},
+}
 
 
 class Telemetry:
-    """Answers telemetry requests; interrupt context, so nothing here waits."""
+    """Answers telemetry requests; interrupt context, so nothing here waits.
 
-    def __init__(
-        self,
-        hardware: CubeStarHardware,
-        meter: Meter,
-        state: State,
-        capture: ImageCapture,
-        processing: Processing,
-        supply: SupplyMonitor,
-        commands: Commands,
-        pending: Callable[[], bool],
-    ) -> None:
-        """Report on the given parts; ``pending``: whether telecommands wait in the queue."""
-        self._hardware = hardware
-        self._meter = meter
-        self._state = state
-        self._capture = capture
-        self._processing = processing
-        self._supply = supply
+    Without any attitude the quaternion is that of no rotation.
+    """
+
+    def __init__(self, commands: Commands, pending: Callable[[], bool]) -> None:
+        """Report on what ``commands`` act on; ``pending``: whether telecommands wait."""
         self._commands = commands
-        self._pending = pending
+        self._processing, self._state = processing, state = commands.processing, commands.state
+        self._hardware = hardware = state.hardware
+        self._capture = processing.capture
+        self._stars = StarReports(processing)
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
             "ExtendedIdentification": self._extended_identification,
             "ErrorFlags": state.flag_values,
-            "TcmdProcessed": self._processed,
+            "TcmdProcessed": lambda: {"Processed": int(not pending() and not commands.running)},
             "TaskStatus": lambda: {"taskStatus": state.task_status},
             "StartAndLoopTime": self._loop_times,
             "SRAMTestResults": lambda: {"TestResult": commands.memory_test},
             "PowerStatus": lambda: {"Status": self._switch(), **self._currents()},
             "ImageSetup": INTERFACE.telemetry("ImageSetup").reset_values,
-            "IS_Register": lambda: {"DataH": 0, "DataL": capture.sensor.selected_register[1] or 0},
+            "IS_Register": lambda: {"DataH": 0, "DataL": self._camera_register()["Value"]},
             "ImageBlock": self._image_block,
             "CameraTiming": self._camera_timing,
             "TimingSummary": self._timing_summary,
@@ -71,22 +116,24 @@ class Telemetry:
             "SupplyReport": self._supply_report,
             "CameraRegister": self._camera_register,
             "LoopStatus": self._loop_status,
-            **StarReports(processing).sources,
-            **AttitudeReports(state, processing, meter).sources,
+            "Quaternion": self._quaternion,
+            "SphereicalCoordinates": lambda: self._angles(self._boresight()),
+            "AttitudeData": self._attitude_data,
+            "AttitudeQuaternion": self._attitude_quaternion,
+            "PerformanceParameters": self._performance,
+            "Results": self._counts,
+            **self._stars.sources,
         }
 
     def values(self, message: Message) -> Values | None:
         """Values of every field of ``message``; None when the node does not offer it."""
-        if message.name in SETTINGS_SHOWN:
-            return {
-                name: self._state.settings.get(command, field)
-                for name, command, field in SETTINGS_SHOWN[message.name]
-            }
-        if message.name in TIMES_SHOWN:
+        if shown := SETTINGS_SHOWN.get(message.name):
+            return {name: self._state.settings.get(*setting) for name, setting in shown.items()}
+        if steps := TIMES_SHOWN.get(message.name):
             latest, longest = self._processing.latest_ms, self._processing.longest_ms
             return {
-                name: (longest if is_longest else latest).get(step, 0.0)
-                for name, step, is_longest in TIMES_SHOWN[message.name]
+                name: (longest if name.startswith("Max") else latest).get(step, 0.0)
+                for name, step in steps.items()
             }
         source = self._sources.get(message.name)
         return None if source is None else source()
@@ -104,9 +151,6 @@ class Telemetry:
             "TlmCount": retained.telemetry & 0xFFFF,
         }
 
-    def _processed(self) -> Values:
-        return {"Processed": int(not self._pending() and not self._commands.running)}
-
     def _loop_times(self) -> Values:
         return {
             "StartupTime": self._state.startup_us / 1000,
@@ -115,26 +159,24 @@ class Telemetry:
         }
 
     def _switch(self) -> SwitchState:
-        return SwitchState.ON if self._supply.imager_on else SwitchState.OFF
+        return SwitchState.ON if self._capture.supply.imager_on else SwitchState.OFF
 
     def _currents(self) -> Values:
         return {
-            "Current": self._supply.sample(),
+            "Current": self._capture.supply.sample(),
             "MaxCurrent": self._state.retained.highest_ua / 1000,
             "MinCurrent": self._state.retained.lowest_ua / 1000,
         }
 
     def _log_status(self) -> Values:
-        currents = self._currents()
-        shown = {f.name: f.flag in self._state.flags for f in flag_fields(log_names=True)}
         return {
             "Temp": self._hardware.temperature_c(),
             "Runtime": self._hardware.uptime_us() // 1_000_000,
             "WDGcounter": self._state.retained.watchdog_resets,
             "Status": self._state.task_status,
             "SW": self._switch(),
-            **currents,
-            **shown,
+            **self._currents(),
+            **{f.name: f.flag in self._state.flags for f in flag_fields(log_names=True)},
         }
 
     def _supply_report(self) -> Values:
@@ -209,8 +251,70 @@ class Telemetry:
         }
 
     def _thresholds(self) -> Values:
-        detection = self._processing.results.detection
+        dark = self._stars.summary()["ImageDarkValue"]
+        return {"DarkThreshold": dark, **self._state.settings.all("setDetectionThresholds")}
+
+    # --- attitude, and the outcome of the latest picture ------------------------------------------
+
+    def _attitude(self) -> Attitude:
+        mode, none = self._processing.results.mode, np.array([0, 0, 0, 1], np.float32)
+        return self._state.attitude or Attitude(none, 0, 0, 0, mode)
+
+    def _quaternion(self) -> Values:
+        return named((f"Qbar{index}" for index in range(4)), self._attitude().quaternion)
+
+    def _boresight(self) -> NDArray[np.float32]:
+        return np.asarray(dcm(self._attitude().quaternion, self._processing.meter)[2])
+
+    def _angles(self, boresight: NDArray[np.float32]) -> Values:
+        angles = angles_of(boresight, self._processing.meter)
+        return named(("RightAscension", "Declination"), angles)
+
+    def _attitude_data(self) -> Values:
+        boresight = self._boresight()
+        vector = named(("BSVX", "BSVY", "BSVZ"), boresight)
+        return {**self._quaternion(), **self._angles(boresight), **vector}
+
+    def _attitude_quaternion(self) -> Values:
+        attitude = self._attitude()
         return {
-            "DarkThreshold": 0 if detection is None else detection.dark_value,
-            **self._state.settings.all("setDetectionThresholds"),
+            **named(("Q0", "Q1", "Q2", "Q3"), attitude.quaternion),
+            "FrameCounter": attitude.frame,
+            "ImageTime": attitude.image_ms,
+            "Mode": attitude.mode,
+            "Matched": attitude.matched,
+            "Valid": bool(self._state.retained.solved),
+        }
+
+    def _counts(self) -> Values:
+        summary, identification = self._stars.summary(), self._processing.results.identification
+        return {
+            "DarkValue": summary["ImageDarkValue"],
+            "Detected": summary["NumStarsDetected"],
+            "Invalid": summary["NumInvalidStars"],
+            "Noise": summary["AmountOfNoise"],
+            "IDMode": self._state.settings.get("setIDMode", "IdMode"),
+            "ID": 0 if identification is None else len(identification.matched),
+        }
+
+    def _performance(self) -> Values:
+        results, latest = self._processing.results, self._processing.latest_ms
+        flags, counts = self._state.flags, self._counts()
+        steps = ("detection", "identification", "attitude")
+        return {
+            "ImageDarkValue": counts["DarkValue"],
+            "NumStarsDetected": counts["Detected"],
+            "InvalidStars": counts["Invalid"],
+            "StarImageNoise": counts["Noise"],
+            "Idmode": counts["IDMode"],
+            "NumberOfStarsID": counts["ID"],
+            "ImageCaptureSuccess": bool(self._state.retained.image_present),
+            "DetectionSuccess": len(results.vectors) > 0,
+            "IdentificationSuccess": results.identification is not None,
+            "AttitudeSuccess": bool(self._state.retained.solved),
+            "ProcessingTimeError": sum(latest.get(step, 0.0) for step in steps)
+            > PROCESSING_LIMIT_MS,
+            "MaxStarsDetected": "MaxStarsDetection" in flags,
+            "LessThanThreeStarsInFoV": "LessThanThreeStarsInFoV" in flags,
+            "CommsError": any(flag.startswith(("UART_", "I2C_")) for flag in flags),
         }

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.assisted import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.matching.identification import (
     NONE,
     CentroidPairs,
@@ -23,7 +22,7 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     unidentified,
     verify,
 )
-from cubestack.firmware_model.cubestar.matching.voting import DEFAULT_MARGIN_RAD
+from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, DEFAULT_MARGIN_RAD
 from cubestack.firmware_model.mcu.costs import Meter
 
 #: Largest angle between a centroid and its star's predicted direction, in degrees.
@@ -40,8 +39,6 @@ def track(
     meter: Meter,
     *,
     margin_rad: float = DEFAULT_MARGIN_RAD,
-    reach_deg: float = REACH_DEG,
-    radius_deg: float = CUT_RADIUS_DEG,
 ) -> Identification:
     """Identify centroids from the attitude of the iteration before.
 
@@ -51,24 +48,20 @@ def track(
         directions: (n, 3) unit vectors of the centroids in camera axes.
         attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
         margin_rad: largest difference between a measured and a catalogue angle, in rad.
-        reach_deg: largest angle between a centroid and the predicted direction of its star.
-        radius_deg: radius around the last boresight in which stars are predicted.
     """
     count = len(directions)
     if count < FEWEST_STARS:
         return unidentified(count, MatchOutcome.TOO_FEW_CENTROIDS)
     with meter.phase("reduction"):
-        stars = catalogue.near(attitude[2], radius_deg, meter)
+        stars = catalogue.near(attitude[2], CUT_RADIUS_DEG, meter)
     with meter.phase("prediction"):
-        identities = _nearest(directions, catalogue.vectors, stars, attitude, reach_deg, meter)
+        identities = _nearest(directions, catalogue.vectors, stars, attitude, meter)
     with meter.phase("distances"):
         pairs = CentroidPairs.measure(directions, meter)
     with meter.phase("verification"):
         votes, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
     if np.count_nonzero(kept != NONE) < FEWEST_STARS:
-        return Identification(
-            np.full(count, NONE, dtype=np.int32), votes, MatchOutcome.TOO_FEW_MATCHED
-        )
+        return Identification(np.full_like(kept, NONE), votes, MatchOutcome.TOO_FEW_MATCHED)
     return Identification(kept, votes, MatchOutcome.IDENTIFIED)
 
 
@@ -77,7 +70,6 @@ def _nearest(
     vectors: NDArray[np.float32],
     stars: NDArray[np.uint16],
     attitude: NDArray[np.float32],
-    reach_deg: float,
     meter: Meter,
 ) -> NDArray[np.int32]:
     """Star among `stars` (k,) predicted nearest to each centroid (n, 3), -1 when out of reach.
@@ -99,6 +91,6 @@ def _nearest(
     apart = directions[:, None, :] - predicted[None, :, :]
     chord2 = apart[..., 0] ** 2 + apart[..., 1] ** 2 + apart[..., 2] ** 2
     nearest = np.argmin(chord2, axis=1)
-    reach2 = np.float32((2 * sin(radians(reach_deg) / 2)) ** 2)
+    reach2 = np.float32((2 * sin(radians(REACH_DEG) / 2)) ** 2)
     in_reach = chord2[np.arange(count), nearest] <= reach2
     return np.where(in_reach, stars[nearest].astype(np.int32), np.int32(NONE))

@@ -5,6 +5,10 @@ angles computed once, preassigned arrays). For each pair of centroids the pair l
 pairs of stars as far apart, and both centroids get a vote from both stars; the star with the most
 votes becomes a centroid's identity; a verification round and a selection follow.
 
+Assisted matching (section 4.3.4) votes among the stars near a rough boresight: the catalogue is cut
+to 35 deg, the 5 deg by which the boresight may be wrong and 30 deg of field. Pairs with a star
+outside are dropped with it; nothing else differs from lost in space.
+
 What the text leaves open, or leaves to chance, is completed here:
 
 - Between the first round and the identities the voting is repeated over the same entries, and a
@@ -19,7 +23,7 @@ What the text leaves open, or leaves to chance, is completed here:
   expected in a picture; above `LARGEST_CHANCE` the result is refused.
 """
 
-from math import comb, pi
+from math import comb, cos, pi, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +42,9 @@ from cubestack.firmware_model.mcu.costs import Meter
 #: Search tolerance of section 4.3.5, about one pixel.
 DEFAULT_MARGIN_RAD = 0.001
 
+#: Radius of the cut in assisted matching, in degrees.
+CUT_RADIUS_DEG = 35.0
+
 #: Coincidences per picture above which a result is refused; an extension, see the test of false
 #: stars.
 LARGEST_CHANCE = 0.05
@@ -54,50 +61,37 @@ def identify(
     catalogue: StarCatalogue,
     meter: Meter,
     *,
+    boresight: NDArray[np.float32] | None = None,
     margin_rad: float = DEFAULT_MARGIN_RAD,
 ) -> Identification:
-    """Identify centroids of unit vectors (n, 3) with the whole catalogue: lost in space.
+    """Identify centroids of unit vectors (n, 3): lost in space, or near a `boresight` (3,).
 
     `margin_rad` is the largest difference between a measured and a catalogue angle. Phases:
-    `distances`, `votes`, `identities`, `verification`, `selection`.
+    `reduction` (assisted only), `distances`, `votes`, `identities`, `verification`, `selection`.
     """
-    density = len(catalogue) / (4 * pi)
-    return identify_among(
-        directions, catalogue.vectors, catalogue.pairs, density, meter, margin_rad=margin_rad
-    )
-
-
-def identify_among(
-    directions: NDArray[np.float32],
-    vectors: NDArray[np.float32],
-    catalogue_pairs: PairList,
-    stars_per_sr: float,
-    meter: Meter,
-    *,
-    margin_rad: float = DEFAULT_MARGIN_RAD,
-) -> Identification:
-    """Identify centroids with a given pair list, whose indices count in `vectors` (stars, 3).
-
-    `stars_per_sr` is the density of the stars that the pair list draws on.
-    """
+    listed, stars_per_sr = catalogue.pairs, len(catalogue) / (4 * pi)
+    if boresight is not None:
+        with meter.phase("reduction"):
+            stars, listed = catalogue.reduced(boresight, CUT_RADIUS_DEG, meter)
+        stars_per_sr = len(stars) / (2 * pi * (1 - cos(radians(CUT_RADIUS_DEG))))
     count = len(directions)
     if count < FEWEST_STARS:
         return unidentified(count, MatchOutcome.TOO_FEW_CENTROIDS)
     with meter.phase("distances"):
         pairs = CentroidPairs.measure(directions, meter)
     with meter.phase("votes"):
-        entries = _Entries(pairs, catalogue_pairs, len(vectors), margin_rad, meter)
+        entries = _Entries(pairs, listed, len(catalogue), margin_rad, meter)
         votes = entries.vote(meter)
     with meter.phase("identities"):
         identities = _best(votes, meter)
     with meter.phase("verification"):
-        confirmed, kept = verify(pairs, identities, vectors, margin_rad, meter)
+        confirmed, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
     with meter.phase("selection"):
         outcome = _judge(
-            kept, directions, vectors, entries.looked_up, stars_per_sr, margin_rad, meter
+            kept, directions, catalogue, entries.looked_up, stars_per_sr, margin_rad, meter
         )
     if outcome is not MatchOutcome.IDENTIFIED:
-        return Identification(np.full(count, NONE, dtype=np.int32), confirmed, outcome)
+        kept = np.full_like(kept, NONE)
     return Identification(kept, confirmed, outcome)
 
 
@@ -185,7 +179,7 @@ def _best(votes: NDArray[np.intp], meter: Meter) -> NDArray[np.int32]:
 def _judge(
     kept: NDArray[np.int32],
     directions: NDArray[np.float32],
-    vectors: NDArray[np.float32],
+    catalogue: StarCatalogue,
     looked_up: int,
     stars_per_sr: float,
     margin_rad: float,
@@ -195,7 +189,7 @@ def _judge(
     matched = np.flatnonzero(kept != NONE)
     if len(matched) < FEWEST_STARS:
         return MatchOutcome.TOO_FEW_MATCHED
-    if _mirrored(directions[matched], vectors[kept[matched]], meter):
+    if _mirrored(directions[matched], catalogue.vectors[kept[matched]], meter):
         return MatchOutcome.MIRRORED
     chance = expected_coincidences(len(kept), len(matched), looked_up, stars_per_sr, margin_rad)
     meter.charge(f32_mul=2 * len(matched) + 6, f32_div=len(matched), f32_compare=1)

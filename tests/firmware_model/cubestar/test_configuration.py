@@ -8,7 +8,7 @@ from cubestack.firmware_model.cubestar.configuration import (
     field_radius_deg,
 )
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
-from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS
+from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.node.settings import Settings
 

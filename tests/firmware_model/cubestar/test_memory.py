@@ -67,5 +67,5 @@ def test_the_reduced_list_s_size(buffers: tuple[Buffer, ...], catalogue: StarCat
     directions = rng.normal(size=(200, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     meter = Meter(CORTEX_M3)
-    sizes = [8 * len(catalogue.reduced(each, 35.0, meter).pairs) for each in directions]
+    sizes = [8 * len(catalogue.reduced(each, 35.0, meter)[1]) for each in directions]
     assert max(sizes) <= 1.05 * size(buffers, "reduced pair list")

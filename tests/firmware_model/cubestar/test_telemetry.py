@@ -246,7 +246,7 @@ def thresholds(unit: Harness, _: Sky) -> None:
 
 
 def test_counters_wrap_or_saturate_on_the_wire(unit: Harness) -> None:
-    retained = unit.program.commands._state.retained
+    retained = unit.program.commands.state.retained
     retained.telecommands = retained.telemetry = 65_536 + 5
     retained.watchdog_resets = retained.latch_ups = 70_000
     retained.iterations = 2**40

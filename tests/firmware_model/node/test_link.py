@@ -49,12 +49,7 @@ class Canned(Runner, HostSide):
         self.state: NodeState
         if interface is CUBESTAR:
             self.state = state = CubeStarState(self)  # type: ignore[arg-type]
-            self.served: SatelliteLink = CubeStarLink(
-                self,  # type: ignore[arg-type]
-                self.meter,
-                state,
-                self.values,
-            )
+            self.served: SatelliteLink = CubeStarLink(self.meter, state, self.values)
         else:
             self.state = other = AramisState(self.flash)
             self.served = AramisLink(

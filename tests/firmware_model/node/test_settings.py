@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.aramis.settings import SETTING_COMMANDS as ARAMIS_SETTINGS
-from cubestack.firmware_model.cubestar.settings import SETTING_COMMANDS as CUBESTAR_SETTINGS
+from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS as CUBESTAR_SETTINGS
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR

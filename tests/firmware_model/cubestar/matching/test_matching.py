@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.assisted import identify_assisted
 from cubestack.firmware_model.cubestar.matching.identification import (
     CentroidPairs,
     Identification,
@@ -71,7 +70,7 @@ def test_a_sky_is_solved_and_never_wrong(
             found = identify(shot.directions, catalogue, meter())
         else:
             hint = near(shot.attitude[2], hint_deg, rng)
-            found = identify_assisted(shot.directions, catalogue, hint, meter())
+            found = identify(shot.directions, catalogue, meter(), boresight=hint)
         results.append(check(found, shot.stars))
     assert solved(results, least)
 
@@ -92,7 +91,7 @@ def test_a_boresight_on_the_far_side_finds_nothing(catalogue: StarCatalogue, sho
     for _ in range(60):
         shot = shoot(rng)
         hint = -shot.attitude[2].astype(np.float32)
-        found = identify_assisted(shot.directions, catalogue, hint, meter())
+        found = identify(shot.directions, catalogue, meter(), boresight=hint)
         assert found.outcome is not MatchOutcome.IDENTIFIED
 
 
@@ -260,7 +259,7 @@ def test_the_charge_is_that_of_the_work_done(catalogue: StarCatalogue, shoot: Sh
     full, half, cut = meter(), meter(), meter()
     identify(shot.directions, catalogue, full)
     identify(shot.directions[:10], catalogue, half)
-    identify_assisted(shot.directions, catalogue, shot.attitude[2].astype(np.float32), cut)
+    identify(shot.directions, catalogue, cut, boresight=shot.attitude[2].astype(np.float32))
     assert 190 <= full.counts["f32_acos"] <= 2 * 190
     assert 45 <= half.counts["f32_acos"] <= 2 * 45
     assert full.phases["votes"] > 2.5 * half.phases["votes"]

@@ -5,8 +5,8 @@ import pytest
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 
-from ..harness import Harness
-from ..sky import Sky, take, undistort
+from .harness import Harness
+from .sky import Sky, take, undistort
 
 STEPPING = [message.name for message in INTERFACE.telemetries if message.steps]
 OF_IDENTIFIED_STARS = ("IDStarsDetails", "InertialUnitVectors", "HipparcosNumber")

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, detect_stars
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
-from cubestack.firmware_model.cubestar.pictures.contract import ITERATION_US, Pictures
-from cubestack.firmware_model.cubestar.pictures.on_bus import pictures_of
+from cubestack.firmware_model.cubestar.pictures import ITERATION_US, pictures_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
@@ -20,8 +19,8 @@ from cubestack.firmware_model.mcu.external_bus import EBI
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.mcu.requests import BusAccess, Request
 
-from ...runner import Runner
-from ..sky import Sky
+from ..runner import Runner
+from .sky import Sky
 
 ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]
 SIZE = 2 * IMAGE_BYTES
@@ -40,14 +39,7 @@ class Board(Runner):
         self.pins: dict[str, int] = {}
         self.levels: list[tuple[str, int]] = []
         self.state = State(self)  # type: ignore[arg-type]  # what it does not use is missing
-        self.supply = SupplyMonitor(self, self.state)  # type: ignore[arg-type]
-        self.pictures: Pictures = pictures_of(
-            layout,
-            self,  # type: ignore[arg-type]
-            self.state,
-            self.meter,
-            self.supply,
-        )
+        self.pictures = pictures_of(layout, self.state, self.meter, SupplyMonitor(self.state))
         self.accesses = 0
         self.stuck: int | None = None
         self.perform(self.pictures.start())

@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 
-from ..harness import Harness
-from ..sky import Sky, attitude_of, error_deg, take
+from .harness import Harness
+from .sky import Sky, attitude_of, error_deg, take
 
 
 @pytest.fixture(params=range(4))
@@ -121,7 +121,7 @@ def test_processing_that_takes_too_long(unit: Harness) -> None:
     unit.command("DetectStars")
     assert unit.telemetry("DetectionTimingTwo")["StarDetectionTime"] < 500
     assert "ProcessingTimeError" not in outcome(unit)
-    unit.program.commands._processing.latest_ms["detection"] = 501.0
+    unit.program.commands.processing.latest_ms["detection"] = 501.0
     assert "ProcessingTimeError" in outcome(unit)
 
 

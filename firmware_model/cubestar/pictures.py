@@ -1,0 +1,320 @@
+"""Where pictures lie and how they get there, by memory layout (CubeStar thesis, section 3.3).
+
+Published is option 1: the FPGA stores into its own SRAM, and the program copies the picture to the
+processor's. In options 2 and 3, and with two boards (section 7.2), nothing is copied: the program
+reaches the memories behind the FPGA over its external bus. Pins and addresses of these are those of
+``docs/gateware-cubestar-next.md``; assumed, as none of it was built. Visited pixels are zeroed and
+written back over the bus.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubestar import detection
+from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.cubestar.supply import SupplyMonitor
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, pins
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import BusAccess, Pay, Routine, SetPin, StrobeRead
+
+ITERATION_US = 1_000_000
+FAST_ITERATION_US = 500_000
+
+_ENABLED, _DISABLED = (pins.ENABLE, 1), (pins.ENABLE, 0)
+_READING, _STORING = (pins.RNW, 1), (pins.RNW, 0)
+_TAKE = (_DISABLED, _READING, _ENABLED)
+"""Pins that give the bus to the program."""
+
+
+def _drive(*levels: tuple[str, int], board: str = "") -> Routine[None]:
+    for pin, level in levels:
+        yield SetPin(board + pin, level)
+
+
+@dataclass(eq=False)
+class Pictures(ABC):
+    """The newest picture, and the way of the next one into memory.
+
+    All offsets count in the newest picture, of ``IMAGE_BYTES``. A place is where a picture can be;
+    ``Retained.image_place`` has that of the newest one.
+
+    Attributes:
+        acknowledge: pin that tells that a picture is stored.
+        while_storing: the newest picture can be worked on while the next one is stored.
+        iteration_us: time of one turn of the loop.
+        selects: chip select of each memory of two pictures.
+    """
+
+    state: State
+    meter: Meter
+    supply: SupplyMonitor
+
+    acknowledge = str(pins.ACK)
+    while_storing = True
+    iteration_us = FAST_ITERATION_US
+    selects: ClassVar[tuple[int, ...]] = (0,)
+
+    @abstractmethod
+    def start(self) -> Routine[None]:
+        """Set the pins up after a reset."""
+
+    @abstractmethod
+    def begin(self) -> Routine[None]:
+        """Let the FPGA store the next whole frame."""
+
+    @abstractmethod
+    def end(self, stored: bool) -> Routine[None]:
+        """Let it stop; a frame that is ``stored`` becomes the newest picture."""
+
+    @abstractmethod
+    def fetch(self) -> Routine[bool]:
+        """Copy the stored frame to where the program works on it; False where nothing is copied."""
+
+    @abstractmethod
+    def search(self, config: detection.DetectionConfig) -> Routine[detection.Detection]:
+        """Find stars; see ``detect_stars``."""
+
+    @abstractmethod
+    def read_now(self, start: int, count: int) -> bytes | None:
+        """Read bytes in an interrupt; None where they are out of reach."""
+
+    def read(self, start: int, count: int) -> Routine[bytes]:
+        """Read bytes."""
+        values = yield from self._reads(np.arange(start, start + count, dtype=np.int32))
+        return values.tobytes()
+
+    def write(self, start: int, data: NDArray[np.uint8]) -> Routine[None]:
+        """Write bytes (n,)."""
+        yield from self._writes(np.arange(start, start + len(data), dtype=np.int32), data)
+
+    def test_memory(self) -> Routine[bool]:
+        """Write a pattern and read it back, then its complement; the picture is lost."""
+        addresses = np.arange(2 * IMAGE_BYTES, dtype=np.int32)
+        pattern = (addresses * 167 >> 3).astype(np.uint8)  # differs between rows
+        passed = True
+        for select in self.selects:
+            for wanted in (pattern, ~pattern):
+                found = np.zeros_like(wanted)
+                for data, write in ((wanted, True), (found, False)):
+                    yield from self._access(select, addresses, data, write=write)
+                    self.meter.charge(loop=len(addresses))
+                passed &= bool(np.array_equal(found, wanted))
+        return passed
+
+    def _reads(self, offsets: NDArray[np.int32], above: int = 255) -> Routine[NDArray[np.uint8]]:
+        select, first = self._address_of(self.state.retained.image_place)
+        data = np.zeros(len(offsets), np.uint8)
+        count = yield from self._access(select, offsets + first, data, write=False, above=above)
+        return data[:count]
+
+    def _writes(self, offsets: NDArray[np.int32], data: NDArray[np.uint8]) -> Routine[None]:
+        select, first = self._address_of(self.state.retained.image_place)
+        yield from self._access(select, offsets + first, data, write=True)
+
+    def _address_of(self, place: int) -> tuple[int, int]:
+        """Chip select and first address of ``place``."""
+        return 0, place * IMAGE_BYTES
+
+    def _access(
+        self,
+        select: int,
+        addresses: NDArray[np.int32],
+        data: NDArray[np.uint8],
+        *,
+        write: bool,
+        above: int = 255,
+    ) -> Routine[int]:
+        operation = "ebi_write" if write else "ebi_read"
+        access = BusAccess(
+            np.ascontiguousarray(addresses, np.int32),
+            np.ascontiguousarray(data),
+            write,
+            self.meter.table.operations[operation].cycles,
+            select,
+            above,
+        )
+        return (yield from self._perform(access, operation))
+
+    @abstractmethod
+    def _perform(self, access: BusAccess, operation: str) -> Routine[int]:
+        """Answer ``access`` and count it as so many times ``operation``."""
+
+    def _bank(self) -> int:
+        return int(self.state.settings.get("SelectImageBank", "Bank"))
+
+
+class _CopiedPictures(Pictures):
+    """Pictures at the start of the processor's own external RAM."""
+
+    iteration_us = ITERATION_US
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """The newest picture, shape (512, 1024), a live view of the external RAM."""
+        return self.state.hardware.external_ram[:IMAGE_BYTES].reshape(ROWS, COLUMNS)
+
+    def start(self) -> Routine[None]:
+        yield from ()  # pins are as a reset leaves them
+
+    def begin(self) -> Routine[None]:
+        yield from _drive((pins.BANK, self._bank()), _STORING, _ENABLED)
+
+    def end(self, stored: bool) -> Routine[None]:
+        yield from _drive(_DISABLED)
+
+    def fetch(self) -> Routine[bool]:
+        yield from _drive(_READING, _ENABLED)
+        self.supply.sample()
+        cycles = self.meter.table.operations["transfer_byte"].cycles
+        yield StrobeRead(self.state.hardware.external_ram[:IMAGE_BYTES], cycles)
+        yield from _drive(_DISABLED, _STORING)
+        return True
+
+    def search(self, config: detection.DetectionConfig) -> Routine[detection.Detection]:
+        yield from ()
+        return detection.detect_stars(self.image, config, self.meter)
+
+    def read_now(self, start: int, count: int) -> bytes:
+        self.meter.charge(ebi_read=count)
+        return self.state.hardware.external_ram[start : start + count].tobytes()
+
+    def _perform(self, access: BusAccess, operation: str) -> Routine[int]:
+        memory, data = self.state.hardware.external_ram, access.data
+        if access.write:
+            memory[access.addresses] = data
+        else:
+            data[:] = memory[access.addresses]
+        self.meter.charge(**{operation: len(data)})
+        yield Pay()
+        return len(data)
+
+
+class _BusPictures(Pictures):
+    """What the layouts without a copy share."""
+
+    _open = False
+    """Whether the bus leads to the newest picture."""
+
+    def fetch(self) -> Routine[bool]:
+        yield from ()
+        return False
+
+    def search(self, config: detection.DetectionConfig) -> Routine[detection.Detection]:
+        """Find stars; a picture whose supply was cut meanwhile is lost, as pixels may stay zero."""
+        search, answer = detection.search_stars(ROWS, COLUMNS, config, self.meter), None
+        while True:
+            try:
+                access = search.send(answer)
+            except StopIteration as done:
+                if self.supply.cut:
+                    self.state.retained.image_present = 0
+                found: detection.Detection = done.value
+                return found
+            if isinstance(access, detection.Look):
+                answer = yield from self._reads(access.offsets, access.above)
+            else:
+                yield from self._writes(access.offsets, access.values)
+
+    def read_now(self, start: int, count: int) -> bytes | None:
+        if not self._open or not self.supply.imager_on:
+            return None
+        select, first = self._address_of(self.state.retained.image_place)
+        self.meter.charge(ebi_read=count)
+        return self.state.hardware.bus_read(select, first + start, count)
+
+    def _perform(self, access: BusAccess, operation: str) -> Routine[int]:
+        count: int = yield access
+        self.meter.book(**{operation: count})  # not charged: the time has passed
+        return count
+
+
+class _SharedPictures(_BusPictures):
+    """One memory of two banks, the places: either the FPGA stores, or the program has it."""
+
+    while_storing = False
+    iteration_us = ITERATION_US
+
+    def start(self) -> Routine[None]:
+        yield from _drive(*_TAKE)
+        self._open = True
+
+    def begin(self) -> Routine[None]:
+        self._open = False
+        self.state.retained.image_place = bank = self._bank()
+        yield from _drive(_DISABLED, (pins.BANK, bank), _STORING, _ENABLED)
+
+    def end(self, stored: bool) -> Routine[None]:
+        yield from self.start()
+
+
+class _TwoMemoryPictures(_BusPictures):
+    """Two memories of one picture each, the places, at one FPGA, in turn."""
+
+    def start(self) -> Routine[None]:
+        yield from _drive(_READING, _ENABLED)
+        self._open = True
+
+    def begin(self) -> Routine[None]:
+        """Store into the other memory; the bus keeps the one of the newest picture."""
+        yield from _drive((pins.INTO, 1 - self.state.retained.image_place), _STORING)
+
+    def end(self, stored: bool) -> Routine[None]:
+        yield from _drive(_READING)
+        if stored:
+            self.state.retained.image_place ^= 1
+
+
+class _TwoBoardPictures(_BusPictures):
+    """Two boards with one memory of two banks each, in turn.
+
+    The lower bit of a place is its board, the upper one its bank.
+    """
+
+    selects = (0, 1)
+
+    def __post_init__(self) -> None:
+        self._choose()
+
+    def start(self) -> Routine[None]:
+        for board in pins.BOARD_PREFIXES:
+            yield from _drive(*_TAKE, board=board)
+        self._open = True
+
+    def begin(self) -> Routine[None]:
+        """Store at the other board; the bus keeps the one of the newest picture."""
+        self._choose()
+        bank = (pins.BANK, self._into >> 1)
+        yield from _drive(_DISABLED, bank, _STORING, _ENABLED, board=self._board)
+
+    def end(self, stored: bool) -> Routine[None]:
+        yield from _drive(*_TAKE, board=self._board)
+        if stored:
+            self.state.retained.image_place = self._into
+
+    def _choose(self) -> None:
+        """Store into the board that has not got the newest picture."""
+        self._into = ~self.state.retained.image_place & 1 | self._bank() << 1
+        self._board = pins.BOARD_PREFIXES[self._into & 1]
+        self.acknowledge = self._board + pins.ACK
+
+    def _address_of(self, place: int) -> tuple[int, int]:
+        return place & 1, (place >> 1) * IMAGE_BYTES
+
+
+_KINDS: dict[Layout, type[Pictures]] = {
+    Layout.COPIED: _CopiedPictures,
+    Layout.SHARED: _SharedPictures,
+    Layout.TWO_MEMORIES: _TwoMemoryPictures,
+    Layout.TWO_BOARDS: _TwoBoardPictures,
+}
+
+
+def pictures_of(layout: Layout, state: State, meter: Meter, supply: SupplyMonitor) -> Pictures:
+    """The program's way to its pictures in ``layout``."""
+    return _KINDS[layout](state, meter, supply)

@@ -1,1 +1,0 @@
-"""Where pictures lie and how they get there, by memory layout."""

@@ -1,1 +1,0 @@
-"""Telemetry of results: stars, attitude, and messages that are plain tables of values."""

@@ -1,0 +1,184 @@
+"""Telemetry of single stars; frames that step give the next star at each read, and wrap."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from cubestack.firmware_model.cubestar.detection import Detection
+from cubestack.firmware_model.cubestar.processing import Processing, Results
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+
+NOT_IDENTIFIED = 0xFFFF
+NO_STAR = 0xFF
+
+_NOTHING = {
+    "StarNumber": NO_STAR,
+    **dict.fromkeys(("Identity", "ID", "S1CatNum", "S2CatNum", "S3CatNum"), NOT_IDENTIFIED),
+}
+"""What is not 0 in a frame without a star."""
+
+Values = dict[str, Any]
+
+
+def named(names: Iterable[str], vector: Iterable[Any]) -> Values:
+    """Each component by its name."""
+    return dict(zip(names, vector, strict=True))
+
+
+class StarReports:
+    """Values of the telemetry of detected, identified and selected stars.
+
+    Attributes:
+        sources: by name of the telemetry frame.
+    """
+
+    def __init__(self, processing: Processing) -> None:
+        """Report on the results of ``processing``."""
+        self._processing = processing
+        self._cursors: dict[str, tuple[Results, int]] = {}
+        self.sources: dict[str, Callable[[], Values]] = {
+            "DetectionSummary": self.summary,
+            "StarPositions": self._stepping("StarPositions", self._detected, self._position),
+            "BodyUnitVectors": self._stepping("BodyUnitVectors", self._detected, self._body_vector),
+            "NumIdStars": lambda: {"numIdStars": len(self._identified())},
+            "IDStarsDetails": self._stepping("IDStarsDetails", self._identified, self._identity),
+            "InertialUnitVectors": self._stepping(
+                "InertialUnitVectors", self._identified, self._inertial_vector
+            ),
+            "BestStarIndex": self._best,
+            "Star1Details": lambda: self._selected(1),
+            "Star2Details": lambda: self._selected(2),
+            "Star3Details": lambda: self._selected(3),
+            "StarDetails": self._stepping("StarDetails", self._detected, self._details),
+            "HipparcosNumber": self._stepping("HipparcosNumber", self._identified, self._hipparcos),
+            "MatchSummary": self._match_summary,
+        }
+
+    @property
+    def _results(self) -> Results:
+        return self._processing.results
+
+    @property
+    def _detection(self) -> Detection:
+        assert self._results.detection is not None, "there is no star"
+        return self._results.detection
+
+    def _detected(self) -> Sequence[int]:
+        return range(len(self._results.vectors))
+
+    def _identified(self) -> Sequence[int]:
+        identification = self._results.identification
+        return [] if identification is None else identification.matched.tolist()
+
+    def _stepping(
+        self, frame: str, stars: Callable[[], Sequence[int]], values: Callable[[int], Values]
+    ) -> Callable[[], Values]:
+        """Give ``values`` of the next of ``stars`` at each call. New results start over."""
+
+        def source() -> Values:
+            if not (there := stars()):
+                return _nothing(frame)
+            results, position = self._cursors.get(frame, (self._results, 0))
+            position = position % len(there) if results is self._results else 0
+            self._cursors[frame] = (self._results, position + 1)
+            return {"StarNumber": there[position], **values(there[position])}
+
+        return source
+
+    # --- detected stars -----------------------------------------------------------------------
+
+    def summary(self) -> Values:
+        """Telemetry DetectionSummary."""
+        detection = self._results.detection
+        return {
+            "NumStarsDetected": len(self._results.vectors),
+            "NumInvalidStars": 0 if detection is None else detection.invalid,
+            "AmountOfNoise": 0 if detection is None else detection.noise,
+            "ImageDarkValue": 0 if detection is None else detection.dark_value,
+        }
+
+    def _position(self, star: int) -> Values:
+        corrected = ("X_CorrectedCoordinate", "Y_CorrectedCoordinate")
+        return {
+            **named(("X_Coordinate", "Y_Coordinate"), self._detection.centroids[star]),
+            **named(corrected, self._results.points[star]),
+            "Size": self._detection.sizes[star],
+            "Intensity": self._detection.intensities[star],
+        }
+
+    def _body_vector(self, star: int) -> Values:
+        return named(("VbX", "VbY", "VbZ"), self._results.vectors[star])
+
+    def _details(self, star: int) -> Values:
+        return {
+            **named(("CCx", "CCy"), self._results.points[star]),
+            **named(("Vbx", "Vby", "Vbz"), self._results.vectors[star]),
+            **named(("ID", "ValidationVote", "confidance"), self._match(star)),
+        }
+
+    # --- identified stars ---------------------------------------------------------------------
+
+    def _match(self, star: int) -> tuple[int, int, float]:
+        """Identity, votes and confidence (0 to 1) of a detected star."""
+        identification = self._results.identification
+        if identification is None or identification.stars[star] < 0:
+            return NOT_IDENTIFIED, 0, 0.0
+        return (
+            int(identification.stars[star]),
+            int(identification.votes[star]),
+            float(identification.confidence[star]),
+        )
+
+    def _identity(self, star: int) -> Values:
+        identity, votes, confidence = self._match(star)
+        return {"Identity": identity, "ValidationVotes": votes, "Confidence": 100 * confidence}
+
+    def _inertial_vector(self, star: int) -> Values:
+        identity, _, confidence = self._match(star)
+        return {
+            **named(("ViX", "ViY", "ViZ"), self._processing.catalogue.vectors[identity]),
+            "Identity": identity,
+            "Confidence": 100 * confidence,
+        }
+
+    def _hipparcos(self, star: int) -> Values:
+        return {
+            "Hipparcos": int(self._processing.catalogue.hip[self._match(star)[0]]),
+            **named(("X", "Y"), self._detection.centroids[star]),
+        }
+
+    def _match_summary(self) -> Values:
+        matches = [self._match(star) for star in self._identified()]
+        return {
+            "Detected": len(self._results.vectors),
+            "Matched": len(matches),
+            "MeanConfidence": float(np.mean([m[2] for m in matches])) if matches else 0.0,
+            "MaxVotes": max((m[1] for m in matches), default=0),
+        }
+
+    # --- selected stars -----------------------------------------------------------------------
+
+    def _best(self) -> Values:
+        chosen = [*self._results.best, NO_STAR, NO_STAR, NO_STAR][:3]
+        return named(("Star1Index", "Star2Index", "Star3Index"), chosen)
+
+    def _selected(self, number: int) -> Values:
+        if number > len(self._results.best):
+            return _nothing(f"Star{number}Details")
+        star, prefix = self._results.best[number - 1], f"S{number}"
+        identity, _, confidence = self._match(star)
+        inertial = self._processing.catalogue.vectors[identity]
+        return {
+            **named((f"{prefix}CentX", f"{prefix}CentY"), self._detection.centroids[star]),
+            f"{prefix}Mag": self._detection.intensities[star],
+            **named([f"{prefix}VB{axis}" for axis in "XYZ"], self._results.vectors[star]),
+            **named([f"{prefix}VI{axis}" for axis in "XYZ"], inertial),
+            f"{prefix}Conf": 100 * confidence,
+            f"{prefix}CatNum": identity,
+        }
+
+
+def _nothing(frame: str) -> Values:
+    values = INTERFACE.telemetry(frame).reset_values()
+    return {name: _NOTHING.get(name, value) for name, value in values.items()}
