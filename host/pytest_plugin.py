@@ -12,8 +12,6 @@ paths, or a scene of the emulator and the text of a plan. Seed, virtual time and
 events go into the JUnit report; what the faults did is shown below a test that failed.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -63,7 +61,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def _fixture(name: str) -> Any:
     """The fixture of a device: powered up as the test's marker says, and down after it."""
 
-    def powered(request: pytest.FixtureRequest) -> Iterator[AnyEmulated]:
+    def powered(request: pytest.FixtureRequest) -> "Iterator[AnyEmulated]":
         from cubestack.emulator.faults.plan import load_plan, parse_plan
         from cubestack.host.devices.emulated import open_device
         from cubestack.host.devices.registry import device
@@ -104,7 +102,7 @@ def _options(item: pytest.Item) -> dict[str, Any]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
-) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+) -> "Generator[None, pytest.TestReport, pytest.TestReport]":
     """Show what the faults did below a test that failed."""
     report = yield
     if call.when == "call" and report.failed:

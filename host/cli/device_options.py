@@ -1,7 +1,5 @@
 """Options of commands that run an emulated device: how it is made, its faults, what is kept."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
@@ -101,7 +99,7 @@ def tell_notices(
 
 
 def inject_plan(
-    faults: Faults, path: Path | None, say: Callable[[str], None] | None = None
+    faults: "Faults", path: Path | None, say: Callable[[str], None] | None = None
 ) -> None:
     """Inject the plan in ``path``, if one is given; ``say`` is told what each fault does.
 
@@ -131,8 +129,8 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def record(
-    args: argparse.Namespace, emulated: AnyEmulated, stack: ExitStack, setup: Setup | None = None
-) -> Recorder | None:
+    args: argparse.Namespace, emulated: AnyEmulated, stack: ExitStack, setup: "Setup | None" = None
+) -> "Recorder | None":
     """Start what the options ask for; ``stack`` ends it. Before any port is opened.
 
     ``setup`` is for the recording's header. Returns what records, if anything. Raises ValueError

@@ -1,7 +1,5 @@
 """Options that say where a device's serial lines are served, and the ports that they open."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -54,7 +52,7 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
 
 def open_ports(
     args: argparse.Namespace, devices: Sequence[AnyEmulated], stack: ExitStack
-) -> list[tuple[AnyEmulated, SerialLine, Endpoint]]:
+) -> "list[tuple[AnyEmulated, SerialLine, Endpoint]]":
     """A port for each serial line of each device, in order; ``stack`` closes them.
 
     Raises ValueError when there are not enough ports from the given one on, PortError when one

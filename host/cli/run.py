@@ -12,8 +12,6 @@ examples:
   cubestack run --attach -- i2cdump -y 7 0x1a      on the bus of `emulate --i2c 7`
 """
 
-from __future__ import annotations
-
 import argparse
 import errno
 import shutil
@@ -121,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
             raise OSError(str(error)) from None
 
 
-def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
+def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
     """Power up the devices on one bus."""
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
     from cubestack.emulator.i2cdev.running import emulated_bus

@@ -5,8 +5,6 @@ Command, shell, fixtures, conformance, registers, recordings, faults and gatewar
 loads none of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -98,7 +96,7 @@ class Report:
 
     name: str
     summary: str
-    load: Callable[[], AnyExperiment]
+    load: "Callable[[], AnyExperiment]"
 
 
 @dataclass(frozen=True)
@@ -155,12 +153,12 @@ class Device(Generic[BoardT_co, ClientT_co]):
     default_scene_title: str
     options: tuple[BoardOption, ...] = ()
     has_fpga: bool = True
-    experiment: Callable[[], AnyExperiment] | None = None
+    experiment: "Callable[[], AnyExperiment] | None" = None
     reports: tuple[Report, ...] = ()
     benchmark: Callable[[], Benchmark] | None = None
     demo: Callable[[], Demo] | None = None
-    tops: Callable[[], TopTable] = dict
-    proofs: Callable[[], Mapping[str, Proof]] = dict
+    tops: "Callable[[], TopTable]" = dict
+    proofs: "Callable[[], Mapping[str, Proof]]" = dict
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
 

@@ -1,7 +1,5 @@
 """Recordings and traces of an emulated device, made at its pins."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -14,7 +12,9 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.formats.setup import Setup
 
 
-def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None = None) -> Recorder:
+def start_recorder(
+    emulated: AnyEmulated, stream: IO[str], setup: "Setup | None" = None
+) -> "Recorder":
     """Record every byte of all ports; before any port is opened.
 
     ``setup`` goes into the header.
@@ -27,7 +27,7 @@ def start_recorder(emulated: AnyEmulated, stream: IO[str], setup: Setup | None =
     return recorder
 
 
-def start_trace(emulated: AnyEmulated, stream: IO[str]) -> VcdTrace:
+def start_trace(emulated: AnyEmulated, stream: IO[str]) -> "VcdTrace":
     """Trace lines, buses, FPGA pins and firmware for a waveform viewer; as ``start_recorder``."""
     from cubestack.emulator.recording.trace import VcdTrace
 

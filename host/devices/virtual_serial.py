@@ -1,7 +1,5 @@
 """A serial port with pyserial's interface, in virtual time."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from cubestack.host.clients.contract import Closable
@@ -24,7 +22,7 @@ class VirtualSerial(Closable):
         baudrate: of the line.
     """
 
-    def __init__(self, line: DirectSerial, baudrate: int, timeout: float | None = None) -> None:
+    def __init__(self, line: "DirectSerial", baudrate: int, timeout: float | None = None) -> None:
         """Plug in."""
         self._line = line
         self._ahead = bytearray()

@@ -4,8 +4,6 @@ Axes and errors: D = A_measured A_truth^T, with A the rotation from inertial to 
 across is the angle between the boresights, the error about them atan2(D01 - D10, D00 + D11).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -60,8 +58,8 @@ class SkyOptions(MeasureOptions):
 
 
 def random_view(
-    options: SkyOptions, condition: SkyCondition, rng: np.random.Generator, **more: Any
-) -> SkyView:
+    options: SkyOptions, condition: "SkyCondition", rng: np.random.Generator, **more: Any
+) -> "SkyView":
     """A sky as the options say, at a random pose, and the camera; ``more`` as the scene has it."""
     from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.attitude import random_quaternion

@@ -1,7 +1,5 @@
 """Powers devices up for experiments, and the options of all that are measured."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +20,7 @@ class MeasureOptions(Options):
     scene: Any = option(None, "TOML scene; default: a random one", SCENE, metavar="FILE")
     frames: int = option(1, "number of frames (default 1)", whole(1))
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    faults: Path | Plan | None = option(
+    faults: "Path | Plan | None" = option(
         None, "TOML plan of faults, with their seed (see docs/faults.md)", PLAN, metavar="FILE"
     )
 
@@ -39,8 +37,7 @@ class Opener(Generic[BoardT_co, ClientT_co]):
         device: to power up.
         engine: how its FPGA is run.
         board: options of its board.
-        shown: passes items through and shows how many are done, of what takes seconds the first
-            time: (items, total, label) -> the items.
+        shown: shows how many are done of what takes seconds the first time.
     """
 
     device: Device[BoardT_co, ClientT_co]
@@ -49,14 +46,16 @@ class Opener(Generic[BoardT_co, ClientT_co]):
     shown: Shown = _silent
 
     def __call__(
-        self, scene: Any, *, seed: int, faults: Path | Plan | None = None, **board: Any
+        self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **board: Any
     ) -> EmulatedDevice[BoardT_co, ClientT_co]:
         """The device, looking at ``scene``, with a plan of faults, or that in a file, injected.
 
         ``board`` are keywords of its board that the experiment decides. Raises ValueError for a
         scene or a plan that makes no sense.
         """
-        plan = _load(faults) if isinstance(faults, Path) else faults
+        from cubestack.emulator.faults.plan import load_plan
+
+        plan = load_plan(faults) if isinstance(faults, Path) else faults
         emulated = power_up(
             self.device, scene, seed=seed, engine=self.engine, **{**self.board, **board}
         )
@@ -67,9 +66,3 @@ class Opener(Generic[BoardT_co, ClientT_co]):
                 emulated.close()
                 raise
         return emulated
-
-
-def _load(path: Path) -> Plan:
-    from cubestack.emulator.faults.plan import load_plan
-
-    return load_plan(path)

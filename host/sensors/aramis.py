@@ -1,7 +1,5 @@
 """AraMiS' star tracker as a registered device."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,8 +23,8 @@ POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 
 
 def _open_board(
-    scene: Scene | SkyView, *, baud: int | None = None, engine: Engine = "auto", **common: Any
-) -> AramisBoard:
+    scene: "Scene | SkyView", *, baud: int | None = None, engine: Engine = "auto", **common: Any
+) -> "AramisBoard":
     from cubestack.emulator.boards.aramis.board import AramisBoard
     from cubestack.emulator.boards.aramis.catalogue import onboard_database
 
@@ -36,14 +34,14 @@ def _open_board(
     return AramisBoard(scene, catalogue, baud=baud or INTERFACE.baud, **common)
 
 
-def _load_scene(path: Path) -> SkyView:
+def _load_scene(path: Path) -> "SkyView":
     from cubestack.emulator.camera.common.scene_file import load_scene
     from cubestack.emulator.camera.mt9m001.lens import CONDITION
 
     return load_scene(path, CONDITION)
 
 
-DEVICE: Device[AramisBoard, Aramis] = Device(
+DEVICE: "Device[AramisBoard, Aramis]" = Device(
     name="aramis",
     title="AraMiS",
     summary="attitudes of the star tracker without FPGA",

@@ -1,7 +1,5 @@
 """CubeSense as a registered device."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -18,14 +16,14 @@ EXPERIMENTS = "cubestack.host.experiments.cubesense"
 
 
 def _open_board(
-    scene: EarthSunScene | EarthSunView, *, baud: int | None = None, **common: Any
-) -> CubeSenseBoard:
+    scene: "EarthSunScene | EarthSunView", *, baud: int | None = None, **common: Any
+) -> "CubeSenseBoard":
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
     return CubeSenseBoard(scene, baud=baud or INTERFACE.baud, **common)
 
 
-DEVICE: Device[CubeSenseBoard, CubeSense] = Device(
+DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     name="cubesense",
     title="CubeSense",
     summary="directions of the Sun and of the Earth's centre",

@@ -1,7 +1,5 @@
 """CubeStar as a registered device."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,12 +25,12 @@ MAG_LIMIT = 3.8
 
 
 def _open_board(
-    scene: Scene | SkyView,
+    scene: "Scene | SkyView",
     *,
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
     **common: Any,
-) -> CubeStarBoard:
+) -> "CubeStarBoard":
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
@@ -41,14 +39,14 @@ def _open_board(
     )
 
 
-def _load_scene(path: Path) -> SkyView:
+def _load_scene(path: Path) -> "SkyView":
     from cubestack.emulator.camera.common.scene_file import load_scene
     from cubestack.emulator.camera.mlx75412.lens import CONDITION
 
     return load_scene(path, CONDITION)
 
 
-def _default_scene() -> Scene:
+def _default_scene() -> "Scene":
     from cubestack.emulator.scene.attitude import quaternion_from_pointing
     from cubestack.emulator.scene.sky import SkyScene
 
@@ -70,7 +68,7 @@ def _layout_notice(value: str) -> str | None:
     )
 
 
-DEVICE: Device[CubeStarBoard, CubeStar] = Device(
+DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
     name="cubestar",
     title="CubeStar",
     summary="attitudes of the star tracker",

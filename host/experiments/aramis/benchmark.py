@@ -1,7 +1,5 @@
 """What it costs to emulate an AraMiS star tracker."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
 HIGHEST_GAIN = 15.0
 
 
-def _figures(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
+def _figures(device: "Device[AramisBoard, Aramis]") -> dict[str, float]:
     """The loop, and the wall times of what it spends them on."""
     from cubestack.emulator.boards.aramis.catalogue import onboard_database
     from cubestack.emulator.camera.common.register_file import RegisterFile

@@ -5,8 +5,6 @@ examples:
   cubestack catalogue aramis --epoch 2000 --fov 18 --output image.bin
 """
 
-from __future__ import annotations
-
 import hashlib
 import time
 from dataclasses import dataclass
@@ -39,7 +37,7 @@ class CatalogueOptions(Options):
     )
     output: Path | None = option(None, "write the flash image", PATH, metavar="FILE")
 
-    def parameters(self) -> CatalogueParameters:
+    def parameters(self) -> "CatalogueParameters":
         """As the compiler of the catalogue takes them; ValueError for what it can not do."""
         from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 

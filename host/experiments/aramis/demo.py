@@ -1,7 +1,5 @@
 """AraMiS: a sky captured, solved lost in space and near a rough direction, and downloaded."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +21,7 @@ ROUGHLY_OFF_DEG = 2.0
 
 
 def show(
-    device: Device[AramisBoard, Aramis], out: Path, seed: int, _photographs: Path | None
+    device: "Device[AramisBoard, Aramis]", out: Path, seed: int, _photographs: Path | None
 ) -> bool:
     """Measure twice and download; returns whether both measurements were conclusive."""
     from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing

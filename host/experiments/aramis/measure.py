@@ -15,8 +15,6 @@ examples:
   cubestack measure aramis --bit-flips 1e-6                  upsets in flash
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -189,7 +187,7 @@ class _Experiment(attitudes.AttitudeExperiment["_Opener", AramisOptions, AramisR
                 yield _measure(emulated, options, rng, flips)
 
 
-def _view(options: AramisOptions, condition: SkyCondition, rng: np.random.Generator) -> SkyView:
+def _view(options: AramisOptions, condition: "SkyCondition", rng: np.random.Generator) -> "SkyView":
     from cubestack.emulator.camera.common.scene_file import load_scene
     from cubestack.emulator.camera.common.view import SkyView, View
     from cubestack.emulator.scene.sky import PictureScene
@@ -229,7 +227,7 @@ def _configure(aramis: Aramis, options: AramisOptions) -> None:
 
 
 def _measure(
-    emulated: EmulatedDevice[AramisBoard, Aramis],
+    emulated: "EmulatedDevice[AramisBoard, Aramis]",
     options: AramisOptions,
     rng: np.random.Generator,
     flips: int,
@@ -270,7 +268,7 @@ def _measure(
 
 
 def _count_wrong(
-    emulated: EmulatedDevice[AramisBoard, Aramis], truth: NDArray[np.float64] | None
+    emulated: "EmulatedDevice[AramisBoard, Aramis]", truth: NDArray[np.float64] | None
 ) -> int | None:
     """Identified stars that the truth puts elsewhere; None without a truth."""
     from cubestack.emulator.scene.sky import SkyScene

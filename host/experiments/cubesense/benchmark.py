@@ -1,7 +1,5 @@
 """What it costs to emulate a CubeSense."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera
@@ -14,7 +12,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
 
-def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:
+def _figures(device: "Device[CubeSenseBoard, CubeSense]") -> dict[str, float]:
     from cubestack.emulator.boards.cubesense import benchmark
     from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
     from cubestack.emulator.rtl.benchmark import cold_build_s
@@ -28,7 +26,7 @@ def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:
     return figures
 
 
-def _loop_ratio(device: Device[CubeSenseBoard, CubeSense]) -> float:
+def _loop_ratio(device: "Device[CubeSenseBoard, CubeSense]") -> float:
     """Each second a host reads both results, which starts the next measurements."""
     from cubestack.emulator.scene.earth_sun import EarthSunScene
 

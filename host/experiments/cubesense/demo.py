@@ -1,7 +1,5 @@
 """CubeSense: the Sun and the Earth measured and their pictures downloaded."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +27,7 @@ PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}
 
 
 def show(
-    device: Device[CubeSenseBoard, CubeSense], out: Path, seed: int, _photographs: Path | None
+    device: "Device[CubeSenseBoard, CubeSense]", out: Path, seed: int, _photographs: Path | None
 ) -> bool:
     """Measure with both sensors; returns whether both found what they looked for."""
     demo = Demo(out, "earth-sun", "sun and nadir sensor: the Sun, and the Earth from 750 km")

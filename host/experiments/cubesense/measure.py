@@ -12,8 +12,6 @@ examples:
   cubestack measure cubesense --memory other     through the link of the FPGAs
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -199,7 +197,7 @@ def _degrees(value: float | None, digits: int = 2) -> str:
 
 def _random_view(
     options: CubeSenseOptions, sensor: Camera, rng: np.random.Generator
-) -> EarthSunView:
+) -> "EarthSunView":
     """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
     from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
     from cubestack.emulator.scene.earth_sun import EarthSunScene
@@ -224,7 +222,7 @@ def _or(given: float | None, default: float) -> float:
 
 
 def _measure(
-    emulated: EmulatedDevice[CubeSenseBoard, CubeSense], sensor: Camera, sram: Sram
+    emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]", sensor: Camera, sram: Sram
 ) -> SensorResult:
     cubesense = emulated.client
     started = time.perf_counter()
@@ -252,7 +250,7 @@ def _measure(
     )
 
 
-def _error_deg(measured: Measurement, truth: SensorTruth) -> float | None:
+def _error_deg(measured: Measurement, truth: "SensorTruth") -> float | None:
     if not measured.detected:
         return None
     vector = direction(measured.alpha_deg, measured.beta_deg)

@@ -1,7 +1,5 @@
 """What it costs to emulate a CubeStar, and to read one over I2C."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
@@ -29,7 +27,7 @@ print(100 / times[len(times) // 2])
 """
 
 
-def _figures(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
+def _figures(device: "Device[CubeStarBoard, CubeStar]") -> dict[str, float]:
     from cubestack.emulator.boards.cubestar.benchmark import rtl_clocks_per_s, strobes_per_s
     from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
     from cubestack.emulator.rtl.benchmark import cold_build_s
@@ -50,7 +48,7 @@ def _figures(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
     return figures | _i2c()
 
 
-def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, float]:
+def _capture(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> dict[str, float]:
     """Wall times of capture and transfer."""
     engine = emulated.board.engine
     strobe_read = engine.strobe_read

@@ -1,7 +1,5 @@
 """CubeStar: a rendered sky and a photograph captured, solved and downloaded."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +52,7 @@ class _Subject:
 
 
 def show(
-    device: Device[CubeStarBoard, CubeStar], out: Path, seed: int, photographs: Path | None
+    device: "Device[CubeStarBoard, CubeStar]", out: Path, seed: int, photographs: Path | None
 ) -> bool:
     """Show both subjects; returns whether both were solved."""
     solved = [_show(device, subject, out) for subject in (_sky(seed), _photograph(photographs))]
@@ -100,7 +98,7 @@ def _shipped() -> _Subject:
     )
 
 
-def _show(device: Device[CubeStarBoard, CubeStar], subject: _Subject, out: Path) -> bool:
+def _show(device: "Device[CubeStarBoard, CubeStar]", subject: _Subject, out: Path) -> bool:
     """Capture, solve and download one subject; returns whether it was solved."""
     demo = Demo(out, subject.name, subject.title)
     with demo.client(device, subject.scene) as (cubestar, _):

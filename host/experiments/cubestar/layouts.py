@@ -15,8 +15,6 @@ examples:
   cubestack measure cubestar --layout 2 --json     one shot, with its phases
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -185,7 +183,7 @@ class _Found:
     right: bool | None
 
 
-def _attitudes(board: CubeStarBoard, seconds: int) -> Iterator[_Found]:
+def _attitudes(board: "CubeStarBoard", seconds: int) -> Iterator[_Found]:
     """What the loop finds after ``SETTLING`` attitudes: one, and those of ``seconds`` after it.
 
     When the first one does not come, its place is told without it.

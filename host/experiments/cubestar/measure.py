@@ -16,8 +16,6 @@ examples:
   cubestack measure cubestar --mag-limit 3.8 --layout 2       one SRAM for FPGA and processor
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator
@@ -137,7 +135,7 @@ def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | No
 
 
 def _measure(
-    emulated: EmulatedDevice[CubeStarBoard, CubeStar],
+    emulated: "EmulatedDevice[CubeStarBoard, CubeStar]",
     options: CubeStarOptions,
     picture_truth: NDArray[np.float64] | None,
     rng: np.random.Generator,
@@ -193,8 +191,8 @@ def give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
 
 
 def _prime_tracking(
-    emulated: EmulatedDevice[CubeStarBoard, CubeStar],
-    scene: Scene,
+    emulated: "EmulatedDevice[CubeStarBoard, CubeStar]",
+    scene: "Scene",
     offset_deg: float,
     rng: np.random.Generator,
 ) -> None:
