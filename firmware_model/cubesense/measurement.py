@@ -38,9 +38,8 @@ PROJECTIONS = {
     codes.Camera.NADIR: distortion.Projection.STEREOGRAPHIC,
 }
 
-SCANNED_PIXELS = (
-    len(FULL_SIZE.scan_rows) * FULL_SIZE.columns + len(FULL_SIZE.scan_columns) * FULL_SIZE.rows
-)
+SCANNED_PIXELS = FULL_SIZE.scan_clocks - 2
+"""Two clocks present no pixel."""
 
 FLASH_ERASE_BYTES, FLASH_WRITE_BYTES, FLASH_STEP_US = 64, 32, 2_000
 """The part erases and writes its flash in such blocks, and stops for each: 2 ms, assumed."""
@@ -69,14 +68,10 @@ class Measurement:
             for camera in codes.Camera
         }
 
-    def measure(
-        self, camera: codes.Camera, sram: codes.Sram, *, detect: bool = True
-    ) -> Routine[None]:
+    def measure(self, camera: codes.Camera, sram: codes.Sram, *, detect: bool) -> Routine[None]:
         """Take a picture of ``camera`` into ``sram`` and, with ``detect``, measure in it."""
-        result = Result(codes.CaptureResult.PENDING, codes.DetectResult.PENDING, sram=sram)
-        if not detect:
-            result.detect = codes.DetectResult.NONE_SCHEDULED
-        self._state.results[camera] = result
+        result = self._state.results[camera] = Result()
+        self._state.schedule(camera, sram, detect=detect)
         if detect:
             yield from self._update_table(camera)
         yield from self._cameras.prepare(camera)
@@ -84,16 +79,6 @@ class Measurement:
         capture = yield from self._acquisition.store(camera, sram)
         if capture is codes.CaptureResult.CAMERA_TIMEOUT:
             self._cameras.forget_set_up(camera)
-        yield from self._stored(result, capture, started)
-        if detect and capture.stored:
-            measured = self._measure_nadir if camera == codes.Camera.NADIR else self._measure_sun
-            found = yield from measured(result, started)
-            if not found:  # the memory was cut off under the search
-                result.capture = codes.CaptureResult.SRAM_OVER_CURRENT
-                result.detect = codes.DetectResult.NONE_SCHEDULED
-
-    def _stored(self, result: Result, capture: codes.CaptureResult, started: int) -> Routine[None]:
-        """The picture is there, or will not come."""
         ticks = yield from ticks_since(started)
         reading = min(READ_OUT_TICKS, ticks) if capture.stored else 0
         result.wait_us = microseconds(ticks - reading)
@@ -102,6 +87,12 @@ class Measurement:
         result.capture = capture
         if not capture.stored:
             result.detect = codes.DetectResult.NONE_SCHEDULED
+        elif detect:
+            measured = self._measure_nadir if camera == codes.Camera.NADIR else self._measure_sun
+            found = yield from measured(result, started)
+            if not found:  # the memory was cut off under the search
+                result.capture = codes.CaptureResult.SRAM_OVER_CURRENT
+                result.detect = codes.DetectResult.NONE_SCHEDULED
 
     def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
         """The Earth; False when the memory was cut off."""
@@ -113,8 +104,7 @@ class Measurement:
             return False
         searched = yield from read_ticks()
         result.search_us = microseconds((yield from ticks_since(stored)))
-        _, table = self._tables[codes.Camera.NADIR]
-        found = find_nadir(edges, NadirConfig(table), self._meter)
+        found = find_nadir(edges, NadirConfig(self._tables[codes.Camera.NADIR][1]), self._meter)
         self._meter.charge(f32_mul=1, f32_convert=1)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
         result.total_us = microseconds((yield from ticks_since(started)))

@@ -147,7 +147,4 @@ class State(NodeState):
         result = self.results[camera]
         result.capture = codes.CaptureResult.PENDING
         result.sram = sram
-        if detect:
-            result.detect = codes.DetectResult.PENDING
-        else:
-            result.detect = codes.DetectResult.NONE_SCHEDULED
+        result.detect = codes.DetectResult.PENDING if detect else codes.DetectResult.NONE_SCHEDULED

@@ -74,36 +74,22 @@ class LeastSquaresCircle:
             return None
         xx, xy, yy, sx, sy, zx, zy, z = self._sums
         n = np.float32(self._count)
-        matrix = ((xx, xy, sx), (xy, yy, sy), (np.float32(2) * sx, np.float32(2) * sy, n))
-        right = (zx, zy, z)
-        # Cofactors of each column's elements are the rows of the inverse, times the determinant.
-        inverse = [
-            [_cofactor(matrix, row, column) for row in range(FEWEST)] for column in range(FEWEST)
-        ]
-        determinant = sum(
-            (a * b for a, b in zip(matrix[0], (row[0] for row in inverse), strict=True)),
-            np.float32(0),
-        )
+        matrix = np.array([[xx, xy, sx], [xy, yy, sy], [2 * sx, 2 * sy, n]])
+
+        def turned(down: int, right: int) -> Values:
+            return np.roll(matrix, (-down, -right), (0, 1))
+
+        # The inverse, transposed, times the determinant; cyclic indices give the sign.
+        cofactors = turned(1, 1) * turned(2, 2) - turned(1, 2) * turned(2, 1)
+        determinant = sequential_sum(matrix[0] * cofactors[0])
         self._meter.charge(f32_mul=18 + 3 + 9, f32_add=9 + 2 + 6, f32_compare=1)
         # A determinant this small by its largest product is rounding alone.
         if abs(determinant) <= np.float32(1e-5) * abs(xx * yy * n):
             return None
         # The thesis' unknowns are the negative centre, and its right side is negative too.
-        x, y, c = (
-            sum((a * b for a, b in zip(row, right, strict=True)), np.float32(0)) / determinant
-            for row in inverse
-        )
+        x, y, c = sequential_sum(cofactors * np.array([[zx], [zy], [z]])) / determinant
         square = x * x + y * y + c
         self._meter.charge(f32_div=3, f32_mul=2, f32_add=2, f32_compare=1, f32_sqrt=1)
         if not square > 0:
             return None
         return Circle(x, y, np.sqrt(square))
-
-
-def _cofactor(
-    matrix: tuple[tuple[np.float32, np.float32, np.float32], ...], row: int, column: int
-) -> np.float32:
-    """Signed minor of a 3 x 3 matrix; cyclic indices give the sign."""
-    r, s = (row + 1) % FEWEST, (row + 2) % FEWEST
-    c, d = (column + 1) % FEWEST, (column + 2) % FEWEST
-    return matrix[r][c] * matrix[s][d] - matrix[r][d] * matrix[s][c]

@@ -13,8 +13,9 @@ where a straight line through their values meets the threshold. The published ed
 the bright one, up to a pixel inside, which also lets parts of the lens' rim pass for edges.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
@@ -137,6 +138,14 @@ class Crossing:
     dark_value: int
 
 
+def crossing(one: tuple[int, int], other: tuple[int, int], threshold: int) -> Crossing | None:
+    """Between two pixels of a line (position, value); None when they are alike."""
+    if (one[1] >= threshold) == (other[1] >= threshold):
+        return None
+    bright, dark = (one, other) if one[1] >= threshold else (other, one)
+    return Crossing(bright[0], dark[0], bright[1], dark[1])
+
+
 def bisect(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, int, Crossing]:
     """Narrow a wide crossing down to neighbours: asks for the values of positions on the line."""
     bright, dark = crossing.bright, crossing.dark
@@ -197,7 +206,7 @@ class NadirLines:
         self.edges = EdgeList(config, meter)
         self._threshold = config.threshold
         self._meter = meter
-        self._pieces = iter(_pieces(read_out))
+        self._pieces = _pieces(read_out)
         self._piece: _Piece | None = next(self._pieces)
         self._buffer = np.zeros(read_out.scan_step, np.uint8) if buffer is None else buffer
         self._previous = 0
@@ -225,36 +234,18 @@ class NadirLines:
         sample = int(self._buffer[piece.size - 1])
         self._previous = sample
         self._meter.charge(array_byte=2, i8=3, loop16=1)
-        if (sample >= self._threshold) == (before >= self._threshold):
-            return
-        first, last = piece.start - 1, piece.start + piece.size - 1
-        wide = (
-            Crossing(last, first, sample, before)
-            if sample >= self._threshold
-            else Crossing(first, last, before, sample)
-        )
         start = piece.start
-        found = answered(
-            bisect(wide, self._threshold, self._meter),
-            lambda position: int(self._buffer[position - start]),
-        )
-        self.edges.add(line, piece.vertical, found)
+        wide = crossing((start - 1, before), (start + piece.size - 1, sample), self._threshold)
+        if wide is not None:
+            steps = bisect(wide, self._threshold, self._meter)
+            found = answered(steps, lambda position: int(self._buffer[position - start]))
+            self.edges.add(line, piece.vertical, found)
 
 
-def _pieces(read_out: ReadOut) -> list[_Piece]:
+def _pieces(size: ReadOut) -> Iterator[_Piece]:
     """The scan in the order of its clocks, cut into what the buffer takes."""
-    step = read_out.scan_step
-
-    def cut(line: int, vertical: bool, length: int) -> list[_Piece]:
-        return [
-            _Piece(min(step, length - start), line, vertical, start)
-            for start in range(0, length, step)
-        ]
-
-    pieces = [_Piece(1)]
-    for row in read_out.scan_rows:
-        pieces += cut(row, False, read_out.columns)
-    pieces.append(_Piece(1))
-    for column in read_out.scan_columns:
-        pieces += cut(column, True, read_out.rows)
-    return pieces
+    scans = ((size.scan_rows, size.columns), (size.scan_columns, size.rows))
+    for vertical, (lines, length) in enumerate(scans):
+        yield _Piece(1)
+        for line, start in product(lines, range(0, length, size.scan_step)):
+            yield _Piece(min(size.scan_step, length - start), line, bool(vertical), start)

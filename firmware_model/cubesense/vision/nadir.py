@@ -62,16 +62,13 @@ class NadirConfig:
 
 
 @dataclass(frozen=True)
-class NadirResult:
+class Direction:
     """What became of a detection.
 
     Attributes:
         detect: its result code.
         x, y: centre from the boresight, 1/100 px, undistorted; 0 without success.
         alpha, beta: the same, 1/100 deg.
-        edges: that the fit used; without a fit, that were found.
-        dropped: edges left out of it.
-        radius_deg: angular radius of the circle; 0 when there is none.
     """
 
     detect: codes.DetectResult
@@ -79,6 +76,18 @@ class NadirResult:
     y: int = 0
     alpha: int = 0
     beta: int = 0
+
+
+@dataclass(frozen=True)
+class NadirResult(Direction):
+    """A direction, and what it rests on.
+
+    Attributes:
+        edges: that the fit used; without a fit, that were found.
+        dropped: edges left out of it.
+        radius_deg: angular radius of the circle; 0 when there is none.
+    """
+
     edges: int = 0
     dropped: int = 0
     radius_deg: float = 0.0
@@ -112,21 +121,12 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
         meter.charge(f32_compare=4)
         in_range = bool(np.all(np.abs(centre) <= LARGEST_PX))
         if not (in_range and low <= radius_deg <= high):
-            detect = codes.DetectResult.BAD_FIT
-            return NadirResult(detect, edges=used, dropped=dropped, radius_deg=radius_deg)
+            bad = codes.DetectResult.BAD_FIT
+            return NadirResult(bad, edges=used, dropped=dropped, radius_deg=radius_deg)
         meter.charge(f32_mul=2, f32_convert=2)
         position = arithmetic.to_int16(centre * arithmetic.HUNDREDTHS)
-        angle = angle_of(position, meter)
-    return NadirResult(
-        codes.DetectResult.SUCCESS,
-        int(position[0]),
-        int(position[1]),
-        int(angle[0]),
-        int(angle[1]),
-        used,
-        dropped,
-        radius_deg,
-    )
+        x, y, alpha, beta = (int(value) for value in (*position, *angle_of(position, meter)))
+    return NadirResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, used, dropped, radius_deg)
 
 
 def _fit(points: Values, config: NadirConfig, meter: Meter) -> tuple[Circle | None, int]:

@@ -12,7 +12,13 @@ from enum import Enum
 
 import numpy as np
 
-from cubestack.firmware_model.cubesense.vision.edges import Crossing, EdgeConfig, EdgeList, bisect
+from cubestack.firmware_model.cubesense.vision.edges import (
+    Crossing,
+    EdgeConfig,
+    EdgeList,
+    bisect,
+    crossing,
+)
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -49,18 +55,13 @@ def around_samples(
                 (False, left, x, y),
                 (True, int(above[index]), y, x),
             ):
-                if (sample >= config.threshold) == (before >= config.threshold):
-                    continue
                 first = max(end - read_out.scan_step, -1)
-                wide = (
-                    Crossing(end, first, sample, before)
-                    if sample >= config.threshold
-                    else Crossing(first, end, before, sample)
-                )
+                wide = crossing((first, before), (end, sample), config.threshold)
+                if wide is None:
+                    continue
                 search = bisect if between is Between.BINARY else _walk
                 steps = search(wide, config.threshold, meter)
-                found = yield from _on_line(steps, line, vertical)
-                edges.add(line, vertical, found)
+                edges.add(line, vertical, (yield from _on_line(steps, line, vertical)))
             left = sample
             above[index] = sample
     return edges

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubesense.vision.arithmetic import sequential_sum
 from cubestack.firmware_model.cubesense.vision.distortion import RIM_PX, RadiusTable
 from cubestack.firmware_model.cubesense.vision.masks import Mask, masked
-from cubestack.firmware_model.cubesense.vision.nadir import angle_of
+from cubestack.firmware_model.cubesense.vision.nadir import Direction, angle_of
 from cubestack.firmware_model.interface.cubesense import codes, fpga
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -57,21 +57,9 @@ class SunConfig:
 
 
 @dataclass(frozen=True)
-class SunResult:
-    """What became of a detection.
+class SunResult(Direction):
+    """A direction, and the number of ``pixels`` that reached the threshold."""
 
-    Attributes:
-        detect: its result code.
-        x, y: centre from the boresight, 1/100 px, undistorted; 0 without success.
-        alpha, beta: the same, 1/100 deg.
-        pixels: that reached the threshold.
-    """
-
-    detect: codes.DetectResult
-    x: int = 0
-    y: int = 0
-    alpha: int = 0
-    beta: int = 0
     pixels: int = 0
 
 
@@ -111,15 +99,11 @@ def find_sun(
         meter.charge(i8=1)
         if pixels < config.min_pixels:
             return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
-        _charge_sums(pixels, meter)
+        # What the listing does for each Sun pixel, every factor converted anew.
+        meter.charge(f32_convert=4 * pixels, f32_mul=2 * pixels, f32_add=2 * pixels, i16_add=pixels)
         values = window[rows, columns]
-        mean = np.array(
-            [
-                _mean(columns, rows, values, read_out.window, config, meter),
-                _mean(rows, columns, values, read_out.window, config, meter),
-            ],
-            np.float32,
-        )
+        side, axes = read_out.window, ((columns, rows), (rows, columns))
+        mean = np.array([_mean(*axis, values, side, config, meter) for axis in axes])
         offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
         meter.charge(f32_add=4, f32_div=2, f32_convert=4)
         # In whole pixels, because the processor multiplies bytes by itself.
@@ -135,11 +119,6 @@ def find_sun(
             return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
     x, y, alpha, beta = (int(value) for value in (*centre, *angle))
     return SunResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, pixels)
-
-
-def _charge_sums(pixels: int, meter: Meter) -> None:
-    """What the listing does for each Sun pixel, every factor converted anew."""
-    meter.charge(f32_convert=4 * pixels, f32_mul=2 * pixels, f32_add=2 * pixels, i16_add=pixels)
 
 
 def _mean(
