@@ -32,7 +32,6 @@ Frames = list[dict[str, Any]]
 Measure = Callable[..., Frames]
 Open = Callable[..., AnyEmulated]
 Emulate = Callable[..., AbstractContextManager["Served"]]
-Wire = list[tuple[bytes, int, int]]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -143,22 +142,28 @@ class Served:
 
 
 class Ear:
-    """Hears what a device sends on a line.
+    """Hears what passes on a device's line.
 
     Attributes:
-        wire: bytes, time of the first one, and of each, in ps.
+        sent: bytes of the device, time of the first one, and of each, in ps.
+        heard: each byte that it got, and when it began.
+        errors: when there was a framing error.
     """
 
     def __init__(self, uart: Uart) -> None:
-        self.wire: Wire = []
+        self.sent: list[tuple[bytes, int, int]] = []
+        self.heard: list[tuple[int, int]] = []
+        self.errors: list[int] = []
         uart.taps.append(self)
 
     def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        self.wire.append((bytes(data), first_ps, byte_ps))
+        self.sent.append((bytes(data), first_ps, byte_ps))
 
-    def device_heard(self, byte: int, start_ps: int) -> None: ...
+    def device_heard(self, byte: int, start_ps: int) -> None:
+        self.heard.append((byte, start_ps))
 
-    def framing_error(self, time_ps: int) -> None: ...
+    def framing_error(self, time_ps: int) -> None:
+        self.errors.append(time_ps)
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ firmware makes of it; without kinds, it is that of the test's parameter ``kind``
 says the fixture. A marked test whose faults did nothing fails.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,64 +14,45 @@ import pytest
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 
-from .bench import BENCHES, NADIR_DEG, Bench
+from .bench import BENCHES, NADIR_DEG, Sense, powered
 
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "fault(*kinds): the test shows what these faults do")
 
 
-def _powered(
-    request: pytest.FixtureRequest, power_up: Callable[[], AbstractContextManager[Bench]]
-) -> Iterator[Bench]:
-    marker = request.node.get_closest_marker("fault")
-    with power_up() as bench:
-        yield bench
-        if marker is not None:
-            kinds = marker.args or [request.node.callspec.params["kind"]]
-            assert set(kinds) <= {event.kind for event in bench.faults.log}
+def one_of(*names: str) -> Any:
+    """A fixture that is each of these devices."""
+
+    @pytest.fixture(params=names)
+    def powered_up(request: pytest.FixtureRequest) -> Iterator[Any]:
+        marker = request.node.get_closest_marker("fault")
+        with powered(request.param) as bench:
+            yield bench
+            if marker is not None:
+                kinds = marker.args or [request.node.callspec.params["kind"]]
+                assert set(kinds) <= {event.kind for event in bench.faults.log}
+
+    return powered_up
+
+
+star, sense, tracker = one_of("cubestar"), one_of("cubesense"), one_of("aramis")
+bench = one_of(*BENCHES)
 
 
 @pytest.fixture
-def star(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """A CubeStar."""
-    yield from _powered(request, BENCHES["cubestar"])
-
-
-@pytest.fixture
-def sense(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """A CubeSense."""
-    yield from _powered(request, BENCHES["cubesense"])
-
-
-@pytest.fixture
-def tracker(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """An AraMiS star tracker."""
-    yield from _powered(request, BENCHES["aramis"])
-
-
-@pytest.fixture(params=BENCHES)
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """Each of the devices."""
-    yield from _powered(request, BENCHES[request.param])
-
-
-@pytest.fixture
-def quiet(sense: Bench) -> Bench:
+def quiet(sense: Sense) -> Sense:
     """A sensor without noise, so that all pictures of the nadir camera are the same."""
     still = EarthSunScene.facing(nadir_deg=NADIR_DEG)
     sense.board.scene = EarthSunView(still, FisheyeCondition(noise=False))
-    from .cubesense_bench import check_right, measure
-
-    check_right(measure(sense))
+    sense.check()
     return sense
 
 
 @pytest.fixture(scope="session")
 def good() -> np.ndarray:
     """CubeStar's picture without faults, (512, 1024)."""
-    from .cubestar_bench import stored
-
-    with BENCHES["cubestar"]() as bench:
-        bench.device.capture_and_process()
-        return stored(bench)
+    with powered("cubestar") as star:
+        star.device.capture_and_process()
+        found: np.ndarray = star.stored
+        return found

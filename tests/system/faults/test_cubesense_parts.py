@@ -5,32 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.cubesense.codes import (
-    Camera,
-    CaptureResult,
-    DetectResult,
-    ResetTarget,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import codes
+from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.errors import NoAnswerError
 
-from .bench import Bench
-from .cubesense_bench import (
-    await_frame,
-    check_next,
-    check_right,
-    host_pixel,
-    line_s,
-    measure,
-    measure_with,
-    picture,
-)
+from .bench import Sense, check_right, line_s
 
 X, Y = 320, 300
 ADDRESS = 1024 * Y + X
-SEARCHING_S = 0.1
-"""From the request on."""
 
 UNTOUCHED = 1
 """A value that no pixel of the scene has."""
@@ -42,88 +25,86 @@ CUT = (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
 
 
 @pytest.mark.fault("memory-flip")
-def test_a_flipped_bit_is_one_bit(quiet: Bench) -> None:
-    before = host_pixel(quiet, X, Y)
+def test_a_flipped_bit_is_one_bit(quiet: Sense) -> None:
+    before = quiet.host_pixel(X, Y)
     quiet.inject("memory-flip", target="nadir", address=ADDRESS, bit=5)
-    assert host_pixel(quiet, X, Y) == before ^ 0x20
-    assert host_pixel(quiet, X, Y) == before ^ 0x20
-    assert host_pixel(quiet, X + 1, Y) == picture(quiet)[Y, X + 1]
-    check_next(quiet)
-    assert host_pixel(quiet, X, Y) == before
+    assert quiet.host_pixel(X, Y) == before ^ 0x20
+    assert quiet.host_pixel(X + 1, Y) == quiet.picture()[Y, X + 1]
+    quiet.check()
+    assert quiet.host_pixel(X, Y) == before
 
 
 @pytest.mark.fault("memory-upsets")
-def test_upsets_come_at_their_rate_and_the_fit_bears_them(quiet: Bench) -> None:
-    clean = picture(quiet)
+def test_upsets_come_at_their_rate_and_the_fit_bears_them(quiet: Sense) -> None:
+    clean = quiet.picture()
     quiet.inject("memory-upsets", target="nadir", rate=1e-2)
     began_s = quiet.now_s
-    check_right(measure(quiet))
+    quiet.check()
     expected = 1e-2 * 8 * clean.size * (quiet.now_s - began_s)
-    flipped = int(np.unpackbits(picture(quiet) ^ clean).sum())
+    flipped = int(np.unpackbits(quiet.picture() ^ clean).sum())
     assert 0.5 * expected < flipped < expected
     quiet.faults.clear()
-    check_next(quiet)
+    quiet.check()
 
 
 @pytest.mark.fault("memory-stuck")
-def test_a_stuck_bit_is_the_same_in_every_picture(quiet: Bench) -> None:
-    before = host_pixel(quiet, X, Y)
+def test_a_stuck_bit_is_the_same_in_every_picture(quiet: Sense) -> None:
+    before = quiet.host_pixel(X, Y)
     level = 1 - (before >> 5 & 1)
     quiet.inject("memory-stuck", target="nadir", address=ADDRESS, bit=5, level=level)
     for _ in range(2):
-        check_next(quiet)
-        assert host_pixel(quiet, X, Y) == before ^ 0x20
+        quiet.check()
+        assert quiet.host_pixel(X, Y) == before ^ 0x20
     quiet.faults.clear()
-    check_next(quiet)
-    assert host_pixel(quiet, X, Y) == before
+    quiet.check()
+    assert quiet.host_pixel(X, Y) == before
 
 
 @pytest.mark.fault("register-flip")
-def test_a_row_counter_that_flips_puts_the_rest_elsewhere(quiet: Bench) -> None:
-    clean = picture(quiet)
+def test_a_row_counter_that_flips_puts_the_rest_elsewhere(quiet: Sense) -> None:
+    clean = quiet.picture()
     quiet.board.engine.memories["nadir"][:] = UNTOUCHED
     register = "nadir.pix_writer.counter.row"
-    at_s = line_s(await_frame(quiet), 35.5)
+    at_s = line_s(quiet.await_frame(), 35.5)
     quiet.faults.inject("register-flip", register=register, bit=7, at_s=at_s)
-    found = measure(quiet)
-    assert found.capture is CaptureResult.STORED_OWN_SRAM
-    skipped = np.flatnonzero((picture(quiet) == UNTOUCHED).all(axis=1))
+    assert quiet.outcome()[0] is CaptureResult.STORED_OWN_SRAM
+    skipped = np.flatnonzero((quiet.picture() == UNTOUCHED).all(axis=1))
     assert len(skipped) == 127  # and two halves of lines
     row = int(skipped[0]) - 1
     assert row == 35
-    np.testing.assert_array_equal(picture(quiet)[:row], clean[:row])
-    np.testing.assert_array_equal(picture(quiet)[row + 129 :], clean[row + 1 : -128])
-    assert host_pixel(quiet, X, row + 60) == UNTOUCHED
-    check_next(quiet)
+    np.testing.assert_array_equal(quiet.picture()[:row], clean[:row])
+    np.testing.assert_array_equal(quiet.picture()[row + 129 :], clean[row + 1 : -128])
+    assert quiet.host_pixel(X, row + 60) == UNTOUCHED
+    quiet.check()
 
 
 @pytest.mark.fault("register-flip")
-def test_registers_of_an_idle_fpga_do_not_flip(quiet: Bench) -> None:
-    clean = picture(quiet)
+def test_registers_of_an_idle_fpga_do_not_flip(quiet: Sense) -> None:
+    clean = quiet.picture()
     for number in range(20):
         quiet.inject("register-flip", after_s=0.001 + number * 1e-5)
     quiet.client.pause(0.01)
     assert len(quiet.said()) == 20
-    np.testing.assert_array_equal(picture(quiet), clean)
-    check_next(quiet)
-    np.testing.assert_array_equal(picture(quiet), clean)
+    np.testing.assert_array_equal(quiet.picture(), clean)
+    quiet.check()
+    np.testing.assert_array_equal(quiet.picture(), clean)
 
 
 @pytest.mark.fault("register-upsets")
-def test_register_upsets_cost_a_measurement(quiet: Bench) -> None:
-    found = measure_with(quiet, "register-upsets", target="fpga", rate=10)
+def test_register_upsets_cost_a_measurement(quiet: Sense) -> None:
+    found = quiet.measure_with("register-upsets", target="fpga", rate=10)
     assert found.detect is DetectResult.BAD_FIT
     assert quiet.board.engine.violation_log.counts
     assert len(quiet.said()) > 100
-    check_next(quiet)
+    quiet.check()
 
 
 # --- latch-up -------------------------------------------------------------------------------------
 
 
 @pytest.mark.fault("latch-up")
-def test_a_latched_memory_is_cut_until_a_telecommand(sense: Bench) -> None:
-    check_right(measure(sense))
+def test_a_latched_memory_is_cut_until_a_telecommand(sense: Sense) -> None:
+    sense.check()
     sense.inject("latch-up", target="SRAM2")
     assert sense.board.power.current_ma("SRAM2") > 300
     sense.client.pause(0.006)
@@ -131,32 +112,29 @@ def test_a_latched_memory_is_cut_until_a_telecommand(sense: Bench) -> None:
     power = sense.device.power()
     assert power.over_current == (False, True)
     assert power.current_sram_ma[1] == 0
-    found = measure(sense)
-    assert (found.capture, found.detect) == CUT
-    other = sense.device.capture_and_detect(Camera.NADIR, Sram.SRAM1)
+    assert sense.outcome() == CUT
+    other = sense.device.capture_and_detect(Camera.NADIR, codes.Sram.SRAM1)
     assert other.capture is CaptureResult.STORED_OTHER_SRAM
     check_right(other)
     sense.device.clear_over_current()
-    check_next(sense)
+    sense.check()
     assert sense.device.power().over_current == (False, False)
 
 
-@pytest.mark.parametrize("storing", [True, False])
+@pytest.mark.parametrize("line", [-50, 240, 1500])  # awaited, stored, searched in
 @pytest.mark.fault("latch-up")
-def test_a_latch_up_in_a_measurement_ends_it(sense: Bench, storing: bool) -> None:
-    check_right(measure(sense))
-    at_s = line_s(await_frame(sense), 240) if storing else sense.now_s + SEARCHING_S
-    sense.faults.inject("latch-up", target="SRAM2", at_s=at_s)
-    found = measure(sense)
-    assert (found.capture, found.detect) == CUT
+def test_a_latch_up_in_a_measurement_ends_it(sense: Sense, line: int) -> None:
+    sense.check()
+    sense.faults.inject("latch-up", target="SRAM2", at_s=line_s(sense.await_frame(), line))
+    assert sense.outcome() == CUT
     assert sense.device.power().over_current == (False, True)
     sense.device.clear_over_current()
-    check_next(sense)
+    sense.check()
 
 
 @pytest.mark.fault("latch-up")
-def test_a_lasting_latch_up_is_cut_again_each_time(sense: Bench) -> None:
-    check_right(measure(sense))
+def test_a_lasting_latch_up_is_cut_again_each_time(sense: Sense) -> None:
+    sense.check()
     sense.inject("latch-up", target="SRAM2", lasting=True)
     for _ in range(2):
         sense.client.pause(0.006)
@@ -165,26 +143,24 @@ def test_a_lasting_latch_up_is_cut_again_each_time(sense: Bench) -> None:
         sense.device.clear_over_current()
         sense.client.pause(0.3)
     assert sense.device.power().over_current == (False, True)
-    check_right(sense.device.capture_and_detect(Camera.NADIR, Sram.SRAM1))
+    check_right(sense.device.capture_and_detect(Camera.NADIR, codes.Sram.SRAM1))
 
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.fault("latch-up")
-def test_a_latched_camera_draws_on_until_the_cameras_are_reset(
-    sense: Bench, camera: Camera
-) -> None:
-    check_right(measure(sense, camera))
+def test_a_latched_camera_draws_on_until_it_is_reset(sense: Sense, camera: Camera) -> None:
+    sense.check(camera)
     usual_ma = sense.device.power().current_5v_ma
     sense.inject("latch-up", target=("sun_camera", "nadir_camera")[camera])
     sense.client.pause(0.1)
     found = sense.device.power()
     assert found.over_current == (False, False)
     assert found.current_5v_ma == MONITOR_MA > usual_ma + 100
-    check_next(sense, camera)
-    sense.device.reset(ResetTarget.CAMERAS)
+    sense.check(camera)
+    sense.device.reset(codes.ResetTarget.CAMERAS)
     sense.client.pause(0.3)
     assert sense.device.power().current_5v_ma == pytest.approx(usual_ma, abs=1)
-    check_next(sense, camera)
+    sense.check(camera)
 
 
 # --- the bench line -------------------------------------------------------------------------------
@@ -192,7 +168,7 @@ def test_a_latched_camera_draws_on_until_the_cameras_are_reset(
 
 @pytest.mark.fault
 @pytest.mark.parametrize("kind", ["uart-drop", "uart-corrupt", "uart-delay"])
-def test_the_bench_line_has_faults_of_its_own(sense: Bench, kind: str) -> None:
+def test_the_bench_line_has_faults_of_its_own(sense: Sense, kind: str) -> None:
     bench = ServicePortClient(sense.board.serial("bench_uart"), timeout_s=0.5)
     options: dict[str, Any] = {"delay_ms": 1000} if kind == "uart-delay" else {}
     sense.inject(kind, target="bench", direction="to-device", **options)

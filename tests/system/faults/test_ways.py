@@ -1,41 +1,32 @@
 """Every kind from the shell, from a plan and from a test; logged; the same again from its seed."""
 
+import json
 import math
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from cubestack.emulator.faults.declaration import Fault, FaultError, Parameter
+from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.plan import parse_plan
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.cli.main import main
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.targets import open_target
 from cubestack.host.shell.language import Shell
 from tests.system.conftest import Ear
 
-from .bench import BENCHES, Bench
+from .bench import BENCHES, Bench, Star, Tracker, powered
 
 
-def given(fault: type[Fault], registers: dict[str, int]) -> dict[str, Any]:
+def given(kind: str, board: Any) -> dict[str, Any]:
     """A value for each parameter of a fault; the rates are those that no run takes notice of."""
-    values = {}
-    for name, parameter in fault.parameters().items():
-        default = getattr(fault(), name)
-        values[name] = _value(name, parameter, registers) if default is None else default
-    return values | ({"rate": 1e-9} if "upsets" in fault.kind else {})
-
-
-def _value(name: str, parameter: Parameter, registers: dict[str, int]) -> Any:
-    return next(iter(registers)) if name == "register" else round(min(parameter.high, 0))
-
-
-def registers_of(board: Any) -> dict[str, int]:
-    engine = getattr(board, "engine", None)
-    return {} if engine is None else dict(engine.registers)
+    fault = FAULTS[kind]
+    values = {name: getattr(fault(), name) for name in fault.parameters()}
+    for name in (name for name, default in values.items() if default is None):
+        values[name] = next(iter(board.engine.registers)) if name == "register" else 0
+    return values | ({"rate": 1e-9} if "upsets" in kind else {})
 
 
 def in_words(value: Any) -> str:
@@ -55,19 +46,18 @@ def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
 def test_the_shell_completes_and_takes_every_kind(shell: Shell) -> None:
     board: Any = shell.target.controls._board  # type: ignore[union-attr]
     kinds = board.faults.kinds()
-    completed = shell.complete("fault ")
-    assert set(kinds) | {"clear"} <= set(completed)
-    absent = {kind for kind, fault in FAULTS.items() if not board.faults.targets(fault.site)}
-    assert not absent & set(completed)
+    completed = set(shell.complete("fault "))
+    assert {*kinds, "clear"} <= completed
+    assert not {kind for kind in FAULTS if not board.faults.targets(FAULTS[kind].site)} & completed
     for kind, targets in kinds.items():
         assert kind in shell.complete(f"fault {kind[:-1]}")
         assert shell.complete(f"fault {kind} ")[: len(targets)] == list(targets)
-        words = [f"{n}={in_words(v)}" for n, v in given(FAULTS[kind], registers_of(board)).items()]
-        for target in targets:
-            for line in (f"fault {kind} {target}", f"fault {kind} {target} {' '.join(words)}"):
-                assert shell.execute(line) is not None
+        values = given(kind, board).items()
+        words = " ".join(f"{name}={in_words(value)}" for name, value in values)
         again = "" if FAULTS[kind].momentary else " for_s=0.001"
-        assert shell.execute(f"fault {kind} at_s=0.01{again}") is not None
+        lines = [f"{target}{more}" for target in targets for more in ("", f" {words}")]
+        for line in (*lines, f"at_s=0.01{again}"):
+            assert shell.execute(f"fault {kind} {line}") is not None
     lasting = {kind for kind in kinds if not FAULTS[kind].momentary}
     assert {injection.fault.kind for injection in board.faults._running} >= lasting
     assert shell.execute("fault clear") is not None
@@ -76,35 +66,38 @@ def test_the_shell_completes_and_takes_every_kind(shell: Shell) -> None:
 
 @pytest.mark.parametrize("device", BENCHES)
 def test_the_command_line_takes_every_kind(device: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with BENCHES[device]() as bench:
-        kinds = bench.faults.kinds()
-    commands = [f"fault {kind} {targets[-1]}; fault clear" for kind, targets in kinds.items()]
-    assert main(["shell", f"emulated:{device}", "-c", "; ".join(commands)]) == 0
+    with powered(device) as bench:
+        faults = [f"{kind} {targets[-1]}" for kind, targets in bench.faults.kinds().items()]
+    commands = "; ".join(f"fault {fault}; fault clear" for fault in faults)
+    assert main(["shell", f"emulated:{device}", "-c", commands]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert said[::2] == [f"fault: {kind} {targets[-1]}" for kind, targets in kinds.items()]
+    assert said[::2] == [f"fault: {fault}" for fault in faults]
 
 
 # --- plans ----------------------------------------------------------------------------------------
 
 
+def plan(seed: int, entries: list[dict[str, Any]]) -> str:
+    """The text of a plan."""
+    lines = [f"seed = {seed}"]
+    for entry in entries:
+        lines += ["[[fault]]", *(f"{key} = {json.dumps(value)}" for key, value in entry.items())]
+    return "\n".join(lines)
+
+
 def test_a_plan_takes_every_kind(bench: Bench) -> None:
-    kinds = bench.faults.kinds()
-    entries = []
-    for kind, targets in kinds.items():
-        for target in targets:
-            values = given(FAULTS[kind], registers_of(bench.board))
-            lines = [f'kind = "{kind}"', f'target = "{target}"', "at = 0.5"]
-            lines += [] if FAULTS[kind].momentary else ["for = 0.25"]
-            lines += [
-                f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {in_words(value)}"
-                for name, value in values.items()
-            ]
-            entries.append("[[fault]]\n" + "\n".join(lines))
-    injections = bench.faults.load(parse_plan("seed = 3\n" + "\n".join(entries)))
+    entries = [
+        {"kind": kind, "target": target, "at": 0.5}
+        | ({} if FAULTS[kind].momentary else {"for": 0.25})
+        | given(kind, bench.board)
+        for kind, targets in bench.faults.kinds().items()
+        for target in targets
+    ]
+    injections = bench.faults.load(parse_plan(plan(3, entries)))
     assert len(injections) == len(entries)
     for injection in injections:
-        values = given(FAULTS[injection.fault.kind], registers_of(bench.board))
-        assert all(getattr(injection.fault, name) == value for name, value in values.items())
+        values = given(injection.fault.kind, bench.board)
+        assert {name: getattr(injection.fault, name) for name in values} == values
         assert injection.start_ps == 500 * 10**9
         assert injection.end_ps in (None, 750 * 10**9)
     bench.board.kernel.advance_to(10**12)
@@ -130,57 +123,39 @@ RATES = {
 }
 
 
-def all_kinds(bench: Bench) -> tuple[str, float]:
-    """A plan of every kind: those of the wires all the time, the others one after the other."""
+def all_kinds(bench: Bench) -> tuple[list[dict[str, Any]], float]:
+    """A plan of every kind, and its end: those of memories and wires all the time, else in turn."""
     entries, at_s = [], 0.2
     for kind, targets in bench.faults.kinds().items():
         target = next((name for name in NADIR_HALF if name in targets), targets[0])
-        lines = [f'kind = "{kind}"', f'target = "{target}"']
+        entry: dict[str, Any] = {"kind": kind, "target": target}
         if kind in RATES:
-            lines.append(f"rate = {RATES[kind]}")
-        if not kind.startswith(("uart", "i2c-n", "i2c-str", "mem", "reg")):
-            lines.append(f"at = {at_s}")
-            lines += [] if FAULTS[kind].momentary else [f"for = {0.9 * STEP_S[bench.name]}"]
+            entry["rate"] = RATES[kind]
+        elif not kind.startswith(("memory", "register")):
+            entry["at"] = at_s
             at_s += STEP_S[bench.name]
-        entries.append("[[fault]]\n" + "\n".join(lines))
-    return "\n".join(entries), at_s
+            if not FAULTS[kind].momentary:
+                entry["for"] = 0.9 * STEP_S[bench.name]
+        entries.append(entry)
+    return entries, at_s
 
 
-def played(
-    device: str, seed: int, until_s: float = math.inf
-) -> tuple[list[Any], list[str], set[str]]:
+def played(device: str, seed: int, until_s: float = math.inf) -> tuple[Any, list[str], set[str]]:
     """All bytes with their times, the log, and the kinds of the plan."""
-    trace: list[Any] = []
-
-    class Tap(Ear):
-        def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-            trace.append((bytes(data), first_ps))
-
-        def device_heard(self, byte: int, start_ps: int) -> None:
-            trace.append((byte, start_ps))
-
-        def framing_error(self, time_ps: int) -> None:
-            trace.append(time_ps)
-
-    with BENCHES[device]() as bench:
-        text, end_s = all_kinds(bench)
-        bench.faults.load(parse_plan(f"seed = {seed}\n{text}"))
-        uarts = {"cubesense": (bench.board.uart, getattr(bench.board, "bench_uart", None))}
-        for uart in uarts.get(device, (bench.board.uart,)):
-            Tap(uart)
+    with powered(device) as bench:
+        entries, end_s = all_kinds(bench)
+        bench.faults.load(parse_plan(plan(seed, entries)))
+        ears = [vars(Ear(uart)) for uart in bench.board.uarts.values()]
         bench.plug_in(timeout_s=0.2, retries=1)
-        picture = {
-            "cubestar": lambda: bench.device.capture_and_process(),
-            "cubesense": lambda: bench.device.capture_and_detect(Camera.NADIR),
-            "aramis": lambda: bench.device.measure(),
-        }[device]
+        found: list[tuple[float, str]] = []
         while bench.now_s < min(end_s, until_s):
-            for act in (picture, bench.ask_i2c):
+            for act in (bench.measure, bench.ask_i2c):
                 try:
-                    trace.append((bench.now_s, repr(act())))
+                    answer = repr(act())
                 except OSError as error:
-                    trace.append((bench.now_s, str(error)))
-        return trace, [str(event) for event in bench.faults.log], set(bench.faults.kinds())
+                    answer = str(error)
+                found.append((bench.now_s, answer))
+        return (found, ears), [str(event) for event in bench.faults.log], set(bench.faults.kinds())
 
 
 @pytest.mark.parametrize("device", BENCHES)
@@ -198,7 +173,7 @@ def test_a_plan_of_every_kind_repeats_to_the_byte(device: str) -> None:
 # --- what makes no sense --------------------------------------------------------------------------
 
 
-def test_refusals_name_what_would_be_right(star: Bench) -> None:
+def test_refusals_name_what_would_be_right(star: Star) -> None:
     cases: list[tuple[dict[str, Any], str]] = [
         ({"fault": "pixel-hat"}, "no fault 'pixel-hat'; there are uart-drop"),
         ({"fault": "pixel-hot", "target": "sun"}, "no camera 'sun'; there are imager"),
@@ -212,7 +187,7 @@ def test_refusals_name_what_would_be_right(star: Bench) -> None:
         with pytest.raises(ValueError, match=message):
             star.faults.inject(**arguments)
     assert issubclass(FaultError, ValueError)
-    assert star.device.capture_and_process().name == "CALCULATED"
+    assert star.measure() == "CALCULATED"
     assert star.faults.events == 0
 
 
@@ -224,7 +199,7 @@ def test_the_simulator_s_registers_can_not_be_hit() -> None:
             session.board.faults.inject("register-upsets")
 
 
-def test_what_a_device_does_not_have_can_not_be_hit(tracker: Bench) -> None:
+def test_what_a_device_does_not_have_can_not_be_hit(tracker: Tracker) -> None:
     missing = set(FAULTS) - set(tracker.faults.kinds())
     assert len(missing) > 10
     for kind in missing:
