@@ -63,9 +63,7 @@ def values_for(owner: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key in names}
 
 
-def read_table(
-    table: Mapping[str, Any], readers: Mapping[str, Callable[[Any], Any]]
-) -> dict[str, Any]:
+def read_table(table: Mapping[str, Any], readers: Readers) -> dict[str, Any]:
     """Checked values of ``table``; SceneError for keys and values that ``readers`` do not take."""
     values = {}
     for key, value in table.items():
@@ -74,19 +72,14 @@ def read_table(
         try:
             values[key] = readers[key](value)
         except ValueError as error:
-            raise SceneError(
-                f"{key}: {error}" if isinstance(value, dict) else f"{key} {error}"
-            ) from None
+            colon = ":" if isinstance(value, dict) else ""
+            raise SceneError(f"{key}{colon} {error}") from None
     return values
 
 
 def number(value: Any) -> float:
     """A finite number."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not abs(value) <= sys.float_info.max
-    ):
+    if type(value) not in (int, float) or not abs(value) <= sys.float_info.max:
         raise SceneError(f"must be a number, not {value!r}")
     return float(value)
 

@@ -102,11 +102,8 @@ class SkyScene:
 
     def pose_at(self, time_ps: int) -> Pose:
         """The pose that holds at a time."""
-        current = self._all_poses[0]
-        for pose in self.poses:
-            if pose.start_s * PS_PER_S <= time_ps:
-                current = pose
-        return current
+        begun = [pose for pose in self.poses if pose.start_s * PS_PER_S <= time_ps]
+        return begun[-1] if begun else self._all_poses[0]
 
     def truth(self, time_ps: int) -> NDArray[np.float64]:
         """The attitude (4,) at a time: scalar last, inertial to camera."""
@@ -123,14 +120,11 @@ class SkyScene:
 
     def turned(self, rotation_deg: ArrayLike) -> "SkyScene":
         """The same sky, all poses turned by a rotation vector (3,) in camera axes, in degrees."""
-        return replace(
-            self,
-            quaternion=propagate(self.quaternion, rotation_deg, 1.0),
-            poses=tuple(
-                replace(pose, quaternion=propagate(pose.quaternion, rotation_deg, 1.0))
-                for pose in self.poses
-            ),
+        first, *later = (
+            replace(pose, quaternion=propagate(pose.quaternion, rotation_deg, 1.0))
+            for pose in self._all_poses
         )
+        return replace(self, quaternion=first.quaternion, poses=tuple(later))
 
 
 Scene = SkyScene | PictureScene

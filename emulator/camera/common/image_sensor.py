@@ -3,21 +3,14 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cubestack.emulator.camera.common.imager import Grey
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.stream import PixelClock
-from cubestack.emulator.camera.common.view import View
+from cubestack.emulator.camera.common.view import C, S, View
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
-
-S = TypeVar("S")
-C = TypeVar("C")
-
-Grey = NDArray[np.uint8]
 
 
 class ImageSensor(ABC, Generic[S, C]):

@@ -13,24 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.scene.file import refuse_zero
+
 PHOTONS_V0 = 1000.0
 """Flux of a star of V = 0 in photons / (s cm^2 Angstrom) (published, eq. 3.4.2)."""
 
 WIDEST_PSF_PX = 20.0
 """Standard deviation of a spot in px, at most (assumed): few stars would still show."""
-
-_POSITIVE = (
-    "focal_length_mm",
-    "pixel_pitch_um",
-    "fx",
-    "fy",
-    "psf_sigma_px",
-    "columns",
-    "rows",
-    "aperture_mm",
-    "effective_width_a",
-    "field_stop_deg",
-)
 
 Pixels = NDArray[np.float64]
 
@@ -84,16 +73,15 @@ class Optics:
 
     def __post_init__(self) -> None:
         """Refuse a lens that can not make pictures."""
-        for name in _POSITIVE:
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
+        refuse_zero(
+            self, "focal_length_mm", "pixel_pitch_um", "fx", "fy", "psf_sigma_px", "columns"
+        )
+        refuse_zero(self, "rows", "aperture_mm", "effective_width_a", "field_stop_deg")
         if self.psf_sigma_px > WIDEST_PSF_PX:
             raise ValueError(
                 f"psf_sigma_px must be at most {WIDEST_PSF_PX:g}, not {self.psf_sigma_px}"
             )
-        x, y = np.meshgrid(
-            np.linspace(-0.5, self.columns - 0.5, 9), np.linspace(-0.5, self.rows - 0.5, 5)
-        )
+        y, x = np.mgrid[-0.5 : self.rows - 0.5 : 5j, -0.5 : self.columns - 0.5 : 9j]
         sensor = np.stack([x.ravel(), y.ravel()], axis=1)
         with np.errstate(all="ignore"):
             there_and_back = self.project(self.unproject(sensor))
@@ -179,13 +167,9 @@ class Optics:
         r2 = x * x + y * y
         radial = 1 + sign * r2 * (self.k1 + self.k2 * r2)
         p1, p2 = sign * self.p1, sign * self.p2
-        return np.stack(
-            [
-                x * radial + p2 * (r2 + 2 * x * x) + 2 * p1 * x * y,
-                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-            ],
-            axis=1,
-        )
+        across = x * radial + p2 * (r2 + 2 * x * x) + 2 * p1 * x * y
+        down = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        return np.stack([across, down], axis=1)
 
     @np.errstate(all="ignore")  # a search without a result may go anywhere
     def _inverse_polynomial(self, targets: Pixels, sign: int) -> Pixels:

@@ -1,11 +1,11 @@
 """A camera's registers behind its control bus: address pointer, values, and the wait for a sync.
 
-An address holds a byte, or a wider word where the camera's table says so.
-
-What is declared as not modelled, or not declared at all, is stored and logged when accessed.
+An address holds a byte, or a wider word where the camera's table says so. What is declared as not
+modelled, or not declared at all, is stored and logged when accessed.
 """
 
 import logging
+from logging import INFO, WARNING
 
 from cubestack.firmware_model.interface.cameras.registers import (
     CameraRegister,
@@ -26,7 +26,6 @@ class RegisterFile:
     def __init__(self, table: CameraRegisterMap) -> None:
         """Make a file with the reset values of ``table``."""
         self._table = table
-        self._pointer = 0
         self._written: dict[int, int] = {}
         self._active: dict[int, int] = {}
         self.reset()
@@ -34,14 +33,8 @@ class RegisterFile:
     def reset(self) -> None:
         """Go back to the reset values."""
         self._pointer = 0
-        self._written = {
-            address: byte
-            for register in self._table
-            for address, byte in zip(
-                register.addresses, register.units(register.reset), strict=True
-            )
-        }
-        self._active = dict(self._written)
+        for register in self._table:
+            self.store(register.name, register.reset)
 
     def select(self, address: int) -> None:
         """Set the address of the next byte read or written."""
@@ -51,14 +44,9 @@ class RegisterFile:
         """Write the next byte; returns the register that it belongs to, None if there is none."""
         address, register = self._step()
         if register is None:
-            logger.warning(
-                "%s: wrote %#04x to %#06x, where no register is known",
-                self._table.camera,
-                byte,
-                address,
-            )
+            self._log(WARNING, "wrote %#04x to %#06x, where no register is known", byte, address)
         elif register.access is RegisterAccess.READ_ONLY:
-            logger.warning("%s: wrote to %s, which is read-only", self._table.camera, register.name)
+            self._log(WARNING, "wrote to %s, which is read-only", register.name)
         else:
             self._log_unmodelled(register, address, byte)
             self._written[address] = byte
@@ -70,12 +58,10 @@ class RegisterFile:
         """Read the next byte; 0 where no register is known."""
         address, register = self._step()
         if register is None:
-            logger.warning(
-                "%s: read %#06x, where no register is known", self._table.camera, address
-            )
+            self._log(WARNING, "read %#06x, where no register is known", address)
             return 0
         if not register.modelled:
-            logger.info("%s: read %s, which is not modelled", self._table.camera, register.name)
+            self._log(INFO, "read %s, which is not modelled", register.name)
         return self._written[address]
 
     def sync(self) -> None:
@@ -102,17 +88,15 @@ class RegisterFile:
         return address, self._table.at(address)
 
     def _log_unmodelled(self, register: CameraRegister, address: int, byte: int) -> None:
-        camera = self._table.camera
         if not register.modelled:
-            logger.info("%s: wrote %s, which is not modelled", camera, register.name)
+            self._log(INFO, "wrote %s, which is not modelled", register.name)
             return
         value = byte << (register.unit_bits * (register.addresses[-1] - address))
         for field in register.fields:
             if value & field.mask and not field.modelled:
-                logger.info(
-                    "%s: set %s of %s, which is not modelled", camera, field.name, register.name
-                )
-        if undeclared := value & ~register.bits:
-            logger.warning(
-                "%s: set bits %#04x of %s, which are not known", camera, undeclared, register.name
-            )
+                self._log(INFO, "set %s of %s, which is not modelled", field.name, register.name)
+        if other := value & ~register.bits:
+            self._log(WARNING, "set bits %#04x of %s, which are not known", other, register.name)
+
+    def _log(self, level: int, text: str, *values: object) -> None:
+        logger.log(level, f"%s: {text}", self._table.camera, *values)

@@ -23,17 +23,20 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
-from cubestack.emulator.camera.mlx75412.frame_timing import LINE_CLOCKS, exposure_lines, frame_lines
 from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 
-IDLE_CLOCKS = 4096 * LINE_CLOCKS
+IDLE_CLOCKS = 4096 * chip.LINE_CLOCKS
 """Length in which the endless blanking of the disabled sensor is handed out."""
 
 REMEMBERED = 8
 """Spans and frames kept: more than anybody looks ahead or back."""
+
+MOST_FRAME_LINES = 4095
+FEWEST_FRAME_LINES = chip.ROWS + 8
+"""Shortest vertical blanking: assumed, far below what 30 frames a second leave."""
 
 _ENABLE = chip.REGISTERS["MODE_SELECT"].field("ENABLE")
 
@@ -74,7 +77,7 @@ class Mlx75412(StarSensor):
     """
 
     columns, rows, word_bytes = chip.COLUMNS, chip.ROWS, 1
-    line_clocks = LINE_CLOCKS
+    line_clocks = chip.LINE_CLOCKS
     active_columns = chip.COLUMNS
 
     def __init__(
@@ -86,11 +89,10 @@ class Mlx75412(StarSensor):
         crystal_hz: int = chip.CRYSTAL_HZ,
         vsync_before_first_frame: bool = False,
     ) -> None:
-        """Power up with the reset pin high.
+        """Power up with the reset pin high; see ``ImageSensor``.
 
         Args:
-            scene: what it looks at; with a condition, that counts.
-            condition: what lens and sensor are like, unless ``scene`` says.
+            scene, condition: as of there.
             seed: of the part's defects and of the undefined exposures.
             crystal_hz: input clock; PIXCLK has the same frequency.
             vsync_before_first_frame: whether VSync goes low between the undefined and the first
@@ -139,9 +141,7 @@ class Mlx75412(StarSensor):
         span = next(
             s for s in self._spans if not s.cut and clock.end_ps(s.first, s.clocks) > time_ps
         )
-        pixels = None
-        if span.rows and span.frame is not None:
-            pixels = partial(self._picture, span.frame)
+        pixels = partial(self._picture, span.frame) if span.rows and span.frame else None
         return StreamSegment(clock.edge_ps(span.first), span.clocks, span.vsync, span.rows, pixels)
 
     def frame_from(self, time_ps: int) -> RollingShutter | None:
@@ -169,7 +169,7 @@ class Mlx75412(StarSensor):
             return self._read_out(clock, last.end, last.frame)
         undefined = last.frame.number == 0
         vsync = int(undefined and not self._vsync_before_first_frame)
-        clocks = (last.frame.lines - chip.ROWS) * LINE_CLOCKS
+        clocks = (last.frame.lines - chip.ROWS) * chip.LINE_CLOCKS
         return _Span(last.end, clocks, vsync, last.frame)
 
     def _read_out(self, clock: PixelClock, first: int, before: _Frame | None) -> _Span:
@@ -183,11 +183,11 @@ class Mlx75412(StarSensor):
         else:
             exposure = wanted = before.next_exposure
         shutter = RollingShutter(
-            clock.edge_ps(first), LINE_CLOCKS * self.period, exposure, programmed_lines=wanted
+            clock.edge_ps(first), chip.LINE_CLOCKS * self.period, exposure, programmed_lines=wanted
         )
         number = 0 if before is None else before.number + 1
         frame = _Frame(number, shutter, self._corrections(), lines, next_exposure=programmed)
-        return _Span(first, chip.ROWS * LINE_CLOCKS, 1, frame, chip.ROWS)
+        return _Span(first, chip.ROWS * chip.LINE_CLOCKS, 1, frame, chip.ROWS)
 
     def _corrections(self) -> Corrections:
         value = self._registers.active("HARDWARE_FEATURES")
@@ -226,3 +226,24 @@ class Mlx75412(StarSensor):
         return self._once(
             frame, lambda: look(self.scene, self.condition, frame.shutter, frame.corrections)
         )
+
+
+def frame_lines(clocks_per_second: int, frames_per_second: int) -> int:
+    """Line times from one frame to the next, the nearest whole number (assumed) in range.
+
+    A line is 1322 input clocks, and the lowest frame rate, one frame in 5 413 590 of them, is 4095
+    lines: so a frame is a whole number of lines (appendix C, equation C.0.1, figure C.1; table D.2).
+    ``clocks_per_second`` is what the registers assume, whatever crystal there is.
+    """
+    if frames_per_second == 0:
+        return MOST_FRAME_LINES
+    clocks = 2 * frames_per_second * chip.LINE_CLOCKS
+    nearest = (2 * clocks_per_second + clocks // 2) // clocks
+    return min(max(nearest, FEWEST_FRAME_LINES), MOST_FRAME_LINES)
+
+
+def exposure_lines(rule: int, exposure: int, lines: int) -> int:
+    """Line times of exposure within a frame of ``lines``, by EXPOSURE_RULE and EXPOSURE."""
+    if rule == chip.LONGEST_EXPOSURE:
+        return lines - 1
+    return min(max(exposure, 1), lines - 1)

@@ -79,14 +79,12 @@ class Mt9m001Imager(Imager[SensorSettings]):
         # The dark rows' mean, which holds the mean dark current, is subtracted on the chip.
         if terms.dark:
             signal -= np.float32(dark)
-        signal *= _gain(settings) * np.float32(
-            (physics.FULL_SCALE + 1) / physics.FULL_WELL_ELECTRONS
-        )
+        scale = (physics.FULL_SCALE + 1) / physics.FULL_WELL_ELECTRONS
+        signal *= _gain(settings) * np.float32(scale)
         signal += np.float32(physics.BLACK_LEVEL)
         if not terms.quantisation:
-            nearest: Light = np.clip(
-                signal / np.float32(4) + np.float32(0.5), 0, physics.FULL_SCALE // 4
-            )
+            signal /= np.float32(4)
+            nearest: Light = np.clip(signal + np.float32(0.5), 0, physics.FULL_SCALE // 4)
             return nearest.astype(np.uint8)
         whole: Light = np.clip(signal + np.float32(0.5), 0, physics.FULL_SCALE)
         return (whole.astype(np.uint16) >> 2).astype(np.uint8)
@@ -103,12 +101,10 @@ def _gain(settings: SensorSettings) -> float | Light:
 
 
 def _window(full: Grey, settings: SensorSettings) -> Grey:
-    if (settings.row, settings.column) == (0, 0) and full.shape == (
-        settings.rows,
-        settings.columns,
-    ):
+    shape = (settings.rows, settings.columns)
+    if (settings.row, settings.column) == (0, 0) and full.shape == shape:
         return full
-    window = np.full((settings.rows, settings.columns), physics.BLACK_LEVEL >> 2, np.uint8)
+    window = np.full(shape, physics.BLACK_LEVEL >> 2, np.uint8)
     top, left = max(0, settings.row), max(0, settings.column)
     bottom = min(ROWS, settings.row + settings.rows)
     right = min(COLUMNS, settings.column + settings.columns)

@@ -74,11 +74,10 @@ class Mt9m001(StarSensor):
         clock_hz: int = chip.PIXEL_CLOCK_HZ,
         noise: NoiseTerms | None = None,
     ) -> None:
-        """Power up with the reset pin high.
+        """Power up with the reset pin high; see ``ImageSensor``.
 
         Args:
-            scene: what it looks at; with a condition, that counts.
-            condition: what lens and sensor are like, unless ``scene`` says.
+            scene, condition: as of there.
             seed: of the part's hot pixels.
             clock_hz: master clock; PIXCLK has the same frequency.
             noise: which terms of noise there are in a condition that has noise, all unless given.
@@ -187,9 +186,8 @@ class Mt9m001(StarSensor):
     def _next(self, clock: PixelClock) -> _Frame:
         """The frame after the last one that was made."""
         settings = self._settings
-        first = self._since + max(settings.blank_rows, settings.exposure_rows + 1) * (
-            settings.row_clocks
-        )
+        rows = max(settings.blank_rows, settings.exposure_rows + 1)
+        first = self._since + rows * settings.row_clocks
         if self._frames:
             last = self._frames[-1]
             if last.settings.timing == settings.timing:

@@ -1,7 +1,7 @@
 import pytest
 
-from cubestack.emulator.camera.mlx75412.frame_timing import LINE_CLOCKS, exposure_lines, frame_lines
-from cubestack.firmware_model.interface.cameras.mlx75412 import LONGEST_EXPOSURE
+from cubestack.emulator.camera.mlx75412.sensor import exposure_lines, frame_lines
+from cubestack.firmware_model.interface.cameras.mlx75412 import LINE_CLOCKS, LONGEST_EXPOSURE
 
 
 # CubeStar thesis, table D.2: register, expected and measured rate, approximate exposure in ms.
