@@ -232,7 +232,7 @@ def frame_lines(clocks_per_second: int, frames_per_second: int) -> int:
     """Line times from one frame to the next, the nearest whole number (assumed) in range.
 
     A line is 1322 input clocks, and the lowest frame rate, one frame in 5 413 590 of them, is 4095
-    lines: so a frame is a whole number of lines (appendix C, equation C.0.1, figure C.1; table D.2).
+    lines: so a frame is a whole number of lines (appendix C: eq. C.0.1, figure C.1; table D.2).
     ``clocks_per_second`` is what the registers assume, whatever crystal there is.
     """
     if frames_per_second == 0:
