@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus, I2cTarget
+from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.faults.sites import CameraSite, Sites
@@ -188,7 +188,7 @@ class Board(ABC):
     def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:
         """Lead the satellite's serial line and I2C bus to what ``link`` finds in the program."""
         self._serial_line(baud, link)
-        self.i2c_bus.attach(i2c_address, CurrentTarget(link))
+        self.i2c_bus.attach(i2c_address, Forwarder(lambda: [link()]))
 
     def _serial_line(
         self,

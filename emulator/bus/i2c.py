@@ -8,7 +8,7 @@ transfers queue for the wire.
 
 import errno
 from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -90,8 +90,8 @@ class I2cFaultHook(Protocol):
         """A byte was sent by the host, or by the target, and is not acknowledged yet."""
 
 
-class I2cTap(Protocol):
-    """Listens to whole transfers and changes nothing."""
+class I2cTap:
+    """Listens to whole transfers, to what it overrides, and changes nothing."""
 
     def transfer_began(self, messages: list[I2cMessage]) -> None:
         """A host wants this transfer from now on, behind those already under way."""
@@ -102,28 +102,32 @@ class I2cTap(Protocol):
         """It has ended now, read data in the messages; with ``error``, not all of it was done."""
 
 
-class CurrentTarget:
-    """Hands every call on to the program that runs now, which a reset replaces."""
+class Forwarder:
+    """Hands every call on: to the program that runs now, or to all that hear a general call."""
 
-    def __init__(self, link: Callable[[], I2cTarget]) -> None:
-        """Ask ``link`` for the program's end of the bus at each call."""
-        self._link = link
+    def __init__(self, targets: Callable[[], Sequence[I2cTarget]]) -> None:
+        """Ask ``targets`` at each call, as a reset replaces the program."""
+        self._targets = targets
 
     def i2c_start(self, read: bool) -> None:
         """A (repeated) start."""
-        self._link().i2c_start(read)
+        for target in self._targets():
+            target.i2c_start(read)
 
     def i2c_write(self, byte: int) -> bool:
-        """A byte came."""
-        return self._link().i2c_write(byte)
+        """A byte came; one acknowledge is enough."""
+        acknowledges = [target.i2c_write(byte) for target in self._targets()]
+        return any(acknowledges)
 
     def i2c_read(self) -> int | None:
-        """The next byte to send."""
-        return self._link().i2c_read()
+        """The next byte to send; only one target answers."""
+        (target,) = self._targets()
+        return target.i2c_read()
 
     def i2c_stop(self) -> None:
         """The transfer ended."""
-        self._link().i2c_stop()
+        for target in self._targets():
+            target.i2c_stop()
 
 
 class I2cBus:
@@ -142,7 +146,8 @@ class I2cBus:
             raise ValueError(f"an I2C bus needs a positive bit rate, not {hz} Hz")
         self.kernel = kernel
         self._targets: dict[int, I2cTarget] = {}
-        self._general = _GeneralCall()
+        self._listeners: list[I2cTarget] = []
+        self._general = Forwarder(lambda: self._listeners)
         self._taken = False
         self._turns: deque[simpy.Event] = deque()
         self.fault_hook: I2cFaultHook | None = None
@@ -160,7 +165,7 @@ class I2cBus:
             raise ValueError(f"I2C address {address:#04x} is taken already")
         self._targets[address] = target
         if general_call:
-            self._general.listeners.append(target)
+            self._listeners.append(target)
 
     @property
     def targets(self) -> Mapping[int, I2cTarget]:
@@ -246,7 +251,7 @@ class I2cBus:
 
     def _find(self, message: I2cMessage) -> I2cTarget:
         address = message.address
-        if address == GENERAL_CALL and self._general.listeners and not message.reading:
+        if address == GENERAL_CALL and self._listeners and not message.reading:
             return self._general
         target = self._targets.get(address)
         if target is None:
@@ -271,48 +276,22 @@ class I2cBus:
             if self.fault_hook is not None:
                 yield from self.fault_hook.after_byte(message.address, read=False)
             if not target.i2c_write(byte):
-                raise I2cError(
-                    errno.EIO, f"I2C device {message.address:#04x} refused byte {byte:#04x}"
-                )
+                text = f"I2C device {message.address:#04x} refused byte {byte:#04x}"
+                raise I2cError(errno.EIO, text)
 
     def _next_byte(self, target: I2cTarget, address: int) -> Generator[simpy.Event, Any, int]:
         """Wait while ``target`` stretches the clock."""
         give_up_ps = self.kernel.now + LONGEST_STRETCH_PS
         while (byte := target.i2c_read()) is None:
             if self.kernel.now >= give_up_ps:
-                raise I2cError(
-                    errno.ETIMEDOUT, f"I2C device {address:#04x} held the clock low for over 1 s"
-                )
+                text = f"I2C device {address:#04x} held the clock low for over 1 s"
+                raise I2cError(errno.ETIMEDOUT, text)
             yield self.kernel.timeout(self.bit_ps)
         return byte
 
 
 def _block_length(byte: int, address: int) -> int:
     if not 1 <= byte <= MAX_BLOCK_BYTES:
-        raise I2cError(
-            errno.EPROTO,
-            f"I2C device {address:#04x} sent block length {byte}, not 1..{MAX_BLOCK_BYTES}",
-        )
+        text = f"I2C device {address:#04x} sent block length {byte}, not 1..{MAX_BLOCK_BYTES}"
+        raise I2cError(errno.EPROTO, text)
     return byte
-
-
-class _GeneralCall:
-    """Those that listen to address 0, as one target: one acknowledge is enough."""
-
-    def __init__(self) -> None:
-        self.listeners: list[I2cTarget] = []
-
-    def i2c_start(self, read: bool) -> None:
-        for target in self.listeners:
-            target.i2c_start(read)
-
-    def i2c_write(self, byte: int) -> bool:
-        acknowledges = [target.i2c_write(byte) for target in self.listeners]
-        return any(acknowledges)
-
-    def i2c_read(self) -> int:
-        raise AssertionError("nobody answers a read from the general call address")
-
-    def i2c_stop(self) -> None:
-        for target in self.listeners:
-            target.i2c_stop()

@@ -16,8 +16,8 @@ from cubestack.emulator.sim.virtual_time import Kernel
 BITS_PER_BYTE = 10  # start bit, 8 data bits, stop bit
 
 
-class UartTap(Protocol):
-    """Listens at the device's end of a line and changes nothing."""
+class UartTap:
+    """Listens at the device's end of a line, to what it overrides, and changes nothing."""
 
     def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         """The device sends ``data``; byte i ends at ``first_ps + i * byte_ps``."""

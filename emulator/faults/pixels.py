@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection, Report, active
-from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
+from cubestack.emulator.rtl.pixel_clock import PixelSegment, PixelSource
 
 Picture = NDArray[np.uint8]
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.declaration import Site
-from cubestack.emulator.rtl.contract import PixelSource, RtlEngine
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.pixel_clock import PixelSource
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import Kernel

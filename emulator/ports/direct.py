@@ -24,7 +24,7 @@ class DirectSerial:
 
     def write(self, data: bytes) -> None:
         """Start sending ``data`` now."""
-        self._line.write(data)
+        self._line.uart.host_writes(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """Wait at most ``timeout_s`` of virtual time for a byte; return those that have arrived."""

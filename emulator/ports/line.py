@@ -13,13 +13,14 @@ class HostLine:
     what a receiver makes of the levels, characters with errors included.
 
     Attributes:
+        uart: the device's end; what is written goes there.
         framing_errors: characters with a low stop bit.
         parity_errors: characters with a wrong parity bit.
     """
 
     def __init__(self, uart: Uart) -> None:
         """Plug into ``uart``; what it sent before is lost, as on a wire."""
-        self._uart = uart
+        self.uart = uart
         self._blocks: deque[tuple[bytes, int, int]] = deque()
         self._sampler: LineSampler | None = None
         self.framing_errors = self.parity_errors = 0
@@ -29,13 +30,13 @@ class HostLine:
     @property
     def form(self) -> LineFormat:
         """Format of this end; setting another one loses what is on the wire to it."""
-        return self._uart.host_form
+        return self.uart.host_form
 
     @form.setter
     def form(self, form: LineFormat) -> None:
-        if form != self._uart.host_form:
-            self._uart.host_form = form
-            self._sampler = None if form == self._uart.form else LineSampler(form)
+        if form != self.uart.host_form:
+            self.uart.host_form = form
+            self._sampler = None if form == self.uart.form else LineSampler(form)
             self._blocks.clear()
 
     def arrival_ps(self, count: int = 1) -> int | None:
@@ -50,23 +51,6 @@ class HostLine:
             if count <= 0:
                 break
         return arrival
-
-    @property
-    def write_backlog(self) -> int:
-        """Bytes written that are not yet on the wire to the device."""
-        return self._uart.host_backlog
-
-    def write(self, data: bytes) -> None:
-        """Start sending ``data``, behind what is still being sent."""
-        self._uart.host_writes(data)
-
-    def send_break(self) -> None:
-        """Hold the line low for a while."""
-        self._uart.host_breaks()
-
-    def drop_writes(self) -> None:
-        """Take back what is not on the wire yet."""
-        self._uart.host_drops()
 
     def take(self, now_ps: int, max_bytes: int | None = None) -> bytes:
         """Bytes that have arrived by ``now_ps``, at most ``max_bytes`` of them."""
@@ -88,16 +72,16 @@ class HostLine:
     def unplug(self) -> None:
         """Take the plug out: what the device sends from now on is lost."""
         self._blocks.clear()
-        if self._uart.line == self._deliver:
-            self._uart.line = lambda _data, _first_ps, _byte_ps: None
-            self._uart.host_form = self._uart.form
+        if self.uart.line == self._deliver:
+            self.uart.line = lambda _data, _first_ps, _byte_ps: None
+            self.uart.host_form = self.uart.form
 
     def _deliver(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         if self._sampler is None:
             self._blocks.append((data, first_ps, byte_ps))
             return
         for index, byte in enumerate(data):
-            self._sampler.put(byte, first_ps + (index - 1) * byte_ps, self._uart.form)
+            self._sampler.put(byte, first_ps + (index - 1) * byte_ps, self.uart.form)
 
     def _settle(self, sampler: LineSampler, now_ps: int) -> None:
         """Turn what has been found on the line into bytes."""

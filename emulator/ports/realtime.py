@@ -8,6 +8,7 @@ wire, and follows wall time while everything waits for the host, or a client rea
 import select
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Literal
 
 from cubestack.emulator.ports.endpoint import Endpoint
@@ -43,41 +44,34 @@ def wait_ready(watched: Watched, timeout_s: float) -> None:
     poller.poll(timeout_s * 1000)
 
 
+@dataclass
 class RealtimeScheduler:
-    """Runs an environment against endpoints until it is stopped."""
+    """Runs an environment against endpoints until it is stopped.
 
-    def __init__(
-        self,
-        env: Kernel,
-        endpoints: Sequence[Endpoint],
-        busy: Callable[[], bool],
-        *,
-        pace: Literal["real", "fast"],
-        report: Callable[[str], None] = lambda _text: None,
-        clock_ns: Callable[[], int] = time.monotonic_ns,
-        wait: Callable[[Watched, float], None] = wait_ready,
-    ) -> None:
-        """Prepare to serve.
+    Attributes:
+        env: kernel; its time is in ps.
+        endpoints: open ports.
+        busy: whether the device has work, or bytes are on a wire.
+        pace: whether virtual time follows wall time or runs ahead (text of the module).
+        report: receives a line when pace "real" can not be kept.
+        clock_ns: wall time in ns from any origin; never runs back.
+        wait: waits for descriptors, at most so many s, as ``wait_ready`` does.
+    """
 
-        Args:
-            env: kernel; its time is in ps.
-            endpoints: open ports.
-            busy: whether the device has work, or bytes are on a wire.
-            pace: whether virtual time follows wall time or runs ahead (text of the module).
-            report: receives a line when pace "real" can not be kept.
-            clock_ns: wall time in ns from any origin; never runs back.
-            wait: waits for descriptors, at most so many s, as ``wait_ready`` does.
-        """
-        self._env = env
-        self._endpoints = endpoints
-        self._busy = busy
-        self._fast = pace == "fast"
-        self._report = report
-        self._clock_ns = clock_ns
-        self._wait = wait
+    env: Kernel
+    endpoints: Sequence[Endpoint]
+    busy: Callable[[], bool]
+    _: KW_ONLY
+    pace: Literal["real", "fast"]
+    report: Callable[[str], None] = lambda _text: None
+    clock_ns: Callable[[], int] = time.monotonic_ns
+    wait: Callable[[Watched, float], None] = wait_ready
+
+    def __post_init__(self) -> None:
+        """Prepare to serve."""
         self._stopped = False
         self._offset_ps = 0  # virtual less wall time
-        self._reported_ns = clock_ns()
+        self._reported_ns = self.clock_ns()
 
     def stop(self) -> None:
         """Make ``run`` return soon; for other threads, and for signal handlers."""
@@ -87,46 +81,46 @@ class RealtimeScheduler:
         """Serve until ``stop``."""
         self._align()
         while not self._stopped:
-            ahead = self._fast and self._run_ahead()
+            ahead = self.pace == "fast" and self._run_ahead()
             if ahead:
                 self._align()
             else:
                 self._follow()
-            for endpoint in self._endpoints:
-                endpoint.exchange(self._env.now)
+            for endpoint in self.endpoints:
+                endpoint.exchange(self.env.now)
             if not ahead:
-                watched = [item for endpoint in self._endpoints for item in endpoint.watched()]
-                self._wait(watched, self._until_next_s())
+                watched = [item for endpoint in self.endpoints for item in endpoint.watched()]
+                self.wait(watched, self._until_next_s())
 
     def _wall_ps(self) -> int:
         """Wall time on the scale of virtual time."""
-        return self._clock_ns() * PS_PER_NS + self._offset_ps
+        return self.clock_ns() * PS_PER_NS + self._offset_ps
 
     def _align(self) -> None:
-        self._offset_ps = self._env.now - self._clock_ns() * PS_PER_NS
+        self._offset_ps = self.env.now - self.clock_ns() * PS_PER_NS
 
     def _slice_end_ns(self) -> int:
-        return self._clock_ns() + int(SLICE_S * NS_PER_S)
+        return self.clock_ns() + int(SLICE_S * NS_PER_S)
 
     def _run_ahead(self) -> bool:
         """Work for a slice of wall time, or until everything waits for the host.
 
         Returns False when there was nothing to do, or no client to take the output in time.
         """
-        if any(endpoint.congested for endpoint in self._endpoints):
+        if any(endpoint.congested for endpoint in self.endpoints):
             return False
         progress = False
         end_ns = self._slice_end_ns()
-        while self._clock_ns() < end_ns:
-            horizon, release = self._env.horizon(), self._release_ps(BURST_BYTES)
-            if release is None and not self._busy():
+        while self.clock_ns() < end_ns:
+            horizon, release = self.env.horizon(), self._release_ps(BURST_BYTES)
+            if release is None and not self.busy():
                 break
-            if release is not None and release <= self._env.now:
+            if release is not None and release <= self.env.now:
                 break  # to the clients with it
             if horizon is not None and (release is None or horizon <= release):
-                self._env.step()
+                self.env.step()
             elif release is not None:
-                self._env.advance_to(release)
+                self.env.advance_to(release)
             else:
                 break
             progress = True
@@ -134,31 +128,31 @@ class RealtimeScheduler:
 
     def _release_ps(self, count: int) -> int | None:
         """When an endpoint has ``count`` bytes from the device, or all that it will get."""
-        releases = [endpoint.release_ps(count) for endpoint in self._endpoints]
+        releases = [endpoint.release_ps(count) for endpoint in self.endpoints]
         return min((ps for ps in releases if ps is not None), default=None)
 
     def _follow(self) -> None:
         """Bring virtual time up to wall time, as far as a slice of wall time allows."""
         target_ps = self._wall_ps()
         end_ns = self._slice_end_ns()
-        while (horizon := self._env.horizon()) is not None and horizon <= target_ps:
-            self._env.step()
-            if self._clock_ns() >= end_ns:
+        while (horizon := self.env.horizon()) is not None and horizon <= target_ps:
+            self.env.step()
+            if self.clock_ns() >= end_ns:
                 break
         else:
-            self._env.advance_to(target_ps)
-        self._report_lag((self._wall_ps() - self._env.now) / PS_PER_S)
+            self.env.advance_to(target_ps)
+        self._report_lag((self._wall_ps() - self.env.now) / PS_PER_S)
 
     def _report_lag(self, lag_s: float) -> None:
-        now_ns = self._clock_ns()
+        now_ns = self.clock_ns()
         due_ns = self._reported_ns + int(LAG_REPORT_S * NS_PER_S)
         if lag_s > LAG_WORTH_SAYING_S and now_ns >= due_ns:
             self._reported_ns = now_ns
-            self._report(f"can not keep real time: {lag_s:.1f} s behind")
+            self.report(f"can not keep real time: {lag_s:.1f} s behind")
 
     def _until_next_s(self) -> float:
         """Wall time until something is due, at most ``IDLE_S``."""
-        times = [ps for ps in (self._release_ps(1), self._env.horizon()) if ps is not None]
+        times = [ps for ps in (self._release_ps(1), self.env.horizon()) if ps is not None]
         if not times:
             return IDLE_S
         return min(IDLE_S, max(0.0, (min(times) - self._wall_ps()) / PS_PER_S))

@@ -10,12 +10,13 @@ control and modem lines, as the line has neither.
 import select
 import struct
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 from serial.rfc2217 import IAC, IAC_DOUBLED, SERVER_NOTIFY_LINESTATE, PortManager
 
-from cubestack.emulator.bus.line_format import LineFormat, Parity
+from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.ports.tcp import TcpEndpoint
@@ -56,7 +57,7 @@ class Rfc2217Endpoint(TcpEndpoint):
     def _welcome(self) -> None:
         self._line.form = self._device_form
         settings = _Settings(self._line, self._change_form, self._purge, self._drop_writes)
-        self._manager = PortManager(settings, _Replies(self._replies))
+        self._manager = PortManager(settings, SimpleNamespace(write=self._replies.extend))
 
     def _read(self, max_bytes: int) -> bytes:
         manager = self._manager
@@ -104,12 +105,12 @@ class Rfc2217Endpoint(TcpEndpoint):
 
     def _change_form(self, form: LineFormat) -> None:
         """What was written before keeps the form that it had then."""
-        self._line.write(self._take_written())
+        self._line.uart.host_writes(self._take_written())
         self._line.form = form
 
     def _drop_writes(self) -> None:
         self._written.clear()
-        self._line.drop_writes()
+        self._line.uart.host_drops()
 
     def _purge(self) -> None:
         self._unread.clear()
@@ -122,69 +123,27 @@ class Rfc2217Endpoint(TcpEndpoint):
             self._manager.rfc2217_send_subnegotiation(SERVER_NOTIFY_LINESTATE, bytes([state]))
 
 
-class _Replies:
-    """Where PortManager puts what goes to the client."""
+def _setting(name: str) -> property:
+    """A field of the line's format; one that can not be raises ValueError, the old one stays."""
 
-    def __init__(self, replies: bytearray) -> None:
-        self._replies = replies
+    def change(settings: "_Settings", value: object) -> None:
+        settings.change(LineFormat(**(vars(settings.line.form) | {name: value})))
 
-    def write(self, data: bytes) -> None:
-        self._replies.extend(data)
+    return property(lambda settings: getattr(settings.line.form, name), change)
 
 
+@dataclass
 class _Settings:
-    """The line's end, as PortManager wants a port: named like pyserial's Serial.
+    """The line's end, as PortManager wants a port: named like pyserial's Serial."""
 
-    A setting that can not be raises ValueError, which leaves the old one.
-    """
-
+    line: HostLine
+    change: Callable[[LineFormat], None]
+    reset_input_buffer: Callable[[], None]
+    reset_output_buffer: Callable[[], None]
     cts = dsr = cd = True
-    ri = False
-    rts = dtr = xonxoff = rtscts = False
-
-    def __init__(
-        self,
-        line: HostLine,
-        change: Callable[[LineFormat], None],
-        reset_input_buffer: Callable[[], None],
-        reset_output_buffer: Callable[[], None],
-    ) -> None:
-        self._line = line
-        self._change = change
-        self.reset_input_buffer = reset_input_buffer
-        self.reset_output_buffer = reset_output_buffer
-
-    @property
-    def baudrate(self) -> int:
-        return self._line.form.baud
-
-    @baudrate.setter
-    def baudrate(self, baud: int) -> None:
-        self._change(replace(self._line.form, baud=baud))
-
-    @property
-    def bytesize(self) -> int:
-        return self._line.form.data_bits
-
-    @bytesize.setter
-    def bytesize(self, bits: int) -> None:
-        self._change(replace(self._line.form, data_bits=bits))
-
-    @property
-    def parity(self) -> Parity:
-        return self._line.form.parity
-
-    @parity.setter
-    def parity(self, parity: Parity) -> None:
-        self._change(replace(self._line.form, parity=parity))
-
-    @property
-    def stopbits(self) -> float:
-        return self._line.form.stop_bits
-
-    @stopbits.setter
-    def stopbits(self, bits: float) -> None:
-        self._change(replace(self._line.form, stop_bits=bits))
+    ri = rts = dtr = xonxoff = rtscts = False
+    baudrate, bytesize = _setting("baud"), _setting("data_bits")
+    parity, stopbits = _setting("parity"), _setting("stop_bits")
 
     @property
     def break_condition(self) -> bool:
@@ -193,4 +152,4 @@ class _Settings:
     @break_condition.setter
     def break_condition(self, on: bool) -> None:
         if on:
-            self._line.send_break()
+            self.line.uart.host_breaks()

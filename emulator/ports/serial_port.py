@@ -41,7 +41,7 @@ class SerialPort(Endpoint):
     def exchange(self, now_ps: int) -> None:
         """Client to line as far as there is room; line to the client that is there."""
         while (room := self._room()) > 0 and (data := self._read(room)):
-            self._line.write(data)
+            self._line.uart.host_writes(data)
         arrived = self._line.take(now_ps)
         client = self._look()
         if client is None or client is not self._served:
@@ -62,7 +62,7 @@ class SerialPort(Endpoint):
         self._line.unplug()
 
     def _room(self) -> int:
-        return MAX_UNSENT - self._line.write_backlog
+        return MAX_UNSENT - self._line.uart.host_backlog
 
     def _events(self, *, reading: bool) -> int:
         """Events to wait for on the client's descriptor."""

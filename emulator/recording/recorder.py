@@ -6,20 +6,11 @@ its way is not on record, so that it can be done again. The format is that of
 """
 
 from collections.abc import Mapping
-from types import TracebackType
-from typing import IO, Self
+from typing import IO
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage
-from cubestack.emulator.bus.uart import Uart
-from cubestack.firmware_model.formats.recording import (
-    BusMessage,
-    BusTransfer,
-    Control,
-    LineBytes,
-    LineError,
-    RecordingWriter,
-    Side,
-)
+from cubestack.emulator.bus.i2c import I2cBus, I2cError, I2cMessage, I2cTap
+from cubestack.emulator.bus.uart import Uart, UartTap
+from cubestack.firmware_model.formats import recording as rec
 from cubestack.firmware_model.formats.setup import Setup
 
 BLOCK_BYTES = 256
@@ -34,7 +25,7 @@ class Recorder:
     ) -> None:
         """Record ``uarts`` by the names of their ports; ``stream`` stays its owner's."""
         bauds = {port: uart.form.baud for port, uart in uarts.items()}
-        self._writer = RecordingWriter(stream, device, bauds, setup)
+        self._writer = rec.RecordingWriter(stream, device, bauds, setup)
         self._taps: list[_LineTap | _BusTap] = [
             _LineTap(self._writer, port, uart) for port, uart in uarts.items()
         ]
@@ -45,35 +36,22 @@ class Recorder:
 
     def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
         """The device was told so, from outside of its ports; see ``Control``."""
-        self._writer.write(Control(time_ps, words, text))
+        self._writer.write(rec.Control(time_ps, words, text))
 
     def close(self) -> None:
         """Write what is pending and detach."""
         for tap in self._taps:
             tap.close()
 
-    def __enter__(self) -> Self:
-        """Use the recorder in a ``with`` block."""
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close."""
-        self.close()
-
-
-class _LineTap:
+class _LineTap(UartTap):
     """Joins bytes that follow each other without a gap."""
 
-    def __init__(self, writer: RecordingWriter, port: str, uart: Uart) -> None:
+    def __init__(self, writer: rec.RecordingWriter, port: str, uart: Uart) -> None:
         self._writer = writer
         self._port = port
         self._uart = uart
-        self._side: Side = "host"
+        self._side: rec.Side = "host"
         self._data = bytearray()
         self._start_ps = 0
         uart.taps.append(self)
@@ -82,22 +60,19 @@ class _LineTap:
     def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         self._add("device", data, first_ps - byte_ps)
 
-    def device_heard(self, byte: int, start_ps: int) -> None:
-        pass
-
     def _host_sent(self, byte: int, start_ps: int) -> None:
         self._add("host", bytes([byte]), start_ps)
 
     def framing_error(self, time_ps: int) -> None:
         self._flush()
-        self._writer.write(LineError(time_ps, self._port))
+        self._writer.write(rec.LineError(time_ps, self._port))
 
     def close(self) -> None:
         self._flush()
         self._uart.taps.remove(self)
         self._uart.host_taps.remove(self._host_sent)
 
-    def _add(self, side: Side, data: bytes, start_ps: int) -> None:
+    def _add(self, side: rec.Side, data: bytes, start_ps: int) -> None:
         next_ps = self._start_ps + len(self._data) * self._uart.byte_ps
         if side != self._side or start_ps != next_ps or len(self._data) >= BLOCK_BYTES:
             self._flush()
@@ -107,31 +82,28 @@ class _LineTap:
 
     def _flush(self) -> None:
         if self._data:
-            event = LineBytes(
-                self._start_ps, self._port, self._side, bytes(self._data), self._uart.byte_ps
-            )
-            self._writer.write(event)
+            start_ps, data, byte_ps = self._start_ps, bytes(self._data), self._uart.byte_ps
+            self._writer.write(rec.LineBytes(start_ps, self._port, self._side, data, byte_ps))
             self._data.clear()
 
 
-class _BusTap:
+class _BusTap(I2cTap):
     """An I2C bus on record."""
 
-    def __init__(self, writer: RecordingWriter, port: str, bus: I2cBus) -> None:
+    def __init__(self, writer: rec.RecordingWriter, port: str, bus: I2cBus) -> None:
         self._writer = writer
         self._port = port
         self._bus = bus
         bus.taps.append(self)
 
-    def transfer_began(self, messages: list[I2cMessage]) -> None:
-        pass
-
     def transfer_ended(
         self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
     ) -> None:
         errno = error.errno or 0 if isinstance(error, I2cError) else 0
-        found = tuple(BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
-        self._writer.write(BusTransfer(began_ps, self._port, self._bus.kernel.now, found, errno))
+        found = tuple(rec.BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
+        self._writer.write(
+            rec.BusTransfer(began_ps, self._port, self._bus.kernel.now, found, errno)
+        )
 
     def close(self) -> None:
         self._bus.taps.remove(self)

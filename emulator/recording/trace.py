@@ -17,8 +17,8 @@ from typing import IO, Any
 
 from vcd import VCDWriter
 
-from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
-from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.bus.i2c import I2cBus, I2cMessage, I2cTap
+from cubestack.emulator.bus.uart import Uart, UartTap
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.virtual_time import Kernel
 
@@ -53,7 +53,7 @@ class VcdTrace:
         self._written_ns = 0
         self._lag_ps = 2 * max((uart.byte_ps for uart in uarts.values()), default=0)
         for name, value in probes().items():
-            self._declare(f"firmware.{name}", None if isinstance(value, str) else 32)
+            self.declare(f"firmware.{name}", None if isinstance(value, str) else 32)
         self._pins = self._declare_pins()
         self._taps: list[_LineTap | _BusTap] = [
             _LineTap(self, port, uart) for port, uart in uarts.items()
@@ -73,7 +73,13 @@ class VcdTrace:
 
     def declare(self, name: str, bits: int | None, init: int | str = 0) -> None:
         """A variable, dots between its scopes; ``bits`` None is a text."""
-        self._declare(name, bits, init)
+        *scopes, last = name.split(".")
+        scope = ".".join([self._device, *scopes])
+        if bits is None:
+            variable = self._writer.register_var(scope, last, "string", init=str(init or ""))
+        else:
+            variable = self._writer.register_var(scope, last, "wire", size=bits, init=init)
+        self._variables[name] = variable
 
     def close(self) -> None:
         """Write what is pending and detach."""
@@ -83,22 +89,13 @@ class VcdTrace:
         self._flush(None)
         self._writer.close(max(self._written_ns, self._kernel.now // PS_PER_NS))
 
-    def _declare(self, name: str, bits: int | None, init: int | str = 0) -> None:
-        *scopes, last = name.split(".")
-        scope = ".".join([self._device, *scopes])
-        if bits is None:
-            variable = self._writer.register_var(scope, last, "string", init=str(init or ""))
-        else:
-            variable = self._writer.register_var(scope, last, "wire", size=bits, init=init)
-        self._variables[name] = variable
-
     def _declare_pins(self) -> tuple[str, ...]:
         if self._engine is None:
             return ()
         wiring = self._engine.wiring
         pins = (*wiring.mcu_pins, *wiring.output_pins)
         for pin in pins:
-            self._declare(f"fpga.{pin}", wiring.widths[pin], self._engine.get_pin(pin))
+            self.declare(f"fpga.{pin}", wiring.widths[pin], self._engine.get_pin(pin))
         return pins
 
     def _observed_step(self) -> None:
@@ -129,7 +126,7 @@ class VcdTrace:
             self._writer.change(self._variables[name], self._written_ns, value)
 
 
-class _LineTap:
+class _LineTap(UartTap):
     """A serial line in the trace."""
 
     def __init__(self, trace: VcdTrace, port: str, uart: Uart) -> None:
@@ -165,7 +162,7 @@ class _LineTap:
                 last = level
 
 
-class _BusTap:
+class _BusTap(I2cTap):
     """An I2C bus in the trace."""
 
     def __init__(self, trace: VcdTrace, bus: I2cBus, port: str) -> None:
@@ -184,12 +181,9 @@ class _BusTap:
     def transfer_ended(
         self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
     ) -> None:
-        del began_ps
         self._put("busy", 0)
-        found = (
-            f"{'R' if m.reading else 'W'}{m.address:02x}:{bytes(m.data).hex()}" for m in messages
-        )
-        self._put("transfer", "refused" if error else ",".join(found))
+        made = (f"{'WR'[m.reading]}{m.address:02x}:{bytes(m.data).hex()}" for m in messages)
+        self._put("transfer", "refused" if error else ",".join(made))
 
     def close(self) -> None:
         self._bus.taps.remove(self)

@@ -1,16 +1,70 @@
-"""Edges of the camera's pixel clock inside one segment of its stream.
+"""What a camera sends, and the edges of its pixel clock inside one segment of that.
 
 Edge k of a segment is at floor(start + k * period / 2): even edges rise, odd ones fall. Rising
 edge 2n takes sample n, which stands on the lines since the falling edge before.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.contract import PixelSegment, PixelSource
+
+class PixelSegment(Protocol):
+    """A stretch of the camera's output with an unbroken pixel clock: blanking, or whole lines."""
+
+    @property
+    def start_ps(self) -> int:
+        """First rising edge of the clock; rising edge n is at floor(start_ps + n * period)."""
+
+    @property
+    def clocks(self) -> int:
+        """Number of pixel clocks."""
+
+    @property
+    def vsync(self) -> int:
+        """Level of the frame pin throughout, where there is one."""
+
+    @property
+    def rows(self) -> int:
+        """Number of lines; 0 is blanking, with the line pin low throughout.
+
+        Otherwise ``clocks`` is ``rows * line_clocks``, and the line pin is high in the first
+        ``active_columns`` clocks of each line.
+        """
+
+    @property
+    def pixels(self) -> Callable[[], NDArray[np.uint8]] | None:
+        """Renders the lines: shape (rows, active_columns), uint8, C-contiguous.
+
+        Called only when the FPGA may store them, and once for each time the segment is given out.
+        """
+
+
+class PixelSource(Protocol):
+    """The camera's parallel output. All but the clock change with its falling edge."""
+
+    @property
+    def period(self) -> Fraction:
+        """Time of one pixel clock in ps."""
+
+    @property
+    def line_clocks(self) -> int:
+        """Clocks of a line, those with the line pin low included."""
+
+    @property
+    def active_columns(self) -> int:
+        """Clocks of a line with the line pin high."""
+
+    def segment_at(self, time_ps: int) -> PixelSegment | None:
+        """Segment whose clocks contain ``time_ps``; None when there is no pixel clock then.
+
+        After None the engine asks again only when told to, by ``stream_changed``.
+        """
 
 
 @dataclass
@@ -55,15 +109,13 @@ class LoadedSegment:
 
     def time_of(self, edge: int) -> int:
         """Time of ``edge`` in ps."""
-        return self.segment.start_ps + (edge * self.half_period.numerator) // (
-            self.half_period.denominator
-        )
+        return self.segment.start_ps + int(edge * self.half_period)
 
     def first_edge(self, time_ps: int) -> int:
         """First edge at ``time_ps`` or later; ``edges`` when all are over."""
         # floor(k * h) >= d exactly when k * h >= d, because d is an integer.
-        distance = (time_ps - self.segment.start_ps) / self.half_period
-        return min(max(-(-distance.numerator // distance.denominator), 0), self.edges)
+        edge = ceil((time_ps - self.segment.start_ps) / self.half_period)
+        return min(max(edge, 0), self.edges)
 
     def sample(self, n: int) -> tuple[int, int]:
         """HSYNC and PIXDATA of sample ``n``; pixels that were never rendered are 0."""

@@ -22,7 +22,7 @@ class _Segment:
 
 @dataclass(frozen=True)
 class RepeatedFrame:
-    """A :class:`~cubestack.emulator.rtl.contract.PixelSource`: blanking, then the picture.
+    """A :class:`~cubestack.emulator.rtl.pixel_clock.PixelSource`: blanking, then the picture.
 
     Attributes:
         image: (rows, columns).

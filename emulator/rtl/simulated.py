@@ -9,16 +9,9 @@ import numpy as np
 from amaranth.sim import Simulator
 from numpy.typing import NDArray
 
+from cubestack.emulator.rtl.contract import BurstEnd, RtlEngine
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
-from cubestack.emulator.rtl.sram import (
-    BETWEEN_FPGAS,
-    Sram,
-    SramPins,
-    SramTiming,
-    Violation,
-    ViolationLog,
-)
-from cubestack.emulator.rtl.stepping import BurstEnd, SteppingEngine
+from cubestack.emulator.rtl.sram import BETWEEN_FPGAS, Sram, SramPins, SramTiming, Violation
 from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
 
@@ -38,8 +31,8 @@ class _Stream:
         return self.loaded.time_of(self.edge)
 
 
-class SimulatedEngine(SteppingEngine):
-    """An :class:`~cubestack.emulator.rtl.contract.RtlEngine` at some ten thousand clocks a second.
+class SimulatedEngine(RtlEngine):
+    """Some ten thousand clocks a second; it has no way to a register inside the design.
 
     With ``skipping``, of longer time outside of lines only the clocks are made that the wiring says
     the design needs to settle.
@@ -50,10 +43,8 @@ class SimulatedEngine(SteppingEngine):
     ) -> None:
         """Elaborate the wiring's design."""
         super().__init__(wiring, skipping=skipping)
-        self._log = ViolationLog()
-        self._srams = [
-            Sram(memory, sram_timing, self._log, name) for name, memory in self.memories.items()
-        ]
+        timing = sram_timing or SramTiming()
+        self._srams = [Sram(memory, timing, self._log, n) for n, memory in self.memories.items()]
         self._streams = [_Stream(pins) for pins in wiring.cameras]
         self._contention = 0
         contexts: list[Any] = []
@@ -70,19 +61,6 @@ class SimulatedEngine(SteppingEngine):
 
     def close(self) -> None:
         """Nothing to release."""
-
-    @property
-    def violation_log(self) -> ViolationLog:
-        """What the SRAM model recorded."""
-        return self._log
-
-    @property
-    def registers(self) -> dict[str, int]:
-        """None: the simulator has no way to a register inside the design."""
-        return {}
-
-    def _flip(self, register: str, bit: int) -> None:
-        raise AssertionError("there is no register to turn over")
 
     def _get(self, name: str) -> int:
         return int(self._context.get(getattr(self.wiring.component, name)))
@@ -102,26 +80,21 @@ class SimulatedEngine(SteppingEngine):
 
     def _settle(self, time_ps: int) -> None:
         """Let the memories follow the pins."""
-        for sram, memory in zip(self._srams, self.wiring.memories, strict=True):
+        memories = list(zip(self._srams, self.wiring.memories, strict=True))
+        for sram, memory in memories:
             sram.drive(time_ps, self._memory_pins(memory))
-        for sram, memory in zip(self._srams, self.wiring.memories, strict=True):
+        for sram, memory in memories:
             self._put(memory["D_I"], sram.bus)
         if self.wiring.contention is not None:
-            contention = self._get(self.wiring.contention)
-            if contention & ~self._contention:
-                self._log.add(
-                    Violation.measured("wire-contention", time_ps, 0, contention, 0, BETWEEN_FPGAS)
-                )
-            self._contention = contention
+            found, before = self._get(self.wiring.contention), self._contention
+            if found & ~before:
+                self._log.add(Violation("wire-contention", time_ps, 0, found, 0, BETWEEN_FPGAS))
+            self._contention = found
 
     def _memory_pins(self, memory: MemoryPins) -> SramPins:
-        return SramPins(
-            self._get(memory["A"]),
-            self._get(memory["CE_N"]),
-            self._get(memory["OE_N"]),
-            self._get(memory["WE_N"]),
-            self._get(memory["D_O"]) if self._get(memory["D_OE"]) else None,
-        )
+        a, ce_n, oe_n, we_n = (self._get(memory[pin]) for pin in ("A", "CE_N", "OE_N", "WE_N"))
+        data = self._get(memory["D_O"]) if self._get(memory["D_OE"]) else None
+        return SramPins(a, ce_n, oe_n, we_n, data)
 
     def _power(self, memory: int, on: bool) -> None:
         self._srams[memory].power(on)
@@ -154,14 +127,11 @@ class SimulatedEngine(SteppingEngine):
             if time_ps > until_ps:
                 return until_ps, BurstEnd.TIME_REACHED, camera
             self._make_edge(stream, stream.loaded, time_ps, until_ps)
-            end = BurstEnd.TIME_REACHED
-            if self._acknowledges() != before:
-                end = BurstEnd.ACKNOWLEDGE_CHANGED
-            elif stream.edge == stream.loaded.edges:
-                end = BurstEnd.SEGMENT_OVER
-            if end is not BurstEnd.TIME_REACHED:
+            changed = self._acknowledges() != before
+            if changed or stream.edge == stream.loaded.edges:
                 for number in cameras:
                     self._come_back(self._streams[number], time_ps, number > camera)
+                end = BurstEnd.ACKNOWLEDGE_CHANGED if changed else BurstEnd.SEGMENT_OVER
                 return time_ps, end, camera
 
     def _acknowledges(self) -> list[int]:
@@ -197,8 +167,8 @@ class SimulatedEngine(SteppingEngine):
             self._drive(now_ps, stream.pins.clock, edge % 2)
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
+        clock = self.wiring.data_clock
         for i in range(len(out)):
-            self._drive(self.now_ps + int(fraction + i * period), self.wiring.data_clock, 1)
+            self._drive(self.now_ps + int(fraction + i * period), clock, 1)
             out[i] = self._get(self.wiring.data)
-            fall_ps = self.now_ps + int(fraction + (i + Fraction(1, 2)) * period)
-            self._drive(fall_ps, self.wiring.data_clock, 0)
+            self._drive(self.now_ps + int(fraction + (i + Fraction(1, 2)) * period), clock, 0)

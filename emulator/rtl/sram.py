@@ -6,7 +6,7 @@ output enable. The CubeStar thesis (section 5.2.2) names only the maker and the 
 
 import logging
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ RULES: dict[ViolationKind, str] = {
 BETWEEN_FPGAS = "wires"
 
 MAX_VIOLATIONS = 64  # of each kind are kept; all are counted
+LONG_AGO = -(10**12)
 
 
 @dataclass(frozen=True)
@@ -64,52 +65,39 @@ class SramTiming:
 class Violation(NamedTuple):
     """One broken rule of the memory's data sheet, or two drivers on one wire.
 
-    The model goes on as a good part at room temperature might; a real part may not. ``where`` is
-    the memory's name, or ``BETWEEN_FPGAS``.
+    The model goes on as a good part at room temperature might; a real part may not. Times found and
+    needed are in ps; ``where`` is the memory's name, or ``BETWEEN_FPGAS``.
     """
 
     kind: ViolationKind
     time_ps: int
     address: int
-    detail: str
+    found: int = 0
+    needed: int = 0
     where: str = "SRAM"
 
-    @classmethod
-    def measured(
-        cls,
-        kind: ViolationKind,
-        time_ps: int,
-        address: int,
-        found: int,
-        needed: int,
-        where: str = "SRAM",
-    ) -> "Violation":
-        """Make one whose detail tells the time found and the time needed, both in ps."""
-        return cls(kind, time_ps, address, RULES[kind].format(found, needed), where)
+    @property
+    def detail(self) -> str:
+        """What is wrong, in words."""
+        return RULES[self.kind].format(self.found, self.needed)
 
 
+@dataclass
 class ViolationLog:
     """The first ``MAX_VIOLATIONS`` of each kind in the order of time, and how many there were.
 
     The first of each kind also goes to the Python log as a warning.
     """
 
-    def __init__(self) -> None:
-        """Start empty."""
-        self.kept: list[Violation] = []
-        self.counts: Counter[ViolationKind] = Counter()
+    kept: list[Violation] = field(default_factory=list)
+    counts: Counter[ViolationKind] = field(default_factory=Counter)
 
     def add(self, violation: Violation) -> None:
         """Record one violation."""
         if not self.counts[violation.kind]:
-            _log.warning(
-                "%s %s at %d ps, address 0x%05X: %s",
-                violation.where,
-                violation.kind,
-                violation.time_ps,
-                violation.address,
-                violation.detail,
-            )
+            kind, time_ps, address, *_, where = violation
+            text = "%s %s at %d ps, address 0x%05X: %s"
+            _log.warning(text, where, kind, time_ps, address, violation.detail)
         self.counts[violation.kind] += 1
         if self.counts[violation.kind] <= MAX_VIOLATIONS:
             self.kept.append(violation)
@@ -138,8 +126,9 @@ class SramPins(NamedTuple):
         return not self.ce_n and not self.oe_n and bool(self.we_n)
 
 
+@dataclass
 class Sram:
-    """The memory, told about every change of its pins.
+    """The memory, told about every change of its pins; they are inactive since long ago.
 
     A write takes effect when its pulse ends, with the address and data from just before that
     instant: hold times are 0, so address and data may change together with the pulse's end.
@@ -147,25 +136,17 @@ class Sram:
     Attributes:
         memory: the stored bytes, shape (size,); a live view.
         timing: the limits that are checked.
-        violations: what was broken so far.
+        violations: what was broken so far; several memories may share it.
         name: what violations call it.
     """
 
-    def __init__(
-        self,
-        memory: NDArray[np.uint8],
-        timing: SramTiming | None = None,
-        violations: ViolationLog | None = None,
-        name: str = "SRAM",
-    ) -> None:
-        """Make a memory on top of ``memory``; all pins are inactive since long ago.
+    memory: NDArray[np.uint8]
+    timing: SramTiming = field(default_factory=SramTiming)
+    violations: ViolationLog = field(default_factory=ViolationLog)
+    name: str = "SRAM"
 
-        ``violations`` is a log that several memories share.
-        """
-        self.memory = memory
-        self.timing = timing or SramTiming()
-        self.violations = ViolationLog() if violations is None else violations
-        self.name = name
+    def __post_init__(self) -> None:
+        """Begin with the supply."""
         self.power(True)
 
     def power(self, on: bool) -> None:
@@ -175,13 +156,8 @@ class Sram:
         """
         self._powered = on
         self._pins = SramPins()
-        long_ago = -(10**12)
-        self._write_since = long_ago
-        self._data_since = long_ago
-        self._address_since = long_ago
-        self._selected_since = long_ago
-        self._reads_since = long_ago
-        self._released_at = long_ago
+        self._write_since = self._data_since = self._address_since = LONG_AGO
+        self._selected_since = self._reads_since = self._released_at = LONG_AGO
 
     @property
     def bus(self) -> int:
@@ -219,9 +195,8 @@ class Sram:
                 (self._selected_since, self.timing.access_ps),
                 (self._reads_since, self.timing.output_enable_ps),
             ):
-                if time_ps - since < needed:
-                    address = self._pins.address
-                    self._report("read-access", time_ps, address, time_ps - since, needed)
+                if (found := time_ps - since) < needed:
+                    self._report("read-access", time_ps, self._pins.address, found, needed)
                     break
         return self.bus
 
@@ -248,8 +223,6 @@ class Sram:
             self._report("turnaround", time_ps, pins.address, free, needed)
 
     def _report(
-        self, kind: ViolationKind, time_ps: int, address: int, found_ps: int = 0, needed_ps: int = 0
+        self, kind: ViolationKind, time_ps: int, address: int, found: int = 0, needed: int = 0
     ) -> None:
-        self.violations.add(
-            Violation.measured(kind, time_ps, address, found_ps, needed_ps, self.name)
-        )
+        self.violations.add(Violation(kind, time_ps, address, found, needed, self.name))

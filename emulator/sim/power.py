@@ -112,9 +112,8 @@ class PowerModel:
         for name, part in self.table.parts.items():
             if channel in (None, part.channel) and (part.channel is None or self._on[part.channel]):
                 total += part.ma[self._states[name]]
-        return total + sum(
-            extra for name, extra in self._latch_up_ma.items() if channel in (None, name)
-        )
+        latched = self._latch_up_ma
+        return total + (sum(latched.values()) if channel is None else latched[channel])
 
     def charge_mas(self) -> float:
         """Charge drawn since the start, in mA s."""

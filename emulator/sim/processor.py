@@ -6,7 +6,9 @@ the next scheduled event and within ``LOOK_AHEAD_PS``. What is scheduled from ou
 """
 
 from collections.abc import Callable, Generator
+from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
+from math import ceil
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,21 +16,8 @@ import simpy
 
 from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
+from cubestack.firmware_model.mcu import requests
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import (
-    AwaitPin,
-    BusAccess,
-    CameraTransfer,
-    Pay,
-    ReadPin,
-    ReadTimer,
-    Request,
-    Reset,
-    Routine,
-    SetPin,
-    Sleep,
-    StrobeRead,
-)
 
 LOOK_AHEAD_PS = 10 * PS_PER_MS
 
@@ -38,17 +27,17 @@ Steps = Generator[simpy.Event, Any, Any]
 class Program(Protocol):
     """A firmware program: its main routine never returns, it ends in a ``Reset`` request."""
 
-    def main(self) -> Routine[None]:
+    def main(self) -> requests.Routine[None]:
         """Run from reset."""
 
 
 class CameraBus(Protocol):
     """The bus over which the processor controls the camera."""
 
-    def transfer_ps(self, request: CameraTransfer) -> int:
+    def transfer_ps(self, request: requests.CameraTransfer) -> int:
         """How long ``request`` occupies the bus, in ps."""
 
-    def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
+    def transfer(self, request: requests.CameraTransfer, now_ps: int) -> bytes | None:
         """Perform ``request``, which ends at ``now_ps``; None when not acknowledged."""
 
 
@@ -65,65 +54,52 @@ class Pins(Protocol):
         """Level of a pin now."""
 
 
+@dataclass(eq=False)
 class Processor:
     """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
 
     Attributes:
-        fpga: what the processor has at its pins to the FPGA; None on a board without.
+        env: kernel; its time is in ps.
+        meter: what the program charges its cycles to; its table gives the clock.
+        fpga: what the processor has at its pins to the FPGA; None on a board without: requests that
+            need it are a ValueError then.
+        camera_bus: the camera's control bus; None where the program drives its lines as pins.
+        boot: makes the program after a reset; its argument is the cause (see ``Reset``).
+        power_on_cause: cause of the first start.
+        boot_us: time from reset to the first instruction of ``main``.
+        other_pins: pins that do not lead to the FPGA.
+        on_pin: told about every output pin change, after it happened.
+        on_activity: told when the processor falls asleep (False), starts or awakes (True).
+        on_access: told when the program begins to use the external bus (True), and when it
+            requests something else after that.
         program: the running program, for the interrupt lines of the peripherals.
         resets: number of resets since power-up.
         waiting: asleep until an interrupt, with no deadline.
         dozing: asleep until an interrupt, with or without a deadline.
     """
 
-    def __init__(
-        self,
-        env: Kernel,
-        meter: Meter,
-        fpga: FpgaPort | None,
-        camera_bus: CameraBus | None,
-        boot: Callable[[int], Program],
-        *,
-        power_on_cause: int,
-        boot_us: int,
-        other_pins: Pins | None = None,
-        on_pin: Callable[[str, int], None] = lambda _pin, _level: None,
-        on_activity: Callable[[bool], None] = lambda _busy: None,
-        on_access: Callable[[bool], None] = lambda _busy: None,
-    ) -> None:
-        """Power up.
+    env: Kernel
+    meter: Meter
+    fpga: FpgaPort | None
+    camera_bus: CameraBus | None
+    boot: Callable[[int], Program]
+    _: KW_ONLY
+    power_on_cause: int
+    boot_us: int
+    other_pins: Pins | None = None
+    on_pin: Callable[[str, int], None] = lambda _pin, _level: None
+    on_activity: Callable[[bool], None] = lambda _busy: None
+    on_access: Callable[[bool], None] = lambda _busy: None
 
-        Args:
-            env: kernel; its time is in ps.
-            meter: what the program charges its cycles to; its table gives the clock.
-            fpga: the FPGA; None without one: requests that need it are a ValueError then.
-            camera_bus: the camera's control bus; None where the program drives its lines as pins.
-            boot: makes the program after a reset; its argument is the cause (see ``Reset``).
-            power_on_cause: cause of the first start.
-            boot_us: time from reset to the first instruction of ``main``.
-            other_pins: pins that do not lead to the FPGA.
-            on_pin: told about every output pin change, after it happened.
-            on_activity: told when the processor falls asleep (False), starts or awakes (True).
-            on_access: told when the program begins to use the external bus (True), and when it
-                requests something else after that.
-        """
-        self._env = env
-        self._meter = meter
-        self.fpga = fpga
-        self._camera_bus = camera_bus
-        self._boot = boot
-        self._boot_us = boot_us
-        self._other_pins = other_pins
-        self._on_pin = on_pin
-        self._on_activity = on_activity
-        self._on_access = on_access
+    def __post_init__(self) -> None:
+        """Power up."""
         self._accesses = False
-        self._clock = CycleClock(meter.table.clock_hz)
-        self._wake = env.event()
+        self._clock = CycleClock(self.meter.table.clock_hz)
+        self._wake = self.env.event()
         self.resets = 0
         self.waiting = self.dozing = False
-        self.program = boot(power_on_cause)
-        env.process(self._run())
+        self.program = self.boot(self.power_on_cause)
+        self.env.process(self._run())
 
     def wake(self) -> None:
         """End the running wakeable sleep, or the next one at once."""
@@ -137,20 +113,19 @@ class Processor:
         """
         self._follow()
         addresses = np.arange(address, address + count, dtype=np.int32)
-        reads = Transactions(
-            addresses, np.zeros(count, np.uint8), False, self._cycle, cycles, select
-        )
+        data = np.zeros(count, np.uint8)
+        reads = Transactions(addresses, data, False, self._cycle, cycles, select)
         self._reached.access(reads, self._reached.now_ps + int(count * reads.period))
         return reads.data.tobytes()
 
     def _run(self) -> Steps:
-        self._on_activity(True)
+        self.on_activity(True)
         while True:
-            yield self._env.timeout(self._boot_us * PS_PER_US)
+            yield self.env.timeout(self.boot_us * PS_PER_US)
             cause = yield from self._execute(self.program)
             self.resets += 1
-            self._wake = self._env.event()  # a reset clears pending interrupts
-            self.program = self._boot(cause)
+            self._wake = self.env.event()  # a reset clears pending interrupts
+            self.program = self.boot(cause)
 
     def _execute(self, program: Program) -> Steps:
         routine = program.main()
@@ -159,50 +134,49 @@ class Processor:
             try:
                 request = routine.send(answer)
             except StopIteration:
-                raise RuntimeError(
-                    f"{program!r} returned from main: it must end in Reset"
-                ) from None
+                text = f"{program!r} returned from main: it must end in Reset"
+                raise RuntimeError(text) from None
             yield from self._pay()
-            if isinstance(request, Reset):
+            if isinstance(request, requests.Reset):
                 routine.close()
                 return request.cause
             answer = yield from self._perform(request)
 
     def _pay(self) -> Steps:
         """Be busy for the charged cycles, and for those that interrupts charge meanwhile."""
-        while cycles := self._meter.take():
-            yield self._env.timeout(self._clock.elapse(cycles))
+        while cycles := self.meter.take():
+            yield self.env.timeout(self._clock.elapse(cycles))
 
-    def _perform(self, request: Request) -> Steps:
-        if self._accesses != isinstance(request, BusAccess):
+    def _perform(self, request: requests.Request) -> Steps:
+        if self._accesses != isinstance(request, requests.BusAccess):
             self._accesses = not self._accesses
-            self._on_access(self._accesses)
+            self.on_access(self._accesses)
         match request:
-            case Pay():
+            case requests.Pay():
                 return None
-            case ReadTimer():
-                return self._env.now // PS_PER_US
-            case SetPin(pin, level):
+            case requests.ReadTimer():
+                return self.env.now // PS_PER_US
+            case requests.SetPin(pin, level):
                 self._pins_of(request).set_pin(pin, level)
-                self._meter.charge(port_write=1)
-                self._on_pin(pin, level)
+                self.meter.charge(port_write=1)
+                self.on_pin(pin, level)
                 return None
-            case ReadPin(pin):
-                self._meter.charge(port_read=1)
+            case requests.ReadPin(pin):
+                self.meter.charge(port_read=1)
                 return self._pins_of(request).get_pin(pin)
-            case AwaitPin():
+            case requests.AwaitPin():
                 return (yield from self._await_pin(request))
-            case Sleep():
+            case requests.Sleep():
                 return (yield from self._sleep(request))
-            case StrobeRead():
+            case requests.StrobeRead():
                 return (yield from self._strobe_read(request))
-            case BusAccess():
+            case requests.BusAccess():
                 return (yield from self._bus_access(request))
-            case CameraTransfer():
-                assert self._camera_bus is not None
-                yield self._env.timeout(self._camera_bus.transfer_ps(request))
+            case requests.CameraTransfer():
+                assert self.camera_bus is not None
+                yield self.env.timeout(self.camera_bus.transfer_ps(request))
                 self._follow()
-                return self._camera_bus.transfer(request, self._env.now)
+                return self.camera_bus.transfer(request, self.env.now)
             case _:
                 raise TypeError(f"a program can not request {request!r}")
 
@@ -213,7 +187,7 @@ class Processor:
     def _follow(self) -> None:
         """Let the FPGA be where the processor is; after an interrupt's accesses it is ahead."""
         if self.fpga is not None:
-            self.fpga.run(max(self._env.now, self.fpga.now_ps))
+            self.fpga.run(max(self.env.now, self.fpga.now_ps))
 
     @property
     def _reached(self) -> FpgaPort:
@@ -222,55 +196,55 @@ class Processor:
             raise ValueError("this board has no FPGA: its program can not reach for one")
         return self.fpga
 
-    def _pins_of(self, request: SetPin | ReadPin) -> Pins | FpgaPort:
+    def _pins_of(self, request: requests.SetPin | requests.ReadPin) -> Pins | FpgaPort:
         """Where the pin of ``request`` leads to."""
         self._follow()
-        if self._other_pins is not None and request.pin in self._other_pins:
-            return self._other_pins
+        if self.other_pins is not None and request.pin in self.other_pins:
+            return self.other_pins
         return self._reached
 
     def _horizon(self) -> int:
         """Nothing else happens before this time, so the FPGA may run ahead up to it."""
-        limit = self._env.now + LOOK_AHEAD_PS
-        horizon = self._env.horizon()
+        limit = self.env.now + LOOK_AHEAD_PS
+        horizon = self.env.horizon()
         return limit if horizon is None else min(limit, horizon)
 
-    def _await_pin(self, request: AwaitPin) -> Steps:
-        start = self._env.now
+    def _await_pin(self, request: requests.AwaitPin) -> Steps:
+        start = self.env.now
         deadline = start + request.timeout_us * PS_PER_US
         self._follow()
         reached = start
         while self._reached.get_pin(request.pin) != request.level:
-            if self._env.now >= deadline:
+            if self.env.now >= deadline:
                 return False
             until = max(self._reached.now_ps, min(deadline, self._horizon()))
             reached = self._reached.run(until, (request.pin, request.level))
-            yield self._env.timeout(reached - self._env.now)
+            yield self.env.timeout(reached - self.env.now)
         poll = request.poll_cycles * PS_PER_S
         polls = max(1, -(-(reached - start) * self._clock.hz // poll))
-        yield self._env.timeout(start + polls * poll // self._clock.hz - self._env.now)
+        yield self.env.timeout(start + polls * poll // self._clock.hz - self.env.now)
         return True
 
-    def _sleep(self, request: Sleep) -> Steps:
+    def _sleep(self, request: requests.Sleep) -> Steps:
         if request.deadline_us is None and not request.wakeable:
             raise ValueError(f"nothing can end {request!r}: give a deadline or make it wakeable")
         deadline = None if request.deadline_us is None else request.deadline_us * PS_PER_US
-        if deadline is not None and deadline <= self._env.now:
+        if deadline is not None and deadline <= self.env.now:
             return False
         alternatives: list[simpy.Event] = [self._wake] if request.wakeable else []
         if deadline is not None:
-            alternatives.append(self._env.timeout(deadline - self._env.now))
+            alternatives.append(self.env.timeout(deadline - self.env.now))
         self.waiting, self.dozing = deadline is None, request.wakeable
-        self._on_activity(False)
-        yield simpy.AnyOf(self._env, alternatives)
-        self._on_activity(True)
+        self.on_activity(False)
+        yield simpy.AnyOf(self.env, alternatives)
+        self.on_activity(True)
         self.waiting = self.dozing = False
         if request.wakeable and self._wake.triggered:
-            self._wake = self._env.event()
+            self._wake = self.env.event()
             return True
         return False
 
-    def _strobe_read(self, request: StrobeRead) -> Steps:
+    def _strobe_read(self, request: requests.StrobeRead) -> Steps:
         period = Fraction(request.cycles * PS_PER_S, self._clock.hz)
         done = 0
         while done < len(request.target):
@@ -278,31 +252,23 @@ class Processor:
             self._follow()
             fpga = self._reached
             # At least one cycle: an event inside it is an interrupt in the middle of the loop.
-            limit = max(self._horizon(), self._env.now + -(-period.numerator // period.denominator))
+            limit = max(self._horizon(), self.env.now + ceil(period))
             done += fpga.strobe_read(request.target[done:], period, limit)
-            yield self._env.timeout(fpga.now_ps - self._env.now)
+            yield self.env.timeout(fpga.now_ps - self.env.now)
         return None
 
-    def _bus_access(self, request: BusAccess) -> Steps:
+    def _bus_access(self, request: requests.BusAccess) -> Steps:
         done, total = 0, len(request.addresses)
         while done < total:
             yield from self._pay()
             self._follow()
             fpga = self._reached
-            wanted = Transactions(
-                request.addresses[done:],
-                request.data[done:],
-                request.write,
-                self._cycle,
-                request.cycles,
-                request.select,
-                request.above,
-            )
+            addresses, data = request.addresses[done:], request.data[done:]
+            timing = self._cycle, request.cycles, request.select, request.above
+            wanted = Transactions(addresses, data, request.write, *timing)
             # At least one, as above.
-            one = -(-wanted.period.numerator // wanted.period.denominator)
-            limit = max(self._horizon(), fpga.now_ps + one)
-            done += fpga.access(wanted, limit)
-            yield self._env.timeout(fpga.now_ps - self._env.now)
+            done += fpga.access(wanted, max(self._horizon(), fpga.now_ps + ceil(wanted.period)))
+            yield self.env.timeout(fpga.now_ps - self.env.now)
             if not request.write and request.data[done - 1] > request.above:
                 break
         return done

@@ -11,7 +11,7 @@ from cubestack.emulator.boards.cubesense.gpio import GpioPins
 from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
 from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-from cubestack.emulator.bus.i2c import CurrentTarget, I2cBus
+from cubestack.emulator.bus.i2c import Forwarder, I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.ov7620.fisheye import FIELD_DEG
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
@@ -136,7 +136,7 @@ class CubeSenseBoard(Board):
             other_pins=self._lines,
             on_pin=lambda pin, _level: self._pin_changed(pin),
         )
-        self.i2c_bus.attach(register_address, CurrentTarget(lambda: self.program.registers))
+        self.i2c_bus.attach(register_address, Forwarder(lambda: [self.program.registers]))
 
     @property
     def scene(self) -> EarthSunScene:

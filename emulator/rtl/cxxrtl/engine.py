@@ -1,8 +1,9 @@
 """The compiled engine: CXXRTL's C++ of the design with driver.cpp around it, through ctypes."""
 
 import ctypes
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import astuple, fields
+from dataclasses import astuple
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -10,106 +11,45 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.rtl import sram
+from cubestack.emulator.rtl.contract import BurstEnd, RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import library_for
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
-from cubestack.emulator.rtl.sram import (
-    BETWEEN_FPGAS,
-    MAX_VIOLATIONS,
-    RULES,
-    SramTiming,
-    Violation,
-    ViolationLog,
-)
-from cubestack.emulator.rtl.stepping import BurstEnd, SteppingEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import STEPS, Transactions
 
-_KINDS = tuple(RULES)
+_KINDS = tuple(sram.RULES)
 _BURST_ENDS = tuple(BurstEnd)  # declared in the driver's order
 
 
-class _Segment(ctypes.Structure):
-    _fields_ = [
-        (name, ctypes.c_int64)
-        for name in (
-            "start",
-            "half_numerator",
-            "half_denominator",
-            "edges",
-            "rows",
-            "line_clocks",
-            "active_columns",
-            "vsync",
-        )
-    ]
-
-
-class _Timing(ctypes.Structure):
-    _fields_ = [(field.name, ctypes.c_int64) for field in fields(SramTiming)]
-
-
-class _Violation(ctypes.Structure):
-    _fields_ = [
-        (name, ctypes.c_int64) for name in ("kind", "time", "address", "found", "needed", "where")
-    ]
-
-
-class _Transactions(ctypes.Structure):
-    _fields_ = [
-        ("addresses", ctypes.c_void_p),
-        ("data", ctypes.c_void_p),
-        *((name, ctypes.c_int64) for name in ("count", "write", "select", "above")),
-        *((name, ctypes.c_int64) for name in ("start", "numerator", "denominator", "cycles")),
-        ("offsets", ctypes.c_int64 * STEPS),
-    ]
-
-
 _INT, _LONG, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
+_INT_OUT, _LONGS = ctypes.POINTER(_INT), ctypes.POINTER(_LONG)  # the driver's structures, too
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "driver_new": (_POINTER, (ctypes.POINTER(_POINTER), ctypes.POINTER(_Timing), _LONG, _INT)),
+    "driver_new": (_POINTER, (ctypes.POINTER(_POINTER), _LONGS, _LONG, _INT)),
     "driver_delete": (None, (_POINTER,)),
     "driver_pin": (_INT, (ctypes.c_char_p,)),
     "driver_set": (None, (_POINTER, _INT, ctypes.c_uint32, _LONG)),
     "driver_get": (ctypes.c_uint32, (_POINTER, _INT)),
-    "driver_register": (ctypes.c_char_p, (_INT, ctypes.POINTER(_INT))),
+    "driver_register": (ctypes.c_char_p, (_INT, _INT_OUT)),
     "driver_flip": (None, (_POINTER, _INT, _INT, _LONG)),
     "driver_power": (None, (_POINTER, _INT, _INT, _LONG)),
-    "driver_load": (None, (_POINTER, _INT, ctypes.POINTER(_Segment), _LONG)),
+    "driver_load": (None, (_POINTER, _INT, _LONGS, _LONG)),
     "driver_use_pixels": (None, (_POINTER, _INT, _POINTER)),
-    "driver_burst": (
-        _INT,
-        (_POINTER, _LONG, ctypes.c_uint32, ctypes.POINTER(_LONG), ctypes.POINTER(_INT)),
-    ),
-    "driver_strobe": (None, (_POINTER, _POINTER, _LONG, _LONG, _LONG, _LONG, _LONG)),
-    "driver_access": (
-        _LONG,
-        (_POINTER, ctypes.POINTER(_Transactions), _LONG, ctypes.c_uint32, ctypes.POINTER(_INT)),
-    ),
+    "driver_burst": (_INT, (_POINTER, _LONG, ctypes.c_uint32, _LONGS, _INT_OUT)),
+    "driver_strobe": (None, (_POINTER, _POINTER, *[_LONG] * 5)),
+    "driver_access": (_LONG, (_POINTER, _LONGS, _LONG, ctypes.c_uint32, _INT_OUT)),
     "driver_violations": (_LONG, (_POINTER, _LONG, _POINTER)),
     "driver_violation_count": (_LONG, (_POINTER, _INT)),
 }
 
 
-def load_library(path: Path) -> ctypes.CDLL:
-    """Open a library of ``build.library_for``, its types declared."""
-    library = ctypes.CDLL(str(path))
-    for name, (result, arguments) in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype = result
-        function.argtypes = arguments
-    return library
+def _longs(*values: int) -> ctypes.Array[ctypes.c_int64]:
+    """One of the driver's structures."""
+    return (_LONG * len(values))(*values)
 
 
-def _registers_of(library: ctypes.CDLL) -> dict[str, int]:
-    registers: dict[str, int] = {}
-    bits = ctypes.c_int32()
-    while (name := library.driver_register(len(registers), bits)) is not None:
-        registers[name.decode()] = bits.value
-    return registers
-
-
-class CompiledEngine(SteppingEngine):
-    """An ``RtlEngine`` at tens of millions of clocks a second.
+class CompiledEngine(RtlEngine):
+    """Tens of millions of clocks a second.
 
     With ``skipping``, a clock outside of lines that changed no register is not repeated.
     """
@@ -117,7 +57,7 @@ class CompiledEngine(SteppingEngine):
     def __init__(
         self,
         wiring: Wiring,
-        sram_timing: SramTiming | None = None,
+        sram_timing: sram.SramTiming | None = None,
         *,
         skipping: bool = True,
         library: Path | None = None,
@@ -131,19 +71,24 @@ class CompiledEngine(SteppingEngine):
         """
         super().__init__(wiring, skipping=skipping)
         self._driver: int | None = None
-        self._library = load_library(library or library_for(wiring))
+        self._library = ctypes.CDLL(str(library or library_for(wiring)))
+        for name, (result, arguments) in _FUNCTIONS.items():
+            function = getattr(self._library, name)
+            function.restype, function.argtypes = result, arguments
         addresses = [memory.ctypes.data for memory in self.memories.values()]
         self._driver = self._library.driver_new(
             (_POINTER * len(addresses))(*addresses),
-            _Timing(*astuple(sram_timing or SramTiming())),
-            MAX_VIOLATIONS,
+            _longs(*astuple(sram_timing or sram.SramTiming())),
+            sram.MAX_VIOLATIONS,
             skipping,
         )
         self._pins = {name: self._library.driver_pin(name.encode()) for name in wiring.widths}
-        self._registers = _registers_of(self._library)
-        self._log = ViolationLog()
-        self._where = [*self.memories, BETWEEN_FPGAS]  # the driver's -1 is the last one
-        self._reached, self._camera = ctypes.c_int64(), ctypes.c_int32()
+        self._registers: dict[str, int] = {}
+        bits = _INT()
+        while (name := self._library.driver_register(len(self._registers), bits)) is not None:
+            self._registers[name.decode()] = bits.value
+        self._where = [*self.memories, sram.BETWEEN_FPGAS]  # the driver's -1 is the last one
+        self._reached, self._camera = _LONG(), _INT()
 
     def close(self) -> None:
         """Release the driver."""
@@ -163,13 +108,12 @@ class CompiledEngine(SteppingEngine):
         return self._driver
 
     @property
-    def violation_log(self) -> ViolationLog:
-        """What the SRAM model recorded."""
+    def violation_counts(self) -> Counter[sram.ViolationKind]:
+        """How often each rule was broken."""
         for number, kind in enumerate(_KINDS):
-            count = self._library.driver_violation_count(self._handle, number)
-            if count:
+            if count := self._library.driver_violation_count(self._handle, number):
                 self._log.counts[kind] = count
-        return self._log
+        return self._log.counts
 
     @property
     def registers(self) -> dict[str, int]:
@@ -197,22 +141,10 @@ class CompiledEngine(SteppingEngine):
             for name in self.wiring.cameras[camera].pins:
                 self._set(name, 0)
             return
-        segment = loaded.segment
-        self._library.driver_load(
-            self._handle,
-            camera,
-            _Segment(
-                segment.start_ps,
-                loaded.half_period.numerator,
-                loaded.half_period.denominator,
-                loaded.edges,
-                segment.rows,
-                loaded.line_clocks,
-                loaded.active_columns,
-                segment.vsync,
-            ),
-            edge,
-        )
+        segment, half = loaded.segment, loaded.half_period
+        clock = segment.start_ps, half.numerator, half.denominator, loaded.edges
+        lines = segment.rows, loaded.line_clocks, loaded.active_columns, segment.vsync
+        self._library.driver_load(self._handle, camera, _longs(*clock, *lines), edge)
 
     def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
         # The loaded segment keeps the array alive while the driver reads it.
@@ -221,50 +153,33 @@ class CompiledEngine(SteppingEngine):
     def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, BurstEnd, int]:
         self._reached.value = self.now_ps
         running = sum(1 << camera for camera in cameras)
-        end = self._library.driver_burst(
-            self._handle, until_ps, running, self._reached, self._camera
-        )
+        reached, camera = self._reached, self._camera
+        end = self._library.driver_burst(self._handle, until_ps, running, reached, camera)
         self._collect_violations()
-        return max(self.now_ps, self._reached.value), _BURST_ENDS[end], self._camera.value
+        return max(self.now_ps, reached.value), _BURST_ENDS[end], camera.value
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
         if not out.flags.c_contiguous or out.dtype != np.uint8:
             raise ValueError("the target of a transfer must be contiguous uint8")
         half = period / 2
-        self._library.driver_strobe(
-            self._handle,
-            out.ctypes.data,
-            len(out),
-            self.now_ps,
-            half.numerator,
-            half.denominator,
-            int(fraction * half.denominator),
-        )
+        halves = half.numerator, half.denominator, int(fraction * half.denominator)
+        where, count = out.ctypes.data, len(out)
+        self._library.driver_strobe(self._handle, where, count, self.now_ps, *halves)
         self._collect_violations()
 
     def _access(self, transactions: Transactions) -> int:
-        start, period = self.now_ps, transactions.cycle
-        given = _Transactions(
-            transactions.addresses.ctypes.data,
-            transactions.data.ctypes.data,
-            len(transactions),
-            transactions.write,
-            transactions.select,
-            transactions.above,
-            start,
-            period.numerator,
-            period.denominator,
-            transactions.cycles,
-            (ctypes.c_int64 * STEPS)(*transactions.offsets),
-        )
-        event, over = 0, ctypes.c_int32(not len(transactions))
+        start, made, cycle = self.now_ps, transactions, transactions.cycle
+        arrays = made.addresses.ctypes.data, made.data.ctypes.data, len(made)
+        times = start, cycle.numerator, cycle.denominator, made.cycles, *made.offsets
+        given = _longs(*arrays, made.write, made.select, made.above, *times)
+        event, over = 0, _INT(not len(made))
         while not over.value:
             running = sum(1 << camera.number for camera in self._running())
             event = self._library.driver_access(self._handle, given, event, running, over)
             self._collect_violations()
             if not over.value:
                 # A camera wants something before this event.
-                self.run(start + transactions.time_of(event))
+                self.run(start + made.time_of(event))
         return event // STEPS
 
     def _collect_violations(self) -> None:
@@ -272,10 +187,8 @@ class CompiledEngine(SteppingEngine):
         kept = self._library.driver_violations(self._handle, known, None)
         if kept == known:
             return
-        new = (_Violation * (kept - known))()
+        new = (_LONG * 6 * (kept - known))()
         self._library.driver_violations(self._handle, known, new)
-        for item in new:
-            kind, where = _KINDS[item.kind], self._where[item.where]
-            self._log.add(
-                Violation.measured(kind, item.time, item.address, item.found, item.needed, where)
-            )
+        for kind, time_ps, address, found, needed, where in new:
+            broken = _KINDS[kind], time_ps, address, found, needed, self._where[where]
+            self._log.add(sram.Violation(*broken))

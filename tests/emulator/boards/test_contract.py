@@ -61,7 +61,7 @@ def probed(board: Board, name: str) -> list[tuple[int, object]]:
 
     def host() -> Iterator[Any]:
         yield kernel.timeout(100 * PS_PER_MS)
-        line.write(encode_frame(bytes([identifier])))
+        line.uart.host_writes(encode_frame(bytes([identifier])))
         yield from board.i2c_bus.transfer(transfer)
         found.append((kernel.now, bytes(transfer[1].data)))
         for _ in range(40):

@@ -39,17 +39,6 @@ def test_however_it_is_taken(blocks, takes):
     assert taken + line.take(10**12) == sent
 
 
-def test_writes_go_to_the_device():
-    kernel, uart, line = make()
-    received = []
-    uart.on_byte = received.append
-    line.write(b"ab")
-    assert line.write_backlog == 2
-    kernel.run()
-    assert bytes(received) == b"ab"
-    assert line.write_backlog == 0
-
-
 def test_unplugged_line_hears_nothing():
     kernel, uart, line = make()
     uart.send(b"before")

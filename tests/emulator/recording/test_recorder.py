@@ -1,6 +1,7 @@
 """Recordings of small devices: an echo on a line, a memory on the bus."""
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -44,7 +45,8 @@ class Device:
 
 def recorded(path: Path, device: Device, live: Callable[[Recorder], None]) -> Recording:
     """What came on record while a device lived."""
-    with path.open("w") as stream, Recorder(stream, "cubesense", {"uart": device.uart}) as recorder:
+    uarts = {"uart": device.uart}
+    with path.open("w") as stream, closing(Recorder(stream, "cubesense", uarts)) as recorder:
         recorder.listen(device.bus)
         live(recorder)
     return load_recording(path)

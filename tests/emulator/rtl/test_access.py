@@ -17,7 +17,6 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.factory import make_engine
-from cubestack.emulator.rtl.stepping import SteppingEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.fpga_port import Transactions
 from cubestack.firmware_model.mcu.external_bus import BusTiming
@@ -118,7 +117,7 @@ def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin(make_camera) -> None:
             engine.set_pin(pin, level)
         places = rng.integers(0, 1 << 19, 4000) | 1 << 19
         read = transactions(places)
-        way = CompiledEngine._access if bulk else SteppingEngine._access
+        way = CompiledEngine._access if bulk else RtlEngine._access
         with patch.object(CompiledEngine, "_access", way):
             assert engine.access(read, 10**12) == len(places)
         assert np.array_equal(read.data, engine.memories["SRAM2"][places & (1 << 19) - 1])

@@ -87,7 +87,7 @@ def test_same_as_the_python_model(library, seed):
     kinds = list(RULES)
     raw = library.sram_violations(other)[: 6 * library.sram_kept(other)]
     rows = np.array(raw).reshape(-1, 6).tolist()
-    assert [Violation.measured(kinds[kind], *rest[:4]) for kind, *rest in rows] == expected
+    assert [Violation(kinds[kind], *rest[:4]) for kind, *rest in rows] == expected
     for number, kind in enumerate(kinds):
         if kind == "wire-contention":
             continue  # no memory's

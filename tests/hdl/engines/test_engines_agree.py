@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.contract import PinEvent
+from cubestack.emulator.rtl.contract import PinEvent, RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
-from cubestack.emulator.rtl.stepping import SteppingEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import rtlil_text, verilog_text
 from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
@@ -59,7 +58,7 @@ def case(request, tmp_path_factory) -> Case:
     return Case(request.param, wiring, icarus)
 
 
-def play(engine: SteppingEngine, events: list[PinEvent]) -> Played:
+def play(engine: RtlEngine, events: list[PinEvent]) -> Played:
     try:
         outputs = engine.apply(events)
         return Played(outputs, {name: m.tobytes() for name, m in engine.memories.items()})
@@ -82,7 +81,7 @@ def test_settled_pin_by_settled_pin(case, seed):
     events = case.events(seed)
     expected = case.icarus.play(events)
     assert expected.outputs.shape == (len(events), len(case.wiring.output_pins))
-    engines: dict[str, Callable[[], SteppingEngine]] = {
+    engines: dict[str, Callable[[], RtlEngine]] = {
         "compiled": lambda: CompiledEngine(case.wiring),
         "amaranth": lambda: SimulatedEngine(case.wiring),
     }

@@ -1,6 +1,7 @@
 """A CubeSense on record: played back it says the same; with another default, what differs."""
 
 import io
+from contextlib import closing
 
 import pytest
 
@@ -29,7 +30,7 @@ def recorded(session, scene, tmp_path) -> Recording:
     with (
         session(scene, seed=1) as opened,
         path.open("w") as stream,
-        Recorder(stream, "cubesense", lines(opened.board)) as recorder,
+        closing(Recorder(stream, "cubesense", lines(opened.board))) as recorder,
     ):
         board = opened.board
         recorder.listen(board.i2c_bus)
@@ -65,7 +66,7 @@ def test_recording_does_not_change_the_run(recorded, session, scene, tmp_path):
     with session(scene, seed=1) as opened:
         stream = io.StringIO()
         trace = VcdTrace(stream, "x", opened.board.kernel, lines(opened.board))
-        with path.open("w") as file, Recorder(file, "cubesense", lines(opened.board)):
+        with path.open("w") as file, closing(Recorder(file, "cubesense", lines(opened.board))):
             opened.client.capture_and_detect(Camera.SUN)
         trace.close()
     again = load_recording(path)

@@ -106,7 +106,7 @@ def test_register_upsets_cost_a_picture(star: Star, good: np.ndarray) -> None:
     assert len(star.faults.log) > 100
     assert (status, "LessThanThreeStarsID" in flags) == ("IDENTIFICATION_FAILED", True)
     assert (star.stored != good).mean() > 0.1
-    assert star.board.engine.violation_log.counts
+    assert star.board.engine.violation_counts
     assert star.capture()[0] == "CALCULATED"
 
 
