@@ -115,7 +115,6 @@ _COUNT = struct.Struct("=Q")
 _RESULT = struct.Struct("=i")
 
 MAX_REQUEST_BYTES = _HEAD.size + MAX_MESSAGES * (_MESSAGE.size + MAX_MESSAGE_BYTES)
-MAX_REPLY_BYTES = _RESULT.size + MAX_MESSAGES * MAX_MESSAGE_BYTES
 
 
 @dataclass(frozen=True)

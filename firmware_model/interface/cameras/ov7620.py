@@ -42,6 +42,8 @@ def window_row(row: int) -> int:
     return _WINDOW_TOP + row // _ROWS_A_COUNT
 
 
+_COLOUR = "a monochrome picture does not depend on it"
+_FRAME = "the model's frame has 525 lines of 858 clocks"
 _PICTURE = "reset value; the Y output of the model has no such processing"
 
 _stored = partial(CameraRegister, modelled=False)
@@ -52,20 +54,8 @@ _REGISTERS = (
         BitField("DOUBLE", 4, 1, "1 doubles the gain"),
         BitField("DOUBLE_AGAIN", 5, 1, "1 doubles it again"),
     ),
-    _stored(
-        0x01,
-        "BLUE_GAIN",
-        0x80,
-        "gain of the blue channel",
-        assumed="a monochrome picture does not depend on it",
-    ),
-    _stored(
-        0x02,
-        "RED_GAIN",
-        0x80,
-        "gain of the red channel",
-        assumed="a monochrome picture does not depend on it",
-    ),
+    _stored(0x01, "BLUE_GAIN", 0x80, "gain of the blue channel", assumed=_COLOUR),
+    _stored(0x02, "RED_GAIN", 0x80, "gain of the red channel", assumed=_COLOUR),
     _stored(0x03, "SATURATION", 0x80, "saturation of colours", assumed="reset value"),
     _stored(0x06, "BRIGHTNESS", 0x80, "brightness", assumed=_PICTURE),
     _stored(0x07, "SHARPNESS", 0xC6, "enhancement of edges", assumed=_PICTURE),
@@ -119,20 +109,8 @@ _REGISTERS = (
     CameraRegister(0x29, "COMMON_I", 0x00, "control of the exposure").of(
         BitField("MANUAL_EXPOSURE", 7, 1, "1 takes EXPOSURE as it is written")
     ),
-    _stored(
-        0x2A,
-        "FRAME_RATE_HIGH",
-        0x00,
-        "adjustment of the frame rate",
-        assumed="the model's frame has 525 lines of 858 clocks",
-    ),
-    _stored(
-        0x2B,
-        "FRAME_RATE_LOW",
-        0x00,
-        "adjustment of the frame rate, low byte",
-        assumed="the model's frame has 525 lines of 858 clocks",
-    ),
+    _stored(0x2A, "FRAME_RATE_HIGH", 0x00, "adjustment of the frame rate", assumed=_FRAME),
+    _stored(0x2B, "FRAME_RATE_LOW", 0x00, "adjustment of the frame rate, low byte", assumed=_FRAME),
     _stored(
         0x2D, "COMMON_J", 0x81, "band filter against the flicker of lamps", assumed="reset value"
     ),

@@ -6,7 +6,7 @@ lowest address.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import InitVar, dataclass, replace
 from enum import Enum
 
 
@@ -120,6 +120,7 @@ class CameraRegister:
         )
 
 
+@dataclass(eq=False)
 class CameraRegisterMap:
     """All registers of a camera.
 
@@ -129,27 +130,23 @@ class CameraRegisterMap:
         address_bytes: bytes of a register address on that bus, most significant first.
     """
 
-    def __init__(
-        self,
-        camera: str,
-        i2c_address: int,
-        address_bytes: int,
-        registers: tuple[CameraRegister, ...],
-    ) -> None:
+    camera: str
+    i2c_address: int
+    address_bytes: int
+    registers: InitVar[tuple[CameraRegister, ...]]
+
+    def __post_init__(self, registers: tuple[CameraRegister, ...]) -> None:
         """Make the map; ValueError when registers share a name or an address."""
-        self.camera = camera
-        self.i2c_address = i2c_address
-        self.address_bytes = address_bytes
         self._by_name: dict[str, CameraRegister] = {}
         self._by_address: dict[int, CameraRegister] = {}
         for register in sorted(registers, key=lambda r: r.address):
             if register.name in self._by_name:
-                raise ValueError(f"{camera} declares register {register.name} twice")
+                raise ValueError(f"{self.camera} declares register {register.name} twice")
             self._by_name[register.name] = register
             for address in register.addresses:
                 if address in self._by_address:
                     raise ValueError(
-                        f"{camera} registers {self._by_address[address].name} and "
+                        f"{self.camera} registers {self._by_address[address].name} and "
                         f"{register.name} both have address {address:#06x}"
                     )
                 self._by_address[address] = register
@@ -165,10 +162,6 @@ class CameraRegisterMap:
     def __iter__(self) -> Iterator[CameraRegister]:
         """Registers in the order of their addresses."""
         return iter(self._by_name.values())
-
-    def __len__(self) -> int:
-        """Number of registers."""
-        return len(self._by_name)
 
     def at(self, address: int) -> CameraRegister | None:
         """The register that owns the byte at ``address``, or None."""

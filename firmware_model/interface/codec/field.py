@@ -97,7 +97,8 @@ class Field:
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""
         if self.type not in _WIDTHS and not _BYTES.fullmatch(self.type):
-            raise InterfaceError(f"field {self.name}: no type {self.type!r}; {_known_types()}")
+            known = ", ".join((*_WIDTHS, "bytesN"))
+            raise InterfaceError(f"field {self.name}: no type {self.type!r}; known: {known}")
         if self.gap < 0:
             raise InterfaceError(f"field {self.name}: a gap has no {self.gap} bits")
         if not self.scale > 0:
@@ -230,7 +231,3 @@ def flags_at(flags: Iterable[tuple[int, str, str, str]]) -> tuple[Field, ...]:
         fields.append(bool1(name, meaning, flag=flag, gap=bit - end))
         end = bit + 1
     return tuple(fields)
-
-
-def _known_types() -> str:
-    return "known: " + ", ".join(_WIDTHS) + ", bytesN"

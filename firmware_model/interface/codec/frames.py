@@ -30,13 +30,6 @@ class FrameEvent(Enum):
     """A byte outside of a frame, or an escape that means nothing; an open frame is dropped."""
 
 
-class _State(Enum):
-    OUTSIDE = auto()
-    OUTSIDE_ESCAPED = auto()
-    INSIDE = auto()
-    INSIDE_ESCAPED = auto()
-
-
 class FrameDecoder:
     """Finds frames in a stream of bytes, one byte at a time; no byte sequence raises.
 
@@ -52,67 +45,39 @@ class FrameDecoder:
     def __init__(self, max_length: int) -> None:
         """Accept payloads of at most ``max_length`` bytes; memory is bounded by it."""
         self._max_length = max_length
-        self._state = _State.OUTSIDE
+        self._inside = self._escaped = False
         self._buffer = bytearray()
-        self._too_long = False
         self.payload = b""
 
     def feed(self, byte: int) -> FrameEvent | None:
         """Take the next ``byte``; returns what it completed or broke, None while all is well."""
-        match self._state:
-            case _State.OUTSIDE:
-                if byte == ESCAPE:
-                    self._state = _State.OUTSIDE_ESCAPED
-                    return None
-                return FrameEvent.PROTOCOL_ERROR
-            case _State.OUTSIDE_ESCAPED:
-                if byte == START:
-                    self._begin()
-                    return None
-                if byte != ESCAPE:  # after 1F 1F the second one may still begin a frame
-                    self._state = _State.OUTSIDE
-                return FrameEvent.PROTOCOL_ERROR
-            case _State.INSIDE:
-                if byte == ESCAPE:
-                    self._state = _State.INSIDE_ESCAPED
-                else:
-                    self._store(byte)
+        inside, escaped = self._inside, self._escaped
+        self._escaped = not escaped and byte == ESCAPE
+        if self._escaped:
+            return None
+        if not escaped or byte == ESCAPE:
+            if inside:
+                if len(self._buffer) <= self._max_length:
+                    self._buffer.append(byte)
                 return None
-            case _State.INSIDE_ESCAPED:
-                return self._escaped(byte)
+            self._escaped = escaped  # after 1F 1F the second one may still begin a frame
+            return FrameEvent.PROTOCOL_ERROR
+        self._inside = byte == START
+        if byte == START:
+            self._buffer.clear()
+            return FrameEvent.INCOMPLETE if inside else None
+        if byte != END or not inside:
+            return FrameEvent.PROTOCOL_ERROR
+        self.payload = bytes(self._buffer[: self._max_length])
+        return FrameEvent.TOO_LONG if len(self._buffer) > self._max_length else FrameEvent.FRAME
 
     @property
     def unfinished(self) -> bool:
         """Whether a frame has begun and not ended."""
-        return self._state is not _State.OUTSIDE
+        return self._inside or self._escaped
 
     def reset(self) -> bool:
         """Forget an unfinished frame, as after a silence; returns whether there was one."""
         unfinished = self.unfinished
-        self._state = _State.OUTSIDE
+        self._inside = self._escaped = False
         return unfinished
-
-    def _begin(self) -> None:
-        self._state = _State.INSIDE
-        self._buffer.clear()
-        self._too_long = False
-
-    def _store(self, byte: int) -> None:
-        self._state = _State.INSIDE
-        if len(self._buffer) < self._max_length:
-            self._buffer.append(byte)
-        else:
-            self._too_long = True
-
-    def _escaped(self, byte: int) -> FrameEvent | None:
-        if byte == ESCAPE:
-            self._store(byte)
-            return None
-        if byte == START:
-            self._begin()
-            return FrameEvent.INCOMPLETE
-        self._state = _State.OUTSIDE
-        if byte != END:
-            return FrameEvent.PROTOCOL_ERROR
-        self.payload = bytes(self._buffer)
-        return FrameEvent.TOO_LONG if self._too_long else FrameEvent.FRAME

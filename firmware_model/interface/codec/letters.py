@@ -5,6 +5,7 @@ is no letter of the protocol gets no answer.
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 
 @dataclass(frozen=True)
@@ -54,25 +55,13 @@ class LetterProtocol:
 
     def __post_init__(self) -> None:
         """Check the declaration; raises ValueError."""
-        for index, letter in enumerate(self.letters):
-            for other in self.letters[:index]:
-                if letter.letter == other.letter or letter.name == other.name:
-                    raise ValueError(
-                        f"letters {other.name} ({other.letter!r}) and {letter.name} "
-                        f"({letter.letter!r}) must differ in both"
-                    )
+        for other, letter in combinations(self.letters, 2):
+            if letter.letter == other.letter or letter.name == other.name:
+                raise ValueError(
+                    f"letters {other.name} ({other.letter!r}) and {letter.name} "
+                    f"({letter.letter!r}) must differ in both"
+                )
 
     def find(self, byte: int) -> Letter | None:
         """The letter that ``byte`` is, or None."""
-        for letter in self.letters:
-            if letter.request[0] == byte:
-                return letter
-        return None
-
-    def __getitem__(self, name: str) -> Letter:
-        """The letter ``name``; ValueError when there is none."""
-        for letter in self.letters:
-            if letter.name == name:
-                return letter
-        known = ", ".join(letter.name for letter in self.letters)
-        raise ValueError(f"no letter {name!r}; known: {known}")
+        return next((letter for letter in self.letters if letter.request[0] == byte), None)

@@ -131,7 +131,3 @@ class PointerMap:
     def __iter__(self) -> Iterator[PointerRegister]:
         """Registers in the order of their addresses."""
         return iter(self._by_address.values())
-
-    def __len__(self) -> int:
-        """Number of registers."""
-        return len(self._by_address)

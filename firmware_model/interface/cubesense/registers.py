@@ -7,6 +7,8 @@ the thresholds. The settings and results are the same ones as in the node protoc
 values are taken from there.
 """
 
+from collections.abc import Iterator
+
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
@@ -30,41 +32,30 @@ _WO = RegisterAccess.WRITE_ONLY
 _RESETS = {message.name: message.reset_values() for message in TELECOMMANDS}
 
 
-def _camera(camera: Camera) -> tuple[PointerRegister, ...]:
+def _camera(camera: Camera) -> Iterator[PointerRegister]:
     """Registers of a camera; those of the nadir one are 8 behind those of the Sun's."""
     number, name = camera + 1, camera.name
-    settings = _RESETS[f"CameraSettings{number}"]
-    threshold = _RESETS[f"DetectionThreshold{number}"]["Threshold"]
-    rows = (
-        (0x00, _RW, u8(f"{name}_THRESHOLD", "detection threshold", reset=threshold)),
-        (
-            0x01,
-            _RW,
-            u8(
-                f"{name}_EXPOSURE", "exposure in two line times, 127 us", reset=settings["Exposure"]
-            ),
-        ),
-        (
-            0x02,
-            _RW,
-            u8(f"{name}_GAIN", "amplification; the camera gets at most 63", reset=settings["Gain"]),
-        ),
-        (
-            0x03,
-            _RW,
-            u8(f"{name}_BLUE_GAIN", "gain of the blue channel", reset=settings["BlueGain"]),
-        ),
-        (0x04, _RW, u8(f"{name}_RED_GAIN", "gain of the red channel", reset=settings["RedGain"])),
-        (0x05, _RW, u8(f"{name}_AUTO", "1: the camera adjusts itself", maximum=1)),
-        (0x20, _RO, u8(f"{name}_CAPTURE", "what became of the capture", choices=CaptureResult)),
-        (0x21, _RO, u8(f"{name}_DETECT", "what became of the detection", choices=DetectResult)),
-        (0x22, _RO, u8(f"{name}_POINTS", "edges of the fit, or Sun pixels of the mean")),
-        (0x40, _RO, _centre(f"{name}_X", "column")),
-        (0x41, _RO, _centre(f"{name}_Y", "row")),
+    resets = _RESETS[f"CameraSettings{number}"] | _RESETS[f"DetectionThreshold{number}"]
+    settings = (
+        ("THRESHOLD", "Threshold", "detection threshold"),
+        ("EXPOSURE", "Exposure", "exposure in two line times, 127 us"),
+        ("GAIN", "Gain", "amplification; the camera gets at most 63"),
+        ("BLUE_GAIN", "BlueGain", "gain of the blue channel"),
+        ("RED_GAIN", "RedGain", "gain of the red channel"),
     )
-    return tuple(
-        PointerRegister(8 * camera + address, access, field) for address, access, field in rows
-    )
+    fields = {
+        address: u8(f"{name}_{register}", meaning, reset=resets[parameter])
+        for address, (register, parameter, meaning) in enumerate(settings)
+    } | {
+        0x05: u8(f"{name}_AUTO", "1: the camera adjusts itself", maximum=1),
+        0x20: u8(f"{name}_CAPTURE", "what became of the capture", choices=CaptureResult),
+        0x21: u8(f"{name}_DETECT", "what became of the detection", choices=DetectResult),
+        0x22: u8(f"{name}_POINTS", "edges of the fit, or Sun pixels of the mean"),
+        0x40: _centre(f"{name}_X", "column"),
+        0x41: _centre(f"{name}_Y", "row"),
+    }
+    for address, field in fields.items():
+        yield PointerRegister(8 * camera + address, _RW if address < 0x20 else _RO, field)
 
 
 def _centre(name: str, line: str) -> Field:

@@ -28,21 +28,14 @@ _EXPOSURES = {codes.Camera.SUN: 1, codes.Camera.NADIR: 4}
 _BORESIGHTS = {codes.Camera.SUN: (369.0, 250.0), codes.Camera.NADIR: (371.0, 236.0)}
 
 
-def _camera() -> Field:
-    return u8("Camera", "camera that takes the picture", choices=codes.Camera)
-
-
-def _sram(meaning: str) -> Field:
-    return u8("Sram", meaning, choices=codes.Sram)
-
-
-def _location() -> Field:
-    return u8(
-        "Location",
-        "half of the memory; one picture fills it",
-        choices=codes.ImageLocation,
-        maximum=codes.ImageLocation.TOP,
-    )
+_CAMERA = u8("Camera", "camera that takes the picture", choices=codes.Camera)
+_TO_SRAM = u8("Sram", "memory that stores it", choices=codes.Sram)
+_LOCATION = u8(
+    "Location",
+    "half of the memory; one picture fills it",
+    choices=codes.ImageLocation,
+    maximum=codes.ImageLocation.TOP,
+)
 
 
 def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
@@ -122,13 +115,13 @@ _COMMON = (
     ).of(u8("Selection", "which memories", choices=codes.SramSelection)),
     _high(
         20, "CaptureAndDetect", "take a picture and measure in it; results become pending at once"
-    ).of(_camera(), _sram("memory that stores it")),
+    ).of(_CAMERA, _TO_SRAM),
     _medium(21, "CaptureOnly", "take a picture; the capture result becomes pending at once").of(
-        _camera(), _sram("memory that stores it"), _location()
+        _CAMERA, _TO_SRAM, _LOCATION
     ),
     _high(64, "StartImageDownload", "select a picture and its size, and prepare frame 0").of(
-        _sram("memory that is read"),
-        _location(),
+        u8("Sram", "memory that is read", choices=codes.Sram),
+        _LOCATION,
         u8("Size", "side of the square", choices=codes.ImageSize),
     ),
     _high(

@@ -5,7 +5,7 @@ hosts use them; names are assumed. IDs are as on the wire, bit 7 set. Unlike Cub
 of Identification has seconds before milliseconds.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8, u16
@@ -48,26 +48,22 @@ _RESULT = (
 )
 
 
-def _configuration_fields() -> tuple[Field, ...]:
-    fields = [u8(f"Threshold{camera + 1}", "detection threshold", "DN") for camera in codes.Camera]
+def _configuration_fields() -> Iterator[Field]:
     for camera in codes.Camera:
-        number = camera + 1
-        fields += [
-            u8(f"AutoAdjust{number}", "1: the camera adjusts itself"),
-            u16(f"Exposure{number}", "as it was sent"),
-            u8(f"Gain{number}", "as it was sent"),
-            u8(f"BlueGain{number}", "as it was sent"),
-            u8(f"RedGain{number}", "as it was sent"),
-        ]
-    return tuple(fields)
+        yield u8(f"Threshold{camera + 1}", "detection threshold", "DN")
+    for camera in codes.Camera:
+        yield u8(f"AutoAdjust{camera + 1}", "1: the camera adjusts itself")
+        yield u16(f"Exposure{camera + 1}", "as it was sent")
+        for name in ("Gain", "BlueGain", "RedGain"):
+            yield u8(f"{name}{camera + 1}", "as it was sent")
 
 
 def _mask(camera: codes.Camera) -> Message:
     limits = (
-        ("XMin", codes.COLUMNS),
-        ("XMax", codes.COLUMNS),
-        ("YMin", codes.ROWS),
-        ("YMax", codes.ROWS),
+        ("XMin", "first column", codes.COLUMNS),
+        ("XMax", "last column", codes.COLUMNS),
+        ("YMin", "first row", codes.ROWS),
+        ("YMax", "last row", codes.ROWS),
     )
     return _medium(
         200 + camera,
@@ -75,15 +71,9 @@ def _mask(camera: codes.Camera) -> Message:
         f"areas that detection ignores, camera {camera + 1}; ends included, all 0: none",
     ).of(
         *(
-            u16(
-                f"{name}{area + 1}",
-                f"{'first' if name.endswith('Min') else 'last'} "
-                f"{'column' if name.startswith('X') else 'row'} of area {area + 1}",
-                "px",
-                maximum=size - 1,
-            )
-            for area in range(codes.MASK_AREAS)
-            for name, size in limits
+            u16(f"{name}{area}", f"{what} of area {area}", "px", maximum=size - 1)
+            for area in range(1, codes.MASK_AREAS + 1)
+            for name, what, size in limits
         )
     )
 

@@ -10,6 +10,8 @@ the scale of all others. Quaternions turn inertial vectors into camera vectors,
 v_camera = q v_inertial q*, with the scalar in Qbar3. Angles are in rad.
 """
 
+from functools import partial
+
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import (
     Field,
@@ -27,47 +29,28 @@ from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 
 _UNIT_VECTOR_SCALE = 10_000
 
+_identity = partial(u16, meaning="index in the onboard star list; 65535: not identified")
+_percent = partial(u8, meaning="confidence of the identification", unit="%")
+_switch = partial(u8, meaning="load switch of imager and frame buffer", choices=codes.SwitchState)
+_task = partial(enum8, meaning="what the node last did", choices=codes.TaskStatus)
+_temperature = partial(i16, meaning="temperature of the processor", unit="degC", scale=100)
+
+_STAR_NUMBER = u8("StarNumber", "number of the detected star, from 0")
+_CURRENTS = (
+    u16("Current", "present current of frame buffer and imager", "mA", 10),
+    u16("MaxCurrent", "largest since power-up", "mA", 10),
+    u16("MinCurrent", "smallest since power-up", "mA", 10),
+)
+
 
 def _times(*names_and_meanings: tuple[str, str]) -> tuple[Field, ...]:
     """u16 fields in ms, one after the other."""
     return tuple(u16(name, meaning, "ms") for name, meaning in names_and_meanings)
 
 
-def _currents() -> tuple[Field, ...]:
-    return (
-        u16("Current", "present current of frame buffer and imager", "mA", 10),
-        u16("MaxCurrent", "largest since power-up", "mA", 10),
-        u16("MinCurrent", "smallest since power-up", "mA", 10),
-    )
-
-
-def _switch(name: str) -> Field:
-    return u8(name, "load switch of imager and frame buffer", choices=codes.SwitchState)
-
-
-def _task(name: str) -> Field:
-    return enum8(name, "what the node last did", choices=codes.TaskStatus)
-
-
-def _temperature(name: str) -> Field:
-    return i16(name, "temperature of the processor", "degC", 100)
-
-
 def _scaled(meaning: str, *names: str, unit: str = "") -> tuple[Field, ...]:
     """i16/10000 fields, one after the other."""
     return tuple(i16(name, meaning, unit, _UNIT_VECTOR_SCALE) for name in names)
-
-
-def _star_number() -> Field:
-    return u8("StarNumber", "number of the detected star, from 0")
-
-
-def _identity(name: str) -> Field:
-    return u16(name, "index in the onboard star list; 65535: not identified")
-
-
-def _percent(name: str) -> Field:
-    return u8(name, "confidence of the identification", "%")
 
 
 def _selected_star(number: int) -> Message:
@@ -126,7 +109,7 @@ _NODE = (
         u8("TestResult", "latest result", choices=codes.MemoryTest)
     ),
     Message(135, "PowerStatus", "switched supply of imager and frame buffer").of(
-        _switch("Status"), *_currents()
+        _switch("Status"), *_CURRENTS
     ),
 )
 
@@ -216,12 +199,12 @@ _DETECTION = (
         f32("Y_Coordinate", "measured row", "px"),
         f32("X_CorrectedCoordinate", "column without distortion", "px"),
         f32("Y_CorrectedCoordinate", "row without distortion", "px"),
-        _star_number(),
+        _STAR_NUMBER,
         u8("Size", "pixels of the area", "px"),
         u16("Intensity", "sum over the centroiding window", "DN"),
     ),
     Message(152, "BodyUnitVectors", "next detected star's direction in the camera", steps=True).of(
-        *_scaled("camera unit vector", "VbX", "VbY", "VbZ"), _star_number()
+        *_scaled("camera unit vector", "VbX", "VbY", "VbZ"), _STAR_NUMBER
     ),
     Message(
         153, "DetectionTimingOne", "longest times of the detection's steps since the last reset"
@@ -247,7 +230,7 @@ _IDENTIFICATION = (
     ),
     Message(157, "NumIdStars", "stars identified").of(u8("numIdStars", "stars identified")),
     Message(158, "IDStarsDetails", "next identified star", steps=True).of(
-        _star_number(),
+        _STAR_NUMBER,
         _identity("Identity"),
         u8("ValidationVotes", "other stars whose distance agrees"),
         _percent("Confidence"),
@@ -256,7 +239,7 @@ _IDENTIFICATION = (
         159, "InertialUnitVectors", "next identified star's catalogue direction", steps=True
     ).of(
         *_scaled("inertial unit vector", "ViX", "ViY", "ViZ"),
-        _star_number(),
+        _STAR_NUMBER,
         _identity("Identity"),
         _percent("Confidence"),
     ),
@@ -326,7 +309,7 @@ _ATTITUDE = (
     _selected_star(2),
     _selected_star(3),
     Message(176, "StarDetails", "next detected star: position, direction, identity", steps=True).of(
-        _star_number(),
+        _STAR_NUMBER,
         f32("CCx", "column without distortion", "px"),
         f32("CCy", "row without distortion", "px"),
         *_scaled("camera unit vector", "Vbx", "Vby", "Vbz"),
@@ -352,7 +335,7 @@ _LOG = (
         u16("WDGcounter", "resets by the watchdog"),
         _task("Status"),
         _switch("SW"),
-        *_currents(),
+        *_CURRENTS,
         *flag_fields(log_names=True),
     ),
     Message(175, "Results", "counts of the latest picture").of(
