@@ -22,6 +22,7 @@ from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.experiments.attitude import errors
 from tests.system.conftest import Ear
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
@@ -37,7 +38,8 @@ TURNS = {
     "noise": 0.25,
     "telemetry": 0.34,
     "command": 0.02,
-    "i2c": 0.25,
+    "i2c": 0.24,
+    "i2c_noise": 0.01,
     "bench": 0.01,
     "disconnect": 0.06,
     "inject": 0.05,
@@ -49,20 +51,6 @@ REFUSED = {"CubeStar": (), "CubeSense": (), "AraMiS": ("memory-stuck",)}
 UPSETS = {"memory-upsets": 1e-7, "register-upsets": 0.05}
 
 
-class Hashed(Ear):
-    """Hears what a device sends on a line, and when to the picosecond; into a hash."""
-
-    def __init__(self, trace: Any, uart: Any) -> None:
-        super().__init__(uart)
-        self.trace = trace
-
-    def device_sent(self, data: bytes, first_ps: int, byte_ps: int) -> None:
-        self.trace.update(b"%d %d " % (first_ps, byte_ps) + data)
-
-    def framing_error(self, time_ps: int) -> None:
-        self.trace.update(b"framing %d " % time_ps)
-
-
 class Fuzzer:
     """Mistreats one board.
 
@@ -71,24 +59,19 @@ class Fuzzer:
         trace: of all that came out of it, with its time, and of what reached the host.
     """
 
-    def __init__(self, opened: AnyEmulated, seed: int) -> None:
+    def __init__(self, opened: AnyEmulated, seed: int, turns: dict[str, float] = TURNS) -> None:
         self.board: Any = opened.board
         self.interface = interface = opened.device.interface
         self.kernel = self.board.kernel
         self._step, self._then_ps, self._still = self.kernel.step, 0, 0
         vars(self.kernel)["step"] = self._watched_step
         self.rng = np.random.default_rng(seed)
-        self.plugs = {"uart": self.board.serial}
-        uarts = [self.board.uart]
-        if interface.service_port is not None:
-            self.plugs["bench"] = lambda: self.board.serial("bench_uart")
-            uarts.append(self.board.bench_uart)
-        self.lines = {name: plug() for name, plug in self.plugs.items()}
+        self.lines = {name: self.board.serial(name) for name in self.board.uarts}
         self.addresses = [interface.i2c_address]
         if interface.registers is not None:
             self.addresses.append(interface.registers.i2c_address)
         self.trace = hashlib.sha256()
-        self.ears = [Hashed(self.trace, uart) for uart in uarts]
+        self.ears = [Ear(uart) for uart in self.board.uarts.values()]
         self.events = 0
         self.board.faults.seed = seed
         self.kinds = [
@@ -96,20 +79,20 @@ class Fuzzer:
             for kind, fault in FAULTS.items()
             if self.board.faults.targets(fault.site) and kind not in REFUSED[interface.name]
         ]
-        self.turns = [getattr(self, f"_{name}") for name in TURNS]
-        self.shares = list(accumulate(TURNS.values()))
+        self.turns = [getattr(self, f"_{name}") for name in turns]
+        self.shares = list(accumulate(turns.values()))
         self.steady = [m for m in interface.telemetries if m.supported and not m.has_side_effect]
 
     def run(self, events: int) -> tuple[int, str]:
         """Make ``events``; how many faults did something, and the trace."""
         due = CHECK_EVERY
         while self.events < events:
-            turn = np.searchsorted(self.shares, self.rng.random())
-            self.turns[turn]()
+            self.turns[np.searchsorted(self.shares, self.rng.random())]()
             self._listen(float(self.rng.exponential(0.002)))
             if self.events >= due:
                 due = self.events + CHECK_EVERY
                 self.check()
+        self.check()
         return self.board.faults.events, self.trace.hexdigest()
 
     def _watched_step(self) -> None:
@@ -127,12 +110,18 @@ class Fuzzer:
         self._calm()
         node = NodeClient(self.board.serial(), self.interface, timeout_s=ANSWER_S, retries=0)
         bus = self.board.i2c()
-        clients = [node, I2cClient(bus, self.interface, wait=bus.wait, retries=0)]
-        for client in clients:
+        for client in (node, I2cClient(bus, self.interface, wait=bus.wait, retries=0)):
             version = client.telemetry("Identification")["InterfaceVersion"]
             assert version == self.interface.version
-            client.telemetry(self.steady[self.rng.integers(len(self.steady))].name)
+            client.telemetry(self._one_of(self.steady).name)
         self.lines["uart"] = self.board.serial()
+        for heard in map(vars, self.ears):
+            self._note(heard)
+            for what in heard.values():
+                what.clear()
+
+    def _note(self, found: object) -> None:
+        self.trace.update(repr(found).encode())
 
     def _calm(self) -> None:
         """A stream or a picture may be on its way: wait for its end."""
@@ -152,8 +141,8 @@ class Fuzzer:
                 self.trace.update(data)
         return heard
 
-    def _pick(self) -> Any:
-        return self.interface.messages[self.rng.integers(len(self.interface.messages))]
+    def _one_of(self, choices: Any) -> Any:
+        return choices[self.rng.integers(len(choices))]
 
     def _noise(self) -> None:
         data = self.rng.bytes(int(self.rng.integers(1, 12)))
@@ -163,12 +152,12 @@ class Fuzzer:
         self.lines["uart"].write(data)
 
     def _frame(self, commands: bool) -> None:
-        message = self._pick()
+        message = self._one_of(self.interface.messages)
         if bool(message.id & TELEMETRY_BIT) == commands:
             return
         length = message.length if commands else 0
-        if self.rng.random() < 0.1:
-            length += 1
+        if self.rng.random() < 0.2:
+            length = max(0, length + self._one_of([-1, 1]))
         self.events += 1
         self.lines["uart"].write(encode_frame(bytes([message.id]) + self.rng.bytes(length)))
 
@@ -180,42 +169,44 @@ class Fuzzer:
 
     def _bench(self) -> None:
         """Any byte, now and then one that takes or sends a picture."""
-        if "bench" in self.lines:
+        if "bench_uart" in self.lines:
             self.events += 1
-            self.lines["bench"].write(self.rng.bytes(1))
+            self.lines["bench_uart"].write(self.rng.bytes(1))
 
     def _i2c(self) -> None:
+        head = self._one_of(self.interface.messages).id | TELEMETRY_BIT
+        self._transfer(bytes([head]) + self.rng.bytes(int(self.rng.integers(0, 3))))
+
+    def _i2c_noise(self) -> None:
+        self._transfer(self.rng.bytes(int(self.rng.integers(0, 12))))
+
+    def _transfer(self, data: bytes) -> None:
         self.events += 1
-        address = self.addresses[self.rng.integers(len(self.addresses))]
+        address = self._one_of(self.addresses)
         if self.rng.random() < 0.1:
             address = int(self.rng.integers(8, 0x78))
         messages = []
         if self.rng.random() < 0.8:
-            head = bytes([self._pick().id | TELEMETRY_BIT])
-            data = head + self.rng.bytes(int(self.rng.integers(0, 3)))
             messages.append(I2cMessage(address, bytearray(data)))
         if self.rng.random() < 0.6 or not messages:
             messages.append(I2cMessage(address, read=int(self.rng.integers(1, 30))))
         try:
             self.kernel.run(until=self.kernel.process(self.board.i2c_bus.transfer(messages)))
         except I2cError as error:
-            self.trace.update(b"%d" % (error.errno or 0))
-        for message in messages:
-            self.trace.update(bytes(message.data))
+            self._note(error.errno)
+        self._note([message.data for message in messages])
 
     def _disconnect(self) -> None:
         self.events += 1
         name = str(self.rng.choice(list(self.lines)))
         self.lines[name].close()
         self.kernel.advance_to(self.kernel.now + int(self.rng.integers(1, 10**9)))
-        self.lines[name] = self.plugs[name]()
+        self.lines[name] = self.board.serial(name)
 
     def _inject(self) -> None:
         self.events += 1
-        faults = self.board.faults
-        kind = self.kinds[self.rng.integers(len(self.kinds))]
-        targets = faults.targets(FAULTS[kind].site)
-        options: dict[str, Any] = {"target": targets[self.rng.integers(len(targets))]}
+        faults, kind = self.board.faults, self._one_of(self.kinds)
+        options: dict[str, Any] = {"target": self._one_of(faults.targets(FAULTS[kind].site))}
         if "rate" in FAULTS[kind].parameters():
             options["rate"] = UPSETS.get(kind, 0.2)
         if not FAULTS[kind].momentary:
@@ -242,8 +233,31 @@ def test_nothing_upsets_a_board_for_good(name: str) -> None:
     runs = []
     for _ in range(2):
         with open_device(name, SCENES[name], seed=4) as opened:
-            fuzzer = Fuzzer(opened, seed=11)
-            runs.append(fuzzer.run(EVENTS))
-            fuzzer.check()
+            runs.append(Fuzzer(opened, seed=11).run(EVENTS))
     assert runs[0][0] > EVENTS // 100
     assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize(
+    ("turns", "events"),
+    [
+        ({"noise": 1.0}, 100_000),
+        ({"telemetry": 0.5, "command": 0.5}, 300),
+        ({"i2c_noise": 1.0}, 10_000),
+    ],
+    ids=["bytes", "frames", "i2c"],
+)
+def test_after_any_noise_a_reset_leads_to_a_right_attitude(
+    turns: dict[str, float], events: int
+) -> None:
+    with open_device("cubestar", SCENES["cubestar"], seed=4) as opened:
+        Fuzzer(opened, 11, turns).run(events)
+        client, cubestar = opened.client.client, opened.client
+        client.wait_processed(60)
+        for name in ("StopLoop", "ClearConfig", "Reset"):
+            client.command(name)
+            client.wait_processed(10)  # a reset forgets what waits behind it
+        assert cubestar.capture_and_process().name == "CALCULATED"
+        cross, roll = errors(cubestar.attitude().quaternion, opened.board.truth())
+    assert cross < 0.01
+    assert abs(roll) < 0.05
