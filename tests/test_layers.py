@@ -1,6 +1,7 @@
 """Imports run downward only, between the packages and inside of each; every package is declared."""
 
 import ast
+import sys
 import tomllib
 from collections.abc import Iterator
 from functools import cache
@@ -46,7 +47,6 @@ THIRD_PARTY = {
     "firmware_model/interface": set(),
     "firmware_model/formats": set(),
 }
-STDLIB = __import__("sys").stdlib_module_names
 
 
 @cache
@@ -60,14 +60,6 @@ def name_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def is_type_checking(node: ast.AST) -> bool:
-    return (
-        isinstance(node, ast.If)
-        and isinstance(node.test, ast.Name)
-        and node.test.id == "TYPE_CHECKING"
-    )
-
-
 @cache
 def imported(path: Path) -> tuple[tuple[str, bool], ...]:
     """Names that a module imports, and whether it does so when it is loaded itself."""
@@ -75,7 +67,8 @@ def imported(path: Path) -> tuple[tuple[str, bool], ...]:
     lazy = {
         id(node)
         for block in ast.walk(tree)
-        if isinstance(block, ast.FunctionDef | ast.AsyncFunctionDef) or is_type_checking(block)
+        if isinstance(block, ast.FunctionDef | ast.AsyncFunctionDef)
+        or (isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING")
         for node in ast.walk(block)
     }
     names = []
@@ -86,9 +79,8 @@ def imported(path: Path) -> tuple[tuple[str, bool], ...]:
             assert node.level == 0, f"{path}: imports are absolute here"
             for alias in node.names:
                 deeper = f"{node.module}.{alias.name}"
-                names.append(
-                    (deeper if deeper in modules() else str(node.module), id(node) not in lazy)
-                )
+                name = deeper if deeper in modules() else str(node.module)
+                names.append((name, id(node) not in lazy))
     return tuple(names)
 
 
@@ -151,7 +143,7 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
 def test_only_declared_distributions_are_imported(path: Path) -> None:
     for parent in path.relative_to(ROOT).parents:
         if str(parent) in THIRD_PARTY:
-            allowed = THIRD_PARTY[str(parent)] | STDLIB | {"cubestack"}
+            allowed = THIRD_PARTY[str(parent)] | sys.stdlib_module_names | {"cubestack"}
             tops = {name.split(".")[0] for name, _ in imported(path)}
             assert tops <= allowed, f"{name_of(path)} imports {tops - allowed}"
             return

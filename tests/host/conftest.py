@@ -247,6 +247,36 @@ class I2cLink:
                 message.buf[index] = bytes([byte])
 
 
+class Slave:
+    """Registers behind a pointer, as the protocol is described, with smbus2's ``i2c_rdwr``."""
+
+    def __init__(self) -> None:
+        self.content: dict[int, bytes] = {}
+        self.written: list[bytes] = []
+        self.failures: list[int] = []  # numbers of the transfers that are not acknowledged
+        self.transfers = 0
+        self.longest = 0
+        self._rest = b""
+
+    def i2c_rdwr(self, *messages: Any) -> None:
+        number, self.transfers = self.transfers, self.transfers + 1
+        if number in self.failures or any(message.addr != 0x1C for message in messages):
+            raise OSError(121, "Remote I/O error")
+        for message in messages:
+            if message.flags & 1:
+                self.longest = max(self.longest, message.len)
+                data = self._rest[: message.len].ljust(message.len, b"\xff")
+                self._rest = self._rest[message.len :]
+                for index, byte in enumerate(data):
+                    message.buf[index] = bytes([byte])
+            else:
+                pointer, *values = bytes(message)
+                self._rest = self.content.get(pointer, b"")
+                if values:
+                    self.content[pointer] = bytes(values)
+                    self.written.append(bytes(message))
+
+
 def over_i2c(node: FakeNode) -> I2cClient:
     """A client of ``node`` on its bus, which does not wait."""
     return I2cClient(

@@ -13,19 +13,19 @@ from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs.cubestar import PROOFS
 from cubestack.hdl.proofs.prover import Fault
-from cubestack.host.cli.main import main
+
+from ...conftest import Run
 
 
-def test_area_as_text(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["hdl", "area", "cubestar", "Sun search"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_area_as_text(run: Run) -> None:
+    lines = run("hdl", "area", "cubestar", "Sun search").out.splitlines()
     assert "of 768" in lines[0]
     assert [line[:10] for line in lines[1:]] == ["cubestar  ", "Sun search"]
 
 
-def test_area_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["hdl", "area", "--json", "frame gap of 858 clocks", "cubestar"]) == 0
-    counted = json.loads(capsys.readouterr().out)["designs"]
+def test_area_as_json(run: Run) -> None:
+    outcome = run("hdl", "area", "--json", "frame gap of 858 clocks", "cubestar")
+    counted = json.loads(outcome.out)["designs"]
     recorded = recorded_areas(cubestar.AREA_FILE) | recorded_areas(cubesense.AREA_FILE)
     assert list(counted) == ["frame gap of 858 clocks", "cubestar"]
     for name, entry in counted.items():
@@ -35,23 +35,19 @@ def test_area_as_json(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("arguments", [["area", "cubestar", "--ice40"], ["prove", "cubestar-read"]])
 def test_a_missing_yosys_is_one_line(
-    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.setattr(tools, "find_spec", lambda _: None)
     monkeypatch.setenv("PATH", "")
-    assert main(["hdl", *arguments]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "cubestack[hdl]" in line
+    outcome = run("hdl", *arguments)
+    assert outcome.code == 1
+    assert "cubestack[hdl]" in outcome.line
 
 
-def test_verilog_to_a_file_and_to_standard_output(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["hdl", "verilog", "cubestar"]) == 0
-    text = capsys.readouterr().out
+def test_verilog_to_a_file_and_to_standard_output(tmp_path: Path, run: Run) -> None:
+    text = run("hdl", "verilog", "cubestar").out
     assert text.startswith("// CubeStar frame buffer")
-    assert main(["hdl", "verilog", "cubestar", "--out", str(tmp_path / "cubestar.v")]) == 0
-    assert capsys.readouterr().out == ""
+    assert run("hdl", "verilog", "cubestar", "--out", tmp_path / "cubestar.v").out == ""
     assert (tmp_path / "cubestar.v").read_text(encoding="utf-8") == text
 
 
@@ -72,48 +68,37 @@ def test_wrong_calls_are_one_line(
     words: tuple[str, ...],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run: Run,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    try:
-        result = main(["hdl", *arguments])
-    except SystemExit as end:
-        result = int(end.code or 0)
-    assert result == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    (line,) = captured.err.splitlines()
-    assert all(word in line for word in words)
+    outcome = run("hdl", *arguments)
+    assert outcome.code == code
+    assert all(word in outcome.line for word in words)
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
-def test_proofs_as_text_and_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_proofs_as_text_and_as_json(run: Run) -> None:
     names = ["cubestar-drivers", "cubestar-read"]
-    assert main(["hdl", "prove", *names]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(":")[0] for line in lines[::2]] == names
+    outcome = run("hdl", "prove", *names)
+    lines = outcome.out.splitlines()
+    assert (outcome.code, [line.partition(":")[0] for line in lines[::2]]) == (0, names)
     assert all("proved" in line and "found" in line for line in lines[1::2])
-    assert main(["hdl", "prove", "--json", names[0]]) == 0
-    (verdict,) = json.loads(capsys.readouterr().out).values()
+    (verdict,) = json.loads(run("hdl", "prove", "--json", names[0]).out).values()
     assert verdict["good"]
     assert verdict["fault"] == {"wire": "writer.store", "level": 1}
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
-def test_what_is_not_proved_is_exit_code_1(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_not_proved_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     proof = PROOFS["cubestar-drivers"]
     monkeypatch.setitem(PROOFS, "cubestar-drivers", replace(proof, fault=Fault("bank", 1)))
-    assert main(["hdl", "prove", "cubestar-drivers"]) == 1
-    assert "NOT FOUND" in capsys.readouterr().out
+    outcome = run("hdl", "prove", "cubestar-drivers")
+    assert (outcome.code, "NOT FOUND" in outcome.out) == (1, True)
 
 
 @pytest.mark.parametrize("action", ["area", "verilog", "prove"])
-def test_help_teaches(action: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["hdl", action, "--help"])
-    text = capsys.readouterr().out
+def test_help_teaches(action: str, run: Run) -> None:
+    text = run("hdl", action, "--help").out
     assert f"cubestack hdl {action}" in text
     assert "examples:" in text
     assert max(map(len, text.splitlines())) <= 80

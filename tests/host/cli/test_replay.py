@@ -10,7 +10,6 @@ from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.host.cli import replay
 from cubestack.host.cli.device_options import inject_plan, record
-from cubestack.host.cli.main import main
 from cubestack.host.devices.emulated import open_device, power_up
 from cubestack.host.recording.setups import emulated_setup
 
@@ -36,16 +35,19 @@ def recording(tmp_path):
     return path
 
 
-def test_no_difference(recording, capsys, tmp_path):
+def check_same(outcome):
+    """The replay found no difference, and had nothing to tell."""
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "no difference" in outcome.out
+
+
+def test_no_difference(recording, run, tmp_path):
     again = tmp_path / "b.rec"
-    assert main(["replay", str(recording), "--record", str(again)]) == 0
-    output = capsys.readouterr()
-    assert "no difference" in output.out
-    assert output.err == ""
+    check_same(run("replay", recording, "--record", again))
     assert again.read_text() == recording.read_text()
 
 
-def test_changed_default_is_named(recording, capsys, monkeypatch):
+def test_changed_default_is_named(recording, run, monkeypatch):
     reset = CameraSettings.at_reset
 
     def changed(camera):
@@ -54,8 +56,9 @@ def test_changed_default_is_named(recording, capsys, monkeypatch):
         return settings
 
     monkeypatch.setattr(CameraSettings, "at_reset", changed)
-    assert main(["replay", str(recording), "--json"]) == 1
-    (difference,) = json.loads(capsys.readouterr().out)["differences"]
+    outcome = run("replay", recording, "--json")
+    (difference,) = json.loads(outcome.out)["differences"]
+    assert outcome.code == 1
     assert "telemetry Configuration, field Threshold1: 0xe2, recorded 0xe1" in difference
 
 
@@ -69,31 +72,30 @@ SESSION = (
 
 
 @pytest.fixture
-def session(tmp_path, capsys):
+def session(tmp_path, run):
     """A CubeSense that is mistreated by the shell, its scene files, and what it said."""
     scenes = [tmp_path / "first.toml", tmp_path / "second.toml"]
     for number, path in enumerate(scenes):
         path.write_text(SUN.format(10 * number))
     made = tmp_path / "session.rec"
-    options = ["--scene", str(scenes[0]), "--seed", "5", "--record", str(made)]
-    assert main(["shell", "emulated:cubesense", *options, "-c", SESSION.format(scenes[1])]) == 0
-    return made, scenes, capsys.readouterr().out
+    options = ["--scene", scenes[0], "--seed", "5", "--record", made]
+    outcome = run("shell", "emulated:cubesense", *options, "-c", SESSION.format(scenes[1]))
+    assert outcome.code == 0
+    return made, scenes, outcome.out
 
 
-def test_a_session_says_how_it_was_made(session, capsys, tmp_path):
+def test_a_session_says_how_it_was_made(session, run, tmp_path):
     """Seed, scene, faults and switches come from the recording, its scene files gone or not."""
     made, scenes, said = session
     results = [line.split()[1:] for line in said.splitlines() if line.startswith("Alpha")]
-    assert len(results) == 2
-    assert results[0] != results[1]
+    first, second = results
+    assert first != second
     again = tmp_path / "again.rec"
-    assert main(["replay", str(made), "--record", str(again)]) == 0
-    assert capsys.readouterr().err == ""
+    check_same(run("replay", made, "--record", again))
     assert again.read_text() == made.read_text()
     for scene in scenes:
         scene.unlink()
-    assert main(["replay", str(made)]) == 0
-    assert "no difference" in capsys.readouterr().out
+    check_same(run("replay", made))
 
 
 @pytest.mark.parametrize(
@@ -103,34 +105,27 @@ def test_a_session_says_how_it_was_made(session, capsys, tmp_path):
         ("aramis", "write Activate; write GetAttitude; time 2; dump; fault memory-flip; dump"),
     ],
 )
-def test_a_session_of_each_device_replays(tmp_path, capsys, device, commands):
-    made = str(tmp_path / "session.rec")
-    assert main(["shell", f"emulated:{device}", "--record", made, "-c", commands]) == 0
-    assert main(["replay", made]) == 0
-    output = capsys.readouterr()
-    assert "no difference" in output.out
-    assert output.err == ""
+def test_a_session_of_each_device_replays(tmp_path, run, device, commands):
+    made = tmp_path / "session.rec"
+    assert run("shell", f"emulated:{device}", "--record", made, "-c", commands).code == 0
+    check_same(run("replay", made))
 
 
-def test_what_is_not_as_it_was_is_told(session, capsys, tmp_path):
+def test_what_is_not_as_it_was_is_told(session, run, tmp_path):
     made, scenes, _ = session
-    (tmp_path / "plan.toml").write_text("seed = 1\n")
-    other = ["--seed", "6", "--scene", str(scenes[1]), "--faults", str(tmp_path / "plan.toml")]
-    assert main(["replay", str(made), *other]) == 1
-    output = capsys.readouterr()
-    assert "field" in output.out
-    assert "".join(output.err.split()) == "".join(
-        [
-            "seed6insteadof5,withwhichitwasrecorded",
-            f"scene{scenes[1]}isnotwhatitwasrecordedwith,{scenes[0]}",
-            f"planoffaults{tmp_path}/plan.toml:itwasrecordedwithoutone",
-        ]
+    plan = tmp_path / "plan.toml"
+    plan.write_text("seed = 1\n")
+    outcome = run("replay", made, "--seed", "6", "--scene", scenes[1], "--faults", plan)
+    assert (outcome.code, "field" in outcome.out) == (1, True)
+    assert "".join(outcome.err.split()) == (
+        "seed6insteadof5,withwhichitwasrecorded"
+        f"scene{scenes[1]}isnotwhatitwasrecordedwith,{scenes[0]}"
+        f"planoffaults{plan}:itwasrecordedwithoutone"
     )
-    assert main(["replay", str(made), "--seed", "5", "--scene", str(scenes[0])]) == 0
-    assert capsys.readouterr().err == ""
+    check_same(run("replay", made, "--seed", "5", "--scene", scenes[0]))
 
 
-def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys, monkeypatch):
+def test_plan_of_faults_and_options_are_in_the_header(tmp_path, run, monkeypatch):
     plan = tmp_path / "plan.toml"
     plan.write_text('seed = 9\n[[fault]]\nkind = "uart-drop"\nrate = 0.2\n')
     made = tmp_path / "a.rec"
@@ -153,42 +148,35 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, capsys, monkeypa
         return power_up(*arguments, **others)
 
     monkeypatch.setattr(replay, "power_up", with_usual_fpgas)
-    assert main(["replay", str(made)]) == 0
+    check_same(run("replay", made))
     assert options == [True]
-    assert "no difference" in capsys.readouterr().out
     changed = made.read_text().replace("seed = 9", "seed = 8")
     made.write_text(changed)
-    assert main(["replay", str(made)]) == 1
+    assert run("replay", made).code == 1
     made.write_text(changed.replace("mcu_addressing", "x"))
-    capsys.readouterr()
-    assert main(["replay", str(made)]) == 2
-    assert "its setup has an unknown option 'x'" in capsys.readouterr().err
+    outcome = run("replay", made)
+    assert (outcome.code, "its setup has an unknown option 'x'" in outcome.line) == (2, True)
 
 
 @pytest.mark.parametrize(
-    ("content", "code", "error"),
+    ("content", "error"),
     [
-        (HEADER + ',"setup":{"seed":-1}}', 2, '"seed" must be a whole number from 0, not -1'),
-        (HEADER + '}\n{"ps":1,"control":["fly"]}', 2, "nothing does 'fly'"),
-        ("nonsense", 2, "is no recording of version 1: line 1"),
-        ('{"recording":1,"device":"mars","lines":{}}', 2, "no device 'mars'"),
-        ('{"recording":1,"device":"cubestar","lines":{"bench_uart":1}}', 2, "has port bench_uart"),
+        (HEADER + ',"setup":{"seed":-1}}', '"seed" must be a whole number from 0, not -1'),
+        (HEADER + '}\n{"ps":1,"control":["fly"]}', "nothing does 'fly'"),
+        ("nonsense", "is no recording of version 1: line 1"),
+        ('{"recording":1,"device":"mars","lines":{}}', "no device 'mars'"),
+        ('{"recording":1,"device":"cubestar","lines":{"bench_uart":1}}', "has port bench_uart"),
     ],
 )
-def test_file_that_can_not_be_replayed(tmp_path, capsys, content, code, error):
+def test_file_that_can_not_be_replayed(tmp_path, run, content, error):
     path = tmp_path / "x.rec"
     path.write_text(content)
-    assert main(["replay", str(path)]) == code
-    output = capsys.readouterr().err
-    assert error in output
-    assert output.count("\n") == 1
+    outcome = run("replay", path)
+    assert (outcome.code, error in outcome.line) == (2, True)
 
 
-def test_file_that_is_not_there(capsys):
-    assert main(["replay", "no.rec"]) == 1
-    assert "no.rec" in capsys.readouterr().err
-
-
-def test_trace_that_can_not_be_written(recording, capsys):
-    assert main(["replay", str(recording), "--trace", "no/folder/x.vcd"]) == 2
-    assert "can not write no/folder/x.vcd" in capsys.readouterr().err
+def test_files_that_can_not_be_opened(recording, run):
+    outcome = run("replay", "no.rec")
+    assert (outcome.code, "no.rec" in outcome.line) == (1, True)
+    outcome = run("replay", recording, "--trace", "no/folder/x.vcd")
+    assert (outcome.code, "can not write no/folder/x.vcd" in outcome.line) == (2, True)

@@ -12,7 +12,6 @@ import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.interface.cubesense.codes import ImageSize
-from cubestack.host.cli.main import main
 from cubestack.host.cli.shell import split_commands
 from cubestack.host.clients.cubesense import client
 from cubestack.host.clients.cubesense.download import download_image
@@ -23,13 +22,8 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 
 @pytest.fixture
-def shell(capsys):
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = main(["shell", *arguments])
-        output = capsys.readouterr()
-        return code, output.out, output.err
-
-    return run
+def shell(run):
+    return partial(run, "shell")
 
 
 def test_emulated_cubesense(shell):
@@ -73,10 +67,9 @@ def test_emulated_cubestar_with_a_script(shell, tmp_path):
     ],
 )
 def test_failures_are_one_line(shell, arguments, code, error):
-    found, out, err = shell(*arguments)
-    assert found == code
-    assert error in err
-    assert (out, err.count("\n")) == ("", 1)
+    outcome = shell(*arguments)
+    assert outcome.code == code
+    assert error in outcome.line
 
 
 @pytest.mark.parametrize(

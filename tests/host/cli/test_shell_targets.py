@@ -63,23 +63,20 @@ def serving(kind, folder):
 
 
 @pytest.fixture
-def shell_on(tmp_path, monkeypatch, capsys):
+def shell_on(tmp_path, monkeypatch, run):
     """Runs commands on a kind of target; exit code, output, errors."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
 
-    def run(kind, commands, *options):
+    def call(kind, commands, *options):
         if kind.startswith("recorded"):
             made = tmp_path / "session.rec"
-            run("i2c" if "i2c" in kind else "tcp", commands, "--record", str(made))
+            call("i2c" if "i2c" in kind else "tcp", commands, "--record", made)
             assert load_recording(made).setup.target.startswith(("i2c:", "tcp://"))
-            code = main(["shell", f"recorded:{made}", "-c", commands])
-        else:
-            with serving(kind, tmp_path) as target:
-                words = [target, "--device", "cubesense", "-c", commands, *options]
-                code = main(["shell", *words])
-        return code, *capsys.readouterr()
+            return run("shell", f"recorded:{made}", "-c", commands)
+        with serving(kind, tmp_path) as target:
+            return run("shell", target, "--device", "cubesense", "-c", commands, *options)
 
-    return run
+    return call
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 from vcd import VCDWriter
 
-from cubestack.host.cli.main import main
 from cubestack.host.cli.waveform import read
+
+from ...conftest import Run
 
 ABOUT = {
     "test": "tests/hdl/test_cubestar_top.py::test_stores[8-4-1]",
@@ -40,20 +41,15 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def wave(*arguments: object) -> int:
-    return main(["hdl", "wave", *map(str, arguments)])
-
-
 @pytest.mark.parametrize("name", ["whole_frame", "test_stores[8-4-1]", "cubestar_top.stores"])
-def test_text_ends_where_the_test_failed(
-    name: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert wave(name, "--folder", folder, "--last", 3, "--text") == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "whole_frame of tests/hdl/test_cubestar_top.py::test_stores[8-4-1], " + (
-        "seed 1, on icarus"
+def test_text_ends_where_the_test_failed(name: str, folder: Path, run: Run) -> None:
+    outcome = run("hdl", "wave", name, "--folder", folder, "--last", 3, "--text")
+    lines = outcome.out.splitlines()
+    assert (outcome.code, *lines[:2]) == (
+        0,
+        "whole_frame of tests/hdl/test_cubestar_top.py::test_stores[8-4-1], seed 1, on icarus",
+        "failed: ACK is late",
     )
-    assert lines[1] == "failed: ACK is late"
     times = [line.split() for line in lines[4:7]]
     assert times == [["39.000", "DATA=27"], ["40.000", "DATA=28"], ["41.000", "ACK=1"]]
     assert [line.split() for line in lines[8:]] == [["ACK", "1"], ["DATA", "28"]]
@@ -73,7 +69,7 @@ def test_internal_signals_on_demand(folder: Path) -> None:
 
 
 def test_viewer_is_opened_where_there_is_a_screen(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, run: Run
 ) -> None:
     seen = tmp_path / "seen"
     viewer = tmp_path / "bin" / "surfer"
@@ -83,39 +79,28 @@ def test_viewer_is_opened_where_there_is_a_screen(
     monkeypatch.setenv("PATH", f"{viewer.parent}:/bin:/usr/bin")
     monkeypatch.setattr("cubestack.host.cli.waveform.VIEWERS", ("surfer",))
     monkeypatch.setenv("DISPLAY", ":0")
-    assert wave("whole_frame", "--folder", folder) == 0
+    assert run("hdl", "wave", "whole_frame", "--folder", folder).code == 0
     assert Path(seen.read_text().strip()).name == "cubestar_top.stores-8-4-1.whole_frame.vcd"
 
 
 @pytest.mark.parametrize(
-    ("name", "code", "error"),
+    ("arguments", "code", "error"),
     [
-        (
-            "none",
-            1,
-            "no waveform of 'none'; there are cubestar_top.stores-8-4-1.whole_frame, other",
-        ),
-        ("r", 2, "'r' fits cubestar_top.stores-8-4-1.whole_frame, other; say which"),
-        ("missing.vcd", 1, "there is no waveform missing.vcd"),
+        (["none"], 1, "no waveform of 'none'; there are cubestar_top.stores-8-4-1.whole_frame, o"),
+        (["r"], 2, "'r' fits cubestar_top.stores-8-4-1.whole_frame, other; say which"),
+        (["missing.vcd"], 1, "there is no waveform missing.vcd"),
+        (["whole_frame", "--last", "0"], 2, "must be a whole number from 1 on, not '0'"),
     ],
 )
-def test_wrong_name_lists_all(
-    name: str, code: int, error: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert wave(name, "--folder", folder) == code
-    assert error in capsys.readouterr().err
+def test_wrong_calls(arguments: list[str], code: int, error: str, folder: Path, run: Run) -> None:
+    outcome = run("hdl", "wave", *arguments, "--folder", folder)
+    assert outcome.code == code
+    assert error in outcome.err
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x00\xff", b"$scope module"])
-def test_what_is_no_waveform_is_one_line(
-    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_waveform_is_one_line(content: bytes, tmp_path: Path, run: Run) -> None:
     (tmp_path / "x.vcd").write_bytes(content)
-    assert wave(tmp_path / "x.vcd", "--text") == (0 if not content else 2)
-    assert content == b"" or "is no VCD file" in capsys.readouterr().err
-
-
-def test_count_is_checked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        wave("whole_frame", "--folder", folder, "--last", "0")
-    assert "must be a whole number from 1 on, not '0'" in capsys.readouterr().err
+    outcome = run("hdl", "wave", tmp_path / "x.vcd", "--text")
+    assert outcome.code == (0 if not content else 2)
+    assert content == b"" or "is no VCD file" in outcome.err

@@ -1,5 +1,3 @@
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -8,34 +6,7 @@ from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.errors import NoAnswerError
 
-
-class Slave:
-    """A slave that keeps to the protocol's description, behind smbus2's ``i2c_rdwr``."""
-
-    def __init__(self) -> None:
-        self.content: dict[int, bytes] = {}
-        self.written: list[bytes] = []
-        self.failures: list[int] = []  # numbers of the transfers that are not acknowledged
-        self.transfers = 0
-        self.longest = 0
-        self._rest = b""
-
-    def i2c_rdwr(self, *messages: Any) -> None:
-        number, self.transfers = self.transfers, self.transfers + 1
-        if number in self.failures or any(message.addr != 0x1C for message in messages):
-            raise OSError(121, "Remote I/O error")
-        for message in messages:
-            if message.flags & 1:
-                self.longest = max(self.longest, message.len)
-                data = self._rest[: message.len].ljust(message.len, b"\xff")
-                self._rest = self._rest[message.len :]
-                for index, byte in enumerate(data):
-                    message.buf[index] = bytes([byte])
-            else:
-                pointer, *values = bytes(message)
-                self._rest = self.content.get(pointer, b"")
-                if values:
-                    self.written.append(bytes(message))
+from ..conftest import Slave
 
 
 @pytest.fixture
@@ -67,7 +38,6 @@ def test_configuration_is_one_byte(client: RegisterClient, slave: Slave) -> None
     client.write("NADIR_THRESHOLD", 85)
     client.write("measure", "NADIR_SRAM1")
     assert slave.written == [bytes([address, 85]), bytes([REGISTERS["MEASURE"].address, 2])]
-    slave.content[address] = b"\x55"
     assert client.read("NADIR_THRESHOLD") == 85
 
 

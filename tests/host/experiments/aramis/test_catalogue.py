@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.host.cli.main import main
+
+from ....conftest import Run
 
 SMALL = ("--fov", "20", "--stars-per-field", "3", "--mag-limit", "3", "--step", "5")
 
@@ -16,10 +17,10 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
-def test_facts_and_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_facts_and_image(tmp_path: Path, run: Run) -> None:
     output = tmp_path / "image.bin"
-    assert main(["catalogue", "aramis", *SMALL, "--json", "--output", str(output)]) == 0
-    out, err = capsys.readouterr()
+    code, out, err = run("catalogue", "aramis", *SMALL, "--json", "--output", output)
+    assert (code, err) == (0, "")
     facts = json.loads(out)
     database = Database.unpack(output.read_bytes())
     assert facts["stars"] == len(database.numbers)
@@ -27,15 +28,13 @@ def test_facts_and_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert facts["bytes"] == output.stat().st_size == sum(facts["bytes_of_parts"].values())
     assert (facts["published_stars"], facts["published_triangles"]) == (1312, 265_292)
     assert facts["star_numbers"] == "Hipparcos"
-    assert err == ""
     assert len(list((tmp_path / "cache" / "cubestack").iterdir())) == 1
 
 
-def test_for_people(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["catalogue", "aramis", *SMALL]) == 0
-    out, err = capsys.readouterr()
+def test_for_people(run: Run) -> None:
+    code, out, err = run("catalogue", "aramis", *SMALL)
+    assert (code, err) == (0, "")
     assert "published triangles  265292" in out
-    assert err == ""
 
 
 @pytest.mark.parametrize(
@@ -49,19 +48,13 @@ def test_for_people(capsys: pytest.CaptureFixture[str]) -> None:
         (("aramis", "--fov", "1", "--mag-limit", "1"), "stars give no triangle"),
     ],
 )
-def test_wrong_calls(
-    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: str
-) -> None:
-    assert main(["catalogue", *arguments]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    (line,) = err.splitlines()
-    assert line.startswith("cubestack catalogue: ")
-    assert words in line
+def test_wrong_calls(run: Run, arguments: tuple[str, ...], words: str) -> None:
+    outcome = run("catalogue", *arguments)
+    assert outcome.code == 2
+    assert outcome.line.startswith("cubestack catalogue: ")
+    assert words in outcome.line
 
 
-def test_an_image_that_can_not_be_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["catalogue", "aramis", *SMALL, "--output", str(tmp_path / "no" / "x")]) == 1
-    assert str(tmp_path / "no" / "x") in capsys.readouterr().err
+def test_an_image_that_can_not_be_written(tmp_path: Path, run: Run) -> None:
+    outcome = run("catalogue", "aramis", *SMALL, "--output", tmp_path / "no" / "x")
+    assert (outcome.code, str(tmp_path / "no" / "x") in outcome.line) == (1, True)
