@@ -4,6 +4,8 @@ AraMiS thesis, sections 2.4 and 2.5.2; registers are those of the sensor's own t
 sends frames without a break while the star tracker is active; a picture is the next whole frame.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,23 +13,15 @@ from cubestack.firmware_model.aramis.hardware import AramisHardware, FrameEnd
 from cubestack.firmware_model.aramis.memory import PICTURES_AT
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, Reason
-from cubestack.firmware_model.interface.cameras.mt9m001 import (
-    CHIP_VERSION,
-    COLUMNS,
-    FRAME_END_CLOCKS,
-    FRAME_START_CLOCKS,
-    PIXEL_CLOCK_HZ,
-    REGISTERS,
-    ROWS,
-    gain_register,
-)
+from cubestack.firmware_model.interface.cameras import mt9m001
+from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, REGISTERS, ROWS
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep, pause
 
 SETTLE_US = 2_000
 """From power-up to the first register access; assumed."""
 
-ROW_CLOCKS = COLUMNS + FRAME_START_CLOCKS + FRAME_END_CLOCKS
+ROW_CLOCKS = COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
 BLANK_ROWS = REGISTERS["VERTICAL_BLANKING"].reset + 1
 MARGIN_US = 20_000
 """Added to three frames before a picture is given up; assumed."""
@@ -35,8 +29,9 @@ MARGIN_US = 20_000
 _ENABLE = REGISTERS["OUTPUT_CONTROL"].field("CHIP_ENABLE").mask
 
 
+@dataclass
 class Camera:
-    """Registers over the control bus, and pictures.
+    """Registers over the control bus, and pictures; set up as the settings in the state say.
 
     Attributes:
         selected_register: address and value of the register read last; None: no answer.
@@ -44,20 +39,16 @@ class Camera:
         latest: which of the two places holds the latest picture; None before the first.
     """
 
-    def __init__(self, hardware: AramisHardware, state: State, meter: Meter) -> None:
-        """Set up as the settings in ``state`` say."""
-        self._hardware = hardware
-        self._state = state
-        self._meter = meter
-        self.selected_register: tuple[int, int | None] = (0, None)
-        self.off = False
-        self.latest: int | None = None
-        self._set_up: tuple[int, int] | None = None
-        self._pending: int | None = None
-        self._ended: tuple[FrameEnd, int] | None = None
-        self._exposure_rows = 0  # of the frame that is waited for
-
-    # --- interrupts -------------------------------------------------------------------------------
+    _hardware: AramisHardware
+    _state: State
+    _meter: Meter
+    selected_register: tuple[int, int | None] = (0, None)
+    off: bool = False
+    latest: int | None = None
+    _set_up: tuple[int, int] | None = None
+    _pending: int | None = None
+    _ended: tuple[FrameEnd, int] | None = None
+    _exposure_rows: int = 0  # of the frame that is waited for
 
     def frame_ended(self, end: FrameEnd) -> None:
         """Interrupt: the transfer of a frame ended."""
@@ -73,8 +64,6 @@ class Camera:
         self._set_up = None
         self._hardware.wake()
 
-    # --- supply and set-up ------------------------------------------------------------------------
-
     def restore(self) -> Routine[None]:
         """Turn the supply on and wait until the sensor is ready, at its reset values."""
         self._hardware.switch_camera(True)
@@ -85,19 +74,16 @@ class Camera:
         """Let the sensor send frames as the settings say; why it does not."""
         if self.off:
             return self._fail(Reason.CAMERA_OFF, "CameraOff")
-        gain = gain_register(float(self._state.settings.get("SetGain", "Gain")))
+        gain = mt9m001.gain_register(float(self._state.settings.get("SetGain", "Gain")))
         rows = int(self._state.settings.get("SetExposure", "Rows"))
         if self._set_up == (gain, rows):
             return None
         self._set_up = None
         self._give_up()
-        if (yield from self._read(REGISTERS["CHIP_VERSION"].address)) != CHIP_VERSION:
+        if (yield from self._read(REGISTERS["CHIP_VERSION"].address)) != mt9m001.CHIP_VERSION:
             return self._fail(Reason.CAMERA_SILENT, "CameraSilent")
-        for name, value in (
-            ("SHUTTER_WIDTH", rows),
-            ("GLOBAL_GAIN", gain),
-            ("OUTPUT_CONTROL", _ENABLE),
-        ):
+        written = {"SHUTTER_WIDTH": rows, "GLOBAL_GAIN": gain, "OUTPUT_CONTROL": _ENABLE}
+        for name, value in written.items():
             if not (yield from self.write(REGISTERS[name].address, value)):
                 return self._fail(Reason.CAMERA_SILENT, "CameraSilent")
         self._set_up = gain, rows
@@ -114,8 +100,6 @@ class Camera:
         self._state.raise_flag(flag)
         return reason
 
-    # --- pictures ---------------------------------------------------------------------------------
-
     def picture(self, place: int) -> NDArray[np.uint8]:
         """One of the two pictures in SDRAM, shape (1024, 1280), a live view."""
         start = PICTURES_AT[place]
@@ -123,9 +107,8 @@ class Camera:
 
     def expose(self) -> None:
         """Let the next whole frame come while the program goes on."""
-        place = 0 if self.latest is None else 1 - self.latest
         self._ended = None
-        self._pending = place
+        self._pending = place = 0 if self.latest is None else 1 - self.latest
         self._exposure_rows = int(self._state.settings.get("SetExposure", "Rows"))
         self._hardware.start_capture(self.picture(place))
 
@@ -138,8 +121,10 @@ class Camera:
         """Wait for the frame, asking for it if ``expose`` did not; why there is none."""
         if self._pending is None:
             self.expose()
+        rows = max(ROWS + BLANK_ROWS, self._exposure_rows + 1)
+        frame_us = -(-rows * ROW_CLOCKS * 1_000_000 // mt9m001.PIXEL_CLOCK_HZ)
         started_us: int = yield ReadTimer()
-        deadline_us = started_us + 3 * self._frame_us() + MARGIN_US
+        deadline_us = started_us + 3 * frame_us + MARGIN_US
         while self._ended is None:
             if self.off:
                 return self._fail(Reason.CAMERA_OFF, "CameraOff")
@@ -161,18 +146,11 @@ class Camera:
         """Uptime at mid-exposure of the middle row of the picture that was taken last."""
         assert self._ended is not None
         clocks = ((ROWS - 1) / 2 + self._exposure_rows / 2) * ROW_CLOCKS + COLUMNS
-        return self._ended[1] - round(clocks * 1_000_000 / PIXEL_CLOCK_HZ)
-
-    def _frame_us(self) -> int:
-        rows = max(ROWS + BLANK_ROWS, self._exposure_rows + 1)
-        return -(-rows * ROW_CLOCKS * 1_000_000 // PIXEL_CLOCK_HZ)
-
-    # --- registers --------------------------------------------------------------------------------
+        return self._ended[1] - round(clocks * 1_000_000 / mt9m001.PIXEL_CLOCK_HZ)
 
     def write(self, address: int, value: int) -> Routine[bool]:
         """Write a register; False when the sensor does not acknowledge."""
-        data = bytes([address]) + value.to_bytes(2, "big")
-        return (yield CameraTransfer(data)) is not None
+        return (yield CameraTransfer(bytes([address, *value.to_bytes(2, "big")]))) is not None
 
     def forget_set_up(self) -> None:
         """Registers were written by other means: set the sensor up again before a picture."""

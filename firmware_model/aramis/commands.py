@@ -13,14 +13,8 @@ from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.attitude.geometry import direction_of
-from cubestack.firmware_model.interface.aramis import (
-    BLOCK_BYTES,
-    IMAGE_BYTES,
-    CatalogueState,
-    LatchUpStep,
-    ResetCause,
-    SensorState,
-)
+from cubestack.firmware_model.interface import aramis
+from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, CatalogueState, SensorState
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
@@ -48,7 +42,6 @@ class Commands(CommandExecutor):
     ) -> None:
         """Act on the given parts of the program."""
         super().__init__(hardware, state.settings)
-        self._hardware = hardware
         self._meter = meter
         self._state = state
         self._camera = camera
@@ -86,10 +79,9 @@ class Commands(CommandExecutor):
 
     def urgent(self, command: QueuedCommand) -> None:
         """Interrupt: what of an accepted telecommand can not wait for the main loop."""
-        if command.message.name == "LatchUpAction" and command.values["Step"] == LatchUpStep.OFF:
+        latch_up = command.message.name == "LatchUpAction"
+        if latch_up and command.values["Step"] == aramis.LatchUpStep.OFF:
             self._camera.cut()
-
-    # --- node -------------------------------------------------------------------------------------
 
     def _activate(self, _command: QueuedCommand) -> Routine[None]:
         if self._state.active:
@@ -112,20 +104,18 @@ class Commands(CommandExecutor):
         self._state.clock.set(values["JulianDay"], values["Millisecond"], command.came_us)
 
     def _latch_up_action(self, command: QueuedCommand) -> Routine[None]:
-        if command.values["Step"] == LatchUpStep.OFF or not self._camera.off:
+        if command.values["Step"] == aramis.LatchUpStep.OFF or not self._camera.off:
             return
         yield from self._camera.restore()
         if self._state.active:
             yield from self._camera.start()
 
     def _reset(self, _command: QueuedCommand) -> None:
-        self._reset_cause = ResetCause.TELECOMMAND
+        self._reset_cause = aramis.ResetCause.TELECOMMAND
 
     def _clear_config(self, _command: QueuedCommand) -> None:
         self._state.settings.erase()
         self._measuring.restart()
-
-    # --- measurements -----------------------------------------------------------------------------
 
     def _measure_near_vector(self, command: QueuedCommand) -> Routine[None]:
         vector = np.array([command.values[axis] for axis in "XYZ"], np.float32)
@@ -134,22 +124,18 @@ class Commands(CommandExecutor):
         yield from self._measuring.measure((vector / length).astype(np.float32))
 
     def _measure_near_point(self, command: QueuedCommand) -> Routine[None]:
-        values = command.values
-        hint = direction_of(values["RightAscension"], values["Declination"], self._meter)
-        yield from self._measuring.measure(hint)
+        angles = command.values["RightAscension"], command.values["Declination"]
+        yield from self._measuring.measure(direction_of(*angles, self._meter))
 
     def _start_loop(self, _command: QueuedCommand) -> Routine[None]:
         if not self._state.active:
             self._state.raise_flag("NotActive")
             return
-        now_us: int = yield ReadTimer()
+        self._state.loop_due_us = yield ReadTimer()
         self._state.looping = True
-        self._state.loop_due_us = now_us
 
     def _stop_loop(self, _command: QueuedCommand) -> None:
         self._state.looping = False
-
-    # --- catalogue --------------------------------------------------------------------------------
 
     def _report_load(self) -> None:
         """Raise the flags of the latest pass over the flash."""
@@ -201,11 +187,9 @@ class Commands(CommandExecutor):
             self._report_load()
         self._state.sensor = before
 
-    # --- pictures and registers -------------------------------------------------------------------
-
     def image_block(self) -> bytes:
         """The selected block of the latest picture; zeros before the first."""
-        number = int(self._state.settings.get("ImageBlockSet", "BlockNumber"))
+        number = int(self._settings.get("ImageBlockSet", "BlockNumber"))
         return self._block(number * BLOCK_BYTES)
 
     def _block(self, start: int) -> bytes:
@@ -216,9 +200,9 @@ class Commands(CommandExecutor):
         return picture[start : start + BLOCK_BYTES].tobytes()
 
     def _stream_image(self, _command: QueuedCommand) -> Routine[None]:
-        for start in range(0, IMAGE_BYTES, BLOCK_BYTES):
+        for start in range(0, aramis.IMAGE_BYTES, BLOCK_BYTES):
             yield from self._await_room(STREAM_BACKLOG_BYTES)
-            self._hardware.uart_send(encode_frame(self._block(start)))
+            self._uart.uart_send(encode_frame(self._block(start)))
 
     def _write_register(self, command: QueuedCommand) -> Routine[None]:
         self._camera.forget_set_up()

@@ -1,9 +1,8 @@
 """The camera's geometry: what it sees, and where a pixel looks.
 
-AraMiS thesis, sections 2.5.2 (MT9M001) and 4.5.2 (equation 4.1, whose pixels need not be square),
-section 8.2 and appendix E (only the round field across the shorter side is used; a baffle covers
-the rest). Camera axes are x right, y down, z out of the lens; an integer pixel coordinate is a
-pixel's centre.
+AraMiS thesis, sections 2.5.2 (MT9M001), 4.5.2 (equation 4.1: pixels need not be square), 8.2 and
+appendix E (only the round field across the shorter side is used; a baffle covers the rest).
+Camera axes are x right, y down, z out of the lens; an integer pixel coordinate is a pixel's centre.
 """
 
 from dataclasses import dataclass
@@ -11,8 +10,9 @@ from functools import cached_property
 from math import atan, cos, hypot, pi, radians, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Mask
+from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -41,14 +41,8 @@ class Field:
 
     def __post_init__(self) -> None:
         """Refuse a camera that sees nothing."""
-        if not 1 <= self.fov_deg <= 90:
-            raise ValueError(f"fov_deg must be 1 to 90, not {self.fov_deg}")
-        for name in ("columns", "rows"):
-            if not 16 <= getattr(self, name) <= 4096:
-                raise ValueError(f"{name} must be 16 to 4096, not {getattr(self, name)}")
-        for name in ("pitch_x_mm", "pitch_y_mm"):
-            if not 1e-4 <= getattr(self, name) <= 1:
-                raise ValueError(f"{name} must be 0.0001 to 1, not {getattr(self, name)}")
+        check_bounds(self, fov_deg=(1, 90), columns=(16, 4096), rows=(16, 4096))
+        check_bounds(self, pitch_x_mm=(1e-4, 1), pitch_y_mm=(1e-4, 1))
 
     @property
     def radius_mm(self) -> float:
@@ -86,14 +80,13 @@ class Field:
         return self.columns * across * self.rows * down
 
     @cached_property
-    def mask(self) -> NDArray[np.bool_]:
+    def mask(self) -> Mask:
         """Which pixels (rows, columns) are in the field; read-only."""
         mask = np.ones((self.rows, self.columns), dtype=bool)
         if self.round:
             y, x = np.ogrid[: self.rows, : self.columns]
-            middle_x, middle_y = self.centre
-            across, down = (x - middle_x) * self.pitch_x_mm, (y - middle_y) * self.pitch_y_mm
-            mask = np.hypot(across, down) <= self.radius_mm
+            across = (x - self.centre[0]) * self.pitch_x_mm
+            mask = np.hypot(across, (y - self.centre[1]) * self.pitch_y_mm) <= self.radius_mm
         mask.flags.writeable = False
         return mask
 
@@ -102,7 +95,7 @@ class Field:
         """Number of pixels in the field."""
         return int(np.count_nonzero(self.mask))
 
-    def directions(self, points: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
+    def directions(self, points: Floats, meter: Meter) -> Floats:
         """Unit vectors (n, 3) in camera axes of points (n, 2) of the picture in px: eq. 4.1."""
         x, y = self._tangents(points, meter)
         z = _ONE / np.sqrt(_ONE + x * x + y * y)
@@ -112,39 +105,30 @@ class Field:
         )
         return np.stack([x * z, y * z, z], axis=1).astype(np.float32)
 
-    def inside(self, points: NDArray[np.float32], meter: Meter) -> NDArray[np.bool_]:
+    def inside(self, points: Floats, meter: Meter) -> Mask:
         """Which points (n, 2) of the picture in px are in the field."""
-        x, y = self._tangents(points, meter)
-        return self._inside(x, y, meter)
+        return self._inside(*self._tangents(points, meter), meter)
 
-    def contains(self, directions: NDArray[np.float32], meter: Meter) -> NDArray[np.bool_]:
+    def contains(self, directions: Floats, meter: Meter) -> Mask:
         """Which unit vectors (n, 3) in camera axes are in the field."""
         x, y, z = directions.T
         depth = np.maximum(z, np.float32(1e-6))
         meter.charge(f32_div=2 * len(directions), f32_compare=len(directions))
-        in_front: NDArray[np.bool_] = np.greater(z, 0)
+        in_front: Mask = np.greater(z, 0)
         return in_front & self._inside(x / depth, y / depth, meter)
 
-    def _tangents(
-        self, points: NDArray[np.float32], meter: Meter
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _tangents(self, points: Floats, meter: Meter) -> tuple[Floats, Floats]:
         middle = np.array(self.centre, dtype=np.float32)
         tangents = (points.astype(np.float32) - middle) * np.array(self.scale, dtype=np.float32)
         meter.charge(f32_add=2 * len(points), f32_mul=2 * len(points), ram_read=2 * len(points))
         return tangents[:, 0], tangents[:, 1]
 
-    def _inside(
-        self, x: NDArray[np.float32], y: NDArray[np.float32], meter: Meter
-    ) -> NDArray[np.bool_]:
+    def _inside(self, x: Floats, y: Floats, meter: Meter) -> Mask:
         """Which tangents of angles to the boresight are in the field."""
         count = len(x)
         meter.charge(f32_add=count, f32_mul=2 * count, f32_compare=2 * count, loop=count)
         if self.round:
-            within: NDArray[np.bool_] = x * x + y * y <= np.float32(
-                (self.radius_mm / self.focal_length_mm) ** 2
-            )
-            return within
+            return x * x + y * y <= np.float32((self.radius_mm / self.focal_length_mm) ** 2)
         across, down = self.scale
         half_x, half_y = np.float32(self.columns / 2 * across), np.float32(self.rows / 2 * down)
-        flat: NDArray[np.bool_] = (np.abs(x) <= half_x) & (np.abs(y) <= half_y)
-        return flat
+        return (np.abs(x) <= half_x) & (np.abs(y) <= half_y)

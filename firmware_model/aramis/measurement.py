@@ -6,12 +6,11 @@ is :mod:`cubestack.firmware_model.aramis.pipeline`; this is the only place that 
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.detection.background import Background
@@ -21,18 +20,12 @@ from cubestack.firmware_model.aramis.pipeline import VERIFIED, Configuration, De
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.state import Measurement, State
 from cubestack.firmware_model.attitude.quest import dcm
-from cubestack.firmware_model.interface.aramis import (
-    PHASES,
-    CatalogueState,
-    MeasurementMode,
-    MeasurementOutcome,
-    Reason,
-    SensorState,
-)
+from cubestack.firmware_model.interface import aramis
+from cubestack.firmware_model.interface.aramis import MeasurementMode, Reason, SensorState
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 
-Direction = NDArray[np.float32]
+T = TypeVar("T")
 
 
 @lru_cache(maxsize=4)
@@ -43,11 +36,9 @@ def _lens(fov_deg: float, only_round: bool) -> Field:
 
 def configuration(settings: StoredSettings) -> Configuration:
     """Settings of the processing."""
-    search = settings.all("SetDetection")
-    matching = settings.all("SetIdentification")
-    lens = _lens(
-        float(settings.get("SetField", "FieldOfView")), bool(settings.get("SetField", "Round"))
-    )
+    search, matching = settings.all("SetDetection"), settings.all("SetIdentification")
+    field = settings.all("SetField")
+    lens = _lens(float(field["FieldOfView"]), bool(field["Round"]))
     detection = Detection(
         sigmas=float(search["Sigmas"]),
         spikes=SpikeRemoval(search["Spikes"]),
@@ -67,70 +58,71 @@ def configuration(settings: StoredSettings) -> Configuration:
     return Configuration(lens, detection, profile)
 
 
+@dataclass
 class Measuring:
     """Measures, and keeps what one measurement leaves to the next."""
 
-    def __init__(
-        self, meter: Meter, state: State, camera: Camera, catalogue: CatalogueStore
-    ) -> None:
-        """Work with the given parts of the program."""
-        self._meter = meter
-        self._state = state
-        self._camera = camera
-        self._catalogue = catalogue
-        self._background = Background()
+    _meter: Meter
+    _state: State
+    _camera: Camera
+    _catalogue: CatalogueStore
+
+    def __post_init__(self) -> None:
+        """Begin without pictures."""
+        self.restart()
 
     def restart(self) -> None:
         """Pictures from now on have nothing to do with those before."""
         self._background = Background()
 
-    def latest_boresight(self) -> Direction | None:
+    def latest_boresight(self) -> Floats | None:
         """Inertial unit vector (3,) of the latest measurement's boresight; None without one."""
         if self._state.quaternion is None or not self._state.measurement.valid:
             return None
-        boresight: Direction = dcm(self._state.quaternion, self._meter)[2]
+        boresight: Floats = dcm(self._state.quaternion, self._meter)[2]
         return boresight
 
-    def measure(self, hint: Direction | None, *, overlap: bool = False) -> Routine[None]:
+    def measure(self, hint: Floats | None, *, overlap: bool = False) -> Routine[None]:
         """Measure once, into ``State.measurement``; ``hint`` as for ``identify``.
 
         With ``overlap``, the next frame comes while this one is worked on.
         """
-        state = self._state
         mode = MeasurementMode.LOST_IN_SPACE if hint is None else MeasurementMode.AIDED
         result = Measurement(mode=mode)
-        started_us: int = yield ReadTimer()
-        if not state.active:
-            state.raise_flag("NotActive")
-            failure: Reason | None = Reason.NOT_ACTIVE
-        else:
-            state.sensor = SensorState.MEASURING
-            failure = yield from self._picture(result, overlap=overlap)
-            if failure is None:
-                failure = yield from self._check(result)
-            if failure is None:
-                yield from self._process(result, hint)
-            state.sensor = SensorState.READY
+        steps = self._steps(result, hint, overlap=overlap)
+        failure = yield from self._timed(result, "Total", steps)
         if failure is not None:
-            result.outcome, result.reason = MeasurementOutcome.NONE, failure
-        result.times_us["Total"] = yield from self._since(started_us)
-        state.star = 0
-        state.measurement = result
+            result.outcome, result.reason = aramis.MeasurementOutcome.NONE, failure
+        self._state.star = 0
+        self._state.measurement = result
 
-    def _since(self, started_us: int) -> Routine[int]:
+    def _timed(self, result: Measurement, step: str, routine: Routine[T]) -> Routine[T]:
+        started_us: int = yield ReadTimer()
+        outcome = yield from routine
         yield Pay()
         now_us: int = yield ReadTimer()
-        return now_us - started_us
+        result.times_us[step] = now_us - started_us
+        return outcome
+
+    def _steps(
+        self, result: Measurement, hint: Floats | None, *, overlap: bool
+    ) -> Routine[Reason | None]:
+        if not self._state.active:
+            self._state.raise_flag("NotActive")
+            return Reason.NOT_ACTIVE
+        self._state.sensor = SensorState.MEASURING
+        failure = yield from self._picture(result, overlap=overlap)
+        if failure is None:
+            failure = yield from self._check(result)
+        if failure is None:
+            yield from self._process(result, hint)
+        self._state.sensor = SensorState.READY
+        return failure
 
     def _picture(self, result: Measurement, *, overlap: bool) -> Routine[Reason | None]:
-        started_us: int = yield ReadTimer()
-        failure = yield from self._camera.start()
-        result.times_us["Setup"] = yield from self._since(started_us)
-        if failure is not None:
-            return failure
-        started_us = yield ReadTimer()
-        failure = yield from self._camera.take()
-        result.times_us["Capture"] = yield from self._since(started_us)
+        failure = yield from self._timed(result, "Setup", self._camera.start())
+        if failure is None:
+            failure = yield from self._timed(result, "Capture", self._camera.take())
         if failure is not None:
             return failure
         result.image_us = self._camera.image_us()
@@ -142,18 +134,15 @@ class Measuring:
     def _check(self, result: Measurement) -> Routine[Reason | None]:
         """Make sure that RAM holds a good catalogue."""
         errors = self._catalogue.ram_errors
-        started_us: int = yield ReadTimer()
-        good = yield from self._catalogue.ensure()
-        result.times_us["Check"] = yield from self._since(started_us)
+        good = yield from self._timed(result, "Check", self._catalogue.ensure())
         if self._catalogue.ram_errors != errors:
             self._state.raise_flag("RamError")
         if good:
             return None
-        if self._catalogue.state is CatalogueState.MISSING:
-            return Reason.NO_CATALOGUE
-        return Reason.CATALOGUE_DAMAGED
+        missing = self._catalogue.state is aramis.CatalogueState.MISSING
+        return Reason.NO_CATALOGUE if missing else Reason.CATALOGUE_DAMAGED
 
-    def _process(self, result: Measurement, hint: Direction | None) -> Routine[None]:
+    def _process(self, result: Measurement, hint: Floats | None) -> Routine[None]:
         database, place = self._catalogue.database, self._camera.latest
         assert database is not None
         assert place is not None
@@ -166,8 +155,7 @@ class Measuring:
             result.threshold = past.threshold(settings.detection.sigmas, self._meter)
             result.pictures = len(past.sums)
         yield Pay()
-        result.solution = solution
-        result.outcome = solution.outcome
+        result.solution, result.outcome = solution, solution.outcome
         result.reason = solution.reason
         if solution.quaternion is not None:
             self._state.quaternion = solution.quaternion
@@ -178,7 +166,7 @@ class Measuring:
         """Book the cycles of each phase that the block charges."""
         before = dict(self._meter.phases)
         yield
-        for name in PHASES:
+        for name in aramis.PHASES:
             spent = self._meter.phases.get(name.lower(), 0) - before.get(name.lower(), 0)
             if spent:
                 result.times_us[name] = 1_000_000 * spent // self._meter.table.clock_hz

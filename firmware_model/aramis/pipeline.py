@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
+from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.regions import find_regions, locate_stars
@@ -44,17 +46,8 @@ class Detection:
 
     def __post_init__(self) -> None:
         """Refuse settings with which nothing can be found."""
-        bounds = {
-            "sigmas": (0, 20),
-            "needed": (1, 25),
-            "min_pixels": (1, self.max_pixels),
-            "max_pixels": (1, 1_000_000),
-            "max_stars": (3, 255),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be {low} to {high}, not {value}")
+        check_bounds(self, sigmas=(0, 20), needed=(1, 25), min_pixels=(1, self.max_pixels))
+        check_bounds(self, max_pixels=(1, 1_000_000), max_stars=(3, 255))
 
 
 _FIELD, _DETECTION, _PROFILE = Field(), Detection(), Profile()
@@ -110,9 +103,8 @@ def detect(
         if regions is None:
             return None
         floor = background.mean(meter) if settings.subtract else 0
-        stars = locate_stars(
-            picture, regions, floor, settings.min_pixels, settings.max_pixels, meter
-        )
+        sizes = settings.min_pixels, settings.max_pixels
+        stars = locate_stars(picture, regions, floor, *sizes, meter)
         inside = np.flatnonzero(field.inside(stars.centroids, meter))[: settings.max_stars]
         smear = smear_px(picture, regions, background.mean(meter), meter)
     return StarList(stars.centroids[inside], stars.brightness[inside], smear)
@@ -124,7 +116,7 @@ def solve(
     configuration: Configuration,
     database: Database,
     meter: Meter,
-    hint: NDArray[np.float32] | None = None,
+    hint: Floats | None = None,
     exposure_rows: int | None = None,
 ) -> Solution:
     """Attitude of a picture (rows, columns), or why there is none.
@@ -141,8 +133,7 @@ def solve(
         nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
         return unsolved(Reason.TOO_MANY_PIXELS, nothing)
     if exposure_rows is not None:
-        skew_px = stars.smear_px * configuration.field.rows / exposure_rows
-        stars = replace(stars, skew_px=skew_px)
+        stars = replace(stars, skew_px=stars.smear_px * configuration.field.rows / exposure_rows)
     solution = identify(stars, configuration.field, configuration.profile, database, meter, hint)
     return explain(solution, picture, configuration, meter)
 
@@ -154,9 +145,8 @@ def explain(
 
     Phase `verification`.
     """
-    if not configuration.profile.verify or solution.outcome is not MeasurementOutcome.NONE:
-        return solution
-    if solution.reason is Reason.SMEAR:
+    failed = solution.outcome is MeasurementOutcome.NONE
+    if not (configuration.profile.verify and failed) or solution.reason is Reason.SMEAR:
         return solution
     with meter.phase("verification"):
         drawn_out = is_drawn_out(picture, configuration.field, meter)

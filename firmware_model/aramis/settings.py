@@ -35,7 +35,6 @@ class StoredSettings(Settings):
         """Take what ``flash`` holds, else the declared reset values."""
         super().__init__(INTERFACE, SETTING_COMMANDS)
         self._flash = flash
-        self.damaged = False
         self.load()
 
     def put(self, command: str, values: Mapping[str, Any]) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
+from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
 NONE = -1
@@ -22,24 +24,21 @@ class Profile:
         sigma_rad: noise of a measured direction per axis, in rad. The thesis' appendix E settles on
             0.26 px of its simulator, 0.3759 rad / 582.
         pivots: pivot triangles at most, 0 to 3.
-        verify: whether an attitude must be confirmed by further stars.
-        tolerance_rad: distance within which a star confirms.
-        side_tolerance_rad: largest difference of a side, with verification or a rough direction;
-            three sigma of a difference of two stars' places by default.
-        largest_chance: an attitude is confirmed when chance would do it less often.
-        spread_rad: stars that confirm are at least so far from their middle, root mean square.
-        triples: triples tried at most, with verification.
-        triple_stars: triples are made of so many of the brightest stars, with verification.
-        candidates: with verification, so many candidates of a triple are tried at most, and pivots
-            only serve to leave no more.
         hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (an
             extension).
-        smear_px: with verification, where stars are drawn out farther, that is why there is no
-            attitude.
-        skew_px: with verification, stars that also moved farther from row to row are refused.
-        moved_px: with verification, stars that moved farther from row to row are also refused when
-            they leave too much doubt about the turn about the boresight; below it, stars that look
-            long may just be drawn so by the lens.
+        side_tolerance_rad: largest difference of a side, with verification or a rough direction;
+            three sigma of a difference of two stars' places by default.
+        verify: whether an attitude must be confirmed by further stars; what follows is only then.
+        tolerance_rad: distance within which a star confirms.
+        largest_chance: an attitude is confirmed when chance would do it less often.
+        spread_rad: stars that confirm are at least so far from their middle, root mean square.
+        triples, triple_stars: triples tried at most, and of how many of the brightest stars.
+        candidates: of a triple, tried at most; pivots only serve to leave no more.
+        smear_px: where stars are drawn out farther, that is why there is no attitude.
+        skew_px: stars that also moved farther from row to row are refused.
+        moved_px: stars that moved farther from row to row are also refused when they leave too much
+            doubt about the turn about the boresight; below it, stars that look long may just be
+            drawn so by the lens.
         motion_sigma_rad: that much doubt.
     """
 
@@ -61,26 +60,23 @@ class Profile:
 
     def __post_init__(self) -> None:
         """Refuse settings with which nothing can be found."""
-        bounds = {
-            "sigma_rad": (1e-7, 1e-2),
-            "pivots": (0, 3),
-            "tolerance_rad": (1e-5, 0.05),
-            "side_tolerance_rad": (1e-6, 0.05),
-            "largest_chance": (0, 1),
-            "spread_rad": (0, 1),
-            "triples": (1, 1000),
-            "triple_stars": (3, 64),
-            "candidates": (1, 1000),
-            "hint_tolerance_deg": (0, 180),
-            "smear_px": (1, 1000),
-            "skew_px": (0, 1000),
-            "moved_px": (0, 1000),
-            "motion_sigma_rad": (0, 0.1),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be {low} to {high}, not {value}")
+        check_bounds(
+            self,
+            sigma_rad=(1e-7, 1e-2),
+            pivots=(0, 3),
+            tolerance_rad=(1e-5, 0.05),
+            side_tolerance_rad=(1e-6, 0.05),
+            largest_chance=(0, 1),
+            spread_rad=(0, 1),
+            triples=(1, 1000),
+            triple_stars=(3, 64),
+            candidates=(1, 1000),
+            hint_tolerance_deg=(0, 180),
+            smear_px=(1, 1000),
+            skew_px=(0, 1000),
+            moved_px=(0, 1000),
+            motion_sigma_rad=(0, 0.1),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +90,8 @@ class StarList:
         skew_px: how far they moved while the rows were exposed one after the other.
     """
 
-    centroids: NDArray[np.float32]
-    brightness: NDArray[np.float32]
+    centroids: Floats
+    brightness: Floats
     smear_px: float = 0.0
     skew_px: float = 0.0
 
@@ -114,15 +110,14 @@ class Solution:
         quaternion: (4,) inertial to camera, scalar last and not negative; None unless conclusive.
         stars: (n,) index into the database's star list for each measured star, -1 for none.
         measured: the stars that were found.
-        candidates: triangles left when matching ended.
-        pivots: pivot triangles used for the last triple.
-        triples: triples tried.
+        candidates, pivots: of the last triple: triangles left, and pivot triangles used.
+        triples: tried.
         expected: catalogue stars in the field by the attitude, 0 without verification.
     """
 
     outcome: MeasurementOutcome
     reason: Reason
-    quaternion: NDArray[np.float32] | None
+    quaternion: Floats | None
     stars: NDArray[np.int32]
     measured: StarList
     candidates: int = 0

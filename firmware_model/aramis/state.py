@@ -2,19 +2,11 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.solution import Solution
-from cubestack.firmware_model.interface.aramis import (
-    MS_PER_DAY,
-    PHASES,
-    MeasurementMode,
-    MeasurementOutcome,
-    Reason,
-    SensorState,
-)
+from cubestack.firmware_model.interface import aramis
+from cubestack.firmware_model.interface.aramis import MS_PER_DAY, MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.state import NodeState
@@ -23,9 +15,7 @@ from cubestack.firmware_model.node.state import NodeState
 class Clock:
     """Julian date, counted on from the instant that a host set it (thesis, section 2.2)."""
 
-    def __init__(self) -> None:
-        """Start unset."""
-        self._zero_ms: int | None = None
+    _zero_ms: int | None = None
 
     @property
     def is_set(self) -> bool:
@@ -57,20 +47,25 @@ class Measurement:
     """
 
     outcome: MeasurementOutcome = MeasurementOutcome.NOT_MEASURED
-    reason: Reason = Reason.NOT_MEASURED
-    mode: MeasurementMode = MeasurementMode.LOST_IN_SPACE
+    reason: aramis.Reason = aramis.Reason.NOT_MEASURED
+    mode: aramis.MeasurementMode = aramis.MeasurementMode.LOST_IN_SPACE
     image_us: int = 0
     frame: int = 0
     solution: Solution | None = None
     mean: int = 0
     threshold: int = 0
     pictures: int = 0
-    times_us: dict[str, int] = field(default_factory=lambda: dict.fromkeys(PHASES, 0))
+    times_us: dict[str, int] = field(default_factory=lambda: dict.fromkeys(aramis.PHASES, 0))
 
     @property
     def valid(self) -> bool:
         """Whether it gave an attitude."""
         return self.outcome is MeasurementOutcome.CONCLUSIVE
+
+    @property
+    def detected(self) -> int:
+        """Stars in its picture."""
+        return 0 if self.solution is None else len(self.solution.measured)
 
 
 class State(NodeState):
@@ -96,7 +91,7 @@ class State(NodeState):
         self.clock = Clock()
         self.sensor = SensorState.INACTIVE
         self.measurement = Measurement()
-        self.quaternion: NDArray[np.float32] | None = None
+        self.quaternion: Floats | None = None
         self.matched = 0
         self.frames = 0
         self.looping = False

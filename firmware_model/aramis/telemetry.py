@@ -1,11 +1,12 @@
 """Values of every telemetry frame, taken when it is asked for."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.commands import Commands
@@ -27,9 +28,7 @@ _U16, _U32 = 0xFFFF, 0xFFFF_FFFF
 Values = dict[str, Any]
 
 
-def body_quaternion(
-    rotation: NDArray[np.float32], attitude: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def body_quaternion(rotation: Floats, attitude: Floats) -> Floats:
     """Inertial to body (4,): camera to body, after inertial to camera; all scalar last."""
     (x1, y1, z1, w1), (x2, y2, z2, w2) = rotation.astype(np.float32), attitude.astype(np.float32)
     product = np.array(
@@ -41,35 +40,38 @@ def body_quaternion(
         ],
         np.float32,
     )
-    unit: NDArray[np.float32] = product / np.sqrt((product * product).sum())
+    unit: Floats = product / np.sqrt((product * product).sum())
     return unit
 
 
-class Telemetry:
-    """Answers telemetry requests; interrupt context, so nothing here waits."""
+def _parts(quaternion: Floats | None) -> Values:
+    """Its four fields; zeros without one."""
+    return {f"Q{index}": 0.0 if quaternion is None else quaternion[index] for index in range(4)}
 
-    def __init__(
-        self,
-        hardware: AramisHardware,
-        meter: Meter,
-        state: State,
-        camera: Camera,
-        catalogue: CatalogueStore,
-        commands: Commands,
-        link: Callable[[], AramisLink],
-    ) -> None:
-        """Report on the given parts; ``link`` gives the host's, which is made after this."""
-        self._hardware = hardware
-        self._meter = meter
-        self._state = state
-        self._camera = camera
-        self._catalogue = catalogue
-        self._commands = commands
+
+@dataclass
+class Telemetry:
+    """Answers telemetry requests; interrupt context, so nothing here waits.
+
+    ``_link`` gives the host's link, which is made after this.
+    """
+
+    _hardware: AramisHardware
+    _meter: Meter
+    _state: State
+    _camera: Camera
+    _catalogue: CatalogueStore
+    _commands: Commands
+    _link: Callable[[], AramisLink]
+
+    def __post_init__(self) -> None:
+        """Say where each message's values come from."""
+        hardware, state, commands = self._hardware, self._state, self._commands
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
             "ExtendedIdentification": self._extended_identification,
             "ErrorFlags": state.flag_values,
-            "TcmdProcessed": lambda: link().processed(commands.running),
+            "TcmdProcessed": lambda: self._link().processed(commands.running),
             "SensorStatus": self._sensor_status,
             "SystemTime": self._system_time,
             "Attitude": self._attitude,
@@ -92,8 +94,6 @@ class Telemetry:
         if message.name in SETTINGS_SHOWN:
             return self._state.settings.all(SETTINGS_SHOWN[message.name])
         return self._sources[message.name]()
-
-    # --- node -------------------------------------------------------------------------------------
 
     def _extended_identification(self) -> Values:
         return {
@@ -134,17 +134,10 @@ class Telemetry:
             "LateIterations": self._state.late & _U16,
         }
 
-    # --- results ----------------------------------------------------------------------------------
-
-    def _quaternion(self) -> NDArray[np.float32]:
-        none = np.zeros(4, np.float32)
-        return none if self._state.quaternion is None else self._state.quaternion
-
     def _attitude(self) -> Values:
         latest = self._state.measurement
-        detected = 0 if latest.solution is None else len(latest.solution.measured)
         return {
-            **{f"Q{index}": part for index, part in enumerate(self._quaternion())},
+            **_parts(self._state.quaternion),
             **self._time(latest.image_us),
             "ImageUptime": latest.image_us // 1000 & _U32,
             "FrameCounter": latest.frame & _U32,
@@ -153,18 +146,18 @@ class Telemetry:
             "Mode": latest.mode,
             "Valid": int(latest.valid),
             "Matched": self._state.matched,
-            "Detected": detected,
+            "Detected": latest.detected,
         }
 
     def _body_attitude(self) -> Values:
-        latest, attitude = self._state.measurement, self._quaternion()
-        if self._state.quaternion is not None:
+        latest, attitude = self._state.measurement, self._state.quaternion
+        if attitude is not None:
             rotation = self._state.settings.all("SetBodyRotation")
             parts = np.array([rotation[f"Q{index}"] for index in range(4)], np.float32)
             attitude = body_quaternion(parts, attitude)
             self._meter.charge(f32_mul=20, f32_add=15, f32_sqrt=1, f32_div=4)
         return {
-            **{f"Q{index}": part for index, part in enumerate(attitude)},
+            **_parts(attitude),
             **self._time(latest.image_us),
             "Reason": latest.reason,
             "Valid": int(latest.valid),
@@ -173,8 +166,8 @@ class Telemetry:
     def _boresight(self) -> Values:
         ascension = declination = 0.0
         if self._state.quaternion is not None:
-            direction = dcm(self._state.quaternion, self._meter)[2]
-            ascension, declination = angles_of(direction, self._meter)
+            boresight = dcm(self._state.quaternion, self._meter)[2]
+            ascension, declination = angles_of(boresight, self._meter)
         return {
             "RightAscension": ascension,
             "Declination": declination,
@@ -184,7 +177,7 @@ class Telemetry:
     def _detection_summary(self) -> Values:
         latest = self._state.measurement
         return {
-            "Detected": 0 if latest.solution is None else len(latest.solution.measured),
+            "Detected": latest.detected,
             "Mean": latest.mean,
             "Threshold": latest.threshold,
             "Pictures": latest.pictures,
@@ -220,11 +213,8 @@ class Telemetry:
             "Hipparcos": int(database.numbers[star]) if known and database is not None else 0,
         }
 
-    # --- catalogue and camera ---------------------------------------------------------------------
-
     def _catalogue_status(self) -> Values:
-        store = self._catalogue
-        database = store.database
+        store, database = self._catalogue, self._catalogue.database
         return {
             "State": store.state,
             "Stars": 0 if database is None else len(database.numbers),

@@ -4,8 +4,7 @@ AraMiS thesis, sections 5.5 (triangle database), 5.6 (k-vectors), 5.9 (faces) an
 is copied to RAM, where the program works on it). The thesis sizes its database as a text file of
 doubles, 21.2 MB (section 2.3.2); this one is binary, little-endian, without gaps:
 
-- a header, `HEADER`: magic, version, counts, epoch, field and the bounds of both k-vectors;
-- the arrays of `LAYOUT` in order, whose lengths follow from the counts;
+- `HEADER`; the arrays of `LAYOUT` in order, whose lengths follow from the header's counts;
 - a CRC-32 of everything before it. Error-coding the image is the flash's task, not done here.
 
 Triangles are in the order of their area; a second list has the moments in rising order, each with
@@ -20,6 +19,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.catalogue.geodesic import GeodesicSphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
 
@@ -76,12 +76,12 @@ class Database:
     epoch: float
     fov_deg: float
     numbers: NDArray[np.uint32]
-    vectors: NDArray[np.float32]
-    v_mag: NDArray[np.float32]
+    vectors: Floats
+    v_mag: Floats
     stars: NDArray[np.uint16]
     faces: NDArray[np.uint16]
-    areas: NDArray[np.float32]
-    moments: NDArray[np.float32]
+    areas: Floats
+    moments: Floats
     moment_triangles: NDArray[np.uint32]
     area_index: KVector
     moment_index: KVector
@@ -117,9 +117,8 @@ class Database:
             moment.lowest,
             moment.highest,
         )
-        body = header + b"".join(
-            self._array(name).astype(kind).tobytes() for name, kind, _ in LAYOUT
-        )
+        parts = (self._array(name).astype(kind).tobytes() for name, kind, _ in LAYOUT)
+        body = header + b"".join(parts)
         return body + struct.pack("<I", crc32(body))
 
     @classmethod
@@ -145,14 +144,9 @@ class Database:
                 f"1 to {MOST_STARS}, 1 to {MOST_TRIANGLES} and 12"
             )
         counts = [stars] * 3 + [triangles] * 5 + [areas + 1, moments + 1] + [faces] * 2
-        length = (
-            HEADER.size
-            + 4
-            + sum(
-                count * width * np.dtype(kind).itemsize
-                for count, (_, kind, width) in zip(counts, LAYOUT, strict=True)
-            )
-        )
+        parts = zip(counts, LAYOUT, strict=True)
+        sizes = [count * width * np.dtype(kind).itemsize for count, (_, kind, width) in parts]
+        length = HEADER.size + sum(sizes) + 4
         if len(image) != length:
             raise DatabaseError(f"the image's counts need {length} bytes, not {len(image)}")
         if crc32(image[:-4]) != struct.unpack("<I", image[-4:])[0]:
@@ -165,7 +159,7 @@ class Database:
             arrays[name] = flat.reshape(count, width) if width > 1 else flat
         _check(arrays, stars, triangles, faces)
         epoch, fov_deg, *bounds = numbers
-        low_area, high_area, low_moment, high_moment = (np.float32(bound) for bound in bounds)
+        low_area, high_area, low_moment, high_moment = map(np.float32, bounds)
         return cls(
             epoch=epoch,
             fov_deg=fov_deg,

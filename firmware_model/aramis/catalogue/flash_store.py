@@ -12,13 +12,9 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.catalogue import hamming
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
-from cubestack.firmware_model.aramis.catalogue.hamming import (
-    CODED_BYTES,
-    DATA_BYTES,
-    decode,
-    encode,
-)
+from cubestack.firmware_model.aramis.catalogue.hamming import CODED_BYTES, DATA_BYTES
 from cubestack.firmware_model.aramis.hardware import AramisHardware
 from cubestack.firmware_model.aramis.memory import CATALOGUE_AT, SECTOR_BYTES
 from cubestack.firmware_model.interface.aramis import MOST_CATALOGUE_BYTES, CatalogueState
@@ -47,7 +43,8 @@ def flash_image(image: bytes) -> NDArray[np.uint8]:
             f"a catalogue has at most {MOST_CATALOGUE_BYTES} bytes, not {len(image)}; fewer stars "
             f"per field make it shorter"
         )
-    return np.concatenate([encode(HEADER.pack(MAGIC, len(image))), encode(image)])
+    header = HEADER.pack(MAGIC, len(image))
+    return np.concatenate([hamming.encode(header), hamming.encode(image)])
 
 
 class CatalogueStore:
@@ -162,7 +159,7 @@ class CatalogueStore:
         """Read the header and start a pass; one without a header has ended at once."""
         self._pass_corrected = self._pass_lost = self._pass_us = self._at = 0
         coded = self._hardware.catalogue_flash[:CODED_BYTES]
-        header = decode(coded, self._meter)
+        header = hamming.decode(coded, self._meter)
         self._pass_corrected += header.corrected
         self._pass_lost += len(header.lost)
         magic, length = HEADER.unpack(header.data.tobytes())
@@ -176,7 +173,7 @@ class CatalogueStore:
         words = min(SLICE_WORDS, -(-length // DATA_BYTES) - self._at)
         start = CODED_BYTES * (1 + self._at)
         coded = self._hardware.catalogue_flash[start : start + CODED_BYTES * words]
-        decoded = decode(coded, self._meter)
+        decoded = hamming.decode(coded, self._meter)
         first = DATA_BYTES * self._at
         if self.database is None or not len(decoded.lost):
             stop = min(length, first + DATA_BYTES * words)

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.mcu.costs import Meter
 
 SPLITS = 2
@@ -30,17 +31,16 @@ class GeodesicSphere:
         neighbours: (f, 12) faces that share a corner, rising, filled up with `NO_FACE`; uint16.
     """
 
-    centres: NDArray[np.float32]
+    centres: Floats
     neighbours: NDArray[np.uint16]
 
     def __len__(self) -> int:
         """Number of faces."""
         return len(self.centres)
 
-    def face_of(self, direction: NDArray[np.float32], meter: Meter) -> int:
+    def face_of(self, direction: Floats, meter: Meter) -> int:
         """Face whose centre is nearest to a unit vector (3,)."""
-        x, y, z = self.centres.T
-        along = direction.astype(np.float32)
+        (x, y, z), along = self.centres.T, direction.astype(np.float32)
         cosine = x * along[0] + y * along[1] + z * along[2]
         count = len(self)
         meter.charge(
@@ -48,13 +48,11 @@ class GeodesicSphere:
         )
         return int(np.argmax(cosine))
 
-    def around(self, direction: NDArray[np.float32], meter: Meter) -> NDArray[np.bool_]:
+    def around(self, direction: Floats, meter: Meter) -> Mask:
         """Which faces (f,) are that of a unit vector (3,) or adjacent to it."""
         face = self.face_of(direction, meter)
-        marked = np.zeros(len(self), dtype=bool)
-        adjacent = self.neighbours[face]
-        marked[adjacent[adjacent != NO_FACE]] = True
-        marked[face] = True
+        marked, adjacent = np.zeros(len(self), dtype=bool), self.neighbours[face]
+        marked[[face, *adjacent[adjacent != NO_FACE]]] = True
         meter.charge(ram_read=len(adjacent), ram_write=len(self) // 4 + 13, loop=len(adjacent))
         return marked
 
@@ -81,7 +79,7 @@ def geodesic_sphere(splits: int = SPLITS) -> GeodesicSphere:
     return GeodesicSphere(centres.astype(np.float32), neighbours)
 
 
-def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def _icosahedron() -> tuple[NDArray[np.float64], Indices]:
     """Corners (12, 3) of length 1 and faces (20, 3) as indices of corners."""
     golden = (1 + np.sqrt(5)) / 2
     corners = np.array(
@@ -103,9 +101,7 @@ def _icosahedron() -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     return corners, np.array(faces, dtype=np.intp)
 
 
-def _split(
-    corners: NDArray[np.float64], faces: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def _split(corners: NDArray[np.float64], faces: Indices) -> tuple[NDArray[np.float64], Indices]:
     """Four faces from each: its edges are halved and the new corners lifted to the sphere."""
     points = [*corners]
     middles: dict[tuple[int, int], int] = {}

@@ -1,10 +1,9 @@
 """Error-correcting code of the catalogue in flash: one bit in 72 corrected, two detected.
 
-AraMiS thesis, sections 2.1 (an error-correcting code, which one is to be defined) and 2.3.2 (room
-for a Hamming code's overhead). Assumed: an extended Hamming code whose 72 columns all have an odd
-number of ones (Hsiao, "A Class of Optimal Minimum Odd-weight-column SEC-DED Codes", 1970): 64 bits
-of data, 8 check bits. A syndrome with an odd number of ones is a single error if a column matches;
-with an even number it is two errors.
+AraMiS thesis, sections 2.1 (some error-correcting code) and 2.3.2 (room for a Hamming code).
+Assumed: one whose 72 columns all have an odd number of ones (Hsiao, "A Class of Optimal Minimum
+Odd-weight-column SEC-DED Codes", 1970): 64 bits of data, 8 check bits. A syndrome with an odd
+number of ones is a single error if a column matches; with an even number it is two errors.
 
 A coded word is 9 bytes: 8 of data, then the check byte. The lowest bit of the first byte is bit 0.
 """
@@ -15,6 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Indices
 from cubestack.firmware_model.mcu.costs import Meter
 
 DATA_BYTES = 8
@@ -33,17 +33,13 @@ def _columns() -> list[int]:
 
 def _tables() -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
     """Check byte of each value (8, 256) of each data byte, and the bit (256,) of each syndrome."""
-    columns = _columns()
     checks = np.zeros((DATA_BYTES, 256), np.uint8)
-    values = np.arange(256)
-    for bit, column in enumerate(columns):
-        checks[bit // 8] ^= ((values >> bit % 8 & 1) * column).astype(np.uint8)
     located = np.full(256, LOST, np.int16)
     located[0] = CLEAN
-    for bit, column in enumerate(columns):
+    located[1 << np.arange(8)] = DATA_BITS + np.arange(8)
+    for bit, column in enumerate(_columns()):
+        checks[bit // 8] ^= ((np.arange(256) >> bit % 8 & 1) * column).astype(np.uint8)
         located[column] = bit
-    for bit in range(8):
-        located[1 << bit] = DATA_BITS + bit
     return checks, located
 
 
@@ -62,7 +58,7 @@ class Decoded:
 
     data: NDArray[np.uint8]
     corrected: int
-    lost: NDArray[np.intp]
+    lost: Indices
 
 
 def coded_size(size: int) -> int:

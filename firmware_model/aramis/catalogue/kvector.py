@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Indices
 from cubestack.firmware_model.mcu.costs import Meter
 
 VALUES_PER_BIN = 4
@@ -54,7 +55,7 @@ class KVector:
     starts: NDArray[np.uint32]
 
     @classmethod
-    def build(cls, rising: NDArray[np.float32], values_per_bin: int = VALUES_PER_BIN) -> Self:
+    def build(cls, rising: Floats, values_per_bin: int = VALUES_PER_BIN) -> Self:
         """The k-vector of sorted values (n,), n at least 1."""
         bins = max(1, len(rising) // values_per_bin)
         vector = cls(rising[0], rising[-1], np.zeros(bins + 1, dtype=np.uint32))
@@ -67,9 +68,7 @@ class KVector:
         """Number of bins."""
         return len(self.starts) - 1
 
-    def find(
-        self, rising: NDArray[np.float32], low: np.float32, high: np.float32, meter: Meter
-    ) -> Range:
+    def find(self, rising: Floats, low: np.float32, high: np.float32, meter: Meter) -> Range:
         """Range of the values from `low` to `high`, both included; NaN finds nothing."""
         meter.charge(f32_compare=3)
         if not (low <= high and low <= self.highest and high >= self.lowest):
@@ -77,8 +76,7 @@ class KVector:
         first, last = self._bin(np.array([low, high], dtype=np.float32)).tolist()
         start, stop = int(self.starts[first]), int(self.starts[last + 1])
         meter.charge(f32_add=4, f32_mul=6, f32_compare=4, f32_convert=2, ram_read=2)
-        looked_at = stop - start
-        compared = 2
+        looked_at, compared = stop - start, 2
         while start < stop and rising[start] < low:
             start += 1
             compared += 1
@@ -88,11 +86,10 @@ class KVector:
         meter.charge(ram_read=compared, f32_compare=compared, loop=compared)
         return Range(start, stop, looked_at)
 
-    def _bin(self, values: NDArray[np.float32]) -> NDArray[np.intp]:
+    def _bin(self, values: Floats) -> Indices:
         """Bins of values of any shape: the parabola (top - y)^2 = (top - lowest)^2 (1 - x)."""
         span = self.highest - self.lowest
         scale = _ONE / span if span >= _NARROWEST else _ZERO
         below = np.clip((self.highest - values) * scale, _ZERO, _ONE)
-        bins = len(self.starts) - 1
-        numbers: NDArray[np.float32] = (_ONE - below * below) * np.float32(bins - 1)
+        numbers: Floats = (_ONE - below * below) * np.float32(self.bins - 1)
         return numbers.astype(np.intp)

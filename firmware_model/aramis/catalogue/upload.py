@@ -4,11 +4,13 @@ AraMiS thesis, section 2.2 (inputStarcatalogue). Nothing of the present catalogu
 the new one has been checked.
 """
 
+from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.hardware import AramisHardware
@@ -18,17 +20,17 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
 
+@dataclass
 class CatalogueUpload:
-    """The catalogue that is being loaded."""
+    """The catalogue that is being loaded, and written to the store in the end."""
 
-    def __init__(self, hardware: AramisHardware, meter: Meter, store: CatalogueStore) -> None:
-        """Write to ``store`` in the end."""
-        self._hardware = hardware
-        self._meter = meter
-        self._store = store
-        self._length = 0
-        self._checksum = 0
-        self._received: NDArray[np.bool_] = np.zeros(0, bool)
+    _hardware: AramisHardware
+    _meter: Meter
+    _store: CatalogueStore
+
+    def __post_init__(self) -> None:
+        """None is being loaded."""
+        self.begin(0, 0)
 
     @property
     def blocks(self) -> int:
@@ -48,16 +50,15 @@ class CatalogueUpload:
     def begin(self, length: int, checksum: int) -> None:
         """An image of ``length`` bytes with that CRC-32 will come."""
         self._length, self._checksum = length, checksum
-        self._received = np.zeros(-(-length // BLOCK_BYTES), bool)
+        self._received: Mask = np.zeros(-(-length // BLOCK_BYTES), bool)
 
     def put(self, number: int, data: bytes) -> bool:
         """Take a block; False when it is beyond the image or none is being loaded."""
         if number >= self.blocks:
             return False
         start = number * BLOCK_BYTES
-        self._image()[start : start + BLOCK_BYTES] = np.frombuffer(data, np.uint8)[
-            : self._length - start
-        ]
+        block = np.frombuffer(data, np.uint8)[: self._length - start]
+        self._image()[start : start + BLOCK_BYTES] = block
         self._received[number] = True
         self._meter.charge(ram_write=BLOCK_BYTES // 4, loop=BLOCK_BYTES // 4)
         return True

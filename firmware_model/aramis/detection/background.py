@@ -32,8 +32,7 @@ class Background:
     def add(self, picture: NDArray[np.uint8], field: Field, meter: Meter) -> None:
         """Take a picture (rows, columns) into account; pixels outside the field do not count."""
         levels = np.bincount(picture[field.mask], minlength=256).astype(np.int64)
-        values = np.arange(256)
-        pixels = field.pixels
+        values, pixels = np.arange(256), field.pixels
         self.sums.append((pixels, int(levels @ values), int(levels @ values**2)))
         meter.charge(pixel_read=pixels, i32_add=2 * pixels, i32_mul=pixels, loop=pixels)
 
@@ -55,7 +54,5 @@ class Background:
         return int(np.float32(total / pixels) + np.float32(sigmas) * deviation)
 
     def _totals(self) -> tuple[int, int, int]:
-        pixels, total, squares = (
-            (sum(column) for column in zip(*self.sums, strict=True)) if (self.sums) else (0, 0, 0)
-        )
+        pixels, total, squares = map(sum, zip(*self.sums, (0, 0, 0), strict=True))
         return pixels, total, squares

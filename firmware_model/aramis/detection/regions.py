@@ -12,6 +12,7 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Indices, Mask
 from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -29,13 +30,13 @@ class Regions:
         count: number of regions.
     """
 
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    labels: NDArray[np.intp]
+    rows: Indices
+    columns: Indices
+    labels: Indices
     count: int
 
 
-def find_regions(mask: NDArray[np.bool_], meter: Meter) -> Regions | None:
+def find_regions(mask: Mask, meter: Meter) -> Regions | None:
     """Regions of a mask (rows, columns); None when it has more than `MOST_RUNS` runs of pixels.
 
     One pass lists the runs of each row, a second joins runs of neighbouring rows that touch.
@@ -51,10 +52,7 @@ def find_regions(mask: NDArray[np.bool_], meter: Meter) -> Regions | None:
     parents = _join(starts, stops, width, meter)
     _, run_labels = np.unique(parents, return_inverse=True)
     lengths = stops - starts
-    pixels = np.repeat(starts - np.concatenate([[0], np.cumsum(lengths)[:-1]]), lengths) + (
-        np.arange(int(lengths.sum()))
-    )
-    rows, columns = np.divmod(pixels, width)
+    rows, columns = np.divmod(np.flatnonzero(padded), width)
     count = int(run_labels.max()) + 1 if len(run_labels) else 0
     return Regions(rows, columns, np.repeat(run_labels.ravel(), lengths), count)
 
@@ -94,22 +92,15 @@ def locate_stars(
     )
     used = np.flatnonzero((sizes >= min_pixels) & (sizes <= max_pixels) & (total > 0))
     scale = total[used].astype(np.float32)
-    centroids = np.stack(
-        [
-            left[used].astype(np.float32) + across[used].astype(np.float32) / scale,
-            top[used].astype(np.float32) + down[used].astype(np.float32) / scale,
-        ],
-        axis=1,
-    )
+    corner = np.stack([left, top])[:, used].astype(np.float32)
+    centroids = (corner + np.stack([across, down])[:, used].astype(np.float32) / scale).T
     order = np.argsort(-scale, kind="stable")
     steps = len(used) * ceil(log2(len(used) + 1))
     meter.charge(f32_compare=steps, ram_read=steps, ram_write=steps, loop=steps)
-    return StarList(centroids[order].astype(np.float32), scale[order])
+    return StarList(centroids[order], scale[order])
 
 
-def _join(
-    starts: NDArray[np.intp], stops: NDArray[np.intp], width: int, meter: Meter
-) -> NDArray[np.intp]:
+def _join(starts: Indices, stops: Indices, width: int, meter: Meter) -> Indices:
     """Smallest run of the region of each run (n,): runs touch with their corners too."""
     parents = list(range(len(starts)))
 

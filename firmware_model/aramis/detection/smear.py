@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.detection.regions import Regions
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.mcu.costs import Meter
@@ -53,12 +54,10 @@ _LEAST = 1e-3
 
 def _lags() -> tuple[tuple[frozenset[tuple[int, int]], ...], tuple[tuple[int, int], ...]]:
     """Rows and columns between compared blocks: of each direction, and all without repetition."""
+    reach = range(NEAREST, FARTHEST + 1)
     angles = [pi * number / DIRECTIONS for number in range(DIRECTIONS)]
     directions = tuple(
-        frozenset(
-            (round(far * sin(angle)), round(far * cos(angle)))
-            for far in range(NEAREST, FARTHEST + 1)
-        )
+        frozenset((round(far * sin(angle)), round(far * cos(angle))) for far in reach)
         for angle in angles
     )
     return directions, tuple(sorted(frozenset().union(*directions)))
@@ -82,7 +81,7 @@ def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool
 
     Blocks near the edge of the field do not count.
     """
-    inside: NDArray[np.bool_] = np.all(_blocks(field.mask), axis=(1, 3))
+    inside: Mask = np.all(_blocks(field.mask), axis=(1, 3))
     around = _box(inside.astype(np.float32))
     inside &= around > (2 * SURROUNDINGS + 1) ** 2 - 0.5
     count = int(inside.sum())
@@ -105,9 +104,7 @@ def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool
     return max(directions) - float(np.median(directions)) > ALIKE_SIGMAS * chance
 
 
-def _brightness(
-    picture: NDArray[np.uint8], inside: NDArray[np.bool_], meter: Meter
-) -> NDArray[np.float32]:
+def _brightness(picture: NDArray[np.uint8], inside: Mask, meter: Meter) -> Floats:
     """How much brighter each block is than those around it, in sigmas; 0 outside."""
     sums = _blocks(picture).sum(axis=(1, 3), dtype=np.int32)
     clipped = _clipped(sums.astype(np.float32), inside)
@@ -120,21 +117,20 @@ def _brightness(
     return np.where(inside, _clipped(clipped - level, inside), np.float32(0))
 
 
-def _clipped(values: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _clipped(values: Floats, inside: Mask) -> Floats:
     """Values (rows, columns) less the median, in sigmas of those inside, clipped."""
     low, middle, high = np.percentile(values[inside], (25, 50, 75))
     sigma = max(high - low, _LEAST) / QUARTILES_APART
-    clipped: NDArray[np.float32] = ((values - middle) / sigma).astype(np.float32)
+    clipped: Floats = ((values - middle) / sigma).astype(np.float32)
     return np.clip(clipped, -CLIPPED_SIGMAS, CLIPPED_SIGMAS)
 
 
-def _box(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _box(values: Floats) -> Floats:
     """Sum over the square of `SURROUNDINGS` to all sides of each value (rows, columns)."""
     for axis in (0, 1):
-        size = values.shape[axis]
         sums = np.cumsum(np.insert(values, 0, 0, axis=axis), axis=axis, dtype=np.float64)
-        places = np.arange(size)
-        last = np.minimum(places + SURROUNDINGS + 1, size)
+        places = np.arange(values.shape[axis])
+        last = np.minimum(places + SURROUNDINGS + 1, len(places))
         first = np.maximum(places - SURROUNDINGS, 0)
         values = (sums.take(last, axis) - sums.take(first, axis)).astype(np.float32)
     return values
@@ -146,29 +142,21 @@ def _blocks(pixels: NDArray[Any]) -> NDArray[Any]:
     return pixels[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
 
 
-def _lengths(regions: Regions, weights: NDArray[np.float32], meter: Meter) -> list[float]:
+def _lengths(regions: Regions, weights: Floats, meter: Meter) -> list[float]:
     """Of the largest regions."""
     sizes = np.bincount(regions.labels, minlength=regions.count)
     lengths = []
     for region in np.argsort(-sizes, kind="stable")[:LARGEST]:
         pixels = np.flatnonzero(regions.labels == region)
         lengths.append(_length(regions.rows[pixels], regions.columns[pixels], weights[pixels]))
-        meter.charge(
-            ram_read=3 * len(pixels),
-            f32_convert=3 * len(pixels),
-            f32_mul=8 * len(pixels),
-            f32_add=6 * len(pixels),
-            f32_div=5,
-            f32_sqrt=2,
-            loop=len(pixels),
-        )
+        count = len(pixels)
+        meter.charge(ram_read=3 * count, f32_convert=3 * count, f32_div=5, f32_sqrt=2)
+        meter.charge(f32_mul=8 * count, f32_add=6 * count, loop=count)
     meter.charge(i32_add=len(regions.labels), loop=len(regions.labels) + LARGEST * regions.count)
     return lengths
 
 
-def _length(
-    rows: NDArray[np.intp], columns: NDArray[np.intp], weights: NDArray[np.float32]
-) -> float:
+def _length(rows: Indices, columns: Indices, weights: Floats) -> float:
     """Length of the streak that pixels (n,) with weights make."""
     y, x = (rows - rows[0]).astype(np.float32), (columns - columns[0]).astype(np.float32)
     total = weights.sum()

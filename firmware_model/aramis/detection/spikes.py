@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Mask
 from cubestack.firmware_model.mcu.costs import Meter
 
 WINDOW = 5
@@ -28,9 +29,7 @@ class SpikeRemoval(IntEnum):
     WINDOW = 2
 
 
-def remove_spikes(
-    mask: NDArray[np.bool_], method: SpikeRemoval, needed: int, meter: Meter
-) -> NDArray[np.bool_]:
+def remove_spikes(mask: Mask, method: SpikeRemoval, needed: int, meter: Meter) -> Mask:
     """Which of the bright pixels of a mask (rows, columns) are stars'; phase `spikes`.
 
     ``needed``: bright pixels that a window of 25 must have.
@@ -43,7 +42,7 @@ def remove_spikes(
         return mask
 
 
-def _centre(mask: NDArray[np.bool_], needed: int, meter: Meter) -> NDArray[np.bool_]:
+def _centre(mask: Mask, needed: int, meter: Meter) -> Mask:
     rows, columns = mask.shape
     bright = _sliding(_sliding(mask.astype(np.uint8)).T).T
     present = np.outer(_present(rows), _present(columns))
@@ -51,11 +50,10 @@ def _centre(mask: NDArray[np.bool_], needed: int, meter: Meter) -> NDArray[np.bo
     meter.charge(
         table_byte=looks, i32_add=looks + mask.size, loop=looks + mask.size, ram_write=mask.size
     )
-    enough: NDArray[np.bool_] = WINDOW**2 * bright.astype(np.int32) >= needed * present
-    return enough
+    return WINDOW**2 * bright.astype(np.int32) >= needed * present
 
 
-def _window(mask: NDArray[np.bool_], needed: int, meter: Meter) -> NDArray[np.bool_]:
+def _window(mask: Mask, needed: int, meter: Meter) -> Mask:
     rows, columns = mask.shape
     tops, lefts = np.arange(0, rows, WINDOW), np.arange(0, columns, WINDOW)
     bright = np.add.reduceat(np.add.reduceat(mask, tops, axis=0, dtype=np.int32), lefts, axis=1)
@@ -73,9 +71,8 @@ def _window(mask: NDArray[np.bool_], needed: int, meter: Meter) -> NDArray[np.bo
 
 def _sliding(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Sum of each element and the two before and after it in its column, 0 beyond the ends."""
-    half = WINDOW // 2
     total = values.copy()
-    for step in range(1, half + 1):
+    for step in range(1, WINDOW // 2 + 1):
         total[step:] += values[:-step]
         total[:-step] += values[step:]
     return total
@@ -83,7 +80,6 @@ def _sliding(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _present(count: int) -> NDArray[np.int32]:
     """Lines of a window around each of so many lines that are in the picture."""
-    place = np.arange(count)
-    half = WINDOW // 2
+    place, half = np.arange(count), WINDOW // 2
     lines: NDArray[np.int32] = np.minimum(place, half) + np.minimum(count - 1 - place, half) + 1
     return lines.astype(np.int32)

@@ -10,8 +10,8 @@ to it. The thesis' appendix scores brightness star by star in another way; this 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Indices
 from cubestack.firmware_model.mcu.costs import Meter
 
 #: Corner opposite to side a (1-2), b (2-3) and c (1-3).
@@ -30,27 +30,22 @@ class Assignment:
         other: (3,) the same by the criterion that lost; equal to `order` when both agree.
     """
 
-    scores: NDArray[np.float32]
-    order: NDArray[np.intp]
-    other: NDArray[np.intp]
+    scores: Floats
+    order: Indices
+    other: Indices
 
 
 def assign(
-    brightness: NDArray[np.float32],
-    sides: NDArray[np.float32],
-    v_mag: NDArray[np.float32],
-    catalogue: NDArray[np.float32],
-    meter: Meter,
+    brightness: Floats, sides: Floats, v_mag: Floats, catalogue: Floats, meter: Meter
 ) -> Assignment:
     """Score the stars of a measured triangle against those of the catalogue's.
 
     Measured are the ``brightness`` (3,), in any linear unit, and the ``sides`` (3,) a, b, c; of the
     catalogue's stars the magnitudes (3,) and unit vectors (3, 3) are known.
     """
-    first, second, third = catalogue.astype(np.float32)
-    expected = np.array(
-        [_chord2(first, second), _chord2(second, third), _chord2(first, third)], dtype=np.float32
-    )
+    corners = catalogue.astype(np.float32)
+    x, y, z = (corners[[0, 1, 0]] - corners[[1, 2, 2]]).T
+    expected = x * x + y * y + z * z
     meter.charge(f32_add=15, f32_mul=9, ram_read=9)
     by_brightness = _correspond(-brightness, v_mag)
     by_sides = np.empty(3, dtype=np.intp)
@@ -66,7 +61,7 @@ def assign(
     return Assignment(scores, by_sides, by_brightness)
 
 
-def variation(values: NDArray[np.float32], meter: Meter) -> np.float32:
+def variation(values: Floats, meter: Meter) -> np.float32:
     """Coefficient of variation of three values: sample standard deviation over mean."""
     x, y, z = values.astype(np.float32)
     mean = (x + y + z) / _THREE
@@ -75,13 +70,8 @@ def variation(values: NDArray[np.float32], meter: Meter) -> np.float32:
     return np.float32(np.sqrt(squares / _TWO) / mean) if mean > 0 else np.float32(0)
 
 
-def _correspond(measured: NDArray[np.float32], expected: NDArray[np.float32]) -> NDArray[np.intp]:
+def _correspond(measured: Floats, expected: Floats) -> Indices:
     """For each measured value the expected one of the same rank."""
     found = np.empty(3, dtype=np.intp)
     found[np.argsort(measured, kind="stable")] = np.argsort(expected, kind="stable")
     return found
-
-
-def _chord2(first: NDArray[np.float32], second: NDArray[np.float32]) -> np.float32:
-    x, y, z = first - second
-    return np.float32(x * x + y * y + z * z)

@@ -10,8 +10,8 @@ as the thesis says of Shuster's shortcut; with contradicting ones it moves.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.mcu.costs import Meter
 
 MOST_STEPS = 10
@@ -21,9 +21,7 @@ ROUNDING = np.float32(5e-7)
 _ZERO, _ONE, _TWO, _FOUR = (np.float32(value) for value in (0, 1, 2, 4))
 
 
-def quartic(
-    profile: NDArray[np.float32], meter: Meter
-) -> tuple[np.float32, np.float32, np.float32]:
+def quartic(profile: Floats, meter: Meter) -> tuple[np.float32, np.float32, np.float32]:
     """Coefficients of the square, the linear and the constant term of equation 6.8."""
     matrix = profile + profile.T
     trace = profile[0, 0] + profile[1, 1] + profile[2, 2]
@@ -42,7 +40,7 @@ def quartic(
     return -(a + b), -c, a * b + c * trace - d
 
 
-def largest_eigenvalue(profile: NDArray[np.float32], meter: Meter) -> np.float32:
+def largest_eigenvalue(profile: Floats, meter: Meter) -> np.float32:
     """Root of the quartic next to 1, for a profile (3, 3) of weights that add up to 1."""
     square, linear, constant = quartic(profile, meter)
     root = _ONE

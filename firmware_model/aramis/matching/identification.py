@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.assignment import assign
@@ -37,7 +37,7 @@ def identify(
     profile: Profile,
     database: Database,
     meter: Meter,
-    hint: NDArray[np.float32] | None = None,
+    hint: Floats | None = None,
 ) -> Solution:
     """Identify measured stars, the brightest first, and solve the attitude.
 
@@ -67,25 +67,23 @@ class _Search:
     """One picture's identification."""
 
     measured: StarList
-    vectors: NDArray[np.float32]
+    vectors: Floats
     field: Field
     profile: Profile
     database: Database
-    hint: NDArray[np.float32] | None
-    faces: NDArray[np.bool_] | None
+    hint: Floats | None
+    faces: Mask | None
     meter: Meter
 
     def published(self) -> Solution:
         """The three brightest stars, and nothing that contradicts."""
         main = (0, 1, 2)
         match = self._match(main)
-        counts = {"candidates": len(match.candidates), "pivots": match.pivots, "triples": 1}
-        reason = match.end
-        if match.end is Reason.SEVERAL:
-            several = unsolved(reason, self.measured, **counts)
-            return replace(several, outcome=MeasurementOutcome.AMBIGUOUS)
+        counts = match.counts | {"triples": 1}
         if match.end is not Reason.UNIQUE:
-            return unsolved(reason, self.measured, **counts)
+            several = match.end is Reason.SEVERAL
+            outcome = MeasurementOutcome.AMBIGUOUS if several else MeasurementOutcome.NONE
+            return replace(unsolved(match.end, self.measured, **counts), outcome=outcome)
         choices = self._identities(main, match, int(match.candidates[0]))
         if self.hint is not None:
             choices = [choice for choice in choices if self._sides_agree(main, choice)]
@@ -97,14 +95,13 @@ class _Search:
             return unsolved(Reason.DEGENERATE, self.measured, **counts)
         if self._far_from_hint(quaternion):
             return unsolved(Reason.FAR_FROM_HINT, self.measured, **counts)
-        return self._solution(reason, quaternion, np.array(main), identities, **counts)
+        return self._solution(match.end, quaternion, np.array(main), identities, **counts)
 
     def verified(self) -> Solution:
         """Triples until the attitude of one is confirmed."""
         hypotheses = triples = 0
         reason = None
-        for main in self._triples():
-            triples += 1
+        for triples, main in enumerate(self._triples(), 1):
             match = self._match(main)
             if len(match.candidates):
                 reason = Reason.UNCONFIRMED
@@ -118,21 +115,14 @@ class _Search:
                     if quaternion is None or self._far_from_hint(quaternion):
                         continue
                     found = self._confirm(quaternion, hypotheses)
-                    if found is not None:
-                        quaternion, stars, identities, expected = found
-                        straight = self._at_middle_row(quaternion, stars, identities)
-                        if straight is None:
-                            return unsolved(Reason.SMEAR, self.measured)
-                        return self._solution(
-                            Reason.CONFIRMED,
-                            straight,
-                            stars,
-                            identities,
-                            candidates=len(match.candidates),
-                            pivots=match.pivots,
-                            triples=triples,
-                            expected=expected,
-                        )
+                    if found is None:
+                        continue
+                    quaternion, stars, identities, expected = found
+                    straight = self._at_middle_row(quaternion, stars, identities)
+                    if straight is None:
+                        return unsolved(Reason.SMEAR, self.measured)
+                    counts = match.counts | {"triples": triples, "expected": expected}
+                    return self._solution(Reason.CONFIRMED, straight, stars, identities, **counts)
         return unsolved(reason or Reason.TOO_FEW_STARS, self.measured, triples=triples)
 
     def _triples(self) -> Iterator[tuple[int, int, int]]:
@@ -154,9 +144,7 @@ class _Search:
             self.profile.candidates if self.profile.verify else 1,
         )
 
-    def _identities(
-        self, main: tuple[int, int, int], match: Match, triangle: int
-    ) -> list[NDArray[np.intp]]:
+    def _identities(self, main: tuple[int, int, int], match: Match, triangle: int) -> list[Indices]:
         """Star of the database for each of the three, by the score; then by the other criterion."""
         assert match.main is not None
         database, stars = self.database, self.database.stars[triangle].astype(np.intp)
@@ -168,12 +156,10 @@ class _Search:
                 database.vectors[stars],
                 self.meter,
             )
-        orders = [found.order]
-        if (found.order != found.other).any():
-            orders.append(found.other)
-        return [stars[order] for order in orders]
+        differ = (found.order != found.other).any()
+        return [stars[order] for order in (found.order, found.other)[: 1 + differ]]
 
-    def _sides_agree(self, main: tuple[int, int, int], identities: NDArray[np.intp]) -> bool:
+    def _sides_agree(self, main: tuple[int, int, int], identities: Indices) -> bool:
         with self.meter.phase("verification"):
             return sides_agree(
                 self.vectors[list(main)],
@@ -184,11 +170,11 @@ class _Search:
 
     def _attitude(
         self,
-        measured: NDArray[np.intp],
-        identities: NDArray[np.intp],
-        vectors: NDArray[np.float32] | None = None,
-        weights: NDArray[np.float32] | None = None,
-    ) -> NDArray[np.float32] | None:
+        measured: Indices,
+        identities: Indices,
+        vectors: Floats | None = None,
+        weights: Floats | None = None,
+    ) -> Floats | None:
         """Of identified stars; by default their own vectors, all of the same weight."""
         body = self.vectors[measured] if vectors is None else vectors
         reference = self.database.vectors[identities]
@@ -200,7 +186,7 @@ class _Search:
             except AttitudeError:
                 return None
 
-    def _far_from_hint(self, quaternion: NDArray[np.float32]) -> bool:
+    def _far_from_hint(self, quaternion: Floats) -> bool:
         if self.hint is None:
             return False
         with self.meter.phase("faces"):
@@ -210,8 +196,8 @@ class _Search:
         return not np.dot(boresight, self.hint.astype(np.float32)) >= np.float32(limit)
 
     def _confirm(
-        self, quaternion: NDArray[np.float32], hypotheses: int
-    ) -> tuple[NDArray[np.float32], NDArray[np.intp], NDArray[np.intp], int] | None:
+        self, quaternion: Floats, hypotheses: int
+    ) -> tuple[Floats, Indices, Indices, int] | None:
         """Confirmed attitude of all stars that agree, those stars, and how many were expected."""
         for _ in range(2):
             found = confirm(
@@ -223,9 +209,8 @@ class _Search:
                 hypotheses,
                 self.meter,
             )
-            if found.chance > self.profile.largest_chance:
-                return None
-            if found.spread_rad < self.profile.spread_rad:
+            close = found.spread_rad < self.profile.spread_rad
+            if close or found.chance > self.profile.largest_chance:
                 return None
             refined = self._attitude(found.measured, found.stars)
             if refined is None:
@@ -234,8 +219,8 @@ class _Search:
         return quaternion, found.measured, found.stars, found.expected
 
     def _at_middle_row(
-        self, quaternion: NDArray[np.float32], measured: NDArray[np.intp], stars: NDArray[np.intp]
-    ) -> NDArray[np.float32] | None:
+        self, quaternion: Floats, measured: Indices, stars: Indices
+    ) -> Floats | None:
         """The attitude at one instant, when stars moved; None when it can't be told well enough."""
         still = self.measured.smear_px <= self.profile.smear_px or self.measured.skew_px <= 0
         if still or len(measured) < FEWEST:
@@ -251,17 +236,17 @@ class _Search:
                 self.measured.skew_px * self.field.scale[1],
                 self.meter,
             )
-        moved = self.measured.skew_px > self.profile.moved_px
-        if moved and sigma_rad > self.profile.motion_sigma_rad:
+        doubtful = sigma_rad > self.profile.motion_sigma_rad
+        if doubtful and self.measured.skew_px > self.profile.moved_px:
             return None
         return self._attitude(measured, stars, straight, weights)
 
     def _solution(
         self,
         reason: Reason,
-        quaternion: NDArray[np.float32],
-        measured: NDArray[np.intp],
-        identities: NDArray[np.intp],
+        quaternion: Floats,
+        measured: Indices,
+        identities: Indices,
         **counts: int,
     ) -> Solution:
         stars = np.full(len(self.measured), NONE, dtype=np.int32)

@@ -14,8 +14,8 @@ count less, the more so the worse: a weight of 1 / (1 + (distance / twice the me
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.mcu.costs import Meter
 
 FEWEST = 5
@@ -38,12 +38,8 @@ _ONE = np.float32(1)
 
 
 def at_middle_row(
-    vectors: NDArray[np.float32],
-    predicted: NDArray[np.float32],
-    heights: NDArray[np.float32],
-    moved_rad: float,
-    meter: Meter,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
+    vectors: Floats, predicted: Floats, heights: Floats, moved_rad: float, meter: Meter
+) -> tuple[Floats, Floats, float]:
     """Directions as the middle row's exposure would have measured them.
 
     Args:
@@ -75,7 +71,7 @@ def at_middle_row(
         meter.charge(f32_div=6 + 2 * count, f32_sqrt=6 + count, f32_compare=count * 4)
     turns = heights[:, None] * found[3:]
     meter.charge(f32_mul=9 * count, f32_add=6 * count, loop=count)
-    straight: NDArray[np.float32] = vectors - np.cross(turns, vectors)
+    straight: Floats = vectors - np.cross(turns, vectors)
     left = apart - design @ found
     spare = max(2 * float(weights.sum()) - 3, 1)  # the turn is held by its stiffness
     variance = max(float(weights @ np.sum(left * left, axis=1)) / spare, float(_FLOOR) ** 2)
@@ -84,7 +80,7 @@ def at_middle_row(
     return straight, weights, sigma
 
 
-def _design(predicted: NDArray[np.float32], heights: NDArray[np.float32]) -> NDArray[np.float32]:
+def _design(predicted: Floats, heights: Floats) -> Floats:
     """How vectors (n, 3) follow `a` and `b`: the matrix (n, 3, 6) of (a + u b) x v."""
     cross = np.zeros((len(predicted), 3, 3), dtype=np.float32)
     x, y, z = predicted.T
@@ -93,9 +89,9 @@ def _design(predicted: NDArray[np.float32], heights: NDArray[np.float32]) -> NDA
     return np.concatenate([cross, heights[:, None, None] * cross], axis=2)
 
 
-def _weights(apart: NDArray[np.float32]) -> NDArray[np.float32]:
+def _weights(apart: Floats) -> Floats:
     """(n,) weights of stars that are left (n, 3) apart from where they should be."""
     distances = np.sqrt(np.sum(apart * apart, axis=1))
     typical = 2 * np.maximum(np.median(distances), _FLOOR)
-    weights: NDArray[np.float32] = _ONE / (_ONE + (distances / typical) ** 2)
+    weights: Floats = _ONE / (_ONE + (distances / typical) ** 2)
     return weights

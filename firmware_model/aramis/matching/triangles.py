@@ -10,8 +10,8 @@ the derivative of the area by c is (u1 + u2 + u3 - u4) / 4A, and the three deriv
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.mcu.costs import Meter
 
 _HALF, _FOUR = np.float32(0.5), np.float32(4)
@@ -29,23 +29,22 @@ class Triangle:
         area_sigma, moment_sigma: standard deviations that the directions' noise gives.
     """
 
-    sides: NDArray[np.float32]
+    sides: Floats
     area: np.float32
     moment: np.float32
     area_sigma: np.float32
     moment_sigma: np.float32
 
 
-def measure_triangle(
-    vectors: NDArray[np.float32], sigma_rad: float, meter: Meter
-) -> Triangle | None:
+def measure_triangle(vectors: Floats, sigma_rad: float, meter: Meter) -> Triangle | None:
     """Measure the triangle of three unit vectors (3, 3); None when they lie on a line.
 
     ``sigma_rad`` is the standard deviation of each across the line of sight, per axis.
     """
-    b1, b2, b3 = vectors.astype(np.float32)
-    edges = (b1 - b2, b2 - b3, b1 - b3)
-    a, b, c = (_length(edge) for edge in edges)
+    corners = vectors.astype(np.float32)
+    edges = corners[[0, 1, 0]] - corners[[1, 2, 2]]
+    x, y, z = edges.T
+    a, b, c = sides = np.sqrt(x * x + y * y + z * z)
     meter.charge(f32_add=9 + 6, f32_mul=9, f32_sqrt=3, ram_read=9, call=1)
     half = _HALF * (a + b + c)
     sa, sb, sc = half - a, half - b, half - c
@@ -60,41 +59,23 @@ def measure_triangle(
     meter.charge(f32_sqrt=1, f32_add=2, f32_mul=4, f32_div=1)
 
     # Derivatives by the sides, then by the directions (equations 5.14, 5.18 to 5.20).
-    by_side = (
-        (u1 - u2 + u3 + u4) / (_FOUR * area),
-        (u1 + u2 - u3 + u4) / (_FOUR * area),
-        (u1 + u2 + u3 - u4) / (_FOUR * area),
-    )
-    by_area = squares / _THIRTY_SIX
-    moment_by_side = tuple(
-        area * side / _EIGHTEEN + by_area * slope
-        for side, slope in zip((a, b, c), by_side, strict=True)
-    )
-    units = tuple(edge / side for edge, side in zip(edges, (a, b, c), strict=True))
+    by_side = np.array([u1 - u2 + u3 + u4, u1 + u2 - u3 + u4, u1 + u2 + u3 - u4]) / (_FOUR * area)
+    moment_by_side = area * sides / _EIGHTEEN + squares / _THIRTY_SIX * by_side
+    units = edges / sides[:, None]
     meter.charge(f32_add=9 + 3, f32_mul=3 + 6, f32_div=3 + 1 + 3 + 9)
     sigma = np.float32(sigma_rad)
     return Triangle(
-        np.array([a, b, c], dtype=np.float32),
+        sides,
         area,
         moment,
-        sigma * _gain(by_side, units, (b1, b2, b3), meter),
-        sigma * _gain(moment_by_side, units, (b1, b2, b3), meter),
+        sigma * _gain(by_side, units, corners, meter),
+        sigma * _gain(moment_by_side, units, corners, meter),
     )
 
 
-def _length(vector: NDArray[np.float32]) -> np.float32:
-    x, y, z = vector
-    return np.float32(np.sqrt(x * x + y * y + z * z))
-
-
-def _gain(
-    slopes: tuple[np.float32, ...],
-    units: tuple[NDArray[np.float32], ...],
-    directions: tuple[NDArray[np.float32], ...],
-    meter: Meter,
-) -> np.float32:
+def _gain(slopes: Floats, units: Floats, directions: Floats, meter: Meter) -> np.float32:
     """Square root of H R H^T for sigma 1: each R is a projector across its line of sight."""
-    da, db, dc = (slope * unit for slope, unit in zip(slopes, units, strict=True))
+    da, db, dc = slopes[:, None] * units
     total = np.float32(0)
     for h, direction in zip((da + dc, db - da, -db - dc), directions, strict=True):
         along = h[0] * direction[0] + h[1] * direction[1] + h[2] * direction[2]

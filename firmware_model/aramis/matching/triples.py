@@ -16,6 +16,7 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
 from cubestack.firmware_model.interface.aramis import Reason
@@ -32,10 +33,9 @@ _FIRST, _SECOND = [0, 0, 1], [1, 2, 2]
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Result for one main triangle.
+    """How the search for one main triangle ended.
 
     Attributes:
-        end: how it ended.
         main: the main triangle; None when DEGENERATE.
         candidates: triangles of the database that are left, uint32; empty when there is none.
         pivots: pivot triangles that were used.
@@ -46,25 +46,28 @@ class Match:
     candidates: NDArray[np.uint32]
     pivots: int
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Candidates and pivots, as a solution counts them."""
+        return {"candidates": len(self.candidates), "pivots": self.pivots}
+
 
 _NOTHING = np.zeros(0, dtype=np.uint32)
 
 
 def find_triangles(
-    triangle: Triangle, database: Database, faces: NDArray[np.bool_] | None, meter: Meter
+    triangle: Triangle, database: Database, faces: Mask | None, meter: Meter
 ) -> NDArray[np.uint32]:
     """Triangles of the database within the bounds of a measured one, in the moments' order.
 
     Only those of ``faces`` (f,) count; None: all.
     """
-    reach = BOUND_SIGMAS * triangle.area_sigma
-    areas = database.area_index.find(
-        database.areas, triangle.area - reach, triangle.area + reach, meter
-    )
-    reach = BOUND_SIGMAS * triangle.moment_sigma
-    moments = database.moment_index.find(
-        database.moments, triangle.moment - reach, triangle.moment + reach, meter
-    )
+    area, area_reach = triangle.area, BOUND_SIGMAS * triangle.area_sigma
+    bounds = area - area_reach, area + area_reach
+    areas = database.area_index.find(database.areas, *bounds, meter)
+    moment, moment_reach = triangle.moment, BOUND_SIGMAS * triangle.moment_sigma
+    bounds = moment - moment_reach, moment + moment_reach
+    moments = database.moment_index.find(database.moments, *bounds, meter)
     meter.charge(f32_mul=2, f32_add=4)
     # Triangles are in the order of their area, so the intersection is a comparison of indices.
     found = database.moment_triangles[moments.start : moments.stop]
@@ -78,12 +81,12 @@ def find_triangles(
 
 
 def match_triple(
-    vectors: NDArray[np.float32],
+    vectors: Floats,
     main: Sequence[int],
     pivots: Sequence[int],
     sigma_rad: float,
     database: Database,
-    faces: NDArray[np.bool_] | None,
+    faces: Mask | None,
     meter: Meter,
     enough: int = 1,
 ) -> Match:
@@ -92,10 +95,9 @@ def match_triple(
     Phases: `triangles`, `search` and `pivoting`.
 
     Args:
-        vectors: (n, 3) unit vectors of the stars in camera axes.
+        vectors: (n, 3) unit vectors of the stars in camera axes, with noise ``sigma_rad`` per axis.
         main: the three stars of the main triangle, the brightest first.
         pivots: further stars, at most three are used.
-        sigma_rad: noise of the directions per axis.
         faces: (f,) which faces count; None: all.
         enough: no pivot is needed when so few candidates are left; 1 as published.
     """
@@ -126,24 +128,17 @@ def match_triple(
     return Match(end, triangle, left, used)
 
 
-def _share_pair(
-    triangles: NDArray[np.uint16], others: NDArray[np.uint16], meter: Meter
-) -> NDArray[np.bool_]:
+def _share_pair(triangles: NDArray[np.uint16], others: NDArray[np.uint16], meter: Meter) -> Mask:
     """Which triangles (n,) of star triples (n, 3) share two stars with one of others (m, 3).
 
     The pairs of the others are sorted as 32-bit words, and each pair of this one is searched there.
     """
     wanted, listed = _pairs(triangles), _pairs(others)
-    count = listed.size
-    depth = ceil(log2(count + 1))
-    steps = (count + wanted.size) * depth
-    meter.charge(
-        ram_read=listed.size + wanted.size + steps,
-        ram_write=listed.size + count * depth,
-        i32_add=2 * (listed.size + wanted.size) + steps,
-        loop=steps,
-    )
-    shared: NDArray[np.bool_] = np.isin(wanted, listed)
+    words, depth = listed.size + wanted.size, ceil(log2(listed.size + 1))
+    steps = words * depth
+    meter.charge(ram_read=words + steps, ram_write=listed.size * (1 + depth))
+    meter.charge(i32_add=2 * words + steps, loop=steps)
+    shared: Mask = np.isin(wanted, listed)
     return shared[:, 0] | shared[:, 1] | shared[:, 2]
 
 

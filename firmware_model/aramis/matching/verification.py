@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.arrays import Floats, Indices
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.attitude.geometry import turned
@@ -34,16 +34,14 @@ class Confirmation:
         spread_rad: root mean square distance of the measured stars from their middle.
     """
 
-    measured: NDArray[np.intp]
-    stars: NDArray[np.intp]
+    measured: Indices
+    stars: Indices
     expected: int
     chance: float
     spread_rad: float
 
 
-def sides_agree(
-    vectors: NDArray[np.float32], catalogue: NDArray[np.float32], tolerance: float, meter: Meter
-) -> bool:
+def sides_agree(vectors: Floats, catalogue: Floats, tolerance: float, meter: Meter) -> bool:
     """Whether two triangles of unit vectors (3, 3) agree within `tolerance`.
 
     Compared are the sides, and the volume of the three vectors, whose sign tells a triangle from
@@ -58,16 +56,17 @@ def sides_agree(
     return bool(abs(_volume(vectors) - _volume(catalogue)) <= np.float32(tolerance))
 
 
-def _volume(vectors: NDArray[np.float32]) -> np.float32:
+def _volume(vectors: Floats) -> np.float32:
     """Triple product of three vectors (3, 3)."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vectors
-    across = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-    return np.float32(across)
+    return np.float32(
+        ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    )
 
 
 def confirm(
-    quaternion: NDArray[np.float32],
-    vectors: NDArray[np.float32],
+    quaternion: Floats,
+    vectors: Floats,
     database: Database,
     field: Field,
     tolerance_rad: float,
@@ -103,11 +102,11 @@ def confirm(
         if found > 0:
             chance *= comb(further, found) * reach**found
             meter.charge(f32_mul=3 * found + 3, f32_div=found + 1)
-        spread = _spread(vectors[measured], meter)
-        return Confirmation(measured, seen[stars], len(seen), chance, spread)
+        spread_rad = _spread(vectors[measured], meter)
+        return Confirmation(measured, seen[stars], len(seen), chance, spread_rad)
 
 
-def _spread(vectors: NDArray[np.float32], meter: Meter) -> float:
+def _spread(vectors: Floats, meter: Meter) -> float:
     """Root mean square distance of unit vectors (n, 3) from their mean, 0 without any."""
     count = len(vectors)
     if count == 0:
@@ -117,22 +116,16 @@ def _spread(vectors: NDArray[np.float32], meter: Meter) -> float:
     return float(np.sqrt(np.sum(apart**2) / np.float32(count)))
 
 
-def _nearest(
-    chord2: NDArray[np.float32], limit: np.float32
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _nearest(chord2: Floats, limit: np.float32) -> tuple[Indices, Indices]:
     """Measured stars and rows of `chord2` (stars, measured) that are nearest to each other."""
     if chord2.size == 0:
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    rows = np.arange(len(chord2))
-    nearest = chord2.argmin(axis=1)
-    mutual = chord2.argmin(axis=0)[nearest] == rows
-    kept = mutual & (chord2[rows, nearest] <= limit)
+    rows, nearest = np.arange(len(chord2)), chord2.argmin(axis=1)
+    kept = (chord2.argmin(axis=0)[nearest] == rows) & (chord2[rows, nearest] <= limit)
     return nearest[kept], rows[kept]
 
 
-def _in_field(
-    stars: NDArray[np.float32], turn: NDArray[np.float32], field: Field, meter: Meter
-) -> NDArray[np.intp]:
+def _in_field(stars: Floats, turn: Floats, field: Field, meter: Meter) -> Indices:
     """Stars (n, 3) that a direction cosine matrix puts into the field: those near the boresight
     first, by one product each, then by their place in the picture."""
     count = len(stars)
