@@ -1,7 +1,7 @@
 """What every board has: a processor with its program, supplies, serial lines and an I2C bus."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Protocol
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
-from cubestack.emulator.faults.sites import CameraSite, Sites
+from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.direct import DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
@@ -161,29 +161,10 @@ class Board(ABC):
         if self.engine is not None:
             self.engine.close()
 
-    @abstractmethod
     def _sites(self) -> Sites:
-        """Where faults can hit."""
-
-    def _common_sites(
-        self,
-        *,
-        controls: tuple[str, ...] = (),
-        cameras: Mapping[str, CameraSite] | None = None,
-        memories: Mapping[str, NDArray[np.uint8]] | None = None,
-    ) -> Sites:
-        """What all boards offer to faults, and what this one has beside it; see ``Sites``."""
-        return Sites(
-            self.kernel,
-            self.processor,
-            {line.target: line.uart for line in self.lines},
-            {"i2c": self.i2c_bus},
-            self.power,
-            self.engine,
-            controls,
-            cameras or {},
-            memories or {},
-        )
+        """Where faults can hit: here what all boards have."""
+        uarts, buses = {line.target: line.uart for line in self.lines}, {"i2c": self.i2c_bus}
+        return Sites(self.kernel, self.processor, uarts, buses, self.power, self.engine)
 
     def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:
         """Lead the satellite's serial line and I2C bus to what ``link`` finds in the program."""
@@ -199,13 +180,8 @@ class Board(ABC):
         suffix: str = "",
     ) -> Uart:
         """One more of ``lines``, which leads to what ``link`` finds in the program that runs."""
-        uart = Uart(
-            self.kernel,
-            baud,
-            lambda byte: link().uart_byte(byte),
-            lambda: link().uart_silence(),
-            silence_bytes=SILENCE_BYTES,
-        )
+        deliver, silent = lambda byte: link().uart_byte(byte), lambda: link().uart_silence()
+        uart = Uart(self.kernel, baud, deliver, silent, silence_bytes=SILENCE_BYTES)
         self.lines += (SerialLine(name, title, suffix, uart),)
         return uart
 

@@ -5,7 +5,6 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.bus.i2c import I2cBus
-from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import PowerTable
@@ -52,10 +51,9 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
 
         Args:
             scene: what it sees.
-            seed: of everything random but the scene: memories at power-up among it.
             engine: see ``make_engine``; ValueError for any but "auto" without an FPGA.
             baud: of the satellite's UART; None for the interface's.
-            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
+            seed, kernel, i2c_bus: see ``Board``.
         """
         super().__init__(self.supplies, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.scene = scene
@@ -105,6 +103,3 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
             known = self.scene_type.__name__
             raise TypeError(f"{self.interface.name} sees a {known}, not {scene!r}")
         self._scene: SceneT = scene
-
-    def _sites(self) -> Sites:
-        return self._common_sites()

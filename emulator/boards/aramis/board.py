@@ -6,6 +6,7 @@ flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
 """
 
 from collections import deque
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -79,10 +80,9 @@ class AramisBoard(Board):
         Args:
             scene: what the camera sees.
             catalogue: stars and triangles in flash; None leaves it erased.
-            seed: of everything random but the scene: memory at power-up, hot pixels, bit flips.
+            seed, kernel, i2c_bus: see ``Board``.
             engine: there is no FPGA: ValueError for anything but "auto".
             baud: of the satellite's UART.
-            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
             noise: which terms of noise the sensor has, all unless given.
             i2c_address: 7-bit address on the satellite's bus.
         """
@@ -170,7 +170,8 @@ class AramisBoard(Board):
 
     def _sites(self) -> Sites:
         # Its camera and processor have no faults of their own.
-        return self._common_sites(memories={"sdram": self.sdram, "flash": self.catalogue_flash})
+        memories = {"sdram": self.sdram, "flash": self.catalogue_flash}
+        return replace(super()._sites(), memories=memories)
 
     def _frame_ended(self, end: FrameEnd) -> None:
         if end is FrameEnd.STORED and self.ppi.stored is not None:
@@ -194,17 +195,10 @@ class _Blackfin(NodePeripherals):
 
     def __init__(self, board: AramisBoard) -> None:
         super().__init__(board)
-        self._ppi = board.ppi
-        self.sdram = board.sdram
-        self.catalogue_flash = board.catalogue_flash
+        self.start_capture, self.stop_capture = board.ppi.start, board.ppi.stop
+        self.sdram, self.catalogue_flash = board.sdram, board.catalogue_flash
         self.flash = FlashStore()
         self.reset_cause = int(ResetCause.POWER_ON)
-
-    def start_capture(self, target: NDArray[np.uint8]) -> None:
-        self._ppi.start(target)
-
-    def stop_capture(self) -> None:
-        self._ppi.stop()
 
     def switch_camera(self, on: bool) -> None:
         self._board.power.switch("camera", on)

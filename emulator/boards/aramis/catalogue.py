@@ -15,6 +15,7 @@ cross-identification with the Harvard Revised numbers that the thesis reports.
 import hashlib
 import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.cxxrtl.build import cache_folder
 from cubestack.emulator.scene.hipparcos import CATALOGUE_SHA256, DEFAULT_EPOCH, Sky, load_sky
+from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue import database, geodesic, kvector
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.geodesic import geodesic_sphere
@@ -68,18 +70,8 @@ class CatalogueParameters:
 
     def __post_init__(self) -> None:
         """Refuse what gives no database."""
-        bounds = {
-            "fov_deg": (1, 60),
-            "stars_per_field": (3, 50),
-            "mag_limit": (0, 7.5),
-            "step_deg": (0.25, 10),
-            "epoch": (1800, 2200),
-            "longest_side_deg": (1, 60),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise ValueError(f"{name} must be {low} to {high}, not {value}")
+        check_bounds(self, fov_deg=(1, 60), stars_per_field=(3, 50), mag_limit=(0, 7.5))
+        check_bounds(self, step_deg=(0.25, 10), epoch=(1800, 2200), longest_side_deg=(1, 60))
 
     @property
     def side_deg(self) -> float:
@@ -105,7 +97,7 @@ def select_stars(
     declination = np.arcsin(np.clip(vectors[:, 2], -1, 1))
     radius = np.radians(parameters.fov_deg / 2)
     kept = np.zeros(len(bright), dtype=bool)
-    rows = _declinations(parameters.step_deg)
+    rows = np.radians(np.append(np.arange(-90.0, 90.0, parameters.step_deg), 90.0))
     for row in progress(range(len(rows)), len(rows), "scanning the sky"):
         band = np.flatnonzero(np.abs(declination - rows[row]) <= radius + 1e-9)
         inside = _fields(rows[row], parameters.step_deg) @ vectors[band].T >= np.cos(radius)
@@ -129,14 +121,12 @@ def build_database(
         raise ValueError(f"{len(chosen)} stars are more than {MOST_STARS}; {ADVICE}")
     vectors = sky.vectors[chosen]
     triples = _triples(vectors, np.radians(parameters.side_deg), progress)
-    corners = vectors[triples]
-    areas, moments = _properties(corners)
-    used = areas > 0
-    triples, corners, areas, moments = triples[used], corners[used], areas[used], moments[used]
-    if len(triples) == 0:
-        raise ValueError(f"{len(chosen)} stars give no triangle; {ADVICE}")
+    areas, moments = _properties(vectors[triples])
     order = np.argsort(areas, kind="stable")
-    triples, corners, areas, moments = triples[order], corners[order], areas[order], moments[order]
+    order = order[areas[order] > 0]
+    if len(order) == 0:
+        raise ValueError(f"{len(chosen)} stars give no triangle; {ADVICE}")
+    triples, areas, moments = triples[order], areas[order], moments[order]
     by_moment = np.argsort(moments, kind="stable")
     sphere = geodesic_sphere()
     return Database(
@@ -146,7 +136,7 @@ def build_database(
         vectors=vectors.astype(np.float32),
         v_mag=sky.v_mag[chosen].astype(np.float32),
         stars=triples.astype(np.uint16),
-        faces=_faces(corners, sphere.centres.astype(np.float64)),
+        faces=_faces(vectors[triples], sphere.centres.astype(np.float64)),
         areas=areas,
         moments=moments[by_moment],
         moment_triangles=by_moment.astype(np.uint32),
@@ -181,19 +171,15 @@ def cached_database(
     parameters = parameters or CatalogueParameters()
     folder = cache_folder() if folder is None else folder
     path = folder / f"aramis-{_key(parameters)}.bin"
-    try:
+    with suppress(OSError, DatabaseError):
         return Database.unpack(path.read_bytes())
-    except (OSError, DatabaseError):
-        pass
     built = build_database(parameters, progress)
-    try:
+    with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             image = Path(scratch) / path.name
             image.write_bytes(built.pack())
             image.replace(path)
-    except OSError:
-        pass
     return built
 
 
@@ -206,23 +192,11 @@ def _key(parameters: CatalogueParameters) -> str:
     return digest.hexdigest()[:24]
 
 
-def _declinations(step_deg: float) -> NDArray[np.float64]:
-    declinations: NDArray[np.float64] = np.append(np.arange(-90.0, 90.0, step_deg), 90.0)
-    return np.radians(declinations)
-
-
 def _fields(declination: float, step_deg: float) -> NDArray[np.float64]:
     """Middles (k, 3) of the fields of one declination in rad."""
-    ascension = np.radians(np.arange(0.0, 360.0, step_deg))
-    across = np.cos(declination)
-    return np.stack(
-        [
-            across * np.cos(ascension),
-            across * np.sin(ascension),
-            np.full_like(ascension, np.sin(declination)),
-        ],
-        axis=1,
-    )
+    ascension, across = np.radians(np.arange(0.0, 360.0, step_deg)), np.cos(declination)
+    up = np.full_like(ascension, np.sin(declination))
+    return np.stack([across * np.cos(ascension), across * np.sin(ascension), up], axis=1)
 
 
 def _triples(
@@ -245,10 +219,9 @@ def _triples(
 
 def _properties(corners: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Areas and polar moments (m,) of triangles (m, 3, 3): equations 5.7 and 5.17."""
-    first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
-    a = np.linalg.norm(first - second, axis=1)
-    b = np.linalg.norm(second - third, axis=1)
-    c = np.linalg.norm(first - third, axis=1)
+    first, second, third = corners.transpose(1, 0, 2)
+    edges = first - second, second - third, first - third
+    a, b, c = (np.linalg.norm(edge, axis=1) for edge in edges)
     half = (a + b + c) / 2
     areas = np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 0))
     return areas.astype(np.float32), (areas * (a**2 + b**2 + c**2) / 36).astype(np.float32)

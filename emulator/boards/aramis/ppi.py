@@ -11,35 +11,16 @@ ends: nobody looks at it before.
 """
 
 from collections.abc import Callable, Generator
-from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import simpy
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.common.stream import StreamSegment
+from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.aramis.hardware import FrameEnd
-
-
-class PixelLines(Protocol):
-    """A camera's pixel lines."""
-
-    on_change: Callable[[], None]
-    active_columns: int
-    line_clocks: int
-
-    @property
-    def period(self) -> Fraction:
-        """Time of one pixel clock in ps."""
-
-    def segment_at(self, time_ps: int) -> StreamSegment | None:
-        """What is sent at ``time_ps``; None without a clock."""
-
-    def frame_from(self, time_ps: int) -> RollingShutter | None:
-        """Exposure of the first frame whose read-out starts at ``time_ps`` or later."""
 
 
 class Ppi:
@@ -50,7 +31,7 @@ class Ppi:
         stored: exposure of the frame that was stored last; for whoever compares results.
     """
 
-    def __init__(self, env: Kernel, camera: PixelLines) -> None:
+    def __init__(self, env: Kernel, camera: Mt9m001) -> None:
         """Connect to ``camera``'s lines; nothing is taken before ``start``."""
         self._env = env
         self._camera = camera
@@ -84,10 +65,8 @@ class Ppi:
     def _take(self, run: int, target: NDArray[np.uint8]) -> Generator[simpy.Event, Any, None]:
         rows, columns = target.shape
         pieces: list[NDArray[np.uint8]] = []
-        taken = 0
-        wrong_lines = False
+        taken, wrong_lines, shutter = 0, False, None
         level = 1  # until it was seen low
-        shutter = None
         while run == self._run:
             segment = self._camera.segment_at(self._env.now)
             if segment is None:
@@ -102,10 +81,10 @@ class Ppi:
             if collecting and not level:
                 self._end(run, FrameEnd.TOO_SHORT)
                 return
-            end_ps = self._end_ps(segment)
-            lines = min(segment.rows, rows - taken) if collecting else 0
-            if lines and taken + lines == rows:
-                end_ps = self._last_pixel_ps(segment, lines)
+            lines, clocks = min(segment.rows, rows - taken) if collecting else 0, segment.clocks
+            if lines and taken + lines == rows:  # until the last line's last pixel
+                clocks = (lines - 1) * self._camera.line_clocks + self._camera.active_columns
+            end_ps = int(segment.start_ps + clocks * self._camera.period)
             if (yield from self._until(end_ps)) and lines:
                 assert segment.pixels is not None
                 picture = segment.pixels()[:lines]
@@ -125,14 +104,6 @@ class Ppi:
         yield simpy.AnyOf(self._env, [timeout, changed])
         return not changed.triggered or self._env.now >= end_ps
 
-    def _end_ps(self, segment: StreamSegment) -> int:
-        return int(segment.start_ps + segment.clocks * self._camera.period)
-
-    def _last_pixel_ps(self, segment: StreamSegment, lines: int) -> int:
-        """When the last pixel of the segment's line ``lines`` - 1 has come."""
-        clocks = (lines - 1) * self._camera.line_clocks + self._camera.active_columns
-        return int(segment.start_ps + clocks * self._camera.period)
-
     def _end(self, run: int, end: FrameEnd) -> None:
         if run == self._run:
             self._run += 1
@@ -141,8 +112,7 @@ class Ppi:
 
 def _store(pieces: list[NDArray[np.uint8]], target: NDArray[np.uint8]) -> None:
     row = 0
-    columns = target.shape[1]
     for piece in pieces:
-        width = min(columns, piece.shape[1])
+        width = min(target.shape[1], piece.shape[1])
         target[row : row + len(piece), :width] = piece[:, :width]
         row += len(piece)

@@ -11,11 +11,8 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.cameras.ov7620 import (
-    CLOCKS_PER_LINE,
-    LINES_PER_FRAME,
-    PIXEL_CLOCK_HZ,
-)
+from cubestack.firmware_model.interface.cameras import ov7620
+from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, LINES_PER_FRAME
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.pins import ACKNOWLEDGE, CONTROLS
 
@@ -28,6 +25,7 @@ STORES = {
     "both": ((0, 0, 0, 0, 0), (_SUN, _NADIR)),
 }
 _SCAN_PERIOD = Fraction(PS_PER_S, 1_000_000)
+_PERIOD = Fraction(PS_PER_S, ov7620.PIXEL_CLOCK_HZ)
 
 
 def pair_store_ms(engine: RtlEngine, way: str, rounds: int = ROUNDS) -> float:
@@ -37,7 +35,7 @@ def pair_store_ms(engine: RtlEngine, way: str, rounds: int = ROUNDS) -> float:
     for _ in range(rounds):
         # From standby in the middle of the gap between two frames.
         _command(engine, 0, 0, 0, 1, 1)
-        frame_ps = CLOCKS_PER_LINE * LINES_PER_FRAME * Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
+        frame_ps = CLOCKS_PER_LINE * LINES_PER_FRAME * _PERIOD
         engine.run(int((engine.now_ps // frame_ps + 1) * frame_ps))
         _command(engine, *levels)
         start = time.perf_counter()
@@ -55,9 +53,9 @@ def pair_scan_ms(engine: RtlEngine, rounds: int = ROUNDS) -> float:
         _command(engine, 0, 0, 0, 1, 1)
         _command(engine, 0, 1, 1, 1, 0)
         engine.run(engine.now_ps + 1_000_000)
+        end_ps = engine.now_ps + len(out) * int(_SCAN_PERIOD)
         start = time.perf_counter()
-        reach_ps = len(out) * int(_SCAN_PERIOD)
-        engine.strobe_read(out, _SCAN_PERIOD, engine.now_ps + reach_ps)
+        engine.strobe_read(out, _SCAN_PERIOD, end_ps)
         best = min(best, time.perf_counter() - start)
     return 1000 * best
 
@@ -69,8 +67,7 @@ def pair_with_cameras() -> RtlEngine:
     blank = CLOCKS_PER_LINE * (LINES_PER_FRAME - FULL_SIZE.rows)
     for camera in ("sun", "nadir"):
         image = rng.integers(0, 256, (FULL_SIZE.rows, FULL_SIZE.columns), dtype=np.uint8)
-        period = Fraction(PS_PER_S, PIXEL_CLOCK_HZ)
-        engine.attach(RepeatedFrame(image, period, CLOCKS_PER_LINE, blank), camera)
+        engine.attach(RepeatedFrame(image, _PERIOD, CLOCKS_PER_LINE, blank), camera)
     return engine
 
 

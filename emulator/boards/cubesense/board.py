@@ -4,6 +4,7 @@ CubeSense thesis, figure 3.9 and tables 3.3 and 3.4: two halves of camera, FPGA 
 microcontroller for both, its buses to the satellite, and its switches and current monitors.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 from cubestack.emulator.boards.contract import Board
@@ -24,23 +25,10 @@ from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Targe
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
-from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import (
-    ROWS,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
+from cubestack.firmware_model.interface.cubesense.codes import ROWS, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, actions
-from cubestack.firmware_model.interface.cubesense.pins import (
-    COMMON_PINS,
-    CONTROLS,
-    EDGE,
-    ENABLE,
-    RNW,
-    SHIFT,
-)
+from cubestack.firmware_model.interface.cubesense.pins import CONTROLS, ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.firmware_model.mcu.costs import Meter
@@ -92,14 +80,11 @@ class CubeSenseBoard(Board):
 
         Args:
             scene: what the cameras see.
-            seed: of what the memories hold after power-up.
+            seed, kernel, i2c_bus: see ``Board``.
             engine: see ``make_engine``.
-            baud: of the serial line with the node protocol.
-            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
+            baud, bench_baud: of the serial lines with the node and the bench protocol.
             mcu_addressing: FPGAs with the option that lets the processor choose addresses.
-            bench_baud: of the serial line with the bench protocol.
-            i2c_address: 7-bit address of the node protocol.
-            register_address: 7-bit address of the register-pointer protocol.
+            i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(_wiring(mcu_addressing), engine)
@@ -153,13 +138,14 @@ class CubeSenseBoard(Board):
         probes = super().probes()
         for camera, half in HALVES.items():
             result = self.program.state.results[camera]
-            probes[f"{half}_capture"] = CaptureResult(result.capture).name
-            probes[f"{half}_detect"] = DetectResult(result.detect).name
+            probes[f"{half}_capture"] = codes.CaptureResult(result.capture).name
+            probes[f"{half}_detect"] = codes.DetectResult(result.detect).name
         return probes
 
     def _sites(self) -> Sites:
-        return self._common_sites(
-            controls=(RNW, EDGE, SHIFT, *ENABLE),
+        return replace(
+            super()._sites(),
+            controls=(pins.RNW, pins.EDGE, pins.SHIFT, *ENABLE),
             cameras={
                 half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")
                 for camera, half in HALVES.items()
@@ -167,10 +153,9 @@ class CubeSenseBoard(Board):
         )
 
     def truth(self, camera: Camera) -> SensorTruth | None:
-        """What ``camera`` should have measured in the frame that was stored last.
+        """What ``camera`` should have measured at mid-exposure of the stored frame's middle row.
 
-        At the mid-exposure of its middle row. For whoever compares results; None when nothing was
-        stored.
+        For whoever compares results; None when nothing was stored.
         """
         shutter = self.stored_frame(camera)
         if shutter is None:
@@ -194,7 +179,7 @@ class CubeSenseBoard(Board):
     def _release_pins(self) -> None:
         """The processor is reset: its pins float to where resistors pull them."""
         self._advance_engine()
-        for pin in (*ENABLE, *COMMON_PINS):
+        for pin in (*ENABLE, *pins.COMMON_PINS):
             self.engine.set_pin(pin, pin.level)
         self._command()
         self._lines.release()
@@ -209,14 +194,12 @@ class CubeSenseBoard(Board):
 
     def _command(self) -> None:
         """Follow what the control lines command: currents, and which frame is stored."""
-        levels = (self.engine.get_pin(pin) for pin in CONTROLS)
-        commanded = actions(*levels)
+        commanded = actions(*(self.engine.get_pin(pin) for pin in CONTROLS))
         before, self._commanded = self._commanded, dict(zip(Camera, commanded, strict=True))
         for camera, action in self._commanded.items():
-            part = f"{HALVES[camera]}_fpga"
-            self.power.set_state(part, "imaging" if action in CLOCKED else "idle")
-            storing = action in STORING
-            self.power.set_state(Sram(camera).name.lower(), "active" if storing else "standby")
+            clocked, memory = action in CLOCKED, "active" if action in STORING else "standby"
+            self.power.set_state(f"{HALVES[camera]}_fpga", "imaging" if clocked else "idle")
+            self.power.set_state(Sram(camera).name.lower(), memory)
         for camera in Camera:
             was, stores = (_stores(commanded, camera) for commanded in (before, self._commanded))
             if stores and not was:

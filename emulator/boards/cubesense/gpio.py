@@ -5,38 +5,36 @@ resistors, and the switches of memories and cameras.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
-from cubestack.firmware_model.interface.cubesense.pins import (
-    CAMERA_POWER,
-    CAMERA_SCL,
-    CAMERA_SDA,
-    SRAM_POWER,
-)
 
 #: Load switch of the power table behind each switching pin.
 CHANNELS = {
-    **{SRAM_POWER[sram]: sram.name for sram in Sram},
-    **{pin: f"{camera.name.lower()}_camera" for camera, pin in CAMERA_POWER.items()},
+    **{pins.SRAM_POWER[sram]: sram.name for sram in Sram},
+    **{pin: f"{camera.name.lower()}_camera" for camera, pin in pins.CAMERA_POWER.items()},
 }
 
 _CONTROL = {
-    **{pin: (camera, "SCL") for camera, pin in CAMERA_SCL.items()},
-    **{pin: (camera, "SDA") for camera, pin in CAMERA_SDA.items()},
+    **{pin: (camera, "SCL") for camera, pin in pins.CAMERA_SCL.items()},
+    **{pin: (camera, "SDA") for camera, pin in pins.CAMERA_SDA.items()},
 }
 
 
+@dataclass
 class GpioPins:
     """Camera control lines and load switches; see ``emulator.sim.processor.Pins``."""
 
-    def __init__(self, env: Kernel, cameras: Mapping[Camera, Ov7620], power: PowerModel) -> None:
+    _kernel: Kernel
+    _cameras: Mapping[Camera, Ov7620]
+    _power: PowerModel
+
+    def __post_init__(self) -> None:
         """Start released: control lines high, all switches off."""
-        self._env = env
-        self._cameras = cameras
-        self._power = power
         self._driven: dict[str, int] = {}
         self.release()
 
@@ -58,7 +56,7 @@ class GpioPins:
             self._power.switch(CHANNELS[pin], bool(level))
         else:
             camera, line = _CONTROL[pin]
-            self._cameras[camera].on_pin(line, level, self._env.now)
+            self._cameras[camera].on_pin(line, level, self._kernel.now)
 
     def get_pin(self, pin: str) -> int:
         """Level of a pin; a camera may pull its data line low."""

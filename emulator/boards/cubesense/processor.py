@@ -8,12 +8,8 @@ from cubestack.emulator.boards.cubesense.gpio import CHANNELS
 from cubestack.emulator.boards.peripherals import NodePeripherals
 from cubestack.emulator.sim.virtual_time import PS_PER_US
 from cubestack.firmware_model.cubesense.hardware import Port
-from cubestack.firmware_model.interface.cubesense.pins import (
-    ADC_FULL_SCALE,
-    CAMERA_POWER,
-    MA_PER_COUNT,
-    Monitor,
-)
+from cubestack.firmware_model.interface.cubesense import pins
+from cubestack.firmware_model.interface.cubesense.pins import Monitor
 
 
 class Pic18f45k20(NodePeripherals):
@@ -48,11 +44,11 @@ class Pic18f45k20(NodePeripherals):
                 current = current_ma()
             case Monitor.SUPPLY_3V3:
                 # The cameras' own regulator feeds them from the 5 V supply.
-                cameras = (CHANNELS[pin] for pin in CAMERA_POWER.values())
+                cameras = (CHANNELS[pin] for pin in pins.CAMERA_POWER.values())
                 current = current_ma() - sum(map(current_ma, cameras))
             case Monitor.SRAM1 | Monitor.SRAM2:
                 current = current_ma(monitor.value)
-        return min(ADC_FULL_SCALE, round(current / MA_PER_COUNT))
+        return min(pins.ADC_FULL_SCALE, round(current / pins.MA_PER_COUNT))
 
     def uptime_us(self) -> int:
         """Time since the latest reset in us."""

@@ -4,18 +4,9 @@ from collections.abc import Collection
 from functools import cache
 
 from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
+from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, actions
-from cubestack.firmware_model.interface.cubesense.pins import (
-    ACKNOWLEDGE,
-    CLK,
-    CONTENTION,
-    CONTROLS,
-    DATA,
-    HREF,
-    PCLK,
-    PREFIXES,
-    Y,
-)
+from cubestack.firmware_model.interface.cubesense.pins import CONTROLS, PREFIXES
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
 
@@ -28,7 +19,7 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
     if pair is None:
         pair = CubeSensePair(mcu_addressing=mcu_addressing)
 
-    acks = tuple(ACKNOWLEDGE.values())
+    acks = tuple(pins.ACKNOWLEDGE.values())
 
     def storing(level: Level) -> Collection[str]:
         clocks = _clocks_used(*(level(name) for name in CONTROLS))
@@ -37,19 +28,19 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
     return Wiring(
         pair,
         cameras=tuple(
-            CameraPins(side, *(prefix + pin for pin in (PCLK, Y, HREF)))
+            CameraPins(side, *(prefix + pin for pin in (pins.PCLK, pins.Y, pins.HREF)))
             for side, prefix in PREFIXES.items()
         ),
         memories=tuple(MemoryPins(side, prefix) for side, prefix in PREFIXES.items()),
-        data_clock=CLK,
-        data=DATA,
+        data_clock=pins.CLK,
+        data=pins.DATA,
         acknowledges=acks,
         storing=storing,
         # Two release the reset, one ends the store, one the line;
         # then the pause between two frames is counted.
         settling_clocks=8 + pair.read_out.frame_gap,
-        contention=CONTENTION,
-        burst_levels=tuple(((CLK, 0), *levels.items()) for levels in _storing_levels()),
+        contention=pins.CONTENTION,
+        burst_levels=tuple(((pins.CLK, 0), *levels.items()) for levels in _storing_levels()),
     )
 
 

@@ -6,6 +6,7 @@ layouts than the published one are in :mod:`cubestack.emulator.boards.cubestar.l
 """
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,6 @@ BOOT_US = 3_000
 
 CAMERA_BUS_HZ = 100_000
 """Standard mode; the sources give no rate."""
-
 
 EBI_READ_CYCLES = CORTEX_M3.operations["ebi_read"].cycles
 """Of the processor, for a byte that an interrupt reads over its external bus."""
@@ -75,10 +75,9 @@ class CubeStarBoard(Board):
         Args:
             scene: what the camera sees.
             catalogue: star catalogue in the processor's flash.
-            seed: of everything random but the scene: memories at power-up, undefined frames.
+            seed, kernel, i2c_bus: see ``Board``.
             engine: see ``make_engine``.
             baud: of the satellite's UART.
-            kernel, i2c_bus: what it shares with other boards, if anything; see ``Board``.
             layout: memory layout, with the program that belongs to it.
             i2c_address: 7-bit address on the satellite's bus.
         """
@@ -114,7 +113,7 @@ class CubeStarBoard(Board):
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
-        self._pins = dict(self._layout.controls)
+        self._pins = dict.fromkeys(self._layout.controls, 0)
         self._accesses = False
         self._storing_since_ps = 0
         self.stored: deque[RollingShutter | None] = deque([None], maxlen=4)
@@ -142,8 +141,9 @@ class CubeStarBoard(Board):
         return super().probes() | {"task": TaskStatus(self.program.state.task_status).name}
 
     def _sites(self) -> Sites:
-        return self._common_sites(
-            controls=tuple(self._layout.controls),
+        return replace(
+            super()._sites(),
+            controls=self._layout.controls,
             cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
             memories={"external": self._hardware.external_ram} if self._layout.external_ram else {},
         )
@@ -186,19 +186,15 @@ class CubeStarBoard(Board):
         self.engine.run(now_ps)
         if channel == "imager":
             self.camera.power(on, now_ps)
-        memories = self.engine.memories
-        if not self._layout.external_ram:
+        srams, external = self.engine.memories, self._layout.external_ram
+        if not external:
             # Without supply an FPGA leads nowhere, as a memory without supply does.
             reached = all(self.power.is_on(name) for name in ("imager", "memory"))
-            for name in memories:
+            for name in srams:
                 self.engine.power_memory(name, reached)
-        lost = list(memories.values())
-        if self._layout.external_ram:
-            lost = [self._hardware.external_ram] if channel == "memory" else lost
-        elif channel == "imager":
-            lost = []
         if not on:
-            for memory in lost:
+            feeds_srams = channel == ("imager" if external else "memory")
+            for memory in srams.values() if feeds_srams else [self._hardware.external_ram]:
                 self._scramble(memory)
 
 

@@ -2,7 +2,7 @@
 
 CubeStar thesis, section 3.3, table 6.2 and section 7.2. The currents of the layouts that were never
 built follow from those of the published one: its FPGA board contains an SRAM, whose current is
-taken to be that of the processor's (``SRAM_MA``) and stands alone here, because the program's
+taken to be that of the processor's and stands alone here, because the program's
 supply channel "memory" watches the memory with the picture. An FPGA whose bus is open draws what it
 draws standing by; only accesses draw as much as reading.
 """
@@ -12,13 +12,8 @@ from dataclasses import dataclass, replace
 
 from amaranth.hdl import Fragment
 
+from cubestack.emulator.boards.cubestar import wiring
 from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
-from cubestack.emulator.boards.cubestar.wiring import (
-    cubestar_double_wiring,
-    cubestar_shared_wiring,
-    cubestar_two_boards_wiring,
-    cubestar_wiring,
-)
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import Part, PowerTable
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
@@ -27,8 +22,6 @@ from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENA
 Pins = Mapping[str, int]
 States = dict[str, str]
 
-SRAM_MA = CUBESTAR_POWER.parts["memory"].ma
-
 
 @dataclass(frozen=True)
 class LayoutBoard:
@@ -36,47 +29,40 @@ class LayoutBoard:
 
     Attributes:
         top: name of the design in each of its FPGAs.
-        fpgas: how many there are.
         wiring: of them.
-        controls: pins that command them, with their levels after power-up.
         power: what draws current.
-        storing: how many memories a camera's picture may go to, by the control pins.
         states: of the parts "fpga"... and "memory", by the control pins and whether the processor
             accesses a memory.
+        boards: what is before the names of each FPGA's control pins.
         external_ram: the processor has a memory of its own.
     """
 
     top: str
-    fpgas: int
     wiring: Callable[[], Wiring]
-    controls: Pins
     power: PowerTable
-    storing: Callable[[Pins], int]
     states: Callable[[Pins, bool], States]
+    boards: tuple[str, ...] = ("",)
     external_ram: bool = False
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """Pins that command the FPGAs; low after power-up."""
+        return tuple(board + pin for board in self.boards for pin in (ENABLE, RNW))
+
+    def storing(self, pins: Pins) -> int:
+        """How many memories a camera's picture may go to, by the control pins."""
+        return sum(_stores(pins, board) for board in self.boards)
 
 
 def _powered(fpgas: tuple[str, ...], memories: int) -> PowerTable:
     """Currents with ``fpgas`` boards and so many memories, each for itself."""
-    parts = {
-        name: part for name, part in CUBESTAR_POWER.parts.items() if name not in ("fpga", "memory")
-    }
-    whole = CUBESTAR_POWER.parts["fpga"].ma
-    alone = {
-        "standby": whole["standby"] - SRAM_MA["standby"],
-        "storing": whole["storing"] - SRAM_MA["transfer"],
-        "reading": whole["reading"] - SRAM_MA["transfer"],
-    }
-    idle, used = SRAM_MA["standby"], SRAM_MA["transfer"]
+    parts = dict(CUBESTAR_POWER.parts)
+    whole, sram = parts.pop("fpga").ma, parts.pop("memory").ma
+    idle, used = sram["standby"], sram["transfer"]
+    alone = {state: ma - (idle if state == "standby" else used) for state, ma in whole.items()}
     memory = {f"{n} used": n * used + (memories - n) * idle for n in range(memories + 1)}
-    return replace(
-        CUBESTAR_POWER,
-        parts={
-            **parts,
-            "memory": Part("memory", memory),
-            **{name: Part("imager", alone) for name in fpgas},
-        },
-    )
+    parts |= {"memory": Part("memory", memory), **dict.fromkeys(fpgas, Part("imager", alone))}
+    return replace(CUBESTAR_POWER, parts=parts)
 
 
 def _stores(pins: Pins, board: str = "") -> bool:
@@ -108,46 +94,23 @@ def _two_board_states(pins: Pins, accessed: bool) -> States:
     return {**states, "memory": f"{sum(storing) + (reading is not None)} used"}
 
 
-_ONE_FPGA: Mapping[str, int] = {ENABLE: 0, RNW: 0}
-
 #: Every layout.
 BOARDS = {
     Layout.COPIED: LayoutBoard(
-        "cubestar",
-        1,
-        cubestar_wiring,
-        _ONE_FPGA,
-        CUBESTAR_POWER,
-        _stores,
-        _copied_states,
-        external_ram=True,
+        "cubestar", wiring.cubestar_wiring, CUBESTAR_POWER, _copied_states, external_ram=True
     ),
     Layout.SHARED: LayoutBoard(
-        "cubestar-shared",
-        1,
-        cubestar_shared_wiring,
-        _ONE_FPGA,
-        _powered(("fpga",), 1),
-        _stores,
-        _one_fpga_states,
+        "cubestar-shared", wiring.cubestar_shared_wiring, _powered(("fpga",), 1), _one_fpga_states
     ),
     Layout.TWO_MEMORIES: LayoutBoard(
-        "cubestar-double",
-        1,
-        cubestar_double_wiring,
-        _ONE_FPGA,
-        _powered(("fpga",), 2),
-        _stores,
-        _one_fpga_states,
+        "cubestar-double", wiring.cubestar_double_wiring, _powered(("fpga",), 2), _one_fpga_states
     ),
     Layout.TWO_BOARDS: LayoutBoard(
         "cubestar-shared",
-        2,
-        cubestar_two_boards_wiring,
-        {f"{board}{name}": 0 for board in BOARD_PREFIXES for name in _ONE_FPGA},
+        wiring.cubestar_two_boards_wiring,
         _powered(("fpga1", "fpga2"), 2),
-        lambda pins: sum(_stores(pins, board) for board in BOARD_PREFIXES),
         _two_board_states,
+        BOARD_PREFIXES,
     ),
 }
 

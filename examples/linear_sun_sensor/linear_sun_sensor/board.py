@@ -1,5 +1,6 @@
 """SunSlit's board: array, FPGA, line buffer, microcontroller, the satellite's UART and I2C."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -77,7 +78,8 @@ class SunSlitBoard(NodeBoard[SunSlitProgram, SlitScene]):
         return super().probes() | {"outcome": self.program.latest.outcome.name}
 
     def _sites(self) -> Sites:
-        return self._common_sites(
+        return replace(
+            super()._sites(),
             controls=(ENABLE, RNW, EXPOSE),
             cameras={"array": CameraSite(self.array, self._switch, "array")},
         )

@@ -152,7 +152,7 @@ def _measure(layout: Layout, opened: _Opener, options: LayoutOptions) -> LayoutR
     spent_mj = (found[-1].charge_mas - begun.charge_mas) * volts if count else math.nan
     return LayoutResult(
         layout=layout.value,
-        fpgas=BOARDS[layout].fpgas,
+        fpgas=len(BOARDS[layout].boards),
         pins=fpga.pins,
         tiles=fpga.tiles,
         fits=fpga.fits,
