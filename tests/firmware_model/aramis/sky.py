@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 FALSE_STAR = 0
 """Stands for the Hipparcos number of a star that does not exist."""
 
-
 FIELD = Field()
 
 _build = lru_cache(maxsize=4)(build_database)
@@ -116,6 +115,11 @@ def picture(rng: np.random.Generator, field: Field, light: Light | None = None) 
     return Picture(stars, attitude, hip[order].astype(np.int32))
 
 
+def pictures(count: int, seed: int = 0, light: Light | None = None) -> list[Picture]:
+    rng = np.random.default_rng(seed)
+    return [picture(rng, FIELD, light) for _ in range(count)]
+
+
 def errors_deg(quaternion: NDArray[np.float32], truth: Rotation) -> tuple[float, float]:
     """Cross and roll error: between the boresights, and about them."""
     turn = (Rotation.from_quat(quaternion.astype(np.float64)) * truth.inv()).as_matrix()
@@ -125,7 +129,6 @@ def errors_deg(quaternion: NDArray[np.float32], truth: Rotation) -> tuple[float,
 
 
 def is_right(solution: Solution, truth: Rotation) -> bool:
-    assert solution.quaternion is not None
     cross, roll = errors_deg(solution.quaternion, truth)
     return cross < 0.1 and roll < 0.3
 

@@ -46,7 +46,6 @@ def test_set_up_writes_what_the_settings_say_once(desk: Desk) -> None:
     desk.state.settings.put("SetGain", {"Gain": 4.0})
     assert desk.start() is None
     registers = desk.unit.registers
-    assert registers is not None
     assert (registers[0x09], registers[0x35], registers[0x07]) == (2000, 0x20, 2)
     registers[0x09] = 7
     assert desk.start() is None  # nothing changed, so nothing is written
@@ -64,7 +63,6 @@ def test_a_silent_or_a_strange_camera(desk: Desk) -> None:
     registers, desk.unit.registers = desk.unit.registers, None
     assert desk.start() is Reason.CAMERA_SILENT
     desk.unit.registers = registers
-    assert registers is not None
     registers[0x00] = 0x8421  # the colour version
     assert desk.start() is Reason.CAMERA_SILENT
     assert desk.state.flags == {"CameraSilent"}
@@ -74,8 +72,7 @@ def test_pictures_alternate_between_two_places(desk: Desk) -> None:
     desk.start()
     for number in range(1, 5):
         assert desk.take() is None
-        assert desk.state.frames == number
-        assert desk.camera.latest == (number - 1) % 2
+        assert (desk.state.frames, desk.camera.latest) == (number, (number - 1) % 2)
     one, two = desk.unit.captures[:2]
     assert one.shape == two.shape == (1024, 1280)
     assert not np.shares_memory(one, two)
@@ -96,19 +93,16 @@ def test_no_frame_within_three_of_them_is_a_timeout(desk: Desk) -> None:
     before = desk.unit.now_us
     assert desk.take() is Reason.CAMERA_TIMEOUT
     assert desk.unit.now_us - before == pytest.approx(3 * 6300 * ROW_US + 20_000, rel=1e-3)
-    assert desk.state.flags == {"CameraTimeout"}
-    assert desk.state.frames == 0
+    assert (desk.state.flags, desk.state.frames) == ({"CameraTimeout"}, 0)
     desk.frame_us = 10
-    assert desk.start() is None
-    assert desk.take() is None
+    assert (desk.start(), desk.take()) == (None, None)
 
 
 @pytest.mark.parametrize("end", [FrameEnd.TOO_SHORT, FrameEnd.WRONG_LINES])
 def test_a_frame_that_is_not_as_programmed(desk: Desk, end: FrameEnd) -> None:
     desk.start()
     desk.end = end
-    assert desk.take() is Reason.CAMERA_FRAME
-    assert desk.state.flags == {"CameraFrameError"}
+    assert (desk.take(), desk.state.flags) == (Reason.CAMERA_FRAME, {"CameraFrameError"})
     assert desk.camera.latest is None
 
 
@@ -139,8 +133,7 @@ def test_cutting_the_supply_ends_the_wait(desk: Desk) -> None:
     assert desk.unit.now_us - before >= 2_000
     assert desk.unit.camera_on
     desk.unit.on_sleep = desk.frame_comes
-    assert desk.start() is None
-    assert desk.take() is None
+    assert (desk.start(), desk.take()) == (None, None)
 
 
 def test_registers_by_address(desk: Desk) -> None:

@@ -28,28 +28,15 @@ def test_reset_values_are_the_verified_way() -> None:
 def test_every_setting_arrives() -> None:
     settings = StoredSettings(FlashStore())
     settings.put("SetField", {"FieldOfView": 18.0, "Round": 0})
-    settings.put(
-        "SetDetection",
-        {
-            "Sigmas": 3.5,
-            "Spikes": 2,
-            "Needed": 9,
-            "MinPixels": 4,
-            "MaxPixels": 99,
-            "MaxStars": 12,
-            "Subtract": 0,
-        },
-    )
+    sizes = {"MinPixels": 4, "MaxPixels": 99, "MaxStars": 12}
+    settings.put("SetDetection", {"Sigmas": 3.5, "Spikes": 2, "Needed": 9, "Subtract": 0, **sizes})
     settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 1, "Verify": 0, "HintTolerance": 9})
     found = configuration(settings)
     assert (found.field.fov_deg, found.field.round) == (18.0, False)
-    search = found.detection
-    assert (search.sigmas, search.spikes, search.needed) == (3.5, SpikeRemoval.WINDOW, 9)
-    assert (search.min_pixels, search.max_pixels, search.max_stars) == (4, 99, 12)
-    assert not search.subtract
-    assert found.profile.sigma_rad == pytest.approx(0.5 / 3232.64, rel=1e-4)
-    assert (found.profile.pivots, found.profile.verify) == (1, False)
-    assert found.profile.hint_tolerance_deg == 9
+    assert found.detection == Detection(3.5, SpikeRemoval.WINDOW, 9, 4, 99, 12, subtract=False)
+    profile = found.profile
+    assert profile.sigma_rad == pytest.approx(0.5 / 3232.64, rel=1e-4)
+    assert (profile.pivots, profile.verify, profile.hint_tolerance_deg) == (1, False, 9)
 
 
 @given(st.data())
@@ -57,9 +44,8 @@ def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObj
     settings = StoredSettings(FlashStore())
     for name in ("SetField", "SetDetection", "SetIdentification"):
         message = INTERFACE.telecommand(name)
-        values = message.unpack(
-            data.draw(st.binary(min_size=message.length, max_size=message.length))
-        )
+        drawn = data.draw(st.binary(min_size=message.length, max_size=message.length))
+        values = message.unpack(drawn)
         if not message.violations(values):
             settings.put(name, values)
     configuration(settings)
@@ -67,11 +53,8 @@ def test_whatever_the_tables_allow_is_allowed_by_the_processing(data: st.DataObj
 
 @given(st.integers(0, 2**32 - 1))
 def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    turn, attitude = Rotation.random(2, random_state=rng)
-    found = body_quaternion(
-        turn.as_quat().astype(np.float32), attitude.as_quat().astype(np.float32)
-    )
+    turn, attitude = Rotation.random(2, random_state=np.random.default_rng(seed))
+    found = body_quaternion(*(one.as_quat().astype(np.float32) for one in (turn, attitude)))
     assert ((turn * attitude).inv() * Rotation.from_quat(found)).magnitude() < 1e-6
 
 

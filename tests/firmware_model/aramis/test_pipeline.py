@@ -1,6 +1,7 @@
 """Pictures of the sky, from grey levels to the attitude."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,14 +9,11 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
-from cubestack.firmware_model.aramis.pipeline import (
-    PUBLISHED,
-    VERIFIED,
-    Configuration,
-    detect,
-    solve,
-)
+from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, detect
+from cubestack.firmware_model.aramis.pipeline import solve as solve_picture
+from cubestack.firmware_model.aramis.solution import Solution, StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
+from cubestack.firmware_model.mcu.costs import Meter
 
 from .sky import FIELD, Light, Picture, database, errors_deg, meter, picture
 
@@ -41,12 +39,32 @@ def sky(seed: int) -> tuple[Picture, NDArray[np.uint8]]:
     return made, render(made, rng)
 
 
+def find(image: NDArray[np.uint8], **settings: Any) -> StarList | None:
+    detection = replace(VERIFIED.detection, **settings)
+    return detect(image, Background(), FIELD, detection, meter())
+
+
+def solve(
+    image: NDArray[np.uint8], configuration: Configuration = VERIFIED, spent: Meter | None = None
+) -> Solution:
+    return solve_picture(image, Background(), configuration, database(), spent or meter())
+
+
+def end_of(solution: Solution) -> tuple[MeasurementOutcome, Reason]:
+    return solution.outcome, solution.reason
+
+
+def distances_px(found: StarList, made: Picture) -> NDArray[np.float32]:
+    """From each star found to the nearest true one."""
+    apart = np.linalg.norm(found.centroids[:, None] - made.stars.centroids[None], axis=2)
+    return np.asarray(apart.min(axis=1))
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_picture_gives_the_attitude(seed: int) -> None:
     made, image = sky(seed)
-    solution = solve(image, Background(), VERIFIED, database(), meter())
+    solution = solve(image)
     assert solution.outcome is MeasurementOutcome.CONCLUSIVE
-    assert solution.quaternion is not None
     cross, roll = errors_deg(solution.quaternion, made.attitude)
     assert cross < 0.01
     assert roll < 0.05
@@ -54,61 +72,44 @@ def test_a_picture_gives_the_attitude(seed: int) -> None:
 
 def test_stars_are_found_where_they_are() -> None:
     made, image = sky(5)
-    found = detect(image, Background(), FIELD, VERIFIED.detection, meter())
-    assert found is not None
+    found = find(image)
     assert len(found) > 6
-    apart = np.linalg.norm(found.centroids[:, None] - made.stars.centroids[None], axis=2)
-    assert np.median(apart.min(axis=1)) < 0.15
+    assert np.median(distances_px(found, made)) < 0.15
     assert (np.diff(found.brightness) <= 0).all()
 
 
 def test_subtracting_the_background_makes_centroids_better() -> None:
-    errors = []
-    for subtract in (False, True):
-        found_errors = []
-        for seed in range(3):
-            made, image = sky(seed)
-            settings = replace(VERIFIED.detection, subtract=subtract)
-            found = detect(image, Background(), FIELD, settings, meter())
-            assert found is not None
-            apart = np.linalg.norm(found.centroids[:, None] - made.stars.centroids[None], axis=2)
-            found_errors += apart.min(axis=1).tolist()
-        errors.append(np.median(found_errors))
-    assert errors[1] < errors[0]
+    skies = [sky(seed) for seed in range(3)]
+    plain, better = (
+        [distances_px(find(image, subtract=subtract), made) for made, image in skies]
+        for subtract in (False, True)
+    )
+    assert np.median(np.concatenate(better)) < np.median(np.concatenate(plain))
 
 
 def test_the_published_method_finds_fewer_stars() -> None:
     _, image = sky(6)
-    counts = []
-    for spikes in (SpikeRemoval.CENTRE, SpikeRemoval.WINDOW):
-        settings = replace(VERIFIED.detection, spikes=spikes, max_stars=255)
-        found = detect(image, Background(), FIELD, settings, meter())
-        assert found is not None
-        counts.append(len(found))
-    assert 3 <= counts[1] < counts[0]
+    methods = SpikeRemoval.WINDOW, SpikeRemoval.CENTRE
+    published, other = (len(find(image, spikes=method, max_stars=255)) for method in methods)
+    assert 3 <= published < other
 
 
 def test_what_lies_outside_the_field_is_not_seen() -> None:
     image = np.full((FIELD.rows, FIELD.columns), 10, dtype=np.uint8)
     image[500:510, 20:30] = image[500:510, 640:650] = 200
     found = detect(image, Background(), FIELD, PUBLISHED.detection, meter())
-    assert found is not None
     np.testing.assert_allclose(found.centroids, [[644.5, 504.5]], atol=0.01)
 
 
 def test_only_the_brightest_are_kept() -> None:
-    _, image = sky(7)
-    found = detect(image, Background(), FIELD, replace(VERIFIED.detection, max_stars=5), meter())
-    assert found is not None
-    assert len(found) == 5
+    assert len(find(sky(7)[1], max_stars=5)) == 5
 
 
 @pytest.mark.parametrize("configuration", [PUBLISHED, VERIFIED])
 @pytest.mark.parametrize("level", [0, 14, 255])
 def test_an_empty_picture(configuration: Configuration, level: int) -> None:
     image = np.full((FIELD.rows, FIELD.columns), level, dtype=np.uint8)
-    solution = solve(image, Background(), configuration, database(), meter())
-    assert (solution.outcome, solution.reason) == (MeasurementOutcome.NONE, Reason.TOO_FEW_STARS)
+    assert end_of(solve(image, configuration)) == (MeasurementOutcome.NONE, Reason.TOO_FEW_STARS)
 
 
 def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
@@ -116,32 +117,24 @@ def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
     image[:, ::8] = 255
     image[::2] = 0
     off = replace(VERIFIED, detection=replace(VERIFIED.detection, spikes=SpikeRemoval.OFF))
-    solution = solve(image, Background(), off, database(), meter())
-    assert (solution.outcome, solution.reason) == (MeasurementOutcome.NONE, Reason.TOO_MANY_PIXELS)
+    assert end_of(solve(image, off)) == (MeasurementOutcome.NONE, Reason.TOO_MANY_PIXELS)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_dice_give_no_attitude(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (FIELD.rows, FIELD.columns))
-    solution = solve(image.astype(np.uint8), Background(), VERIFIED, database(), meter())
-    assert solution.outcome is MeasurementOutcome.NONE
+    assert solve(image.astype(np.uint8)).outcome is MeasurementOutcome.NONE
 
 
 def test_a_picture_of_another_size_is_refused() -> None:
     words = r"a picture must have 1024 rows of 1280 pixels, not \(10, 10\)"
     with pytest.raises(ValueError, match=words):
-        solve(np.zeros((10, 10), np.uint8), Background(), VERIFIED, database(), meter())
+        solve(np.zeros((10, 10), np.uint8))
 
 
-def test_the_picture_is_not_changed() -> None:
-    _, image = sky(8)
+def test_phases_and_time_of_a_picture_that_is_not_changed() -> None:
+    (_, image), spent = sky(9), meter()
     image.flags.writeable = False
-    solve(image, Background(), VERIFIED, database(), meter())
-
-
-def test_phases_and_time() -> None:
-    _, image = sky(9)
-    spent = meter()
-    solve(image, Background(), VERIFIED, database(), spent)
+    solve(image, VERIFIED, spent)
     assert {"threshold", "spikes", "centroids", "search", "attitude"} <= set(spent.phases)
     assert 0.02 < spent.table.seconds(spent.total) < 2

@@ -1,3 +1,5 @@
+from typing import Any
+
 import pytest
 
 from cubestack.firmware_model.aramis.settings import BODY_PAGE, CONFIG_PAGE, StoredSettings
@@ -32,19 +34,14 @@ def test_the_body_rotation_is_kept_at_once_and_survives_erasing_the_rest() -> No
 @pytest.mark.parametrize(
     "damage", [lambda b: b[:-1], lambda b: b"", lambda b: bytes([b[0] ^ 1]) + b[1:]]
 )
-def test_damaged_pages_are_noticed_and_left_out(page: str, damage: object) -> None:
+def test_damaged_pages_are_noticed_and_left_out(page: str, damage: Any) -> None:
     flash = FlashStore()
     settings = StoredSettings(flash)
     settings.put("SetGain", {"Gain": 4.0})
     settings.save()
     settings.put("SetBodyRotation", TURN)
-    stored = flash.read(page)
-    assert stored is not None
-    assert callable(damage)
-    flash.write(page, damage(stored))
+    flash.write(page, damage(flash.read(page)))
     again = StoredSettings(flash)
     assert again.damaged
-    changed = {CONFIG_PAGE: "SetGain", BODY_PAGE: "SetBodyRotation"}
-    for key, command in changed.items():
-        kept = again.all(command) == settings.all(command)
-        assert kept == (key != page)
+    for key, command in {CONFIG_PAGE: "SetGain", BODY_PAGE: "SetBodyRotation"}.items():
+        assert (again.all(command) == settings.all(command)) == (key != page)

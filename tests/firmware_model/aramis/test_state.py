@@ -12,15 +12,11 @@ def test_the_clock_counts_on_over_noon() -> None:
     assert not clock.is_set
     clock.set(2_461_366, MS_PER_DAY - 10, 5_000_000)
     assert clock.is_set
-    assert clock.at(5_000_000) == (2_461_366, MS_PER_DAY - 10)
-    assert clock.at(5_010_000) == (2_461_367, 0)
-    assert clock.at(4_990_000) == (2_461_366, MS_PER_DAY - 20)
-
-
-def test_a_time_before_the_epoch_is_the_epoch() -> None:
-    clock = Clock()
+    times = {5_000_000: (0, MS_PER_DAY - 10), 5_010_000: (1, 0), 4_990_000: (0, MS_PER_DAY - 20)}
+    for uptime_us, (days, millisecond) in times.items():
+        assert clock.at(uptime_us) == (2_461_366 + days, millisecond)
     clock.set(0, 0, 5_000_000)
-    assert clock.at(1_000_000) == (0, 0)
+    assert clock.at(1_000_000) == (0, 0)  # a time before the epoch is the epoch
 
 
 def test_a_fresh_state() -> None:

@@ -59,6 +59,4 @@ class Desk:
     def error_deg(self) -> tuple[float, float]:
         found = self.aramis.attitude()
         truth = self.board.truth(found.frame)
-        assert found.quaternion is not None
-        assert truth is not None
         return attitude_error_deg(found.quaternion, truth)

@@ -40,9 +40,8 @@ def swept(
 @pytest.mark.parametrize("length", [0.0, 6.0, 20.0])
 def test_length_of_bright_streaks(length: float, angle_deg: float) -> None:
     image = swept(length, angle_deg, light=4000, count=4)
-    regions = find_regions(image > 12, meter())
-    assert regions is not None
-    assert smear_px(image, regions, 6, meter()) == pytest.approx(length, abs=1.5)
+    found_px = smear_px(image, find_regions(image > 12, meter()), 6, meter())
+    assert found_px == pytest.approx(length, abs=1.5)
 
 
 @pytest.mark.parametrize("angle_deg", [0, 40, 90, 160])
@@ -72,9 +71,9 @@ def test_streaks_explain_why_there_is_no_attitude() -> None:
     nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
     failed = unsolved(Reason.TOO_FEW_STARS, nothing)
     streaks, rest = swept(95, 40, light=800), swept(0, 0, light=800)
-    assert explain(failed, streaks, VERIFIED, meter()).reason is Reason.SMEAR
-    assert explain(failed, rest, VERIFIED, meter()).reason is Reason.TOO_FEW_STARS
-    assert explain(failed, streaks, PUBLISHED, meter()).reason is Reason.TOO_FEW_STARS
+    cases = (streaks, VERIFIED), (rest, VERIFIED), (streaks, PUBLISHED)
+    reasons = [explain(failed, image, way, meter()).reason for image, way in cases]
+    assert reasons == [Reason.SMEAR, Reason.TOO_FEW_STARS, Reason.TOO_FEW_STARS]
 
 
 def test_smear_is_the_reason_when_there_is_no_attitude() -> None:

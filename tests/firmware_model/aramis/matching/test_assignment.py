@@ -23,9 +23,7 @@ def corners(seed: int) -> Vectors:
 
 
 def sides(vectors: Vectors) -> Vectors:
-    triangle = measure_triangle(vectors, 1e-4, meter())
-    assert triangle is not None
-    return triangle.sides
+    return measure_triangle(vectors, 1e-4, meter()).sides
 
 
 def brightness(magnitudes: Vectors) -> Vectors:
@@ -49,13 +47,12 @@ def test_the_more_varied_criterion_wins(order: tuple[int, ...]) -> None:
     catalogue, picked = corners(3), list(order)
     wrong = np.roll(picked, 1)
     measured = sides(catalogue[picked])
-    strong = assign(brightness(MAGNITUDES)[wrong], measured, MAGNITUDES, catalogue, meter())
-    assert strong.order.tolist() == wrong.tolist()
-    assert strong.other.tolist() == picked
-    even = np.float32(1) + np.float32(0.001) * brightness(MAGNITUDES)[wrong] / np.float32(1000)
+    light = brightness(MAGNITUDES)[wrong]
+    strong = assign(light, measured, MAGNITUDES, catalogue, meter())
+    assert [strong.order.tolist(), strong.other.tolist()] == [wrong.tolist(), picked]
+    even = np.float32(1) + np.float32(0.001) * light / np.float32(1000)
     weak = assign(even, measured, MAGNITUDES, catalogue, meter())
-    assert weak.order.tolist() == picked
-    assert weak.other.tolist() == wrong.tolist()
+    assert [weak.order.tolist(), weak.other.tolist()] == [picked, wrong.tolist()]
 
 
 def test_scores_are_the_coefficients_of_variation() -> None:

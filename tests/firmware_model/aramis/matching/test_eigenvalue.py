@@ -14,16 +14,10 @@ Array = NDArray[np.float64]
 
 
 def davenport(profile: Array) -> Array:
-    z = [
-        profile[1, 2] - profile[2, 1],
-        profile[2, 0] - profile[0, 2],
-        profile[0, 1] - profile[1, 0],
-    ]
-    matrix = np.zeros((4, 4))
-    matrix[:3, :3] = profile + profile.T - np.trace(profile) * np.eye(3)
-    matrix[:3, 3] = matrix[3, :3] = z
-    matrix[3, 3] = np.trace(profile)
-    return matrix
+    odd = profile - profile.T
+    z = np.array([[odd[1, 2], odd[2, 0], odd[0, 1]]])
+    even = profile + profile.T - np.trace(profile) * np.eye(3)
+    return np.block([[even, z.T], [z, np.trace(profile)]])
 
 
 def unit(vectors: Array) -> Array:
@@ -32,10 +26,8 @@ def unit(vectors: Array) -> Array:
 
 def profile(rng: np.random.Generator, count: int, noise: float) -> Array:
     body = unit(rng.normal(size=(count, 3)))
-    inertial = (
-        unit(body + rng.normal(0, noise, body.shape))
-        @ Rotation.random(random_state=rng).as_matrix()
-    )
+    turned = unit(body + rng.normal(0, noise, body.shape))
+    inertial = turned @ Rotation.random(random_state=rng).as_matrix()
     return np.asarray(body.T @ inertial / count)
 
 

@@ -13,22 +13,22 @@ from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
 
 from ..campaign import COARSE, rates
-from ..sky import FIELD, Light, Picture, database, errors_deg, picture
+from ..sky import FIELD, Light, Picture, database, errors_deg, meter, pictures
+
+NOISY = replace(COARSE, noise_px=1.0)
+PROFILES = pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+
+
+def named(stars: StarList, profile: Profile, hint: np.ndarray | None = None) -> Solution:
+    return identify(stars, FIELD, profile, database(), meter(), hint)
 
 
 def run(
     made: Picture, profile: Profile = VERIFIED.profile, hint: np.ndarray | None = None
 ) -> Solution:
-    return identify(made.stars, FIELD, profile, database(), Meter(BLACKFIN_BF533), hint)
-
-
-def pictures(count: int, seed: int, light: Light | None = None) -> list[Picture]:
-    rng = np.random.default_rng(seed)
-    return [picture(rng, FIELD, light) for _ in range(count)]
+    return named(made.stars, profile, hint)
 
 
 def test_the_published_profile_is_mostly_right_and_sometimes_wrong() -> None:
@@ -39,7 +39,7 @@ def test_the_published_profile_is_mostly_right_and_sometimes_wrong() -> None:
 
 
 def test_with_more_noise_than_assumed_the_published_profile_fails_as_published() -> None:
-    found = rates(120, PUBLISHED.profile, light=replace(COARSE, noise_px=1.0))
+    found = rates(120, PUBLISHED.profile, light=NOISY)
     assert 0.5 < found["right"] + found["wrong"] < 0.8
     assert found["wrong"] > 0.1
     assert found["far"] > 0.03
@@ -53,40 +53,35 @@ def test_a_rough_direction_leaves_only_right_results() -> None:
 
 def test_a_rough_direction_rules_out_what_is_far_away() -> None:
     """The thesis' own criterion of a true result, in the noise that fails without a direction."""
-    found = rates(120, PUBLISHED.profile, light=replace(COARSE, noise_px=1.0), hint_error_deg=2)
+    found = rates(120, PUBLISHED.profile, light=NOISY, hint_error_deg=2)
     assert found["far"] == 0
     assert found["wrong"] < 0.05
     assert found["right"] > 0.35
 
 
 @pytest.mark.parametrize(
-    ("light", "hint_error_deg", "right"),
+    ("light", "hint_error_deg", "right", "field"),
     [
-        (Light(), None, 0.98),
-        (Light(false_stars=5), None, 0.98),
-        (Light(false_stars=5), 2.0, 0.98),
-        (Light(false_stars=5, false_mags=(0, 3)), None, 0.95),
-        (Light(mag_limit=5, false_stars=5), None, 0.95),
+        (Light(), None, 0.98, FIELD),
+        (Light(false_stars=5), None, 0.98, FIELD),
+        (Light(false_stars=5), 2.0, 0.98, FIELD),
+        (Light(false_stars=5, false_mags=(0, 3)), None, 0.95, FIELD),
+        (Light(mag_limit=5, false_stars=5), None, 0.95, FIELD),
+        (Light(false_stars=5), None, 0.95, Field(fov_deg=18)),
     ],
 )
-def test_verification_is_right(light: Light, hint_error_deg: float | None, right: float) -> None:
-    found = rates(50, VERIFIED.profile, light=light, hint_error_deg=hint_error_deg, seed=1)
+def test_verification_is_right(
+    light: Light, hint_error_deg: float | None, right: float, field: Field
+) -> None:
+    found = rates(50, VERIFIED.profile, field, light, hint_error_deg, seed=1)
     assert found["wrong"] == 0
     assert found["right"] >= right
 
 
-def test_a_lens_of_18_degrees() -> None:
-    found = rates(40, VERIFIED.profile, Field(fov_deg=18), Light(false_stars=5))
-    assert found["wrong"] == 0
-    assert found["right"] >= 0.95
-
-
 def test_false_stars_alone_give_no_attitude() -> None:
     light = Light(mag_limit=-2, false_stars=20, false_mags=(2, 6))
-    for made in pictures(20, 2, light):
-        solution = run(made)
-        assert solution.outcome is MeasurementOutcome.NONE
-        assert solution.quaternion is None
+    for solution in map(run, pictures(20, 2, light)):
+        assert (solution.outcome, solution.quaternion) == (MeasurementOutcome.NONE, None)
         assert (solution.stars == NONE).all()
 
 
@@ -96,7 +91,6 @@ def test_all_confirming_stars_make_the_attitude_better() -> None:
         plain, verified = run(made, replace(VERIFIED.profile, verify=False)), run(made)
         if plain.quaternion is None or errors_deg(plain.quaternion, made.attitude)[0] > 0.1:
             continue
-        assert verified.quaternion is not None
         triple.append(errors_deg(plain.quaternion, made.attitude))
         all_stars.append(errors_deg(verified.quaternion, made.attitude))
     assert np.median(all_stars, axis=0)[0] < 0.7 * np.median(triple, axis=0)[0]
@@ -106,14 +100,13 @@ def test_all_confirming_stars_make_the_attitude_better() -> None:
 def test_what_a_solution_tells() -> None:
     (made,) = pictures(1, 4)
     solution = run(made)
-    assert solution.outcome is MeasurementOutcome.CONCLUSIVE
-    assert solution.reason is Reason.CONFIRMED
-    assert solution.quaternion is not None
+    expected = MeasurementOutcome.CONCLUSIVE, Reason.CONFIRMED
+    assert (solution.outcome, solution.reason) == expected
     assert solution.quaternion[3] >= 0
     assert np.linalg.norm(solution.quaternion) == pytest.approx(1, abs=1e-6)
-    named = solution.stars != NONE
-    assert (database().numbers[solution.stars[named]] == made.hip[named]).all()
-    assert 3 < named.sum() <= solution.expected
+    known = solution.stars != NONE
+    assert (database().numbers[solution.stars[known]] == made.hip[known]).all()
+    assert 3 < known.sum() <= solution.expected
     assert solution.triples >= 1
     assert solution.measured is made.stars
 
@@ -124,36 +117,32 @@ def test_the_order_of_brightness_is_not_needed() -> None:
     right = 0
     for made in pictures(30, 5):
         shuffled = rng.permutation(len(made.stars))[:12]
-        stars = StarList(
-            made.stars.centroids[np.sort(shuffled)], np.sort(made.stars.brightness[shuffled])
-        )
-        solution = identify(stars, FIELD, VERIFIED.profile, database(), Meter(BLACKFIN_BF533))
+        brightness = np.sort(made.stars.brightness[shuffled])
+        stars = StarList(made.stars.centroids[np.sort(shuffled)], brightness)
+        solution = named(stars, VERIFIED.profile)
         if solution.quaternion is not None:
             assert errors_deg(solution.quaternion, made.attitude)[0] < 0.1
             right += 1
     assert right > 10
 
 
+@PROFILES
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_too_few_stars(count: int) -> None:
+def test_too_few_stars(count: int, profile: Profile) -> None:
     (made,) = pictures(1, 6)
     stars = StarList(made.stars.centroids[:count], made.stars.brightness[:count])
-    for profile in (PUBLISHED.profile, VERIFIED.profile):
-        solution = identify(stars, FIELD, profile, database(), Meter(BLACKFIN_BF533))
-        assert (solution.outcome, solution.reason) == (
-            MeasurementOutcome.NONE,
-            Reason.TOO_FEW_STARS,
-        )
+    solution = named(stars, profile)
+    assert (solution.outcome, solution.reason) == (MeasurementOutcome.NONE, Reason.TOO_FEW_STARS)
 
 
-@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+@PROFILES
 def test_stars_that_all_coincide(profile: Profile) -> None:
     stars = StarList(np.full((6, 2), 500, dtype=np.float32), np.ones(6, dtype=np.float32))
-    solution = identify(stars, FIELD, profile, database(), Meter(BLACKFIN_BF533))
+    solution = named(stars, profile)
     assert (solution.outcome, solution.reason) == (MeasurementOutcome.NONE, Reason.DEGENERATE)
 
 
-@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+@PROFILES
 @pytest.mark.parametrize("value", [0.0, np.nan])
 def test_a_direction_that_is_none_gives_nothing(profile: Profile, value: float) -> None:
     for made in pictures(5, 11):
@@ -161,12 +150,11 @@ def test_a_direction_that_is_none_gives_nothing(profile: Profile, value: float) 
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
 
 
-@pytest.mark.parametrize("profile", [PUBLISHED.profile, VERIFIED.profile])
+@PROFILES
 def test_a_direction_on_the_other_side_of_the_sky_gives_nothing(profile: Profile) -> None:
     for made in pictures(10, 7):
-        assert run(made, profile, -made.boresight.astype(np.float32)).outcome is not (
-            MeasurementOutcome.CONCLUSIVE
-        )
+        solution = run(made, profile, -made.boresight.astype(np.float32))
+        assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
 
 
 def test_an_attitude_far_from_the_direction_is_refused() -> None:
@@ -182,14 +170,12 @@ def test_an_attitude_far_from_the_direction_is_refused() -> None:
 
 def test_the_published_profile_ends_as_matching_does() -> None:
     reasons = {run(made, PUBLISHED.profile).reason for made in pictures(100, 9, Light(noise_px=1))}
-    assert Reason.UNIQUE in reasons
-    assert Reason.NO_SHARED_PAIR in reasons
+    assert reasons >= {Reason.UNIQUE, Reason.NO_SHARED_PAIR}
 
 
 def test_phases_add_up() -> None:
-    (made,) = pictures(1, 10)
-    meter = Meter(BLACKFIN_BF533)
-    identify(made.stars, FIELD, VERIFIED.profile, database(), meter, made.boresight)
-    assert set(meter.phases) >= {"faces", "triangles", "search", "identities", "attitude"}
-    assert 0.9 * meter.total < sum(meter.phases.values()) <= meter.total
-    assert meter.table.seconds(meter.total) < 0.1
+    (made,), spent = pictures(1, 10), meter()
+    identify(made.stars, FIELD, VERIFIED.profile, database(), spent, made.boresight)
+    assert set(spent.phases) >= {"faces", "triangles", "search", "identities", "attitude"}
+    assert 0.9 * spent.total < sum(spent.phases.values()) <= spent.total
+    assert spent.table.seconds(spent.total) < 0.1

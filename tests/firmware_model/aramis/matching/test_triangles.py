@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 Array = NDArray[np.float64]
 
@@ -27,9 +27,7 @@ def truth(corners: Array) -> tuple[Array, Array]:
 
 
 def measure(corners: Array, sigma: float = 1e-4) -> Triangle:
-    triangle = measure_triangle(corners.astype(np.float32), sigma, Meter(BLACKFIN_BF533))
-    assert triangle is not None
-    return triangle
+    return measure_triangle(corners.astype(np.float32), sigma, meter())
 
 
 @pytest.mark.parametrize("seed", range(100))
@@ -89,14 +87,14 @@ def test_sides_are_in_the_order_of_the_equations() -> None:
 
 @pytest.mark.parametrize("corners", [np.zeros((3, 3)), np.eye(3)[[0, 0, 1]]])
 def test_stars_on_a_line_give_no_triangle(corners: Array) -> None:
-    assert measure_triangle(corners.astype(np.float32), 1e-4, Meter(BLACKFIN_BF533)) is None
+    assert measure_triangle(corners.astype(np.float32), 1e-4, meter()) is None
 
 
 def test_a_triangle_costs_the_same_wherever_it_is() -> None:
     costs = set()
     for corners in in_field(np.random.default_rng(3), 10):
-        meter = Meter(BLACKFIN_BF533)
-        measure_triangle(corners.astype(np.float32), 1e-4, meter)
-        costs.add(meter.total)
+        spent = meter()
+        measure_triangle(corners.astype(np.float32), 1e-4, spent)
+        costs.add(spent.total)
     (cost,) = costs
     assert 5_000 < cost < 50_000

@@ -1,5 +1,6 @@
 """Candidates against a search of the whole database, and pivoting on real and invented skies."""
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -7,21 +8,25 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.matching.triangles import Triangle, measure_triangle
-from cubestack.firmware_model.aramis.matching.triples import find_triangles, match_triple
+from cubestack.firmware_model.aramis.matching.triples import Match, find_triangles, match_triple
 from cubestack.firmware_model.interface.aramis import Reason
 
-from ..sky import FIELD, Light, Picture, database, meter, picture
+from ..sky import FIELD, Picture, database, meter, pictures
+
+Vectors = NDArray[np.float32]
+
+Vectors = NDArray[np.float32]
 
 SIGMA = 5.6e-5
 
 
-def directions(made: Picture) -> NDArray[np.float32]:
+def directions(made: Picture) -> Vectors:
     return FIELD.directions(made.stars.centroids, meter())
 
 
-def pictures(count: int, light: Light | None = None, seed: int = 0) -> list[Picture]:
-    rng = np.random.default_rng(seed)
-    return [picture(rng, FIELD, light) for _ in range(count)]
+def match(vectors: Vectors, pivots: Sequence[int], sigma: float, enough: int = 1) -> Match:
+    """Of the three brightest stars."""
+    return match_triple(vectors, (0, 1, 2), pivots, sigma, database(), None, meter(), enough)
 
 
 def triangle_of(hip: NDArray[np.int32]) -> int | None:
@@ -83,7 +88,6 @@ def test_the_true_triangle_is_nearly_always_a_candidate() -> None:
         if true is None:
             continue
         triangle = measure_triangle(directions(made)[:3], sigma, meter())
-        assert triangle is not None
         listed += 1
         found += true in find_triangles(triangle, onboard, None, meter())
     assert listed > 270
@@ -96,25 +100,17 @@ def test_pivots_leave_the_true_triangle() -> None:
         true = triangle_of(made.hip[:3])
         if true is None or any(triangle_of(made.hip[[0, 1, star]]) is None for star in (3, 5)):
             continue
-        match = match_triple(
-            directions(made), (0, 1, 2), (3, 4, 5), 2 * SIGMA, database(), None, meter()
-        )
-        if match.end is Reason.UNIQUE:
-            assert match.candidates.tolist() == [true]
-        ends.append(match.end)
+        found = match(directions(made), (3, 4, 5), 2 * SIGMA)
+        if found.end is Reason.UNIQUE:
+            assert found.candidates.tolist() == [true]
+        ends.append(found.end)
     assert ends.count(Reason.UNIQUE) > 0.9 * len(ends)
 
 
 def test_each_pivot_thins_the_candidates() -> None:
     for made in pictures(20, seed=4):
-        left = [
-            set(
-                match_triple(
-                    directions(made), (0, 1, 2), (3, 4, 5)[:count], 2e-4, database(), None, meter()
-                ).candidates.tolist()
-            )
-            for count in range(4)
-        ]
+        found = [match(directions(made), (3, 4, 5)[:count], 2e-4) for count in range(4)]
+        left = [set(one.candidates.tolist()) for one in found]
         assert left[3] <= left[2] <= left[1] <= left[0]
 
 
@@ -123,26 +119,17 @@ def test_survivors_of_pivots_share_two_stars_with_a_candidate_of_each() -> None:
     onboard, sigma, thinned = database(), 4e-4, 0
     for made in pictures(10, seed=5):
         vectors = directions(made)
-        left = match_triple(vectors, (0, 1, 2), (), sigma, onboard, None, meter()).candidates
+        left = match(vectors, (), sigma).candidates
         for pivots, corners in ((1, (0, 1, 3)), (2, (0, 2, 4)), (3, (0, 1, 5))):
             triangle = measure_triangle(vectors[list(corners)], sigma, meter())
             if triangle is None or len(left) < 2:
                 break
             others = onboard.stars[find_triangles(triangle, onboard, None, meter())].tolist()
             pairs = {pair for other in others for pair in combinations(other, 2)}
-            before, left = (
-                len(left),
-                left[
-                    [
-                        bool(pairs & set(combinations(row, 2)))
-                        for row in onboard.stars[left].tolist()
-                    ]
-                ],
-            )
-            thinned += len(left) < before
-            after = match_triple(
-                vectors, (0, 1, 2), (3, 4, 5)[:pivots], sigma, onboard, None, meter()
-            )
+            rows = onboard.stars[left].tolist()
+            before, left = left, left[[bool(pairs & set(combinations(row, 2))) for row in rows]]
+            thinned += len(left) < len(before)
+            after = match(vectors, (3, 4, 5)[:pivots], sigma)
             assert after.candidates.tolist() == left.tolist()
     assert thinned > 10
 
@@ -154,13 +141,9 @@ def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
     for _ in range(20):
         first, last = np.sort(rng.integers(0, len(onboard), 2))
         low, high = float(onboard.areas[first]), float(onboard.areas[last])
-        triangle = Triangle(
-            sides=np.ones(3, dtype=np.float32),
-            area=np.float32((low + high) / 2),
-            moment=np.float32(0),
-            area_sigma=np.float32((high - low) / 6),
-            moment_sigma=np.float32(every),
-        )
+        middle, sigma = np.float32((low + high) / 2), np.float32((high - low) / 6)
+        sides = np.ones(3, dtype=np.float32)
+        triangle = Triangle(sides, middle, np.float32(0), sigma, np.float32(every))
         reach = np.float32(3) * triangle.area_sigma
         inside = (onboard.areas >= triangle.area - reach) & (onboard.areas <= triangle.area + reach)
         found = find_triangles(triangle, onboard, None, meter())
@@ -170,26 +153,20 @@ def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
 def test_enough_candidates_need_no_pivot() -> None:
     (made,) = pictures(1, seed=6)
     vectors = directions(made)
-    plain = match_triple(vectors, (0, 1, 2), (), 1e-4, database(), None, meter())
+    plain = match(vectors, (), 1e-4)
     assert len(plain.candidates) > 1
-    enough = match_triple(
-        vectors, (0, 1, 2), (3, 4, 5), 1e-4, database(), None, meter(), len(plain.candidates)
-    )
+    enough = match(vectors, (3, 4, 5), 1e-4, len(plain.candidates))
     assert enough.pivots == 0
     assert enough.candidates.tolist() == plain.candidates.tolist()
 
 
-def test_a_triangle_that_the_sky_does_not_have() -> None:
-    far = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
-    match = match_triple(far, (0, 1, 2), (), SIGMA, database(), None, meter())
-    assert match.end is Reason.NO_TRIANGLE
-    assert len(match.candidates) == 0
-
-
-def test_three_times_the_same_star() -> None:
-    same = np.tile(np.array([0, 0, 1], dtype=np.float32), (3, 1))
-    match = match_triple(same, (0, 1, 2), (), SIGMA, database(), None, meter())
-    assert match.end is Reason.DEGENERATE
+@pytest.mark.parametrize(
+    ("vectors", "end"),
+    [([[1, 0, 0], [0, 1, 0], [0, 0, 1]], Reason.NO_TRIANGLE), ([[0, 0, 1]] * 3, Reason.DEGENERATE)],
+)
+def test_triangles_that_the_sky_does_not_have(vectors: list[list[int]], end: Reason) -> None:
+    found = match(np.array(vectors, dtype=np.float32), (), SIGMA)
+    assert (found.end, len(found.candidates)) == (end, 0)
 
 
 def test_phases_are_booked() -> None:
