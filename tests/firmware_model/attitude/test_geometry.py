@@ -54,17 +54,8 @@ def test_directions_come_back_from_a_camera_that_inverts_the_equations(seed: int
     pixel = least_squares(lambda p: brown(p) - pinhole, pinhole, xtol=1e-15, ftol=1e-15).x
     meter = Meter(CORTEX_M3)
     found = unit_vectors(undistort(pixel[None].astype(np.float32), C, meter), C, meter)[0]
+    assert found.dtype == np.float32
     assert math.dist(found, ray / np.linalg.norm(ray)) < 1e-6
-
-
-def test_vectors_have_length_one_and_axes_point_right_down_and_out() -> None:
-    points = np.array([[539, 175.5], [900, 175.5], [539, 500]], dtype=np.float32)
-    vectors = unit_vectors(points, C, Meter(CORTEX_M3))
-    assert vectors.dtype == np.float32
-    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1, atol=2e-7)
-    np.testing.assert_allclose(vectors[0], [0, 0, 1], atol=1e-7)
-    assert vectors[1, 0] > 0.2
-    assert vectors[2, 1] > 0.2
 
 
 def test_the_charge_grows_with_the_number_of_points() -> None:

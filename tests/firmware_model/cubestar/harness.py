@@ -7,6 +7,7 @@ apart.
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
@@ -113,6 +114,11 @@ class Harness(Runner, HostSide):
 
     def status(self) -> TaskStatus:
         return TaskStatus(self.telemetry("TaskStatus")["taskStatus"])
+
+    def shown(self, frame: str, **values: float) -> None:
+        """Telemetry ``frame`` shows exactly these ``values``."""
+        found = self.telemetry(frame)
+        assert found == pytest.approx(values, rel=1e-6), f"{frame} shows {found}"
 
     def start_loop(self, seconds: float) -> int:
         """Trigger the 1 Hz loop and run it so long; the time at which it was triggered."""

@@ -123,17 +123,3 @@ def test_processing_that_takes_too_long(unit: Harness) -> None:
     assert "ProcessingTimeError" not in outcome(unit)
     unit.program.commands.processing.latest_ms["detection"] = 501.0
     assert "ProcessingTimeError" in outcome(unit)
-
-
-def test_flags_that_performance_repeats(lit: Harness) -> None:
-    lit.command("CaptureImage")
-    lit.command("setDetectionVariables", MaxStars=3)
-    lit.command("DetectStars")
-    assert "MaxStarsDetected" in outcome(lit)
-    assert "CommsError" not in outcome(lit)
-    lit.i2c_read(1)
-    assert "CommsError" in outcome(lit)
-    lit.command("ClearErrorFlags")
-    assert not outcome(lit) & {"MaxStarsDetected", "CommsError"}
-    lit.uart(b"x")
-    assert "CommsError" in outcome(lit)

@@ -6,13 +6,7 @@ import pytest
 from cubestack.firmware_model.cubestar.capture import ACK_TIMEOUT_US
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, TaskStatus
-from cubestack.firmware_model.mcu.requests import (
-    AwaitPin,
-    CameraTransfer,
-    SetPin,
-    Sleep,
-    StrobeRead,
-)
+from cubestack.firmware_model.mcu.requests import AwaitPin, CameraTransfer, SetPin, StrobeRead
 
 from .harness import FRAME_US, Harness
 
@@ -53,13 +47,6 @@ def test_the_first_frame_is_left_to_pass(unit: Harness, delay_ms: int) -> None:
     enabled_us = at[CameraTransfer(ENABLE)] + 3 * 90
     stored_us = next(now for now, request in unit.log if request == SetPin("ENABLE", 1))
     assert stored_us - enabled_us == pytest.approx(1000 * delay_ms, abs=20)
-
-
-def test_the_telecommands_wait_is_not_cut_short(unit: Harness) -> None:
-    waits = []
-    unit.on_request = lambda request: waits.append(request) if isinstance(request, Sleep) else None
-    unit.command("CaptureImage")
-    assert [wait.wakeable for wait in waits] == [False, True]  # the last one: idle
 
 
 def test_the_bank_is_chosen_before_storing_and_kept_for_the_transfer(unit: Harness) -> None:

@@ -1,6 +1,7 @@
 """The search against a literal transcription of its rules, and its accuracy on drawn stars."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -14,8 +15,8 @@ from cubestack.firmware_model.cubestar.detection import (
     SearchEnd,
     detect_stars,
 )
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
+
+from .sky import meter
 
 Place = tuple[int, int]
 
@@ -49,31 +50,29 @@ def literal_search(picture: NDArray[np.uint8], config: DetectionConfig) -> Detec
     invalid = noise = 0
     background = []
     end = SearchEnd.COMPLETE
-    for y in range(config.y_start, config.y_end, config.step):
-        for x in range(config.x_start, config.x_end, config.step):
-            if image[y, x] <= threshold:
-                background.append(int(image[y, x]))
-                continue
-            area: list[tuple[int, int, int]] = []
-            try:
-                literal_grow(image, y, x, area, config)
-            except TooLargeError:
-                invalid += 1
+    rows = range(config.y_start, config.y_end, config.step)
+    for y, x in product(rows, range(config.x_start, config.x_end, config.step)):
+        if image[y, x] <= threshold:
+            background.append(int(image[y, x]))
+            continue
+        area: list[tuple[int, int, int]] = []
+        try:
+            literal_grow(image, y, x, area, config)
+        except TooLargeError:
+            invalid += 1
+        else:
+            if len(area) < config.min_pixels:
+                noise += 1
             else:
-                if len(area) < config.min_pixels:
-                    noise += 1
-                else:
-                    centroids.append(literal_centroid(area, config))
-                    sizes.append(len(area))
-                    sums.append(sum(value for _, _, value in area))
-            if len(sizes) == config.max_stars:
-                end = SearchEnd.STARS
-            elif invalid > config.max_invalid:
-                end = SearchEnd.INVALID
-            elif noise > config.max_noise:
-                end = SearchEnd.NOISE
-            if end is not SearchEnd.COMPLETE:
-                break
+                centroids.append(literal_centroid(area, config))
+                sizes.append(len(area))
+                sums.append(sum(value for _, _, value in area))
+        if len(sizes) == config.max_stars:
+            end = SearchEnd.STARS
+        elif invalid > config.max_invalid:
+            end = SearchEnd.INVALID
+        elif noise > config.max_noise:
+            end = SearchEnd.NOISE
         if end is not SearchEnd.COMPLETE:
             break
     dark = int(np.floor(np.mean(background) + 0.5)) if background else 0
@@ -127,6 +126,7 @@ def test_search_follows_the_literal_rules(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rows, columns = int(rng.integers(12, 60)), int(rng.integers(12, 60))
     image = crowded(rng, rows, columns)
+    image.setflags(write=False)
     x_start, y_start = (int(v) for v in rng.integers(0, 6, 2))
     config = DetectionConfig(
         step=int(rng.integers(1, 5)),
@@ -138,7 +138,7 @@ def test_search_follows_the_literal_rules(seed: int) -> None:
         max_stars=int(rng.integers(1, 12)), max_invalid=int(rng.integers(0, 8)),
         max_noise=int(rng.choice([2, 20, 255])),
     )  # fmt: skip
-    same(detect_stars(image, config, Meter(CORTEX_M3)), literal_search(image, config))
+    same(detect_stars(image, config, meter()), literal_search(image, config))
 
 
 def test_the_random_pictures_reach_every_end() -> None:
@@ -149,16 +149,8 @@ def test_the_random_pictures_reach_every_end() -> None:
             config = DetectionConfig(
                 x_end=50, y_end=50, detection_threshold=10, star_threshold=8, **settings
             )
-            ends.add(detect_stars(image, config, Meter(CORTEX_M3)).end)
+            ends.add(detect_stars(image, config, meter()).end)
     assert ends == set(SearchEnd)
-
-
-def test_the_picture_is_left_as_it_was() -> None:
-    image = crowded(np.random.default_rng(1), 60, 90)
-    before = image.copy()
-    image.setflags(write=False)
-    detect_stars(image, DetectionConfig(x_end=90, y_end=60), Meter(CORTEX_M3))
-    assert np.array_equal(image, before)
 
 
 def drawn(
@@ -201,7 +193,7 @@ def errors(found: Detection, true: NDArray[np.float64]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("seed", range(5))
 def test_eighteen_noise_free_stars_are_as_accurate_as_published(kind: str, seed: int) -> None:
     image, true = drawn(kind, np.random.default_rng(seed))
-    found = detect_stars(image, DetectionConfig(), Meter(CORTEX_M3))
+    found = detect_stars(image, DetectionConfig(), meter())
     assert len(found.centroids) == 18
     assert (found.invalid, found.noise, found.end) == (0, 0, SearchEnd.COMPLETE)
     error_x, error_y = np.abs(errors(found, true)).mean(axis=0)
@@ -214,7 +206,7 @@ def test_a_bright_uneven_background_hardly_moves_a_centroid() -> None:
     image, true = drawn("integrated", rng, background=30.0)
     image = np.clip(image + rng.normal(0, 1.5, image.shape), 0, 255).astype(np.uint8)
     config = DetectionConfig(detection_threshold=55, star_threshold=55, min_pixels=4)
-    found = detect_stars(image, config, Meter(CORTEX_M3))
+    found = detect_stars(image, config, meter())
     assert len(found.centroids) >= 12
     error = errors(found, true)
     assert np.abs(error).mean() < 0.03
@@ -226,39 +218,29 @@ def test_a_saturated_star_is_centred_on_its_plateau() -> None:
     y, x = np.mgrid[0:60, 0:60]
     image[:] = np.clip(1500 * np.exp(-((x - 30.3) ** 2 + (y - 28.8) ** 2) / 2), 0, 255)
     config = DetectionConfig(x_end=60, y_end=60)
-    found = detect_stars(image, config, Meter(CORTEX_M3))
+    found = detect_stars(image, config, meter())
     assert found.centroids[0] == pytest.approx([30.3, 28.8], abs=0.1)
 
 
-def test_dark_value_is_the_mean_of_the_background_alone() -> None:
-    image = np.full((512, 1024), 4, dtype=np.uint8)
-    image[100:106, 200:206] = 200
-    found = detect_stars(image, DetectionConfig(), Meter(CORTEX_M3))
-    assert found.dark_value == 4
-    assert len(found.centroids) == 1
-
-
 def test_a_field_full_of_light_ends_after_fifty_one_invalid_areas() -> None:
-    found = detect_stars(
-        np.full((512, 1024), 255, dtype=np.uint8), DetectionConfig(), Meter(CORTEX_M3)
-    )
+    found = detect_stars(np.full((512, 1024), 255, dtype=np.uint8), DetectionConfig(), meter())
     assert (found.invalid, len(found.centroids)) == (51, 0)
     assert found.end is SearchEnd.INVALID
 
 
 def test_every_ninth_pixel_is_read_and_twice_the_stars_cost_twice_the_growing() -> None:
     rng = np.random.default_rng(3)
-    empty, few, many = Meter(CORTEX_M3), Meter(CORTEX_M3), Meter(CORTEX_M3)
+    empty, few, many = meter(), meter(), meter()
     detect_stars(np.zeros((512, 1024), dtype=np.uint8), DetectionConfig(), empty)
     assert empty.counts["ebi_read"] == 342 * 171
     assert empty.counts["ebi_write"] == 0
     few_found = detect_stars(drawn("sampled", rng, 6)[0], DetectionConfig(), few)
     many_found = detect_stars(drawn("sampled", rng, 12)[0], DetectionConfig(), many)
-    for meter, found in ((few, few_found), (many, many_found)):
+    for spent, found in ((few, few_found), (many, many_found)):
         pixels = int(found.sizes.sum())
-        assert meter.counts["ebi_write"] == 2 * pixels
-        assert meter.counts["ebi_read"] == 342 * 171 + 4 * pixels
-        assert meter.phases["search"] + meter.phases["centroid"] == meter.total
+        assert spent.counts["ebi_write"] == 2 * pixels
+        assert spent.counts["ebi_read"] == 342 * 171 + 4 * pixels
+        assert spent.phases["search"] + spent.phases["centroid"] == spent.total
 
 
 @pytest.mark.parametrize(
@@ -280,4 +262,4 @@ def test_settings_out_of_range_are_named(settings: dict[str, int], message: str)
 
 def test_a_region_beyond_the_picture_is_refused() -> None:
     with pytest.raises(DetectionConfigError, match="y_end must be at most 256, not 512"):
-        detect_stars(np.zeros((256, 1024), dtype=np.uint8), DetectionConfig(), Meter(CORTEX_M3))
+        detect_stars(np.zeros((256, 1024), dtype=np.uint8), DetectionConfig(), meter())

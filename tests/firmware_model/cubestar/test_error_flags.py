@@ -27,7 +27,7 @@ SETTERS = [
 """Parameters that raise a flag when they are out of range."""
 
 Act = Callable[[Harness, Sky], object]
-CAUSES: dict[str, Act] = {}
+CAUSES: dict[str, tuple[Act, tuple[str, ...]]] = {}
 
 MODE_SELECT = b"\x81\x00"
 DISABLE = MODE_SELECT + b"\x20"
@@ -38,11 +38,7 @@ def flag(name: str, *others: str) -> Callable[[Act], Act]:
     """The function brings flag ``name`` about, and ``others`` with it."""
 
     def register(cause: Act) -> Act:
-        def check(unit: Harness, sky: Sky) -> None:
-            cause(unit, sky)
-            assert unit.flags() == {name, *others}
-
-        assert CAUSES.setdefault(name, check) is check
+        assert CAUSES.setdefault(name, (cause, others)) == (cause, others)
         return cause
 
     return register
@@ -53,14 +49,26 @@ def test_every_flag_is_raised_by_its_cause(name: str, unit: Harness, sky: Sky) -
     if name not in CAUSES:
         assert name in {field.range_flag for _, field in SETTERS}, f"no cause of {name} is known"
         return  # the next test raises it
-    CAUSES[name](unit, sky)
-    assert unit.telemetry("LogStatus") == unit.telemetry("LogStatus") | {
-        field.name: field.flag in unit.flags()
-        for field in INTERFACE.telemetry("LogStatus").fields
-        if field.flag
-    }
+
+    def repeated() -> None:
+        """Other telemetry shows the same flags."""
+        flags = unit.flags()
+        log, performance = unit.telemetry("LogStatus"), unit.telemetry("PerformanceParameters")
+        shown = {f.name: f.flag in flags for f in INTERFACE.telemetry("LogStatus").fields if f.flag}
+        assert log == log | shown
+        assert performance == performance | {
+            "MaxStarsDetected": "MaxStarsDetection" in flags,
+            "LessThanThreeStarsInFoV": "LessThanThreeStarsInFoV" in flags,
+            "CommsError": any(flag.startswith(("UART_", "I2C_")) for flag in flags),
+        }
+
+    cause, others = CAUSES[name]
+    cause(unit, sky)
+    assert unit.flags() == {name, *others}
+    repeated()
     unit.command("ClearErrorFlags")
     assert unit.flags() == set()
+    repeated()
 
 
 @pytest.mark.parametrize(
@@ -141,7 +149,9 @@ def detect(unit: Harness, picture: np.ndarray) -> None:
     unit.command("CaptureImage", "DetectStars")
 
 
-def look_where_the_catalogue_has_no_stars(unit: Harness, sky: Sky, declination: float) -> None:
+def look_where_the_catalogue_has_no_stars(
+    unit: Harness, sky: Sky, declination: float, mode: IdMode = IdMode.TRACKING
+) -> None:
     """The catalogue keeps the stars north of 12 deg."""
     whole = unit.catalogue
     north = whole.vectors[:, 2] > 0.2
@@ -149,10 +159,16 @@ def look_where_the_catalogue_has_no_stars(unit: Harness, sky: Sky, declination: 
         whole.hip[north], whole.vectors[north].astype(float), whole.v_mag[north], 9.0, 50.0
     )
     unit.power_on()
-    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    unit.command("setIDMode", IdMode=mode)
     unit.command("setTrackingMode", RightAscension=0.3, Declination=declination)
     unit.picture = sky.picture
     unit.command("CaptureAndProcess")
+
+
+def test_lost_in_space_blames_no_catalogue(unit: Harness) -> None:
+    south = take(unit.catalogue, Rotation.from_euler("x", 180, degrees=True))
+    look_where_the_catalogue_has_no_stars(unit, south, -1.2, IdMode.LOST_IN_SPACE)
+    assert unit.flags() == set(NOT_FOUND)
 
 
 NO_STARS = "LessThanThreeStarsDetected"

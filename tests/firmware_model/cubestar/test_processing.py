@@ -101,12 +101,6 @@ def test_identifying_again_takes_the_validity_back(unit: Harness, sky: Sky) -> N
     assert unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
-def test_the_attitude_survives_power_off_in_flash(unit: Harness, sky: Sky) -> None:
-    good = process(unit, sky.picture)
-    unit.power_on()
-    assert unit.telemetry("AttitudeQuaternion") == good | {"Valid": False}
-
-
 @pytest.mark.parametrize(
     ("name", "failed", "flag"),
     [
@@ -131,16 +125,6 @@ def test_too_few_stars(unit: Harness, catalogue: StarCatalogue, pose: Rotation) 
     assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
     assert unit.flags() == {"LessThanThreeStarsDetected"}
     assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 2
-
-
-def test_stars_that_are_not_in_the_catalogue(unit: Harness) -> None:
-    picture = DARK.copy()
-    for x, y in ((200, 100), (500, 130), (820, 400), (300, 350)):
-        picture[y : y + 4, x : x + 4] = 90
-    process(unit, picture)
-    assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
-    assert unit.flags() >= {"LessThanThreeStarsID"} or unit.flags() >= {"IDError"}
-    assert unit.telemetry("NumIdStars")["numIdStars"] == 0
 
 
 def test_stars_without_attitude(unit: Harness, monkeypatch: pytest.MonkeyPatch, sky: Sky) -> None:
@@ -275,56 +259,6 @@ def test_a_mode_flag_needs_an_attitude(tracking: Harness, sky: Sky, pose: Rotati
     assert mode_flag(tracking) is MatchMode.ASSISTED
     assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
     assert tracking.flags() == {"IDModeError"}
-
-
-def empty_half(catalogue: StarCatalogue) -> StarCatalogue:
-    """The stars of the northern half alone."""
-    north = catalogue.vectors[:, 2] > 0.2
-    return StarCatalogue.build(
-        catalogue.hip[north], catalogue.vectors[north].astype(float), catalogue.v_mag[north], 9, 50
-    )
-
-
-def test_a_boresight_where_the_catalogue_is_empty(catalogue: StarCatalogue, sky: Sky) -> None:
-    unit = Harness(empty_half(catalogue))
-    unit.command("setIDMode", IdMode=IdMode.TRACKING)
-    for declination, flags in (
-        (-1.5, {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}),
-        (1.5, set()),
-    ):
-        unit.command("setTrackingMode", RightAscension=0.3, Declination=declination)
-        process(unit, sky.picture)
-        assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
-        known = {"ReducedIDListSizeError", "LessThanThreeStarsInFoV"}
-        assert unit.flags() & known == flags
-        performance = unit.telemetry("PerformanceParameters")
-        assert performance["LessThanThreeStarsInFoV"] == bool(flags)
-
-
-def test_lost_in_space_blames_no_catalogue(catalogue: StarCatalogue, pose: Rotation) -> None:
-    unit = Harness(empty_half(catalogue))
-    south = Rotation.from_euler("x", 180, degrees=True)
-    process(unit, take(catalogue, south).picture)
-    assert "LessThanThreeStarsInFoV" not in unit.flags()
-
-
-@pytest.mark.parametrize(
-    ("limits", "flag"),
-    [
-        ({"MaxStars": 5}, "MaxStarsDetection"),
-        ({"MaxInvalidStars": 0}, "MaxInvalidStarsDetectionError"),
-        ({"MaxNoise": 1}, "MaxNoiseDetected"),
-    ],
-)
-def test_why_a_search_stopped(unit: Harness, sky: Sky, limits: dict[str, int], flag: str) -> None:
-    picture = sky.picture.copy()
-    picture[200:220, 600:630] = 200  # the Moon
-    picture[3::30, 3::30] |= 60  # hot pixels
-    unit.picture = picture
-    unit.command("CaptureImage")
-    unit.command("setDetectionVariables", **limits)
-    unit.command("DetectStars")
-    assert unit.flags() - {"LessThanThreeStarsDetected"} == {flag}
 
 
 def test_times_are_those_of_the_charged_cycles(lit: Harness) -> None:

@@ -117,12 +117,6 @@ def test_a_reset_by_telecommand_ends_the_loop(unit: Harness) -> None:
     assert unit.telemetry("LoopStatus")["Iterations"] == 0
 
 
-def test_triggering_twice(unit: Harness) -> None:
-    unit.start_loop(0.95)
-    unit.start_loop(0.04)
-    assert unit.flags() == {"TriggerAlreadySet"}
-
-
 def test_triggering_while_the_delay_timer_runs(unit: Harness) -> None:
     unit.command("setDelayTimerTimeout", Time=1.0)
     for _ in range(2):  # also after the loop ran before

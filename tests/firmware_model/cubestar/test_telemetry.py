@@ -1,11 +1,12 @@
 """Every telemetry frame shows the state that it declares to show."""
 
-from collections.abc import Callable
+import math
 
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubestar.telemetry import NODE_TYPE
+from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS
+from cubestack.firmware_model.cubestar.telemetry import NODE_TYPE, SETTINGS_SHOWN, TIMES_SHOWN
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import (
     INTERFACE,
@@ -17,11 +18,10 @@ from cubestack.firmware_model.interface.cubestar import (
 from cubestack.firmware_model.node.identification import FIRMWARE_VERSION, SERIAL_NUMBER
 
 from ..registry import registered_in
-from .harness import FRAME_US, Harness
+from .harness import Harness
 from .sky import Sky
 
-Check = Callable[[Harness, Sky], None]
-CHECKS: dict[str, Check] = {}
+CHECKS: dict[str, object] = {}
 
 SUPPORTED = [message.name for message in INTERFACE.telemetries if message.supported]
 
@@ -39,33 +39,23 @@ ELSEWHERE = {
         "test_attitude_reports",
     ),
     **dict.fromkeys(
-        ("Exposure", "FocalLengthDetails", "PrincipalPoint", "DistortionCoef", "DetectionRegion",
-         "StarPixels", "StarGrid", "MaxStars", "IDMode", "IDMargin", "DelayTime",
-         "DetectionTimingOne", "DetectionTimingTwo", "IDTimingOne", "IDTimingTwo",
-         "IDTimingThree", "BestStarSelectionTime", "AttitudeTiming"),
-        "test_telemetry_tables",
-    ),
-    **dict.fromkeys(
         ("ErrorFlags", "TcmdProcessed", "SRAMTestResults", "IS_Register", "ImageBlock",
-         "UploadStatus"),
-        "test_commands",
+         "UploadStatus", "CameraRegister"),
+        "test_effects",
     ),
     "PowerStatus": "test_supply",
+    "SupplyReport": "test_supply",
     "CameraTiming": "test_image_sensor",
+    "StartAndLoopTime": "test_program",
 }  # fmt: skip
 
 
-#: Decorator: the function checks the named telemetry.
+#: Decorator: the test is of the named telemetry.
 telemetry = registered_in(CHECKS)
 
 
-@pytest.mark.parametrize("name", [name for name in SUPPORTED if name not in ELSEWHERE])
-def test_every_frame_shows_the_state(name: str, unit: Harness, sky: Sky) -> None:
-    CHECKS[name](unit, sky)
-
-
 def test_every_frame_is_tested_once() -> None:
-    assert sorted([*CHECKS, *ELSEWHERE]) == sorted(SUPPORTED)
+    assert sorted([*CHECKS, *ELSEWHERE, *SETTINGS_SHOWN, *TIMES_SHOWN]) == sorted(SUPPORTED)
 
 
 def test_a_frame_that_is_not_supported_is_not_answered(unit: Harness) -> None:
@@ -89,7 +79,7 @@ def test_every_frame_is_whole_at_any_time(name: str, unit: Harness, sky: Sky) ->
 
 
 @telemetry("Identification")
-def identification(unit: Harness, _: Sky) -> None:
+def test_identification(unit: Harness) -> None:
     unit.now_us = 65_536_000_000 + 7_654_321
     values = unit.telemetry("Identification")
     assert values == {
@@ -103,7 +93,7 @@ def identification(unit: Harness, _: Sky) -> None:
 
 
 @telemetry("ExtendedIdentification")
-def extended_identification(unit: Harness, _: Sky) -> None:
+def test_extended_identification(unit: Harness) -> None:
     unit.command("TestWDG", "Exposure")
     unit.telemetry("IDMode")
     assert unit.telemetry("ExtendedIdentification") == {
@@ -117,7 +107,7 @@ def extended_identification(unit: Harness, _: Sky) -> None:
 
 
 @telemetry("TaskStatus")
-def task_status(unit: Harness, sky: Sky) -> None:
+def test_task_status(unit: Harness, sky: Sky) -> None:
     seen = []
     unit.picture = sky.picture
     unit.on_request = lambda _request: seen.append(unit.telemetry("TaskStatus")["taskStatus"])
@@ -134,21 +124,8 @@ def task_status(unit: Harness, sky: Sky) -> None:
     assert unit.telemetry("TaskStatus")["taskStatus"] == TaskStatus.CALCULATED
 
 
-@telemetry("StartAndLoopTime")
-def start_and_loop_time(unit: Harness, _: Sky) -> None:
-    assert unit.telemetry("StartAndLoopTime") == {
-        "StartupTime": Harness.boot_us // 1000,
-        "LoopTime": 0,
-        "MaxLoopTime": 0,
-    }
-    unit.start_loop(1.9)
-    times = unit.telemetry("StartAndLoopTime")
-    assert times["LoopTime"] == pytest.approx(70 + FRAME_US / 1000 + 404, abs=3)
-    assert times["MaxLoopTime"] > times["LoopTime"]
-
-
 @telemetry("LogStatus")
-def log_status(unit: Harness, _: Sky) -> None:
+def test_log_status(unit: Harness) -> None:
     unit.command("TestWDG", "IDStars")
     unit.now_us = 99_999 * 1_000_000
     unit.currents["imager"] = 60.1
@@ -166,21 +143,8 @@ def log_status(unit: Harness, _: Sky) -> None:
     }
 
 
-@telemetry("SupplyReport")
-def supply_report(unit: Harness, _: Sky) -> None:
-    unit.program.supply.overcurrent("imager")
-    unit.run()
-    unit.program.supply.overcurrent("imager")
-    assert unit.telemetry("SupplyReport") == {
-        "SramCurrent": 2.0,
-        "ImagerCurrent": 0.0,
-        "LatchUps": 2,
-        "PowerCycles": 1,
-    }
-
-
 @telemetry("LoopStatus")
-def loop_status(unit: Harness, _: Sky) -> None:
+def test_loop_status(unit: Harness) -> None:
     unit.command("setTrackingMode", RightAscension=0.0, Declination=0.0)
     unit.command("SetFrameRate", FrameRate=9)
     unit.command("SetDiscardDelay", Delay=71)
@@ -199,44 +163,26 @@ def loop_status(unit: Harness, _: Sky) -> None:
 
 
 @telemetry("ImageSetup")
-def image_setup(unit: Harness, _: Sky) -> None:
+def test_image_setup(unit: Harness) -> None:
     assert unit.telemetry("ImageSetup") == {"FirstLine": 0, "Width": 1024, "Height": 512}
 
 
-@telemetry("CameraRegister")
-def camera_register(unit: Harness, _: Sky) -> None:
-    assert unit.telemetry("CameraRegister") == {"Address": 0, "Value": 0, "Valid": 0}
-    unit.camera[0x8511] = 0xC3
-    unit.command("ReadFrom_IS_Register", Reg=0x11)
-    assert unit.telemetry("CameraRegister") == {"Address": 0x8511, "Value": 0xC3, "Valid": 1}
-
-
-@telemetry("TimingSummary")
-def timing_summary(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.command("CaptureAndProcess")
-    phases = unit.telemetry("PhaseTimes")
-    values = unit.telemetry("TimingSummary")
+@telemetry("PhaseTimes", "TimingSummary")
+def test_phase_times(lit: Harness) -> None:
+    lit.command("CaptureAndProcess")
+    phases = lit.telemetry("PhaseTimes")
+    assert phases.pop("LoopTotal") == 0
+    assert all(value > 0 for value in phases.values())
+    values = lit.telemetry("TimingSummary")
     captured = phases["Discard"] + phases["Capture"] + phases["Transfer"]
     assert values["ImageCaptureTime"] == pytest.approx(captured / 1000, abs=0.5)
     assert values["DetectionTime"] == pytest.approx(phases["Detect"] / 1000, abs=0.5)
     assert values["IdentificationTime"] == pytest.approx(phases["Match"] / 1000, abs=0.5)
-    assert values["DetectionTime"] > values["IdentificationTime"] > 0
-
-
-@telemetry("PhaseTimes")
-def phase_times(unit: Harness, sky: Sky) -> None:
-    unit.picture = sky.picture
-    unit.run(until_us=unit.now_us + 250_000)
-    unit.command("CaptureAndProcess")
-    values = unit.telemetry("PhaseTimes")
-    assert values["Idle"] == pytest.approx(250_000 + Harness.boot_us, abs=100)
-    assert all(value > 0 for name, value in values.items() if name != "LoopTotal")
-    assert values["LoopTotal"] == 0
+    assert values["DetectionTime"] > values["IdentificationTime"]
 
 
 @telemetry("DetectionThresholdValues")
-def thresholds(unit: Harness, _: Sky) -> None:
+def test_thresholds(unit: Harness) -> None:
     unit.command("setDetectionThresholds", DetectionThreshold=40, StarThreshold=30)
     values = {"DarkThreshold": 0, "DetectionThreshold": 40, "StarThreshold": 30}
     assert unit.telemetry("DetectionThresholdValues") == values
@@ -270,3 +216,49 @@ def test_asking_changes_nothing_but_the_count_of_requests(unit: Harness, sky: Sk
     ]
     first = {name: unit.telemetry(name) for name in steady}
     assert first == {name: unit.telemetry(name) for name in steady}
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("frame", SETTINGS_SHOWN | TIMES_SHOWN)
+def test_every_field_of_the_frame_shows_something(frame: str) -> None:
+    shown = {**SETTINGS_SHOWN, **TIMES_SHOWN}[frame]
+    assert list(shown) == [field.name for field in INTERFACE.telemetry(frame).fields]
+
+
+@pytest.mark.parametrize("frame", SETTINGS_SHOWN)
+def test_a_frame_shows_the_setting_that_its_field_is_named_after(unit: Harness, frame: str) -> None:
+    values = unit.telemetry(frame)
+    for field, (command, parameter) in SETTINGS_SHOWN[frame].items():
+        assert command in SETTING_COMMANDS
+        declared = INTERFACE.telecommand(command).field(parameter)
+        assert values[field] == pytest.approx(float(declared.reset or 0), rel=1e-6)
+        shown = INTERFACE.telemetry(frame).field(field)
+        assert (shown.type, shown.scale, shown.unit) == (
+            declared.type,
+            declared.scale,
+            declared.unit,
+        )
+
+
+def test_a_frame_shows_the_times_of_its_steps(unit: Harness) -> None:
+    processing = unit.program.commands.processing
+    steps = sorted({step for shown in TIMES_SHOWN.values() for step in shown.values()})
+    for number, step in enumerate(steps):
+        processing.latest_ms[step] = 100.0 + number
+        processing.longest_ms[step] = 200.0 + number
+    for frame, shown in TIMES_SHOWN.items():
+        values = unit.telemetry(frame)
+        for field, step in shown.items():
+            assert values[field] == steps.index(step) + (200 if "Max" in field else 100)
+
+
+def test_every_step_is_one_that_the_processing_measures(lit: Harness, sky: Sky) -> None:
+    lit.command("CaptureAndProcess")
+    lit.command("setIDMode", IdMode=IdMode.TRACKING)
+    x, y, z = sky.attitude.inv().as_matrix()[:, 2]
+    lit.command("setTrackingMode", RightAscension=math.atan2(y, x), Declination=math.asin(z))
+    lit.command("CaptureAndProcess", "SelectBestStars")
+    steps = {step for shown in TIMES_SHOWN.values() for step in shown.values()}
+    assert steps <= lit.program.commands.processing.latest_ms.keys()
