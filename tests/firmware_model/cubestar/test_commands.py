@@ -3,7 +3,6 @@
 import pytest
 
 from cubestack.firmware_model.cubestar.commands import STREAM_BACKLOG_BYTES
-from cubestack.firmware_model.interface.cubestar import ResetCause
 from cubestack.firmware_model.mcu.requests import Sleep
 
 from .harness import FRAME_US, Harness
@@ -65,16 +64,3 @@ def test_an_interrupt_does_not_cut_a_wait_short(unit: Harness, name: str) -> Non
     unit.send("Exposure", exposure=1)  # wakes
     unit.run()
     assert not sleeps[0].wakeable
-
-
-def test_a_configuration_survives_the_power_cycle_and_nothing_else_does(unit: Harness) -> None:
-    unit.command("setIDMargin", Margin=0.002)
-    unit.command("SaveConfig")
-    unit.command("setIDMargin", Margin=0.003)
-    unit.command("IDStars", "TestWDG")
-    unit.power_on()
-    unit.shown("IDMargin", Margin=0.002)
-    assert unit.flags() == set()
-    values = unit.telemetry("ExtendedIdentification")
-    assert (values["WDGResetCount"], values["TcmdCount"]) == (0, 0)
-    assert values["ResetCause"] == ResetCause.POWER_ON

@@ -54,10 +54,8 @@ def test_every_setting_has_its_place() -> None:
     settings.put("setPrincipalPoint", {"Cx": 501.0, "Cy": 252.0})
     settings.put("setRadialDistortionGains", {"K1": 0.1, "K2": 0.2})
     settings.put("setTangentalDistortionGains", {"P1": 0.3, "P2": 0.4})
-    camera = camera_parameters(settings)
-    assert (camera.focal_length_mm, camera.fx, camera.fy) == (8.0, 1001.0, 1002.0)
-    assert (camera.cx, camera.cy) == (501.0, 252.0)
-    assert (camera.k1, camera.k2, camera.p1, camera.p2) == (0.1, 0.2, 0.3, 0.4)
+    expected = CameraParameters(8.0, 1001.0, 1002.0, 501.0, 252.0, 0.1, 0.2, 0.3, 0.4)
+    assert camera_parameters(settings) == expected
 
 
 @pytest.mark.parametrize(("cx", "cy"), [(539.0, 175.5), (512.0, 256.0), (100.0, 500.0)])

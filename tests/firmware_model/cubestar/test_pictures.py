@@ -1,7 +1,5 @@
 """Pictures behind the FPGA: what the program does over its bus, on memories that are arrays."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -217,14 +215,3 @@ def test_rate_is_twice_as_high_with_two_memories() -> None:
 def test_the_cost_table_has_the_bus_s_cycles() -> None:
     for operation in ("ebi_read", "ebi_write"):
         assert CORTEX_M3.operations[operation].cycles == 2 + EBI.cycles
-
-
-def test_book_counts_without_a_debt() -> None:
-    meter: Meter = Meter(CORTEX_M3)
-    debts: Callable[[], int] = meter.take
-    meter.charge(loop=3)
-    with meter.phase("search"):
-        meter.book(ebi_read=10)
-    assert meter.counts["ebi_read"] == 10
-    assert meter.phases == {"search": 80}
-    assert (debts(), debts()) == (15, 0)

@@ -40,7 +40,8 @@ def test_the_layout_fits_the_retention_registers(memories: Memories) -> None:
 
 def test_settings_flags_and_counters_come_back(memories: Memories) -> None:
     before = state(memories)
-    before.settings.put("Exposure", {"exposure": 1234})
+    before.save_config()
+    before.settings.put("Exposure", {"exposure": 1234})  # goes before the configuration
     before.flags |= set(FLAGS[::3])
     for number, name in enumerate(COUNTERS):
         setattr(before.retained, name, 2**40 + number)
@@ -81,25 +82,6 @@ def test_forgetting_returns_to_the_values_after_power_up(memories: Memories) -> 
     assert before.flags == set()
 
 
-def test_the_configuration(memories: Memories) -> None:
-    first = state(memories)
-    first.settings.put("setIDMargin", {"Margin": 0.002})
-    first.save_config()
-    second = state(memories)
-    assert second.settings.get("setIDMargin", "Margin") == 0.002
-    second.erase_config()
-    assert second.settings.get("setIDMargin", "Margin") == 0.001
-    assert state(memories).settings.get("setIDMargin", "Margin") == 0.001
-
-
-def test_retention_registers_go_before_the_configuration(memories: Memories) -> None:
-    first = state(memories)
-    first.save_config()
-    first.settings.put("Exposure", {"exposure": 8})
-    first.retain()
-    assert state(memories).settings.get("Exposure", "exposure") == 8
-
-
 def test_the_mode_flag(memories: Memories) -> None:
     assert state(memories).mode is MatchMode.LOST_IN_SPACE
     for mode in MatchMode:
@@ -128,19 +110,6 @@ def test_pictures_and_times_beyond_32_bits_wrap() -> None:
     assert (found.frame, found.image_ms) == (5, 6)
 
 
-def test_every_attitude_is_one_write(memories: Memories) -> None:
-    for number in range(5):
-        state(memories).attitude = Attitude(np.zeros(4, np.float32), number, 0, 0, 0)
-    assert memories.flash.writes == {"attitude": 5}
-
-
 def test_a_flag_that_is_not_declared_is_a_programming_error() -> None:
     with pytest.raises(KeyError, match="declares no flag 'Oops'"):
         state(Memories()).raise_flag("Oops")
-
-
-@pytest.mark.parametrize("name", FLAGS)
-def test_flags_are_shown_by_name(name: str) -> None:
-    shown = state(Memories())
-    shown.raise_flag(name)
-    assert [flag for flag, up in shown.flag_values().items() if up] == [name]

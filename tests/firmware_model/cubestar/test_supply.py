@@ -10,7 +10,9 @@ from .harness import Harness
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
-def test_the_interrupt_itself_opens_the_switch(unit: Harness, channel: str) -> None:
+def test_the_interrupt_opens_the_switch_and_the_main_loop_closes_it(
+    unit: Harness, channel: str
+) -> None:
     unit.program.supply.overcurrent(channel)
     other = CHANNELS[1 - CHANNELS.index(channel)]
     assert unit.switches == {channel: False, other: True}  # nothing has run since
@@ -18,11 +20,6 @@ def test_the_interrupt_itself_opens_the_switch(unit: Harness, channel: str) -> N
     values = unit.telemetry("SupplyReport")
     assert (values["LatchUps"], values["PowerCycles"]) == (1, 0)
     assert unit.telemetry("PowerStatus")["Status"] == (channel != "imager")
-
-
-@pytest.mark.parametrize("channel", CHANNELS)
-def test_the_main_loop_closes_the_switch_after_a_pause(unit: Harness, channel: str) -> None:
-    unit.program.supply.overcurrent(channel)
     unit.run(until_us=unit.now_us + OFF_TIME_US - 100)
     assert not unit.switches[channel]
     unit.run()

@@ -1,5 +1,9 @@
+import re
+
 import pytest
 
+from cubestack.firmware_model.mcu import pic18
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533, CORE_HZ, blackfin_bf533
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, cortex_m3
 from cubestack.firmware_model.mcu.costs import Cost, CostError, CostTable, Meter
 
@@ -26,6 +30,16 @@ def test_take_gives_the_cycles_since_the_last_take() -> None:
     meter.charge(loop=2)
     assert meter.take() == 10
     assert meter.total == 13
+
+
+def test_book_counts_without_a_debt() -> None:
+    meter = Meter(SIMPLE)
+    meter.charge(loop=3)
+    with meter.phase("search"):
+        meter.book(add=10)
+    assert meter.counts["add"] == 10
+    assert meter.phases == {"search": 30}
+    assert [meter.take(), meter.take()] == [15, 0]
 
 
 def test_unknown_operation_is_named_and_nothing_of_it_is_counted() -> None:
@@ -91,3 +105,51 @@ def test_wait_states_lengthen_only_their_own_accesses() -> None:
         "port_read": 1,
         "port_write": 1,
     }
+
+
+# --- Blackfin -------------------------------------------------------------------------------------
+
+
+def test_clock_and_memory_speed() -> None:
+    assert BLACKFIN_BF533.clock_hz == CORE_HZ
+    # 70 ns are 42 cycles of 600 MHz, and 21 of 300 MHz.
+    assert BLACKFIN_BF533.operations["flash_read"].cycles == 42
+    assert blackfin_bf533(clock_hz=300_000_000).operations["flash_read"].cycles == 21
+
+
+def test_nothing_is_fitted_and_everything_is_explained() -> None:
+    tags = {cost.provenance for cost in BLACKFIN_BF533.operations.values()}
+    assert tags == {"published", "assumed"}
+    assert all(cost.source for cost in BLACKFIN_BF533.operations.values())
+
+
+def test_every_float_operation_of_the_other_star_tracker_is_there() -> None:
+    floats = {name for name in CORTEX_M3.operations if re.match("f32|i32", name)}
+    assert floats <= set(BLACKFIN_BF533.operations)
+
+
+def test_reading_the_flash_once_takes_the_bus_time() -> None:
+    meter = Meter(BLACKFIN_BF533)
+    meter.charge(flash_read=1_000_000)
+    assert BLACKFIN_BF533.seconds(meter.total) == pytest.approx(0.070)
+
+
+# --- PIC18 ----------------------------------------------------------------------------------------
+
+
+def test_only_the_floating_point_library_is_fitted_and_by_one_factor() -> None:
+    fitted = {n for n, c in pic18.PIC18F45K20.operations.items() if c.provenance == "fitted"}
+    assert fitted == {name for name in pic18.PIC18F45K20.operations if name.startswith("f32_")}
+    plain = pic18.pic18f45k20(1.0).operations
+    for name, cost in pic18.PIC18F45K20.operations.items():
+        factor = pic18.LIBRARY_FACTOR if name in fitted else 1
+        assert cost.cycles == round(plain[name].cycles * factor), name
+
+
+def test_the_instruction_clock_is_that_of_the_published_timer_formula() -> None:
+    # 4 tenths of the timer's period at the prescaler of 256, CubeSense thesis, equation 7.4.1
+    assert pic18.PIC18F45K20.seconds(256 * 1000) == pytest.approx(1000 * 256 / 5e6)
+
+
+def test_the_sun_sensor_s_published_time_leaves_so_much_for_the_processor() -> None:
+    assert pytest.approx(0.0224) == pic18.FITTED_SUN_SECONDS
