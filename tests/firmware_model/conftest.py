@@ -25,7 +25,8 @@ def catalogue() -> StarCatalogue:
     rng = np.random.default_rng(2024)
     vectors = rng.normal(size=(405, 3))
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
-    return StarCatalogue.build(np.arange(405), vectors, rng.uniform(0, 3.7, 405), 3.8, 57.3)
+    hip = rng.permutation(100_000)[:405] + 1
+    return StarCatalogue.build(hip, vectors, rng.uniform(0, 3.7, 405), 3.8, 57.3)
 
 
 @pytest.fixture(scope="session")

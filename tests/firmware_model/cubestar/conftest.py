@@ -1,6 +1,5 @@
 """The program on fake hardware, and skies to look at."""
 
-import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -8,15 +7,6 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
 from .harness import Harness
 from .sky import Sky, take
-
-
-@pytest.fixture(scope="session")
-def catalogue() -> StarCatalogue:
-    rng = np.random.default_rng(2024)
-    vectors = rng.normal(size=(405, 3))
-    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
-    hip = rng.permutation(100_000)[:405] + 1
-    return StarCatalogue.build(hip, vectors, rng.uniform(0, 3.7, 405), 3.8, 57.3)
 
 
 @pytest.fixture(scope="session")
