@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
@@ -42,48 +43,22 @@ class SccbCamera:
         writes: (address, value) of every register written.
         registers: values by name, as far as written since power-up.
         answers: whether it acknowledges.
-        phases_ns: shortest time that SCL was low, and high, inside of transmissions.
     """
 
     def __init__(self) -> None:
         self.writes: list[tuple[int, int]] = []
         self.answers = True
-        self.phases_ns = [10**9, 10**9]
         self.power_up()
 
     def power_up(self) -> None:
         self.registers: dict[str, int] = {}
-        self.levels = {"SCL": 1, "SDA": 1}
-        self.bits: list[int] | None = None
-        self.edge_ns = 0
-        self.bus: set[str] = set()
+        self._slave = SccbSlave(REGISTERS.i2c_address, self._write)
 
     def set(self, line: str, level: int, now_ns: int) -> None:
-        was, self.levels[line] = self.levels[line], level
-        if was == level:
-            return
-        if line == "SDA" and self.levels["SCL"]:
-            self.bits = None if level else []
-            if level:
-                return
-            self.edge_ns = 0
-        elif line == "SCL":
-            if self.edge_ns:
-                phase = int(not level)  # the one that ends now: low is 0
-                self.phases_ns[phase] = min(self.phases_ns[phase], now_ns - self.edge_ns)
-            self.edge_ns = now_ns
-            if level and self.bits is not None:
-                self._bit(self.bits)
+        self._slave.on_pin(line, level, 1000 * now_ns)
 
-    def _bit(self, bits: list[int]) -> None:
-        bits.append(self.levels["SDA"])
-        if len(bits) % 9 == 0:
-            assert bits[-1] == 1, "the ninth bit is the camera's"
-        if len(bits) == 27 and self.answers:
-            device, address, value = (
-                int("".join(map(str, bits[at : at + 8])), 2) for at in (0, 9, 18)
-            )
-            assert device == REGISTERS.i2c_address << 1
+    def _write(self, address: int, value: int, _now_ps: int) -> None:
+        if self.answers:
             self.writes.append((address, value))
             register = REGISTERS.at(address)
             assert register is not None
@@ -91,9 +66,8 @@ class SccbCamera:
 
     @property
     def sda(self) -> int:
-        """0 while the camera pulls the line low in the ninth bit."""
-        ninth = self.bits is not None and len(self.bits) % 9 == 0 and len(self.bits) > 0
-        return 0 if ninth and self.answers else self.levels["SDA"]
+        """0 while the camera pulls the line low."""
+        return self._slave.sda if self.answers else 1
 
 
 class Harness(Runner, HostSide):

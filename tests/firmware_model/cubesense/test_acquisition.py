@@ -16,7 +16,6 @@ from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
 from cubestack.firmware_model.cubesense.vision.sample_search import around_samples
-from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
 from cubestack.firmware_model.interface.cubesense.codes import (
     COLUMNS,
     IMAGE_BYTES,
@@ -288,7 +287,3 @@ def test_an_addressed_pixel_costs_what_the_table_says() -> None:
     strobed = [us for us, r in rig.unit.log if isinstance(r, StrobeRead)]
     cost = rig.unit.meter.table.operations["address_byte"].cycles
     assert np.diff(strobed) == pytest.approx(cost / 5, abs=1)
-
-
-def test_the_buffers_are_those_of_the_budget(rig: Rig) -> None:
-    assert [buffer.nbytes for buffer in rig.acquisition.buffers] == [CHUNK, window_bytes()]

@@ -7,7 +7,7 @@ import pytest
 
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
-from cubestack.firmware_model.mcu.requests import SetPin
+from cubestack.firmware_model.mcu.requests import SetPin, StrobeRead
 
 from ..registry import registered_in
 from .harness import Harness
@@ -91,7 +91,9 @@ def clear_over_current(unit: Harness) -> None:
         unit.run(until_us=unit.now_us + 20_000)
         assert unit.cut() == set(codes.Sram)
         unit.command("ClearOverCurrent", Selection=selection)
-        assert unit.cut() == set(codes.Sram) - memories
+        power = unit.telemetry("Power")
+        flagged = {sram for sram in codes.Sram if power[f"OverCurrent{sram + 1}"]}
+        assert unit.cut() == flagged == set(codes.Sram) - memories
 
 
 @telecommand("CaptureAndDetect")
@@ -115,8 +117,12 @@ def capture_only(unit: Harness) -> None:
     lit(unit)
     for camera in codes.Camera:
         for sram in codes.Sram:
+            unit.log.clear()
             unit.command("CaptureOnly", Camera=camera, Sram=sram)
             assert result(unit, camera)["Detect"] == codes.DetectResult.NONE_SCHEDULED
+            times = unit.telemetry(f"PhaseTimes{camera + 1}")
+            assert (times["Search"], times["Centroid"]) == (0, 0)
+            assert not any(isinstance(request, StrobeRead) for _, request in unit.log)
             np.testing.assert_array_equal(unit.memories[sram], unit.scenes[camera])
 
 
@@ -136,23 +142,25 @@ def detection_threshold(unit: Harness) -> None:
 @telecommand("AutoAdjust1", "AutoAdjust2")
 def auto_adjust(unit: Harness) -> None:
     for camera in codes.Camera:
-        assert unit.cameras[camera].registers["COMMON_B"] & 1 == 0
-        unit.command(f"AutoAdjust{camera + 1}", Enabled=1)
-        unit.command("CaptureOnly", Camera=camera)
-        assert unit.cameras[camera].registers["COMMON_B"] & 1 == 1
-        assert unit.telemetry("Configuration")[f"AutoAdjust{camera + 1}"] == 1
+        before = dict(unit.cameras[camera].registers)
+        switched = {"COMMON_A": 0x24, "COMMON_B": 1, "COMMON_I": 0}
+        for enabled, expected in ((1, before | switched), (0, before)):
+            unit.command(f"AutoAdjust{camera + 1}", Enabled=enabled)
+            unit.command("CaptureOnly", Camera=camera)
+            assert unit.cameras[camera].registers == expected
+            assert unit.telemetry("Configuration")[f"AutoAdjust{camera + 1}"] == enabled
 
 
 @telecommand("CameraSettings1", "CameraSettings2")
 def camera_settings(unit: Harness) -> None:
-    for camera, exposure in zip(codes.Camera, (0x1F1F, 200), strict=True):
-        sent = {"Exposure": exposure, "Gain": 0x1F, "BlueGain": 0x81, "RedGain": 0x7E}
+    expected = {camera: dict(unit.cameras[camera].registers) for camera in codes.Camera}
+    for camera, exposure, gain in zip(codes.Camera, (0x1F1F, 200), (0x1F, 200), strict=True):
+        sent = {"Exposure": exposure, "Gain": gain, "BlueGain": 0x81, "RedGain": 0x7E}
         unit.command(f"CameraSettings{camera + 1}", **sent)
         unit.command("CaptureOnly", Camera=camera)
-        registers = unit.cameras[camera].registers
-        assert registers["EXPOSURE"] == min(exposure, 255)
-        names = ("GAIN", "BLUE_GAIN", "RED_GAIN")
-        assert [registers[name] for name in names] == [0x1F, 0x81, 0x7E]
+        limited = {"EXPOSURE": min(exposure, 255), "GAIN": min(gain, 63)}
+        expected[camera] |= {**limited, "BLUE_GAIN": 0x81, "RED_GAIN": 0x7E}
+        assert {camera: unit.cameras[camera].registers for camera in codes.Camera} == expected
         shown = unit.telemetry("Configuration")
         assert {name: shown[f"{name}{camera + 1}"] for name in sent} == sent
 
@@ -279,14 +287,3 @@ def test_a_reset_drops_what_waits_and_is_not_processed_before(unit: Harness, mor
     unit.run()
     assert set(seen) == {(0, 0), (1, 1)}
     assert unit.telemetry("Configuration")["Threshold1"] == 225
-
-
-def test_a_bench_letter_and_a_telecommand_take_turns(unit: Harness) -> None:
-    unit.letters(b"s")
-    unit.run(until_us=unit.now_us + 5_000)
-    begun = len(unit.bench_sent)
-    assert 0 < begun < 307_200
-    assert unit.send("DetectionThreshold1", Threshold=9) == 0
-    unit.run(until_us=unit.now_us + 5_000)
-    assert begun < len(unit.bench_sent) < 307_200
-    assert unit.telemetry("Configuration")["Threshold1"] == 9

@@ -14,12 +14,6 @@ def over_current(unit: Harness) -> set[codes.Sram]:
     return {sram for sram in codes.Sram if power[f"OverCurrent{sram + 1}"]}
 
 
-def test_both_memories_and_cameras_are_on_after_start_up(unit: Harness) -> None:
-    assert unit.cut() == set()
-    assert all(unit.pins[pin] for pin in ("SUN_POWER", "NAD_POWER"))
-    assert over_current(unit) == set()
-
-
 @pytest.mark.parametrize("sram", codes.Sram)
 def test_a_latch_up_while_idle_is_cut_within_one_sample_time(
     unit: Harness, sram: codes.Sram
@@ -53,16 +47,6 @@ def test_the_memories_are_watched_through_every_wait(
     unit.run()
     cut_us = next(us for us, request in unit.log if request == SetPin("SRAM1_POWER", 0))
     assert cut_us - latched_us[0] <= SAMPLE_US + 200
-
-
-def test_it_stays_off_until_the_host_clears_it(unit: Harness) -> None:
-    unit.latched.add(codes.Sram.SRAM2)
-    unit.run(until_us=unit.now_us + 1_000_000)
-    assert unit.cut() == {codes.Sram.SRAM2}
-    unit.command("ClearOverCurrent", Selection=codes.SramSelection.SRAM1)
-    assert unit.cut() == over_current(unit) == {codes.Sram.SRAM2}
-    unit.command("ClearOverCurrent", Selection=codes.SramSelection.BOTH)
-    assert unit.cut() == over_current(unit) == set()
 
 
 @pytest.mark.parametrize("cleared_after_us", [20_000, 500_000])

@@ -228,12 +228,3 @@ def test_uptime_wraps_at_16_bits_of_seconds(node: Links) -> None:
 def test_serial_numbers_are_six_bytes_of_ascii(node: Links, text: str, sent: bytes) -> None:
     node.serial_number = text
     assert node.telemetry("SerialNumber")["SerialNumber"] == sent.ljust(6, b"\0")
-
-
-def test_a_frame_and_its_checksum_belong_together(node: Links) -> None:
-    node.pictures[:] = np.random.default_rng(3).integers(0, 256, node.pictures.shape)
-    node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
-    node.command("NextImageFrame", Frame=12)
-    data = node.telemetry("ImageFrame")["Frame"]
-    assert any(data)
-    assert node.telemetry("ImageFrameInfo") == {"FrameNumber": 12, "Checksum": codes.checksum(data)}

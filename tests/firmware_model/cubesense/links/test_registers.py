@@ -5,7 +5,6 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.interface.codec.register_pointer import FILL
 from cubestack.firmware_model.interface.cubesense import codes
@@ -260,8 +259,3 @@ def test_a_download_at_the_same_time_leaves_both_whole(node: Links) -> None:
         node.command("NextImageFrame", Frame=number)
         assert node.telemetry("ImageFrameInfo")["FrameNumber"] == number
     assert data == node.pictures[0, :1000].tobytes()
-
-
-def test_a_reset_is_asked_for_by_its_cause(node: Links) -> None:
-    assert node.send("Reset", Target=3) == 0
-    assert node.run() == SOFTWARE_RESET

@@ -14,7 +14,7 @@ from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
 
-from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, chequered, distort, earth, feed, place, scan
+from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, distort, earth, feed, place, scan
 
 WHOLE = EdgeConfig(sub_pixel=False)
 NO_RIM = EdgeConfig(sub_pixel=False, rim_px=1000)
@@ -150,12 +150,6 @@ def test_edges_in_a_mask_are_dropped(meter: Meter) -> None:
     assert int(y) == 236
 
 
-def test_more_edges_than_the_part_keeps(meter: Meter) -> None:
-    edges = search(chequered(), NO_RIM, meter)
-    assert len(edges) == MAX_EDGES
-    assert edges.full
-
-
 @pytest.mark.parametrize("seed", range(50))
 def test_small_frames(meter: Meter, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -171,19 +165,3 @@ def test_small_frames(meter: Meter, seed: int) -> None:
         assert picture[y // 32, x // 32] >= 128
         inside = [(a, b) for a, b in neighbours if 0 <= a < 24 and 0 <= b < 20]
         assert len(inside) < len(neighbours) or any(picture[b, a] < 128 for a, b in inside)
-
-
-def test_bytes_can_be_put_straight_into_the_buffer(meter: Meter) -> None:
-    picture = earth(12, -7)
-    buffer = np.zeros(FULL_SIZE.scan_step, np.uint8)
-    lines = NadirLines(EdgeConfig(), meter, buffer=buffer)
-    data, at = scan(picture), 0
-    while lines.wanted:
-        space = lines.space
-        assert np.shares_memory(space, buffer)
-        space[:] = data[at : at + len(space)]
-        at += len(space)
-        lines.filled()
-    assert at == len(data)
-    fed = search(picture, EdgeConfig(), meter)
-    assert np.array_equal(lines.edges.points, fed.points)

@@ -13,7 +13,6 @@ from cubestack.firmware_model.interface.aramis import (
     Reason,
     SpikeMethod,
 )
-from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
 
 # AraMiS thesis, section 2.2: use case to telecommands.
@@ -61,12 +60,6 @@ def test_each_setting_is_shown_as_it_is_sent() -> None:
         assert INTERFACE.telemetry(frame).fields == INTERFACE.telecommand(command).fields
     settings = {m.name for m in INTERFACE.telecommands if m.name.startswith("Set")}
     assert settings - {"SetSystemTime"} <= set(SETTINGS_SHOWN.values())
-
-
-def test_flags_named_by_fields_exist() -> None:
-    named = {f.range_flag for m in INTERFACE.messages for f in m.fields} - {""}
-    assert named <= FLAG_NAMES
-    assert {f.flag for f in INTERFACE.telemetry("ErrorFlags").fields} == FLAG_NAMES
 
 
 def test_limits_are_those_of_the_things_themselves() -> None:

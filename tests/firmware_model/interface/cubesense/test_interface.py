@@ -227,19 +227,6 @@ def test_registers_are_one_byte_two_bytes_or_the_picture() -> None:
     assert REGISTERS["NADIR_X"].encode(-12.34) == bytes.fromhex("FB2E")
 
 
-def test_registers_and_node_protocol_start_with_the_same_settings() -> None:
-    for camera in codes.Camera:
-        number = camera + 1
-        settings = INTERFACE.telecommand(f"CameraSettings{number}").reset_values()
-        threshold = INTERFACE.telecommand(f"DetectionThreshold{number}").reset_values()
-        for register, value in (
-            ("THRESHOLD", threshold["Threshold"]),
-            ("EXPOSURE", settings["Exposure"]),
-            ("BLUE_GAIN", settings["BlueGain"]),
-        ):
-            assert REGISTERS[f"{camera.name}_{register}"].field.reset == value
-
-
 def test_bench_letters_are_the_published_ones() -> None:
     assert service_port.SERVICE_PORT is INTERFACE.service_port
     assert service_port.SERVICE_PORT.baud == 115_200
