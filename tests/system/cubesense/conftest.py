@@ -1,6 +1,5 @@
 """What the tests of a whole CubeSense share."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,18 +7,17 @@ import pytest
 
 from cubestack.emulator.boards.cubesense.board import HALVES
 from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, IMAGE_BYTES, ROWS, Camera
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
+from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.devices.emulated import AnyEmulated
 from tests.system.conftest import Open
 
 SUN_DEG = (20.0, 10.0)
 NADIR_DEG = (-8.0, 12.0)
+TRUTH_DEG = {Camera.SUN: SUN_DEG, Camera.NADIR: NADIR_DEG}
 
-
-@pytest.fixture
-def scene() -> EarthSunScene:
-    """Sun and Earth in view of their cameras."""
-    return EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
+#: Sun and Earth in view of their cameras.
+FACING = EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +29,7 @@ def device_name() -> str:
 def ready(session: Open) -> Open:
     """Opens the device, looking at a scene, and waits until its cameras are set up."""
 
-    def start(scene: Any, **options: Any) -> AnyEmulated:
+    def start(scene: Any = FACING, **options: Any) -> AnyEmulated:
         opened = session(scene, **options)
         opened.client.client.pause(0.3)
         return opened
@@ -39,28 +37,22 @@ def ready(session: Open) -> Open:
     return start
 
 
-@pytest.fixture
-def sent() -> Callable[[AnyEmulated, Camera], np.ndarray]:
+def check_right(found: Measurement, expected: tuple[float, float] | None = None) -> None:
+    """The direction is the expected one, or the truth's."""
+    assert found.detected
+    expected = expected or TRUTH_DEG[found.camera]
+    assert (found.alpha_deg, found.beta_deg) == pytest.approx(expected, abs=0.1)
+
+
+def sent(opened: AnyEmulated, camera: Camera) -> np.ndarray:
     """The picture (480, 640) that a camera sent while one was stored last, rendered anew."""
-
-    def look(opened: AnyEmulated, camera: Camera) -> np.ndarray:
-        shutter = opened.board.stored_frame(camera)
-        assert shutter is not None
-        segment = opened.board.cameras[camera].segment_at(shutter.readout_ps + 1)
-        assert segment is not None
-        assert segment.pixels is not None
-        return segment.pixels()
-
-    return look
+    shutter = opened.board.stored_frame(camera)
+    segment = opened.board.cameras[camera].segment_at(shutter.readout_ps + 1)
+    found: np.ndarray = segment.pixels()
+    return found
 
 
-@pytest.fixture
-def memory() -> Callable[[AnyEmulated, Camera], np.ndarray]:
-    """The picture (480, 640) in the memory of a camera's half, looked at from outside."""
-
-    def read(opened: AnyEmulated, half: Camera) -> np.ndarray:
-        rows = opened.board.engine.memories[HALVES[half]].reshape(-1, 1024)[:ROWS, :COLUMNS]
-        assert rows.size == IMAGE_BYTES
-        return rows
-
-    return read
+def held(board: Any, half: Camera) -> np.ndarray:
+    """The picture (480, 640) in the memory of a camera's half; an address is row : column."""
+    rows: np.ndarray = board.engine.memories[HALVES[half]].reshape(-1, 1024)
+    return rows[:ROWS, :COLUMNS].copy()

@@ -1,6 +1,7 @@
 """Both sensors once a second, by results that schedule the next measurement; satellite turning."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,11 +13,11 @@ from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.devices.emulated import AnyEmulated
 from tests.system.conftest import Open
 
-from .conftest import NADIR_DEG, SUN_DEG
+from .conftest import FACING
 
 TURNS = 6
 
-TURNING = EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG, rate_deg_s=(0.5, -1.0, 2.0))
+TURNING = replace(FACING, rate_deg_s=(0.5, -1.0, 2.0))
 
 
 def loop(opened: AnyEmulated, turns: int = TURNS) -> list[dict[Camera, Measurement]]:

@@ -1,4 +1,4 @@
-"""A CubeSense on record: played back it says the same; with another default, what differs."""
+"""A CubeSense on record: played back it says the same, and programs run on it."""
 
 import io
 from contextlib import closing
@@ -18,19 +18,17 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 
-
-def lines(board):
-    return {"uart": board.uart, "bench_uart": board.bench_uart}
+from .conftest import FACING
 
 
 @pytest.fixture
-def recorded(session, scene, tmp_path) -> Recording:
+def recorded(session, tmp_path) -> Recording:
     """A measurement, a picture over the bench, telemetry and registers over I2C."""
     path = tmp_path / "a.rec"
     with (
-        session(scene, seed=1) as opened,
+        session(FACING, seed=1) as opened,
         path.open("w") as stream,
-        closing(Recorder(stream, "cubesense", lines(opened.board))) as recorder,
+        closing(Recorder(stream, "cubesense", opened.board.uarts)) as recorder,
     ):
         board = opened.board
         recorder.listen(board.i2c_bus)
@@ -43,14 +41,10 @@ def recorded(session, scene, tmp_path) -> Recording:
     return load_recording(path)
 
 
-def replay(recording: Recording, session, scene, seed: int = 1) -> list[str]:
-    with session(scene, seed=seed) as opened:
+def test_same_version_says_the_same(recorded, session):
+    with session(FACING, seed=1) as opened:
         board = opened.board
-        return Replay(recording, board.kernel, lines(board), board.i2c_bus).run(INTERFACE)
-
-
-def test_same_version_says_the_same(recorded, session, scene):
-    assert replay(recorded, session, scene) == []
+        assert Replay(recorded, board.kernel, board.uarts, board.i2c_bus).run(INTERFACE) == []
 
 
 def test_host_programs_run_on_the_recording(recorded):
@@ -61,16 +55,12 @@ def test_host_programs_run_on_the_recording(recorded):
     assert 0 < power["Current5V"] < 200
 
 
-def test_recording_does_not_change_the_run(recorded, session, scene, tmp_path):
+def test_recording_does_not_change_the_run(recorded, session, tmp_path):
     path = tmp_path / "b.rec"
-    with session(scene, seed=1) as opened:
-        stream = io.StringIO()
-        trace = VcdTrace(stream, "x", opened.board.kernel, lines(opened.board))
-        with path.open("w") as file, closing(Recorder(file, "cubesense", lines(opened.board))):
+    with session(FACING, seed=1) as opened:
+        trace = VcdTrace(io.StringIO(), "x", opened.board.kernel, opened.board.uarts)
+        with path.open("w") as file, closing(Recorder(file, "cubesense", opened.board.uarts)):
             opened.client.capture_and_detect(Camera.SUN)
         trace.close()
-    again = load_recording(path)
-    assert (
-        recorded.sent("uart", "device")[1][: len(again.sent("uart", "device")[1])]
-        == (again.sent("uart", "device")[1])
-    )
+    times = load_recording(path).sent("uart", "device")[1]
+    assert recorded.sent("uart", "device")[1][: len(times)] == times

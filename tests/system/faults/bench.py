@@ -14,7 +14,6 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.scene.attitude import attitude_error_deg
-from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.aramis.catalogue.database import Database
@@ -29,8 +28,8 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device
 from tests.system.conftest import Ear
+from tests.system.cubesense.conftest import FACING, check_right, held
 
-SUN_DEG, NADIR_DEG = (20.0, 10.0), (-8.0, 12.0)
 ORION_DEG = (84.0, -1.0)
 
 
@@ -221,14 +220,13 @@ WAIT_S, REQUEST_S = 0.015, 0.003
 """From a request made after ``await_frame`` to its frame; and what it takes at least: the bytes
 on the line, and the gap before a frame that the FPGA has to see."""
 
-TARGETS = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
 TIMED_OUT = (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
 
 
 class Sense(Bench):
     """A CubeSense; of its halves it is the nadir camera's if nothing else is said."""
 
-    scene = EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
+    scene = FACING
     flags_in = "CommunicationStatus"
 
     def measure(self, camera: Camera = Camera.NADIR) -> Measurement:
@@ -259,10 +257,8 @@ class Sense(Bench):
         return frame
 
     def picture(self, camera: Camera = Camera.NADIR) -> np.ndarray:
-        """What the memory of a camera's half holds, (480, 640); an address is row : column."""
-        rows = self.board.engine.memories[TARGETS[camera]].reshape(-1, 1024)
-        held: np.ndarray = rows[: FULL_SIZE.rows, : FULL_SIZE.columns]
-        return held.copy()
+        """What the memory of a camera's half holds, (480, 640)."""
+        return held(self.board, camera)
 
     def host_pixel(self, x: int, y: int) -> int:
         """A pixel as the host gets it."""
@@ -278,13 +274,6 @@ class Sense(Bench):
             if self.telemetry("ImageFrameInfo")["FrameNumber"] == frame:
                 return int(bytes(self.telemetry("ImageFrame")["Frame"])[at])
         pytest.fail(f"frame {frame} is never ready")
-
-
-def check_right(found: Measurement) -> None:
-    """The direction is the truth's."""
-    assert found.detect is DetectResult.SUCCESS
-    truth = {Camera.SUN: SUN_DEG, Camera.NADIR: NADIR_DEG}[found.camera]
-    assert (found.alpha_deg, found.beta_deg) == pytest.approx(truth, abs=0.1)
 
 
 def line_s(frame: RollingShutter, line: float) -> float:

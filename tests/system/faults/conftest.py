@@ -13,8 +13,9 @@ import pytest
 
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
+from tests.system.cubesense.conftest import NADIR_DEG
 
-from .bench import BENCHES, NADIR_DEG, Sense, powered
+from .bench import BENCHES, Sense, powered
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from cubestack.emulator.boards.cubesense.board import HALVES
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult, ResetTarget
+from tests.system.cubesense.conftest import NADIR_DEG, check_right
 
-from .bench import NADIR_DEG, TARGETS, TIMED_OUT, Sense, check_right
+from .bench import TIMED_OUT, Sense
 
 X, Y = 20, 100
 
@@ -75,7 +77,7 @@ def test_a_camera_that_sends_no_frame_times_out_and_is_set_up_again(
     sense: Sense, camera: Camera, kind: str
 ) -> None:
     sense.check(camera)
-    sense.inject(kind, target=TARGETS[camera])
+    sense.inject(kind, target=HALVES[camera])
     for _ in range(2):
         assert sense.outcome(camera) == TIMED_OUT
         sense.check(Camera(1 - camera))

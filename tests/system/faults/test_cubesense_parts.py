@@ -9,8 +9,9 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.errors import NoAnswerError
+from tests.system.cubesense.conftest import check_right
 
-from .bench import Sense, check_right, line_s
+from .bench import Sense, line_s
 
 X, Y = 320, 300
 ADDRESS = 1024 * Y + X

@@ -7,8 +7,9 @@ import pytest
 
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
+from tests.system.cubesense.conftest import SUN_DEG, check_right
 
-from .bench import SUN_DEG, TIMED_OUT, Sense, check_right, line_s
+from .bench import TIMED_OUT, Sense, line_s
 
 ACK = {Camera.SUN: "SUNACK", Camera.NADIR: "NADACK"}
 ENABLES = {Camera.SUN: "SUNEN", Camera.NADIR: "NADEN"}
