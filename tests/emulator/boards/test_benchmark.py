@@ -6,18 +6,8 @@ from math import ceil
 import numpy as np
 import pytest
 
-from cubestack.emulator.boards.cubesense.benchmark import (
-    STORES,
-    pair_scan_ms,
-    pair_store_ms,
-    pair_with_cameras,
-)
-from cubestack.emulator.boards.cubestar.benchmark import (
-    PERIOD,
-    rtl_clocks_per_s,
-    stored_frame,
-    strobes_per_s,
-)
+from cubestack.emulator.boards.cubesense import benchmark as pair
+from cubestack.emulator.boards.cubestar import benchmark as star
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.benchmark import cold_build_s
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
@@ -30,10 +20,10 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 @pytest.mark.parametrize(
     "figure",
     [
-        lambda: rtl_clocks_per_s(1),
-        lambda: strobes_per_s(1),
+        lambda: star.rtl_clocks_per_s(1),
+        lambda: star.strobes_per_s(1),
         lambda: cold_build_s(cubestar_wiring()),
-        lambda: pair_scan_ms(pair_with_cameras(), 1),
+        lambda: pair.pair_scan_ms(pair.pair_with_cameras(), 1),
     ],
 )
 def test_figures_are_positive(figure):
@@ -42,19 +32,18 @@ def test_figures_are_positive(figure):
 
 def test_the_measured_run_stores_a_frame():
     """The first line is joined in the middle, so the frame begins with the second."""
-    _, engine = stored_frame(skipping=False)
+    _, engine = star.stored_frame(skipping=False)
     rng = np.random.default_rng(0)
     frame = rng.integers(0, 256, (512, 1024), dtype=np.uint8)
     assert (engine.sram[: 1024 * 512].reshape(512, 1024) == np.roll(frame, -1, axis=0)).all()
-    ends = int((512 * LINE_CLOCKS + 1024) * PERIOD)
+    ends = int((512 * LINE_CLOCKS + 1024) * star.PERIOD)
     assert (engine.get_pin("ACK"), engine.now_ps) == (1, ends)
 
 
-@pytest.mark.parametrize("way", STORES)
+@pytest.mark.parametrize("way", pair.STORES)
 def test_the_measured_stores_of_the_pair_end_with_the_frame(way):
-    engine = pair_with_cameras()
-    assert 0 < pair_store_ms(engine, way, 2) < float("inf")
-    _, acknowledges = STORES[way]
-    assert all(engine.get_pin(pin) for pin in acknowledges)
+    engine = pair.pair_with_cameras()
+    assert 0 < pair.pair_store_ms(engine, way, 2) < float("inf")
+    assert all(engine.get_pin(pin) for pin in pair.STORES[way][1])
     clocks = ceil(engine.now_ps / Fraction(10**12, PIXEL_CLOCK_HZ))
     assert -clocks % (525 * 858) == 218  # the last line's blanking is still to come

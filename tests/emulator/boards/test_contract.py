@@ -50,18 +50,15 @@ def powered(stack: ExitStack, **place: Any) -> dict[str, Board]:
 
 def probed(board: Board, name: str) -> list[tuple[int, object]]:
     """Answers to a telemetry on both ways to a board, asked at once, and when the bytes come."""
-    kernel, interface = board.kernel, INTERFACES[name]
-    identifier = interface.telemetries[0].id
+    kernel, address = board.kernel, INTERFACES[name].i2c_address
+    request = bytearray([INTERFACES[name].telemetries[0].id])
     line, answer = HostLine(board.uart), bytearray()
-    transfer = [
-        I2cMessage(interface.i2c_address, bytearray([identifier])),
-        I2cMessage(interface.i2c_address, read=4),
-    ]
+    transfer = [I2cMessage(address, request), I2cMessage(address, read=4)]
     found: list[tuple[int, object]] = []
 
     def host() -> Iterator[Any]:
         yield kernel.timeout(100 * PS_PER_MS)
-        line.uart.host_writes(encode_frame(bytes([identifier])))
+        line.uart.host_writes(encode_frame(bytes(request)))
         yield from board.i2c_bus.transfer(transfer)
         found.append((kernel.now, bytes(transfer[1].data)))
         for _ in range(40):
@@ -98,12 +95,9 @@ def test_boards_share_a_bus(stack: ExitStack) -> None:
         BOARDS["aramis"](kernel=kernel, i2c_bus=bus)
 
 
-def test_a_bus_of_another_kernel_is_refused() -> None:
+def test_a_bus_of_another_kernel_and_a_kernel_that_is_under_way_are_refused() -> None:
     with pytest.raises(ValueError, match="needs the kernel of that bus"):
         BOARDS["aramis"](i2c_bus=I2cBus(Kernel()))
-
-
-def test_a_kernel_that_is_under_way_is_refused() -> None:
     kernel = Kernel()
     kernel.advance_to(5)
     with pytest.raises(ValueError, match="powered up at time 0, not at 5 ps"):
@@ -123,11 +117,9 @@ def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
 
 def test_lines_and_probes(stack: ExitStack) -> None:
     boards = powered(stack)
+    latest = "sun_capture", "sun_detect", "nadir_capture", "nadir_detect"
     assert {name: [*board.uarts, *board.probes()] for name, board in boards.items()} == {
         "cubestar": ["uart", "awake", "resets", "task"],
-        "cubesense": [
-            *("uart", "bench_uart", "awake", "resets"),
-            *("sun_capture", "sun_detect", "nadir_capture", "nadir_detect"),
-        ],
+        "cubesense": [*("uart", "bench_uart", "awake", "resets"), *latest],
         "aramis": ["uart", "awake", "resets", "task", "measurement"],
     }

@@ -58,5 +58,4 @@ class Desk:
 
     def error_deg(self) -> tuple[float, float]:
         found = self.aramis.attitude()
-        truth = self.board.truth(found.frame)
-        return attitude_error_deg(found.quaternion, truth)
+        return attitude_error_deg(found.quaternion, self.board.truth(found.frame))

@@ -49,7 +49,9 @@ class Lines:
 
 
 class Bench:
-    def __init__(self, phase: int = 0) -> None:
+    """Where a frame has just ended, unless told otherwise."""
+
+    def __init__(self, phase: int = ROWS * LINE) -> None:
         self.kernel = Kernel()
         self.lines = Lines(phase)
         self.ppi = Ppi(self.kernel, self.lines)
@@ -66,16 +68,15 @@ def test_the_frame_under_way_is_skipped_and_the_next_one_stored_at_its_last_pixe
     bench = Bench(phase=5)
     bench.ppi.start(bench.target)
     assert bench.ppi.busy
-    assert bench.run(2 * FRAME) == [
-        ((FRAME - 5 + (ROWS - 1) * LINE + COLUMNS) * PERIOD, FrameEnd.STORED)
-    ]
+    stored_ps = (FRAME - 5 + (ROWS - 1) * LINE + COLUMNS) * PERIOD
+    assert bench.run(2 * FRAME) == [(stored_ps, FrameEnd.STORED)]
     assert (bench.target == 1).all()
     assert not bench.ppi.busy
     assert bench.ppi.stored.readout_ps == (FRAME - 5) * PERIOD
 
 
 def test_only_the_lines_wanted_are_taken() -> None:
-    bench = Bench(phase=ROWS * LINE)
+    bench = Bench()
     target = np.zeros((2, COLUMNS), np.uint8)
     bench.ppi.start(target)
     assert bench.run(FRAME) == [((BLANK + LINE + COLUMNS) * PERIOD, FrameEnd.STORED)]
@@ -83,7 +84,7 @@ def test_only_the_lines_wanted_are_taken() -> None:
 
 
 def test_a_short_frame_and_wrong_lines_are_reported() -> None:
-    bench = Bench(phase=ROWS * LINE)
+    bench = Bench()
     bench.lines.rows = ROWS - 2
     bench.ppi.start(bench.target)
     assert [end for _, end in bench.run(2 * FRAME)] == [FrameEnd.TOO_SHORT]
@@ -97,7 +98,7 @@ def test_a_short_frame_and_wrong_lines_are_reported() -> None:
 
 
 def test_a_dead_camera_never_ends_a_frame_and_stopping_helps() -> None:
-    bench = Bench(phase=ROWS * LINE)
+    bench = Bench()
     bench.ppi.start(bench.target)
     bench.run(BLANK + 2 * LINE)
     bench.lines.alive = False
@@ -112,7 +113,7 @@ def test_a_dead_camera_never_ends_a_frame_and_stopping_helps() -> None:
 
 
 def test_starting_again_gives_up_the_frame_before() -> None:
-    bench = Bench(phase=ROWS * LINE)
+    bench = Bench()
     other = np.zeros((ROWS, COLUMNS), np.uint8)
     bench.ppi.start(bench.target)
     bench.run(BLANK + 2 * LINE)
@@ -123,7 +124,7 @@ def test_starting_again_gives_up_the_frame_before() -> None:
 
 
 def test_a_change_that_leaves_the_frame_alone_does_not_disturb_it() -> None:
-    bench = Bench(phase=ROWS * LINE)
+    bench = Bench()
     bench.ppi.start(bench.target)
     for _ in range(9):
         bench.run(17)

@@ -23,11 +23,8 @@ def test_a_double_error_is_reported_and_no_attitude_comes_of_it(desk: Desk) -> N
     desk.flip_flash(4321, 7, 50)
     assert desk.aramis.activate() is CatalogueState.DAMAGED
     found = desk.aramis.measure()
-    assert (found.valid, found.outcome, found.reason) == (
-        False,
-        MeasurementOutcome.NONE,
-        Reason.CATALOGUE_DAMAGED,
-    )
+    expected = False, MeasurementOutcome.NONE, Reason.CATALOGUE_DAMAGED
+    assert (found.valid, found.outcome, found.reason) == expected
     assert desk.client.telemetry("CatalogueStatus")["Lost"] == 1
     assert "CatalogueDamaged" in desk.flags()
 
@@ -40,15 +37,12 @@ def test_upsets_in_ram_are_found_before_the_next_match(active: Desk) -> None:
     assert active.client.telemetry("CatalogueStatus")["RamErrors"] == 1
 
 
-def test_the_catalogue_is_reloaded_periodically_and_the_flash_can_be_refreshed(
-    active: Desk,
-) -> None:
+def test_the_catalogue_is_reloaded_periodically_and_can_be_refreshed(active: Desk) -> None:
     active.client.command("SetReloadPeriod", Period=2)
     active.flip_flash(100, 3)
     active.client.pause(7)
     status = active.client.telemetry("CatalogueStatus")
-    assert status["Loads"] == 4
-    assert (status["Corrected"], status["CorrectedTotal"]) == (1, 3)
+    assert [status[name] for name in ("Loads", "Corrected", "CorrectedTotal")] == [4, 1, 3]
     active.client.command("SetReloadPeriod", Period=0)
     active.client.command("RefreshCatalogue")
     active.client.wait_processed(100)

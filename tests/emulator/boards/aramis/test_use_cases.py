@@ -6,15 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.firmware_model.interface.aramis import (
-    MS_PER_DAY,
-    CatalogueState,
-    LatchUpStep,
-    MeasurementMode,
-    MeasurementOutcome,
-    Reason,
-    SensorState,
-)
+from cubestack.firmware_model.interface import aramis as codes
+from cubestack.firmware_model.interface.aramis import CatalogueState, LatchUpStep, Reason
 
 from .desk import Desk
 
@@ -22,20 +15,19 @@ from .desk import Desk
 def test_activate_measure_deactivate(desk: Desk) -> None:
     desk.client.pause(0.1)
     status = desk.client.telemetry("SensorStatus")
-    assert (status["State"], status["Catalogue"]) == (SensorState.INACTIVE, 0)
+    assert (status["State"], status["Catalogue"]) == (codes.SensorState.INACTIVE, 0)
     assert not desk.board.camera.enabled
     assert desk.aramis.activate() is CatalogueState.GOOD
     assert desk.board.camera.enabled
     found = desk.aramis.measure()
-    assert found.valid
-    assert found.outcome is MeasurementOutcome.CONCLUSIVE
-    assert found.mode is MeasurementMode.LOST_IN_SPACE
+    ways = codes.MeasurementOutcome.CONCLUSIVE, codes.MeasurementMode.LOST_IN_SPACE
+    assert (found.valid, found.outcome, found.mode) == (True, *ways)
     cross, roll = desk.error_deg()
     assert cross < 0.01
     assert abs(roll) < 0.05
     desk.aramis.deactivate()
     assert not desk.board.camera.enabled
-    assert desk.client.telemetry("SensorStatus")["State"] == SensorState.INACTIVE
+    assert desk.client.telemetry("SensorStatus")["State"] == codes.SensorState.INACTIVE
     assert desk.flags() == set()
 
 
@@ -51,11 +43,10 @@ def test_rough_directions_as_vector_and_as_angles(active: Desk) -> None:
     boresight = np.array([0.104, 0.994, -0.017])
     for near in ({"near": boresight}, {"near_rad": (1.466, -0.017)}):
         found = active.aramis.measure(**near)  # type: ignore[arg-type]
-        assert (found.valid, found.mode) == (True, MeasurementMode.AIDED)
+        assert (found.valid, found.mode) == (True, codes.MeasurementMode.AIDED)
         assert active.error_deg()[0] < 0.01
     away = active.aramis.measure(near=-boresight)
-    assert not away.valid
-    assert away.outcome is MeasurementOutcome.NONE
+    assert (away.valid, away.outcome) == (False, codes.MeasurementOutcome.NONE)
     assert away.quaternion is not None  # an older one, marked as such
     with pytest.raises(ValueError, match="give one of them"):
         active.aramis.measure(boresight, near_rad=(0.0, 0.0))
@@ -69,7 +60,7 @@ def test_the_answer_carries_the_image_s_time(active: Desk) -> None:
     found = active.aramis.measure()
     exposed_s = active.board.ppi.stored.mid_exposure_ps(511.5) / PS_PER_S
     assert found.image_uptime_s == pytest.approx(exposed_s, abs=0.0011)
-    seconds = (found.julian_date - 2_461_366.75) * MS_PER_DAY / 1000
+    seconds = (found.julian_date - 2_461_366.75) * codes.MS_PER_DAY / 1000
     assert seconds == pytest.approx(exposed_s - set_at_s, abs=0.03)
     now = active.aramis.julian_date()
     assert (now - 2_461_366.75) * 86_400 == pytest.approx(active.now_s - set_at_s, abs=0.03)
@@ -127,12 +118,8 @@ def test_a_catalogue_is_loaded_by_telecommand() -> None:
     state = desk.aramis.load_catalogue(image, lambda done, total: seen.append((done, total)))
     assert state is CatalogueState.GOOD
     assert seen[-1] == (-(-len(image) // 128),) * 2
-    status = desk.client.telemetry("CatalogueStatus")
-    assert (status["Stars"], status["Triangles"], status["Bytes"]) == (
-        len(small.numbers),
-        len(small),
-        len(image),
-    )
+    expected = {"Stars": len(small.numbers), "Triangles": len(small), "Bytes": len(image)}
+    assert desk.client.telemetry("CatalogueStatus").items() >= expected.items()
     desk.aramis.deactivate()
     assert desk.aramis.activate() is CatalogueState.GOOD
 

@@ -15,16 +15,13 @@ from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
 from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
-from cubestack.firmware_model.interface.cubesense.pins import (
-    CAMERA_SCL,
-    CAMERA_SDA,
-    MA_PER_COUNT,
-    SRAM_POWER,
-    Monitor,
-)
+from cubestack.firmware_model.interface.cubesense.pins import MA_PER_COUNT, Monitor
 
 FRAME_MS = 34
+DETECT = bytes.fromhex("1f7f1401011fff")
+"""Capture and detect: nadir, SRAM2."""
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -51,9 +48,7 @@ def test_starts_with_the_processor_in_reset_and_everything_switched_off() -> Non
     board.close()
 
 
-def test_firmware_switches_everything_on_and_shows_the_published_power(
-    board: CubeSenseBoard,
-) -> None:
+def test_firmware_switches_everything_on_at_the_published_power(board: CubeSenseBoard) -> None:
     assert all(board.power.is_on(channel) for channel in CHANNELS.values())
     assert board.power.current_ma() * 5.0 == pytest.approx(359.5, rel=0.06)
 
@@ -65,26 +60,19 @@ def test_the_firmware_has_set_the_cameras_by_their_control_lines(board: CubeSens
 
 
 def test_monitors_show_what_the_parts_draw(board: CubeSenseBoard) -> None:
-    hardware = board.hardware
-
-    def shown(monitor: Monitor) -> float:
-        return hardware.adc_counts(monitor) * MA_PER_COUNT
-
-    assert shown(Monitor.SRAM1) == pytest.approx(4.6, abs=MA_PER_COUNT)
-    assert shown(Monitor.SUPPLY_5V) == pytest.approx(board.power.current_ma(), abs=MA_PER_COUNT)
-    cameras = 2 * 25.15
-    assert shown(Monitor.SUPPLY_5V) - shown(Monitor.SUPPLY_3V3) == pytest.approx(
-        cameras, abs=2 * MA_PER_COUNT
-    )
+    shown = {one: board.hardware.adc_counts(one) * MA_PER_COUNT for one in Monitor}
+    whole_ma = shown[Monitor.SUPPLY_5V]
+    assert shown[Monitor.SRAM1] == pytest.approx(4.6, abs=MA_PER_COUNT)
+    assert whole_ma == pytest.approx(board.power.current_ma(), abs=MA_PER_COUNT)
+    cameras_ma = whole_ma - shown[Monitor.SUPPLY_3V3]
+    assert cameras_ma == pytest.approx(2 * 25.15, abs=2 * MA_PER_COUNT)
     board.power.latch_up("SRAM2", 5000.0)
-    assert hardware.adc_counts(Monitor.SRAM2) == 1023  # no more than full scale
+    assert board.hardware.adc_counts(Monitor.SRAM2) == 1023  # no more than full scale
 
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", Sram)
-def test_a_picture_on_its_way_takes_current(
-    board: CubeSenseBoard, camera: Camera, sram: Sram
-) -> None:
+def test_a_picture_takes_current(board: CubeSenseBoard, camera: Camera, sram: Sram) -> None:
     """Storing takes it in one memory; FPGAs take it on their own, or both of them linked."""
     idle_ma = board.power.current_ma()
     board.serial().write(bytes([0x1F, 0x7F, 20, camera, sram, 0x1F, 0xFF]))
@@ -136,11 +124,10 @@ def test_truth_is_of_the_frame_that_was_stored(board: CubeSenseBoard) -> None:
     assert board.truth(Camera.NADIR) is None
     board.scene = EarthSunScene(rate_deg_s=(0, 10.0, 0))
     start_ms = board.kernel.now / PS_PER_MS
-    board.serial().write(bytes.fromhex("1f7f1401011fff"))  # capture and detect: nadir, SRAM2
+    board.serial().write(DETECT)
     let_pass(board, 400)
     truth = board.truth(Camera.NADIR)
-    turned_ms = abs(truth.alpha_deg) / 10.0 * 1000
-    assert start_ms < turned_ms < start_ms + 10 + 2 * FRAME_MS
+    assert start_ms < abs(truth.alpha_deg) / 10.0 * 1000 < start_ms + 10 + 2 * FRAME_MS
     assert board.truth(Camera.SUN) is None
 
 
@@ -158,17 +145,15 @@ def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> N
     from smbus2 import i2c_msg
 
     bus = board.i2c()
-    identification = i2c_msg.read(0x1B, 8)
+    identification, threshold = i2c_msg.read(0x1B, 8), i2c_msg.read(0x1C, 1)
     bus.i2c_rdwr(i2c_msg.write(0x1B, [0x80]), identification)
-    assert list(identification)[1] == 2  # interface version
-    threshold = i2c_msg.read(0x1C, 1)
     bus.i2c_rdwr(i2c_msg.write(0x1C, [0x00]), threshold)
-    assert list(threshold) == [225]
+    assert (list(identification)[1], list(threshold)) == (2, [225])  # interface version first
 
 
 def test_busy_while_it_works_and_not_while_it_waits(board: CubeSenseBoard) -> None:
     assert not board.busy()
-    board.serial().write(bytes.fromhex("1f7f1401011fff"))
+    board.serial().write(DETECT)
     assert board.busy()
     let_pass(board, 50)
     assert board.busy()
@@ -190,10 +175,9 @@ def test_reset_of_the_processor_releases_every_pin(board: CubeSenseBoard) -> Non
 
 def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
     lines = GpioPins(board.kernel, board.cameras, board.power)
-    scl, sda = CAMERA_SCL[Camera.SUN], CAMERA_SDA[Camera.SUN]
-    assert all(pin in lines for pin in (scl, sda, *SRAM_POWER.values()))
+    scl, sda = pins.CAMERA_SCL[Camera.SUN], pins.CAMERA_SDA[Camera.SUN]
+    assert all(pin in lines for pin in (scl, sda, *pins.SRAM_POWER.values()))
     assert "SUNEN" not in lines
     assert lines.get_pin(sda) == 1
     lines.set_pin(sda, 0)
-    assert lines.get_pin(sda) == 0
-    assert lines.get_pin(scl) == 1
+    assert (lines.get_pin(sda), lines.get_pin(scl)) == (0, 1)
