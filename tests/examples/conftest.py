@@ -5,14 +5,16 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from configparser import ConfigParser
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from cubestack.host.cli.main import main
 from cubestack.host.devices import registry
+
+from ..conftest import Run
 
 ROOT = Path(__file__).parents[2]
 TIMEOUT_S = 120
@@ -20,11 +22,7 @@ TIMEOUT_S = 120
 
 @dataclass(frozen=True)
 class Installed:
-    """A distribution that this process and its children find.
-
-    Attributes:
-        paths: folders that Python looks into.
-    """
+    """A distribution that this process and its children find in folders ``paths``."""
 
     paths: tuple[Path, ...]
 
@@ -53,12 +51,10 @@ def installed(project: Path, site: Path) -> Iterator[Installed]:
     (info / "METADATA").write_text(
         f"Metadata-Version: 2.1\nName: {told['name']}\nVersion: {told['version']}\n"
     )
-    lines = [
-        line
-        for group, entries in told["entry-points"].items()
-        for line in (f"[{group}]", *(f"{name} = {value}" for name, value in entries.items()))
-    ]
-    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    groups = ConfigParser()
+    groups.read_dict(told["entry-points"])
+    with (info / "entry_points.txt").open("w") as file:
+        groups.write(file)
     distribution = Installed((site, project))
     folders = [str(path) for path in distribution.paths]
     loaded = set(sys.modules)
@@ -81,14 +77,12 @@ def _forget() -> None:
 
 
 @pytest.fixture
-def cubestack(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+def cubestack(run: Run) -> Callable[..., str]:
     """Runs a command in this process; what it prints."""
 
-    def run(*words: str | Path, code: int = 0) -> str:
-        capsys.readouterr()
-        done = main([str(word) for word in words])
-        said = capsys.readouterr()
-        assert done == code, said.err
-        return said.out
+    def call(*words: str | Path, code: int = 0) -> str:
+        outcome = run(*words)
+        assert outcome.code == code, outcome.err
+        return outcome.out
 
-    return run
+    return call

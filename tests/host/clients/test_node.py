@@ -1,3 +1,4 @@
+import re
 from typing import Any
 
 import pytest
@@ -11,6 +12,8 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import MAX_READS, NodeClient
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError
 
+from ..conftest import LetterLine
+
 
 @pytest.fixture
 def client(uart: Any) -> NodeClient:
@@ -23,21 +26,9 @@ def client(uart: Any) -> NodeClient:
 @given(data=st.data())
 def test_every_telemetry_frame_arrives(message: Message, data: st.DataObject) -> None:
     raw = data.draw(st.binary(min_size=message.length, max_size=message.length))
-
-    class OneFrame:
-        def __init__(self) -> None:
-            self.pending = [b""]  # nothing before the request
-
-        def write(self, request: bytes) -> None:
-            assert request == encode_frame(bytes([message.id]))
-            self.pending.append(encode_frame(raw))
-
-        def read(self, max_bytes: int, timeout_s: float) -> bytes:
-            return self.pending.pop(0)
-
-        def close(self) -> None: ...
-
-    answer = NodeClient(OneFrame(), INTERFACE).telemetry(message.name)
+    request = encode_frame(bytes([message.id])).decode("latin-1")
+    line = LetterLine(**{request: encode_frame(raw)})
+    answer = NodeClient(line, INTERFACE).telemetry(message.name)
     assert str(answer) == str(message.unpack(raw))  # as text, because NaN differs from itself
 
 
@@ -67,12 +58,9 @@ def test_a_refusal_names_the_telecommand_and_the_error(
     assert caught.value.code is code
 
 
-def test_a_value_beyond_its_range_is_the_nodes_to_refuse(client: NodeClient) -> None:
+def test_what_the_node_alone_refuses(client: NodeClient, uart: Any) -> None:
     with pytest.raises(CommandRefusedError, match=r"setIDMode refused: BAD_PARAMETER \(3\)"):
         client.command("setIDMode", IdMode=7)
-
-
-def test_an_unknown_error_code_is_told(client: NodeClient, uart: Any) -> None:
     uart.mangle = lambda _data: encode_frame(b"\x63")
     with pytest.raises(CommandRefusedError, match=r"unknown code \(99\)"):
         client.command("DetectStars")
@@ -89,9 +77,8 @@ def test_an_unknown_error_code_is_told(client: NodeClient, uart: Any) -> None:
 def test_what_the_tables_lack_is_never_sent(
     client: NodeClient, node: Any, name: str, parameters: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(InterfaceError) as caught:
+    with pytest.raises(InterfaceError, match=re.escape(message)):
         client.command(name, **parameters)
-    assert message in str(caught.value)
     assert node.log == []
 
 
@@ -106,11 +93,6 @@ def test_silence_names_the_telemetry(client: NodeClient, node: Any, uart: Any) -
     with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags within 1 s in 3 attempts"):
         client.telemetry("ErrorFlags")
     assert [silence for silence in uart.silences if silence] == [1.0, 1.0, 1.0]
-
-
-def test_the_unsupported_frame_gets_no_answer(client: NodeClient) -> None:
-    with pytest.raises(NoAnswerError, match="CameraSetup"):
-        client.telemetry("CameraSetup")
 
 
 def test_telecommands_are_never_repeated(client: NodeClient, node: Any) -> None:
@@ -128,17 +110,13 @@ def test_answers_of_a_wrong_length_are_told(client: NodeClient, uart: Any) -> No
         client.command("Reset")
 
 
-def test_a_babbling_line_ends_as_no_answer(client: NodeClient, uart: Any) -> None:
-    class Babble:
+def test_a_babbling_line_ends_as_no_answer() -> None:
+    class Babble(LetterLine):
         reads = 0
-
-        def write(self, data: bytes) -> None: ...
 
         def read(self, max_bytes: int, timeout_s: float) -> bytes:
             self.reads += 1
             return b"\x55"
-
-        def close(self) -> None: ...
 
     line = Babble()
     assert NodeClient(line, INTERFACE, retries=0).request(b"\x80") is None

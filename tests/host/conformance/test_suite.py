@@ -45,10 +45,9 @@ def good(node, uart, monkeypatch):
     for message in CUBESTAR.telemetries:  # after power-up, settings show their reset values
         node.values[message.name] = {}
     for name, shown in places.items():
+        reset = CUBESTAR.telecommand(name).reset_values()
         for field, (telemetry, place) in shown.items():
-            node.values[telemetry.name][place.name] = CUBESTAR.telecommand(name).reset_values()[
-                field
-            ]
+            node.values[telemetry.name][place.name] = reset[field]
     node.values["Identification"]["InterfaceVersion"] = CUBESTAR.version
     node.values["ExtendedIdentification"]["ResetCause"] = 1
     node.values["TaskStatus"]["taskStatus"] = node.values["LogStatus"]["Status"] = 1
@@ -147,63 +146,50 @@ def test_fault_is_found(good, uart, monkeypatch, payload, reply, check, detail):
     assert detail in found[check]
 
 
-def test_setting_that_does_not_stick_is_found(good, uart, monkeypatch):
-    execute = good.execute
-    monkeypatch.setattr(
-        good, "execute", lambda name, values: None if name == "Exposure" else execute(name, values)
-    )
-    found = failures(suite(good, uart, allow_write=True))
-    assert list(found) == ["telecommand Exposure"]
-    assert "is read back" in found["telecommand Exposure"]
-
-
-def without(name):
-    """A node on which a telecommand has no effect."""
-
-    def spoil(node, _uart):
-        execute = node.execute
-        node.execute = lambda n, values: None if n == name else execute(n, values)
-
-    return spoil
-
-
-def with_another_block(node, uart):
+def spoil(monkeypatch, node, telecommand, streamed=None):
+    """Let a telecommand have no effect, or change what it ``streamed``."""
     execute = node.execute
 
     def do(name, values):
-        execute(name, values)
-        if name == "StreamDownImage":
-            uart.later[10] ^= 1
+        if name != telecommand or streamed is not None:
+            execute(name, values)
+        if name == telecommand and streamed is not None:
+            streamed()
 
-    node.execute = do
-
-
-def with_a_short_block(node, uart):
-    execute = node.execute
-
-    def do(name, values):
-        execute(name, values)
-        if name == "StreamDownImage":
-            uart.later[:] = encode_frame(bytes(127)) + uart.later
-
-    node.execute = do
+    monkeypatch.setattr(node, "execute", do)
 
 
 @pytest.mark.parametrize(
-    ("spoil", "check", "detail"),
+    ("telecommand", "check", "detail"),
     [
-        (without("StreamDownImage"), "StreamDownImage", "ended after 0 of 4 frames"),
-        (with_another_block, "StreamDownImage", "block 0 of the stream is another one"),
-        (with_a_short_block, "StreamDownImage", "block 0 has 127 bytes, declared 128"),
-        (without("UploadBlock"), "UploadBlock", "after one block {'NextBlock': 4, "),
-        (without("TestWDG"), "TestWDG", "WDGResetCount was 0, is 0"),
-        (without("WriteCameraRegister"), "WriteCameraRegister", "0x1 was written to 0x8527"),
-        (without("SelectCameraRegister"), "WriteCameraRegister", "of the camera is not read"),
+        ("Exposure", "Exposure", "is read back"),
+        ("StreamDownImage", "StreamDownImage", "ended after 0 of 4 frames"),
+        ("UploadBlock", "UploadBlock", "after one block {'NextBlock': 4, "),
+        ("TestWDG", "TestWDG", "WDGResetCount was 0, is 0"),
+        ("WriteCameraRegister", "WriteCameraRegister", "0x1 was written to 0x8527"),
+        ("SelectCameraRegister", "WriteCameraRegister", "of the camera is not read"),
     ],
 )
-def test_task_that_is_not_done_is_found(good, uart, spoil, check, detail):
-    spoil(good, uart)
-    assert detail in failures(suite(good, uart, allow_write=True))[f"telecommand {check}"]
+def test_task_that_is_not_done_is_found(good, uart, monkeypatch, telecommand, check, detail):
+    spoil(monkeypatch, good, telecommand)
+    found = failures(suite(good, uart, allow_write=True))
+    assert set(found) <= {f"telecommand {check}", f"telecommand {telecommand}"}
+    assert detail in found[f"telecommand {check}"]
+
+
+@pytest.mark.parametrize(
+    ("change", "detail"),
+    [
+        (lambda sent: bytes([*sent[:10], sent[10] ^ 1, *sent[11:]]), "of the stream is another"),
+        (lambda sent: encode_frame(bytes(127)) + sent, "block 0 has 127 bytes, declared 128"),
+    ],
+)
+def test_picture_that_is_streamed_wrongly_is_found(good, uart, monkeypatch, change, detail):
+    def streamed() -> None:
+        uart.later[:] = change(uart.later)
+
+    spoil(monkeypatch, good, "StreamDownImage", streamed)
+    assert detail in failures(suite(good, uart, allow_write=True))["telecommand StreamDownImage"]
 
 
 def test_missing_flag_is_found(good, uart, monkeypatch):

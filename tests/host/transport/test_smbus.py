@@ -61,9 +61,8 @@ def test_every_method_that_reaches_the_bus_is_ours() -> None:
             continue
         ours = getattr(CubeSMBus, name)
         assert ours is not theirs, name
-        assert list(inspect.signature(ours).parameters) == list(
-            inspect.signature(theirs).parameters
-        ), name
+        parameters = [list(inspect.signature(one).parameters) for one in (ours, theirs)]
+        assert parameters[0] == parameters[1], name
     assert CubeSMBus.pec is not SMBus.pec
 
 
@@ -104,24 +103,17 @@ def test_errors_are_those_of_the_driver(bus: Any) -> None:
         (lambda: bus.read_byte(0x80), errno.EINVAL),
         (lambda: bus.i2c_rdwr(i2c_msg.read(ADDRESS, 9000)), errno.EINVAL),
     ):
-        with pytest.raises(OSError, match=r"\[Errno") as raised:
+        with pytest.raises(OSError, match=rf"\[Errno {code}\]"):
             call()
-        assert raised.value.errno == code
     assert bus.read_byte_data(ADDRESS, 1) == 1
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda bus: bus.write_block_data(ADDRESS, 0, [0] * 33),
-        lambda bus: bus.write_i2c_block_data(ADDRESS, 0, [0] * 33),
-        lambda bus: bus.block_process_call(ADDRESS, 0, [0] * 33),
-        lambda bus: bus.read_i2c_block_data(ADDRESS, 0, 33),
-    ],
-)
-def test_blocks_too_long(bus: Any, call: Any) -> None:
+def test_blocks_too_long(bus: Any) -> None:
+    for write in (bus.write_block_data, bus.write_i2c_block_data, bus.block_process_call):
+        with pytest.raises(ValueError, match="at most 32 bytes, not 33"):
+            write(ADDRESS, 0, [0] * 33)
     with pytest.raises(ValueError, match="at most 32 bytes, not 33"):
-        call(bus)
+        bus.read_i2c_block_data(ADDRESS, 0, 33)
 
 
 def test_packet_error_codes(bus: Any, echo: Echo) -> None:

@@ -6,15 +6,9 @@ from zlib import crc32
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.aramis import (
-    INTERFACE,
-    CatalogueState,
-    MeasurementMode,
-    MeasurementOutcome,
-    Reason,
-    SensorState,
-)
-from cubestack.host.clients.aramis.client import Aramis
+from cubestack.firmware_model.interface import aramis as codes
+from cubestack.firmware_model.interface.aramis import INTERFACE, CatalogueState, SensorState
+from cubestack.host.clients.aramis.client import Aramis, Star
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
@@ -29,9 +23,9 @@ SOLVED = {
     "Millisecond": 21_600_000,
     "ImageUptime": 12_345,
     "FrameCounter": 7,
-    "Outcome": MeasurementOutcome.CONCLUSIVE,
-    "Reason": Reason.CONFIRMED,
-    "Mode": MeasurementMode.AIDED,
+    "Outcome": codes.MeasurementOutcome.CONCLUSIVE,
+    "Reason": codes.Reason.CONFIRMED,
+    "Mode": codes.MeasurementMode.AIDED,
     "Valid": 1,
     "Matched": 9,
     "Detected": 12,
@@ -84,16 +78,15 @@ def test_an_attitude_with_everything(node: FakeAramis, aramis: Aramis) -> None:
     assert found.quaternion is not None
     np.testing.assert_allclose(found.quaternion, [0.5, -0.5, 0.5, 0.5])
     assert (found.valid, found.matched, found.detected, found.frame) == (True, 9, 12, 7)
-    assert found.outcome is MeasurementOutcome.CONCLUSIVE
-    assert (found.reason, found.mode) == (Reason.CONFIRMED, MeasurementMode.AIDED)
-    assert found.image_uptime_s == 12.345
-    assert found.julian_date == 2_461_366.25
+    assert found.outcome is codes.MeasurementOutcome.CONCLUSIVE
+    assert (found.reason, found.mode) == (SOLVED["Reason"], SOLVED["Mode"])
+    assert (found.image_uptime_s, found.julian_date) == (12.345, 2_461_366.25)
 
 
 def test_no_attitude_and_no_time(aramis: Aramis) -> None:
     found = aramis.attitude()
     assert (found.quaternion, found.valid, found.julian_date) == (None, False, None)
-    assert found.reason is Reason.NOT_MEASURED
+    assert found.reason is codes.Reason.NOT_MEASURED
     assert aramis.body_quaternion() is None
     assert aramis.julian_date() is None
 
@@ -103,25 +96,17 @@ def test_no_attitude_and_no_time(aramis: Aramis) -> None:
     [
         ({}, "GetAttitude", {}),
         ({"near": [0.6, 0.0, 0.8]}, "GetAttitudeNearVector", {"X": 0.6, "Y": 0.0, "Z": 0.8}),
-        (
-            {"near_rad": (1.5, -0.5)},
-            "GetAttitudeNearPoint",
-            {"RightAscension": 1.5, "Declination": -0.5},
-        ),
+        ({"near_rad": (1.5, -0.5)}, "GetAttitudeNearPoint",
+         {"RightAscension": 1.5, "Declination": -0.5}),
     ],
-)
+)  # fmt: skip
 def test_measuring_sends_what_is_known(
-    node: FakeAramis,
-    aramis: Aramis,
-    arguments: dict[str, Any],
-    command: str,
-    parameters: dict[str, float],
+    node: FakeAramis, aramis: Aramis, arguments: Any, command: str, parameters: dict[str, float]
 ) -> None:
     node.values["Attitude"] = dict(SOLVED)
     node.busy = 2
     assert aramis.measure(**arguments).valid
-    assert node.log[-1][0] == command
-    assert node.log[-1][1] == pytest.approx(parameters)
+    assert node.log[-1] == (command, pytest.approx(parameters))
 
 
 def test_julian_dates_are_split_exactly(node: FakeAramis, aramis: Aramis) -> None:
@@ -160,20 +145,10 @@ def test_a_refused_or_incomplete_catalogue(node: FakeAramis, aramis: Aramis) -> 
 
 def test_stars_by_number_and_a_list_that_is_not_whole(node: FakeAramis, aramis: Aramis) -> None:
     node.values["DetectionSummary"] = {"Detected": 2}
-    node.records["StarDetails"] = [
-        {"StarNumber": 1, "X": 3.5, "Y": 4.0, "Brightness": 50.0},
-        {
-            "StarNumber": 0,
-            "X": 1.0,
-            "Y": 2.0,
-            "Brightness": 99.0,
-            "Identified": 1,
-            "Hipparcos": 24436,
-        },
-    ]
-    first, second = aramis.stars()
-    assert (first.number, first.hipparcos, second.hipparcos) == (0, 24436, None)
-    assert (second.x_px, second.y_px, second.brightness) == (3.5, 4.0, 50.0)
+    first = {"StarNumber": 0, "X": 1.0, "Y": 2.0, "Brightness": 99.0}
+    second = {"StarNumber": 1, "X": 3.5, "Y": 4.0, "Brightness": 50.0}
+    node.records["StarDetails"] = [second, first | {"Identified": 1, "Hipparcos": 24436}]
+    assert aramis.stars() == [Star(0, 1.0, 2.0, 99.0, 24436), Star(1, 3.5, 4.0, 50.0, None)]
     node.records["StarDetails"] = [{"StarNumber": 1}]
     node._steps.clear()
     with pytest.raises(BadAnswerError, match="1 stars of 2 came"):

@@ -20,9 +20,10 @@ from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_fro
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
-from cubestack.host.cli.main import main
 from cubestack.host.experiments.aramis.measure import NOISE_TERMS, AramisResult
 from cubestack.host.experiments.measure import measure as measure_device
+
+from ....conftest import Run
 
 
 @pytest.fixture(scope="module")
@@ -104,12 +105,9 @@ def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
     assert attitude_error_deg(np.array(frame.quaternion), pointing)[0] < 0.01
 
 
-def test_a_table_for_readers(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["measure", "aramis", "--frames", "2"]) == 0
-    shown = capsys.readouterr().out
-    assert "100.0 % right" in shown
-    assert "mean time" in shown
-    assert "confirmed" in shown
+def test_a_table_for_readers(run: Run) -> None:
+    shown = run("measure", "aramis", "--frames", "2").out
+    assert all(text in shown for text in ("100.0 % right", "mean time", "confirmed"))
 
 
 @pytest.mark.parametrize(
