@@ -1,7 +1,8 @@
 """Runs firmware programs without an emulator: performs their requests in virtual time.
 
 A request is performed as a whole; only a sleep can be left half-way, so that a test can do
-something at any time of it. What hangs on the pins is a subclass' to fake.
+something at any time of it. What hangs on the pins is a subclass' to fake: set_pin, get_pin,
+await_pin, strobe, access and transfer, as far as its programs use them.
 """
 
 from collections.abc import Callable
@@ -99,7 +100,7 @@ class Runner:
             else:
                 answer = self._perform(request)
 
-    # --- what hangs on the pins -------------------------------------------------------------------
+    # --- what a subclass has -------------------------------------------------------------------
 
     def start(self) -> requests.Routine[None]:
         """A new life of the program."""
@@ -109,24 +110,6 @@ class Runner:
     def waiting(self) -> bool:
         """Whether a sleep with a deadline is one that only the host ends."""
         return False
-
-    def set_pin(self, pin: str, level: int) -> None:
-        raise AssertionError(f"nothing hangs on {pin}")
-
-    def get_pin(self, pin: str) -> int:
-        raise AssertionError(f"nothing hangs on {pin}")
-
-    def await_pin(self, request: requests.AwaitPin) -> bool:
-        raise AssertionError(f"nothing hangs on {request.pin}")
-
-    def strobe(self, request: requests.StrobeRead) -> None:
-        raise AssertionError(f"there is nothing for {request}")
-
-    def access(self, request: requests.BusAccess) -> int:
-        raise AssertionError(f"there is nothing for {request}")
-
-    def transfer(self, request: requests.CameraTransfer) -> bytes | None:
-        raise AssertionError(f"there is nothing for {request}")
 
     # --- time -------------------------------------------------------------------------------------
 

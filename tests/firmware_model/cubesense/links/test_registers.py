@@ -62,15 +62,8 @@ def test_a_setting_is_read_back_and_is_the_node_s_own(node: Links, register: obj
     else:
         camera = codes.Camera[name.split("_")[0]]
         shown = node.telemetry("Configuration")
-        field = {
-            "THRESHOLD": "Threshold",
-            "EXPOSURE": "Exposure",
-            "GAIN": "Gain",
-            "BLUE_GAIN": "BlueGain",
-            "RED_GAIN": "RedGain",
-            "AUTO": "AutoAdjust",
-        }[name.removeprefix(f"{camera.name}_")]
-        assert shown[f"{field}{camera + 1}"] == 1
+        field = name.removeprefix(f"{camera.name}_").title().replace("_", "")
+        assert shown[f"{'AutoAdjust' if field == 'Auto' else field}{camera + 1}"] == 1
 
 
 def test_an_exposure_beyond_a_byte_reads_as_255(node: Links) -> None:

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.vision.distortion import (
     Projection,
@@ -85,28 +86,28 @@ def test_a_sun_at_the_border(ours: SunConfig, meter: Meter, centre: tuple[float,
     assert np.hypot(result.x, result.y) < 400
 
 
-def test_no_run_of_bright_pixels(ours: SunConfig, meter: Meter) -> None:
+def bright(*places: tuple[slice, slice]) -> NDArray[np.uint8]:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
-    picture[100, 100:102] = 255  # a pair of stuck pixels
-    # The FPGA then hands out the last corner of the picture; what is there is no Sun either.
-    picture[470:480:2, 630:632] = 255
-    assert find_sun(window(picture), ours, meter).detect is DetectResult.SUN_NOT_FOUND
+    for at in places:
+        picture[at] = 255
+    return picture
 
 
-def test_a_reflection_below_the_processor_s_threshold(ours: SunConfig, meter: Meter) -> None:
-    data = window(np.minimum(sun(np.array([300.0, 200.0]), 6), 220))
-    assert data[:2].any()  # the FPGA found it
-    result = find_sun(data, ours, meter)
-    assert result.detect is DetectResult.SUN_NOT_FOUND
-    assert result.pixels == 0
-
-
-def test_a_row_of_stuck_pixels_is_no_sun(ours: SunConfig, meter: Meter) -> None:
-    picture = np.zeros((ROWS, COLUMNS), np.uint8)
-    picture[100, 100:103] = 255
+@pytest.mark.parametrize(
+    ("picture", "pixels"),
+    [
+        # The FPGA then hands out the last corner of the picture; what is there is no Sun either.
+        (bright(np.s_[100:101, 100:102], np.s_[470:480:2, 630:632]), 0),
+        (bright(np.s_[100:101, 100:103]), 3),
+        (np.minimum(sun(np.array([300.0, 200.0]), 6), 220), 0),  # the FPGA finds it
+    ],
+    ids=["pair of stuck pixels", "row of stuck pixels", "reflection below the threshold"],
+)
+def test_what_is_no_sun(
+    ours: SunConfig, meter: Meter, picture: NDArray[np.uint8], pixels: int
+) -> None:
     result = find_sun(window(picture), ours, meter)
-    assert result.detect is DetectResult.SUN_NOT_FOUND
-    assert result.pixels == 3
+    assert (result.detect, result.pixels) == (DetectResult.SUN_NOT_FOUND, pixels)
 
 
 def test_masked_pixels_do_not_count(ours: SunConfig, meter: Meter) -> None:

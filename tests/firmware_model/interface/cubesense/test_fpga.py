@@ -28,18 +28,13 @@ ADDRESSING = {
 }
 
 
-def test_printed_rows_and_standby_in_all_others() -> None:
-    listed = PRINTED | OURS
+@pytest.mark.parametrize("mcu_addressing", [False, True])
+def test_printed_rows_and_standby_in_all_others(mcu_addressing: bool) -> None:
+    listed = PRINTED | OURS | (ADDRESSING if mcu_addressing else {})
     for levels in product("01", repeat=5):
         expected = listed.get("".join(levels), (fpga.Action.STANDBY, fpga.Action.STANDBY))
-        assert fpga.actions(*map(int, levels)) == expected, levels
-
-
-def test_address_control_adds_rows_that_are_standby_without_it() -> None:
-    listed = PRINTED | OURS | ADDRESSING
-    for levels in product("01", repeat=5):
-        expected = listed.get("".join(levels), (fpga.Action.STANDBY, fpga.Action.STANDBY))
-        assert fpga.actions(*map(int, levels), mcu_addressing=True) == expected, levels
+        found = fpga.actions(*map(int, levels), mcu_addressing=mcu_addressing)
+        assert found == expected, levels
 
 
 def test_no_levels_are_listed_twice() -> None:

@@ -3,6 +3,7 @@ them, typed from their description. A telemetry ID counts without its bit 7.
 """
 
 import math
+from itertools import accumulate
 
 import pytest
 from hypothesis import given
@@ -18,76 +19,59 @@ TC 0 1 u8 H
 TC 11 1 u8 L
 TC 20 2 u8,u8 H
 TC 21 3 u8,u8,u8 M
-TC 40 1 u8 H
-TC 41 1 u8 H
-TC 42 1 u8 H
-TC 43 5 u16,u8,u8,u8 H
-TC 44 1 u8 H
-TC 45 5 u16,u8,u8,u8 H
-TC 50 4 u16,u16 L
-TC 51 4 u16,u16 L
-TC 52 9 u8,u16,u16,u16,u16 L
-TC 53 9 u8,u16,u16,u16,u16 L
-TC 54 15 u16,u8,u16,u8,u16,u8,u16,u8,u16,u8 L
-TC 55 15 u16,u8,u16,u8,u16,u8,u16,u8,u16,u8 L
+TC 40,41,42,44 1 u8 H
+TC 43,45 5 u16,u8,u8,u8 H
+TC 50,51 4 u16,u16 L
+TC 52,53 9 u8,u16,u16,u16,u16 L
+TC 54,55 15 u16,u8,u16,u8,u16,u8,u16,u8,u16,u8 L
 TC 64 3 u8,u8,u8 H
 TC 65 2 u16 H
 TLM 0 8 u8,u8,u8,u8,u16,u16 H
 TLM 1 6 bytes6 L
 TLM 2 8 u16,u16,u8,u8,u8,u8 L
 TLM 3 3 u8,u8,u8 H
-TLM 20 6 i16,i16,u8,u8 M
-TLM 21 6 i16,i16,u8,u8 M
-TLM 22 6 i16,i16,u8,u8 H
-TLM 23 6 i16,i16,u8,u8 H
-TLM 24 6 i16,i16,u8,u8 H
-TLM 25 6 i16,i16,u8,u8 H
+TLM 20,21 6 i16,i16,u8,u8 M
+TLM 22,23,24,25 6 i16,i16,u8,u8 H
 TLM 26 10 u16,u16,u16,u16,u8,u8 H
 TLM 40 14 u8,u8,u8,u16,u8,u8,u8,u8,u16,u8,u8,u8 H
 TLM 64 128 bytes128 H
 TLM 65 3 u16,u8 H
-TLM 72 40 u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16 M
-TLM 73 40 u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16 M
+TLM 72,73 40 u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16,u16 M
 """
 
-
+KNOWN = {
+    int(number) + (0x80 if kind == "TLM" else 0): layout
+    for kind, numbers, *layout in map(str.split, LAYOUTS.strip().splitlines())
+    for number in numbers.split(",")
+}
 BY_ID = {message.id: message for message in INTERFACE.messages}
 
 
-@pytest.mark.parametrize("entry", LAYOUTS.strip().splitlines())
-def test_layout_is_the_known_one(entry: str) -> None:
-    kind, number, length, types, confidence = entry.split()
-    message = BY_ID[int(number) + (0x80 if kind == "TLM" else 0)]
+@pytest.mark.parametrize("number", KNOWN)
+def test_layout_is_the_known_one(number: int) -> None:
+    length, types, confidence = KNOWN[number]
+    message = BY_ID[number]
     assert (message.length, message.extension) == (int(length), False)
     # Signed mantissas are assumed: the description has an unsigned one and no sign.
     signless = ["u16" if f.name.startswith("Mantissa") else f.type for f in message.fields]
     assert signless == types.split(",")
-    offset = 0
-    for field in message.fields:
-        assert field.bit_offset == offset
-        offset += field.bits
-    assert offset == 8 * message.length
-    assert message.confidence is not None
+    ends = [0, *accumulate(field.bits for field in message.fields)]
+    assert [*(field.bit_offset for field in message.fields), 8 * message.length] == ends
     assert message.confidence.name[0] == confidence
 
 
 def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
-    known = set()
-    for entry in LAYOUTS.strip().splitlines():
-        kind, number = entry.split()[:2]
-        known.add(int(number) + (0x80 if kind == "TLM" else 0))
     ours = {message.id for message in INTERFACE.messages if message.extension}
-    assert BY_ID.keys() - ours == known
+    assert BY_ID.keys() - ours == KNOWN.keys()
     assert ours <= set(range(100, 128)) | set(range(220, 256))
     assert all(BY_ID[identifier].confidence is None for identifier in ours)
 
 
 def test_seconds_stand_before_milliseconds() -> None:
-    identification = INTERFACE.telemetry("Identification").unpack(bytes.fromhex("0502010300010200"))
-    assert identification["RuntimeSeconds"] == 256
-    assert identification["RuntimeMilliseconds"] == 2
-    assert (INTERFACE.name, INTERFACE.version, INTERFACE.i2c_address) == ("CubeSense", 2, 0x1B)
-    assert INTERFACE.baud == 57_600
+    values = INTERFACE.telemetry("Identification").unpack(bytes.fromhex("0502010300010200"))
+    assert (values["RuntimeSeconds"], values["RuntimeMilliseconds"]) == (256, 2)
+    assert (INTERFACE.name, INTERFACE.version) == ("CubeSense", 2)
+    assert (INTERFACE.i2c_address, INTERFACE.baud) == (0x1B, 57_600)
 
 
 @pytest.mark.parametrize(
@@ -108,17 +92,12 @@ def test_published_telecommand_bytes(name: str, parameters: dict[str, int], fram
 
 
 def test_published_telemetry_bytes() -> None:
-    assert encode_frame(bytes([INTERFACE.telemetry("Identification").id])) == bytes.fromhex(
-        "1F7F 80 1FFF"
-    )
     result = INTERFACE.telemetry("Result1ThenSram1")
-    assert encode_frame(bytes([result.id])) == bytes.fromhex("1F7F 96 1FFF")
-    data = result.pack(Alpha=12.34, Beta=-5.67, Capture=2, Detect=7)
-    assert encode_frame(data) == bytes.fromhex("1F7F D204 C9FD 02 07 1FFF")
-    values = result.unpack(data)
-    assert (values["Alpha"], values["Beta"]) == (12.34, -5.67)
-    assert codes.DetectResult(int(values["Detect"])) is codes.DetectResult.SUCCESS
-    assert codes.CaptureResult(int(values["Capture"])) is codes.CaptureResult.STORED_OWN_SRAM
+    assert (INTERFACE.telemetry("Identification").id, result.id) == (0x80, 0x96)
+    data = bytes.fromhex("D204 C9FD 02 07")
+    stored, success = codes.CaptureResult.STORED_OWN_SRAM, codes.DetectResult.SUCCESS
+    values = {"Alpha": 12.34, "Beta": -5.67, "Capture": stored, "Detect": success}
+    assert (result.pack(**values), result.unpack(data)) == (data, values)
 
 
 @pytest.mark.parametrize(
@@ -214,12 +193,9 @@ def test_checksum_is_the_exclusive_or() -> None:
     assert codes.checksum(bytes([0x0F, 0xF0, 0x3C])) == 0xC3
 
 
-def test_register_choices_are_those_of_the_interface() -> None:
-    assert codes.Measurement in INTERFACE.choices  # only registers use it
-
-
 def test_registers_are_one_byte_two_bytes_or_the_picture() -> None:
     assert REGISTERS is INTERFACE.registers
+    assert codes.Measurement in INTERFACE.choices  # only registers use it
     assert REGISTERS.i2c_address == 0x1C
     assert [r.name for r in REGISTERS if r.length == 2] == ["SUN_X", "SUN_Y", "NADIR_X", "NADIR_Y"]
     assert [(r.name, r.length) for r in REGISTERS if r.length > 2] == [("IMAGE", 307_200)]
