@@ -77,9 +77,10 @@ def quest(
     for component in rodrigues:
         squares += component * component
     scale = np.float32(1) / np.sqrt(squares)
-    quaternion = np.append(rodrigues * scale, scale)
     meter.charge(f32_mul=6, f32_add=3, f32_sqrt=1, f32_div=1)
-    quaternion = _turn_back(quaternion, turn)
+    x, y, z, w = np.append(rodrigues * scale, scale)
+    turned_back = ((x, y, z, w), (w, -z, y, -x), (z, w, -x, -y), (-y, x, w, -z))[turn]
+    quaternion = np.array(turned_back, dtype=np.float32)
     quaternion[:3] = -quaternion[:3]
     meter.charge(f32_compare=1, i32_add=11)
     return -quaternion if quaternion[3] < 0 else quaternion
@@ -174,17 +175,3 @@ def _eliminate(
         ram_write=30,
     )
     return solution
-
-
-def _turn_back(quaternion: NDArray[np.float32], turn: int) -> NDArray[np.float32]:
-    """Undo the 180 deg turn of the reference axes: a permutation of components with signs."""
-    x, y, z, w = quaternion
-    if turn == 1:
-        components = [w, -z, y, -x]
-    elif turn == 2:
-        components = [z, w, -x, -y]
-    elif turn == 3:
-        components = [-y, x, w, -z]
-    else:
-        components = [x, y, z, w]
-    return np.array(components, dtype=np.float32)

@@ -192,8 +192,6 @@ class StarCatalogue:
 def _companions(vectors: NDArray[np.float64], v_mag: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which stars (n,) stand within `COMPANION_RAD` of a brighter one."""
     first, second = np.triu_indices(len(vectors), k=1)
-    close = np.abs(vectors[first] - vectors[second]).max(axis=1) < COMPANION_RAD
-    first, second = first[close], second[close]
     close = np.linalg.norm(vectors[first] - vectors[second], axis=1) < COMPANION_RAD
     first, second = first[close], second[close]
     fainter = np.zeros(len(vectors), dtype=bool)

@@ -10,41 +10,37 @@ from cubestack.firmware_model.node.settings import Settings
 
 def detection_config(settings: Settings) -> DetectionConfig:
     """Region, thresholds and limits of the search."""
-    region = settings.all("setDetectionRegion")
-    thresholds = settings.all("setDetectionThresholds")
-    pixels = settings.all("setStarPixels")
-    limits = settings.all("setDetectionVariables")
+    values = settings.all(
+        "setDetectionRegion", "setDetectionThresholds", "setStarPixels", "setDetectionVariables"
+    )
     return DetectionConfig(
-        step=region["StepSize"],
-        x_start=region["Xstart"],
-        x_end=region["Xend"] + 1,
-        y_start=region["Ystart"],
-        y_end=region["Yend"] + 1,
-        detection_threshold=thresholds["DetectionThreshold"],
-        star_threshold=thresholds["StarThreshold"],
-        min_pixels=pixels["MinPixels"],
-        max_pixels=pixels["MaxPixels"],
-        grid_size=limits["GridSize"],
-        max_stars=limits["MaxStars"],
-        max_invalid=limits["MaxInvalidStars"],
-        max_noise=limits["MaxNoise"],
+        step=values["StepSize"],
+        x_start=values["Xstart"],
+        x_end=values["Xend"] + 1,
+        y_start=values["Ystart"],
+        y_end=values["Yend"] + 1,
+        detection_threshold=values["DetectionThreshold"],
+        star_threshold=values["StarThreshold"],
+        min_pixels=values["MinPixels"],
+        max_pixels=values["MaxPixels"],
+        grid_size=values["GridSize"],
+        max_stars=values["MaxStars"],
+        max_invalid=values["MaxInvalidStars"],
+        max_noise=values["MaxNoise"],
     )
 
 
 def camera_parameters(settings: Settings) -> CameraParameters:
     """Calibration of camera and lens."""
-    radial = settings.all("setRadialDistortionGains")
-    tangential = settings.all("setTangentalDistortionGains")
+    values = settings.all(
+        "setFocalLengthComponents",
+        "setPrincipalPoint",
+        "setRadialDistortionGains",
+        "setTangentalDistortionGains",
+    )
     return CameraParameters(
-        focal_length_mm=settings.get("setFocalLength", "FocalLength"),
-        fx=settings.get("setFocalLengthComponents", "Fx"),
-        fy=settings.get("setFocalLengthComponents", "Fy"),
-        cx=settings.get("setPrincipalPoint", "Cx"),
-        cy=settings.get("setPrincipalPoint", "Cy"),
-        k1=radial["K1"],
-        k2=radial["K2"],
-        p1=tangential["P1"],
-        p2=tangential["P2"],
+        settings.get("setFocalLength", "FocalLength"),
+        **{name.lower(): value for name, value in values.items()},
     )
 
 

@@ -30,9 +30,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-BLOCK = 1024
-"""Pixels of an array that are compared at once: speed only."""
-
 
 class DetectionConfigError(ValueError):
     """A detection setting out of range; `setting` names the field of `DetectionConfig`."""
@@ -85,28 +82,26 @@ class DetectionConfig:
 
     def __post_init__(self) -> None:
         """Refuse settings with which the search makes no sense."""
-        for name in ("detection_threshold", "star_threshold", "max_invalid", "max_noise"):
-            self._check(name, 0, 255)
-        for name in ("step", "min_pixels", "max_stars"):
-            self._check(name, 1, 255)
-        self._check("max_pixels", self.min_pixels, 255)
-        self._check("grid_size", 1, 255)
+        limits = {
+            **dict.fromkeys(("detection_threshold", "star_threshold"), (0, 255)),
+            **dict.fromkeys(("max_invalid", "max_noise"), (0, 255)),
+            **dict.fromkeys(("step", "min_pixels", "max_stars", "grid_size"), (1, 255)),
+            "max_pixels": (self.min_pixels, 255),
+            "x_end": (self.x_start + 1, 65_535),
+            "y_end": (self.y_start + 1, 65_535),
+            **dict.fromkeys(("x_start", "y_start"), (0, 65_535)),
+        }
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise DetectionConfigError(name, f"{low} to {high}, not {value}")
         if self.grid_size % 2 == 0:
             raise DetectionConfigError("grid_size", f"odd, not {self.grid_size}")
-        self._check("x_end", self.x_start + 1, 65_535)
-        self._check("y_end", self.y_start + 1, 65_535)
-        self._check("x_start", 0, 65_535)
-        self._check("y_start", 0, 65_535)
 
     @property
     def seed_threshold(self) -> int:
         """What a sample must exceed to start an area, DN."""
         return max(self.detection_threshold, self.star_threshold)
-
-    def _check(self, name: str, low: int, high: int) -> None:
-        value = getattr(self, name)
-        if not low <= value <= high:
-            raise DetectionConfigError(name, f"{low} to {high}, not {value}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +179,9 @@ def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter
             return detection
         match access:
             case Look():
-                answer = _looked_at(pixels, access)
+                values = pixels[access.offsets]
+                above = np.flatnonzero(values > access.above)
+                answer = values[: above[0] + 1] if len(above) else values
                 meter.charge(ebi_read=len(answer))
             case Put():
                 pixels[access.offsets] = access.values
@@ -201,7 +198,9 @@ def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter)
         raise DetectionConfigError("x_end", f"at most {columns}, not {config.x_end}")
     if config.y_end > rows:
         raise DetectionConfigError("y_end", f"at most {rows}, not {config.y_end}")
-    samples = _samples(columns, config)
+    along = np.arange(config.x_start, config.x_end, config.step, dtype=np.int32)
+    down = np.arange(config.y_start, config.y_end, config.step, dtype=np.int32)
+    samples = (down[:, None] * columns + along).reshape(-1)
     centroids: list[tuple[np.float32, np.float32]] = []
     areas: list[_Area] = []
     visited: list[int] = []
@@ -221,10 +220,12 @@ def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter)
             area = yield from _grow(int(samples[read - 1]), int(found[-1]), columns, rows, config)
             visited += area.offsets
             values += area.values
-            _charge_growing(area, meter)
+            count = len(area.offsets)  # a call, a list entry, a brightness; per neighbour a test
+            tests = area.looked_at
+            meter.charge(call=count, ram_write=2 * count, loop=tests, i32_add=5 * count + 3 * tests)
             if not area.complete:
                 invalid += 1
-            elif len(area.offsets) < config.min_pixels:
+            elif count < config.min_pixels:
                 noise += 1
             else:
                 areas.append(area)
@@ -250,26 +251,6 @@ def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter)
     )
 
 
-def _looked_at(pixels: NDArray[np.uint8], look: Look) -> NDArray[np.uint8]:
-    """Answer to ``look`` for a picture that is an array."""
-    blocks: list[NDArray[np.uint8]] = []
-    for start in range(0, len(look.offsets), BLOCK):
-        values = pixels[look.offsets[start : start + BLOCK]]
-        above = values > look.above
-        first = int(above.argmax())
-        if above[first]:
-            return np.concatenate([*blocks, values[: first + 1]])
-        blocks.append(values)
-    return np.concatenate(blocks)
-
-
-def _samples(columns: int, config: DetectionConfig) -> NDArray[np.int32]:
-    """Places of the sampled pixels in the order of the search."""
-    rows = np.arange(config.y_start, config.y_end, config.step, dtype=np.int32)
-    along = np.arange(config.x_start, config.x_end, config.step, dtype=np.int32)
-    return (rows[:, None] * columns + along).reshape(-1)
-
-
 def _grow(
     seed: int, value: int, columns: int, rows: int, config: DetectionConfig
 ) -> Generator[Look | Put, Any, _Area]:
@@ -277,19 +258,17 @@ def _grow(
 
     What the recursion still has to look at is a stack, its top the next place.
     """
-    threshold, limit = config.star_threshold, config.max_pixels
     offsets, values = [seed], [value]
     yield _zero(seed)
-    stack = _neighbours(seed, columns, rows)
-    looked_at = 0
+    stack, looked_at = _neighbours(seed, columns, rows), 0
     while stack:
-        found = yield Look(np.array(stack[::-1], np.int32), threshold)
+        found = yield Look(np.array(stack[::-1], np.int32), config.star_threshold)
         looked_at += len(found)
         place, value = stack[-len(found)], int(found[-1])
         del stack[-len(found) :]
-        if value <= threshold:
+        if value <= config.star_threshold:
             break
-        if len(offsets) == limit:
+        if len(offsets) == config.max_pixels:
             return _Area(offsets, values, False, looked_at)
         offsets.append(place)
         values.append(value)
@@ -312,14 +291,6 @@ def _neighbours(place: int, columns: int, rows: int) -> list[int]:
         (column > 0, place - 1),
     )
     return [neighbour for inside, neighbour in around if inside]
-
-
-def _charge_growing(area: _Area, meter: Meter) -> None:
-    """Per pixel: a call, its list entry and its brightness; per neighbour: a test."""
-    count = len(area.offsets)
-    meter.charge(
-        call=count, ram_write=2 * count, loop=area.looked_at, i32_add=5 * count + 3 * area.looked_at
-    )
 
 
 def _centroid(

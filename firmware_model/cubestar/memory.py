@@ -8,7 +8,6 @@ modelled, so flash and RAM must leave room for it.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
@@ -100,17 +99,13 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
 
 def _largest_reduction(catalogue: StarCatalogue) -> int:
     """Pairs that the reduced catalogue holds where it holds most, of evenly spread directions."""
+    step = np.arange(DIRECTIONS) + 0.5
+    z = 1 - 2 * step / DIRECTIONS  # on a spiral from pole to pole
+    turn = step * np.pi * (3 - np.sqrt(5))
+    radius = np.sqrt(1 - z * z)
+    directions = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
     meter = Meter(CORTEX_M3)
     return max(
         len(catalogue.reduced(direction, CUT_RADIUS_DEG, meter)[1])
-        for direction in _even_directions(DIRECTIONS)
+        for direction in directions.astype(np.float32)
     )
-
-
-def _even_directions(count: int) -> NDArray[np.float32]:
-    """Unit vectors (count, 3) on a spiral from pole to pole."""
-    step = np.arange(count) + 0.5
-    z = 1 - 2 * step / count
-    turn = step * np.pi * (3 - np.sqrt(5))
-    radius = np.sqrt(1 - z * z)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1).astype(np.float32)

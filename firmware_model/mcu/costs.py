@@ -7,7 +7,7 @@ happened; the table of its part (a module beside this one) turns the counts into
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 Provenance = Literal["measured", "published", "fitted", "assumed"]
@@ -55,6 +55,7 @@ class CostTable:
         return cycles / self.clock_hz
 
 
+@dataclass(eq=False)
 class Meter:
     """Counts the operations of a program and their cycles.
 
@@ -65,14 +66,12 @@ class Meter:
         phases: cycles charged inside each `phase`, added up over its visits.
     """
 
-    def __init__(self, table: CostTable) -> None:
-        """Start at zero with the costs of `table`."""
-        self.table = table
-        self.total = 0
-        self.counts: Counter[str] = Counter()
-        self.phases: dict[str, int] = {}
-        self._taken = 0
-        self._phase: str | None = None
+    table: CostTable
+    total: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    phases: dict[str, int] = field(default_factory=dict)
+    _taken: int = 0
+    _phase: str | None = None
 
     def charge(self, **operations: int) -> None:
         """Charge each named operation so many times.

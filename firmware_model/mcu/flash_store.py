@@ -1,6 +1,9 @@
 """Non-volatile memory of a processor."""
 
+from dataclasses import dataclass, field
 
+
+@dataclass(eq=False)
 class FlashStore:
     """Flash pages by name: survives resets and power cycles.
 
@@ -9,10 +12,8 @@ class FlashStore:
         writes: how often each page was written, for the wear report.
     """
 
-    def __init__(self) -> None:
-        """Make an erased store."""
-        self.pages: dict[str, bytes] = {}
-        self.writes: dict[str, int] = {}
+    pages: dict[str, bytes] = field(default_factory=dict)
+    writes: dict[str, int] = field(default_factory=dict)
 
     def write(self, page: str, data: bytes) -> None:
         """Erase and program ``page``."""

@@ -31,9 +31,9 @@ class Settings:
         """Value of parameter ``field`` of telecommand ``command``."""
         return self._values[command][field]
 
-    def all(self, command: str) -> dict[str, Any]:
-        """All parameters of telecommand ``command``."""
-        return dict(self._values[command])
+    def all(self, *commands: str) -> dict[str, Any]:
+        """All parameters of ``commands``, which have no two of one name."""
+        return {name: value for key in commands for name, value in self._values[key].items()}
 
     def put(self, command: str, values: Mapping[str, Any]) -> None:
         """Store all parameters of ``command``."""

@@ -80,74 +80,62 @@ def identify(
     with meter.phase("distances"):
         pairs = CentroidPairs.measure(directions, meter)
     with meter.phase("votes"):
-        entries = _Entries(pairs, listed, len(catalogue), margin_rad, meter)
-        votes = entries.vote(meter)
+        votes, looked_up = _vote(pairs, listed, len(catalogue), margin_rad, meter)
     with meter.phase("identities"):
         identities = _best(votes, meter)
     with meter.phase("verification"):
         confirmed, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
     with meter.phase("selection"):
-        outcome = _judge(
-            kept, directions, catalogue, entries.looked_up, stars_per_sr, margin_rad, meter
-        )
+        outcome = _judge(kept, directions, catalogue, looked_up, stars_per_sr, margin_rad, meter)
     if outcome is not MatchOutcome.IDENTIFIED:
         kept = np.full_like(kept, NONE)
     return Identification(kept, confirmed, outcome)
 
 
-class _Entries:
-    """The entries of the pair list within the margin of each pair of centroids.
+def _vote(
+    pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float, meter: Meter
+) -> tuple[NDArray[np.intp], int]:
+    """Votes (centroids, stars) of the last round, 0 for what no longer stands; entries looked up.
 
-    A hypothesis is a centroid with an identity, numbered centroid x stars + star. Each entry ties
-    two pairs of hypotheses together, for either centroid may be either star.
-
-    Attributes:
-        looked_up: number of entries.
+    These are the entries of the pair list within the margin of each pair of centroids. A hypothesis
+    is a centroid with an identity, numbered centroid x stars + star. Each entry ties two pairs of
+    hypotheses together, for either centroid may be either star.
     """
-
-    def __init__(
-        self, pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float, meter: Meter
-    ) -> None:
-        margin = np.float32(margin_rad)
-        start = _search(listed.angle, pairs.angle - margin, meter)
-        # The walk from the start ends at the first entry beyond the margin.
-        end = np.searchsorted(listed.angle, pairs.angle + margin, side="right")
-        lengths = np.maximum(end - start, 0)
-        self.looked_up = int(lengths.sum())
-        walked = self.looked_up + len(start)
-        meter.charge(flash_read=walked, f32_compare=walked, loop=walked, f32_add=2 * len(start))
-        pair = np.repeat(np.arange(len(start)), lengths)
-        skipped = np.cumsum(lengths) - lengths
-        entry = np.arange(self.looked_up) - skipped[pair] + start[pair]
-        one, other = pairs.first[pair] * stars, pairs.second[pair] * stars
-        star, partner = listed.first[entry], listed.second[entry]
-        self._left = np.concatenate([one + star, one + partner])
-        self._right = np.concatenate([other + partner, other + star])
-        self._shape = (pairs.count, stars)
-
-    def vote(self, meter: Meter) -> NDArray[np.intp]:
-        """Votes (centroids, stars) of the last round; 0 for what no longer stands."""
-        size = self._shape[0] * self._shape[1]
-        left, right = self._left, self._right
-        votes = np.zeros(size, dtype=np.intp)
-        for round_number, tenths in enumerate(_STANDING_TENTHS):
-            if round_number > 0:
-                first_stands = votes[self._left] > 0
-                both_stand = first_stands & (votes[self._right] > 0)
-                left, right = self._left[both_stand], self._right[both_stand]
-                tests = len(self._left) + int(first_stands.sum())
-                meter.charge(table_byte=tests, i32_add=tests, loop=self.looked_up)
-            votes = np.bincount(left, minlength=size) + np.bincount(right, minlength=size)
-            # Two 16-bit counters a vote, the largest kept; the table is cleared word by word.
-            meter.charge(
-                flash_read=2 * self.looked_up,
-                table_byte=2 * len(left),
-                i32_add=4 * len(left),
-                ram_write=2 * len(left) + size // 2,
-                loop=size // 2,
-            )
-            votes[10 * votes < tenths * votes.max()] = 0
-        return votes.reshape(self._shape)
+    margin = np.float32(margin_rad)
+    start = _search(listed.angle, pairs.angle - margin, meter)
+    # The walk from the start ends at the first entry beyond the margin.
+    end = np.searchsorted(listed.angle, pairs.angle + margin, side="right")
+    lengths = np.maximum(end - start, 0)
+    looked_up = int(lengths.sum())
+    walked = looked_up + len(start)
+    meter.charge(flash_read=walked, f32_compare=walked, loop=walked, f32_add=2 * len(start))
+    pair = np.repeat(np.arange(len(start)), lengths)
+    skipped = np.cumsum(lengths) - lengths
+    entry = np.arange(looked_up) - skipped[pair] + start[pair]
+    one, other = pairs.first[pair] * stars, pairs.second[pair] * stars
+    star, partner = listed.first[entry], listed.second[entry]
+    left = np.concatenate([one + star, one + partner])
+    right = np.concatenate([other + partner, other + star])
+    size = pairs.count * stars
+    votes = np.ones(size, dtype=np.intp)
+    for round_number, tenths in enumerate(_STANDING_TENTHS):
+        first_stands = votes[left] > 0
+        both = first_stands & (votes[right] > 0)
+        if round_number > 0:
+            tests = len(left) + int(first_stands.sum())
+            meter.charge(table_byte=tests, i32_add=tests, loop=looked_up)
+        votes = np.bincount(left[both], minlength=size) + np.bincount(right[both], minlength=size)
+        # Two 16-bit counters a vote, the largest kept; the table is cleared word by word.
+        counted = int(both.sum())
+        meter.charge(
+            flash_read=2 * looked_up,
+            table_byte=2 * counted,
+            i32_add=4 * counted,
+            ram_write=2 * counted + size // 2,
+            loop=size // 2,
+        )
+        votes[10 * votes < tenths * votes.max()] = 0
+    return votes.reshape(pairs.count, stars), looked_up
 
 
 def _search(
