@@ -1,5 +1,6 @@
 import hashlib
 import math
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -41,18 +42,13 @@ def test_pairs_are_all_those_closer_than_the_limit_in_rising_order() -> None:
     ordered = vectors[np.argsort(hip)]
     expected = {
         (i, j): angle
-        for i in range(60)
-        for j in range(i + 1, 60)
+        for i, j in combinations(range(60), 2)
         if (angle := angle_between(ordered[i], ordered[j])) < math.radians(35)
     }
     pairs = catalogue.pairs
-    found = dict(
-        zip(
-            zip(pairs.first.tolist(), pairs.second.tolist(), strict=True),
-            pairs.angle.tolist(),
-            strict=True,
-        )
-    )
+    found = {
+        (i, j): angle for i, j, angle in zip(pairs.first, pairs.second, pairs.angle, strict=True)
+    }
     assert len(found) == len(pairs)
     assert found == pytest.approx(expected, rel=1e-7)
     assert np.all(np.diff(pairs.angle) >= 0)
@@ -72,15 +68,7 @@ def test_bytes_hold_the_arrays_in_the_documented_order() -> None:
     stars, pairs = len(catalogue), len(catalogue.pairs)
     data = catalogue.to_bytes()
     assert len(data) == catalogue.star_bytes + catalogue.pair_bytes == 14 * stars + 8 * pairs
-    layout = [
-        ("<u2", stars),
-        ("<f4", stars),
-        ("<f4", stars),
-        ("<f4", stars),
-        ("<u2", pairs),
-        ("<u2", pairs),
-        ("<f4", pairs),
-    ]
+    layout = [("<u2", stars), *3 * [("<f4", stars)], *2 * [("<u2", pairs)], ("<f4", pairs)]
     offset, arrays = 0, []
     for kind, count in layout:
         arrays.append(np.frombuffer(data, kind, count, offset))
@@ -88,9 +76,8 @@ def test_bytes_hold_the_arrays_in_the_documented_order() -> None:
     assert offset == len(data)
     assert arrays[0].tolist() == list(range(stars))
     assert np.array_equal(np.stack(arrays[1:4], axis=1), catalogue.vectors)
-    assert np.array_equal(arrays[4], catalogue.pairs.first)
-    assert np.array_equal(arrays[5], catalogue.pairs.second)
-    assert np.array_equal(arrays[6], catalogue.pairs.angle)
+    listed = catalogue.pairs
+    assert all(map(np.array_equal, arrays[4:], (listed.first, listed.second, listed.angle)))
 
 
 def test_published_sizes_follow_from_the_published_counts() -> None:
@@ -162,12 +149,7 @@ def test_reduced_charges_one_pass_over_each_list_and_the_copies() -> None:
 )
 def test_impossible_catalogues_are_refused(change: dict[str, object], message: str) -> None:
     hip, vectors, v_mag = random_sky(10, 9)
-    arguments: dict[str, object] = {
-        "hip": hip,
-        "unit_vectors": vectors,
-        "v_mag": v_mag,
-        "mag_limit": 4.0,
-        "pair_limit_deg": 42.1,
-    }
+    sky = {"hip": hip, "unit_vectors": vectors, "v_mag": v_mag}
+    limits = {"mag_limit": 4.0, "pair_limit_deg": 42.1}
     with pytest.raises(CatalogueError, match=message):
-        StarCatalogue.build(**(arguments | change))  # type: ignore[arg-type]
+        StarCatalogue.build(**{**sky, **limits, **change})  # type: ignore[arg-type]
