@@ -4,6 +4,7 @@ The clock is 1 MHz unless given, so a cycle is a microsecond.
 """
 
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -70,18 +71,13 @@ class FakeEngine:
 
 
 class FakeCameraBus:
-    """A camera that takes 50 us for a byte and answers with its own text."""
-
-    def __init__(self) -> None:
-        self.answer: bytes | None = b"ok"
-        self.performed: list[tuple[int, CameraTransfer]] = []
+    """A camera that takes 50 us for a byte."""
 
     def transfer_ps(self, request: CameraTransfer) -> int:
         return (len(request.data) + request.read) * 50 * PS_PER_US
 
     def transfer(self, request: CameraTransfer, now_ps: int) -> bytes | None:
-        self.performed.append((now_ps, request))
-        return self.answer
+        return b"ok"
 
 
 class FakePins:
@@ -100,26 +96,22 @@ class FakePins:
         return 1 - self.driven
 
 
+@dataclass
 class Program:
     """Runs the body it was given; the program of a later start sleeps for ever."""
 
-    def __init__(self, desk: "Desk", body: Body) -> None:
-        self._desk = desk
-        self._body = body
+    desk: "Desk"
+    body: Body
 
     def main(self) -> Generator[Any, Any, None]:
-        yield from self._body(self._desk)
+        yield from self.body(self.desk)
         yield Sleep(None)
 
 
 class Desk:
     """A processor, ready to run the bodies given: one a start, then one that sleeps.
 
-    Args:
-        bodies: what it runs.
-        hz: its clock, with costs of a test.
-        table: other costs and another clock.
-        engine: its FPGA; a fake one unless given.
+    It has a clock of ``hz`` and costs of a test, unless a ``table`` of others is given.
     """
 
     def __init__(

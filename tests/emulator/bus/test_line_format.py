@@ -105,7 +105,7 @@ def test_noise_leaves_nothing_behind():
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
-        ({"baud": 0}, r"a baud rate in 1\.\.12000000, not 0"),
+        *(({"baud": n}, rf"a baud rate in 1\.\.12000000, not {n}") for n in (0, -1, 12_000_001)),
         ({"baud": 9600, "data_bits": 9}, "5 to 8 data bits, not 9"),
         ({"baud": 9600, "parity": "X"}, "parity is N, E, O, M or S, not 'X'"),
         ({"baud": 9600, "stop_bits": 3}, "1, 1.5 or 2 stop bits, not 3"),

@@ -4,319 +4,309 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.sim.processor import LOOK_AHEAD_PS
-from cubestack.emulator.sim.virtual_time import PS_PER_US
-from cubestack.firmware_model.mcu.requests import (
-    AwaitPin,
-    CameraTransfer,
-    Pay,
-    ReadPin,
-    ReadTimer,
-    Reset,
-    SetPin,
-    Sleep,
-    StrobeRead,
-)
+from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US
+from cubestack.firmware_model.mcu import requests as req
 
-BOOT_US = 100
-PORT_WRITE = 2
-PORT_READ = 3
-POWER_ON = 1
+BOOT_US, POWER_ON = 100, 1
+PORT_WRITE, PORT_READ, POLL = 2, 3, 7
 
 
-def test_a_board_without_an_fpga_refuses_what_needs_one(desk_of):
-    for request in (
-        SetPin("ENABLE", 1),
-        ReadPin("ACK"),
-        AwaitPin("ACK", 1, 10, poll_cycles=1),
-        StrobeRead(np.zeros(1, np.uint8), 4),
-    ):
+def script(*steps):
+    """A body: a number is work, a request is made and its answer noted."""
 
-        def body(desk, request=request):
-            yield CameraTransfer(b"")
-            yield SetPin("LINE", 1)
-            yield request
+    def body(desk):
+        for step in steps:
+            if isinstance(step, int):
+                desk.work(step)
+            else:
+                desk.note((yield step))
 
-        desk = desk_of(body)
-        desk.processor.fpga = None
-        with pytest.raises(ValueError, match="this board has no FPGA"):
-            desk.run()
-        assert desk.pins_told == [("LINE", 1)]
+    return body
 
 
-# --- cycles ------------------------------------------------------------------------------------
+def awaiting(level: int = 1, timeout_us: int = 500_000) -> req.AwaitPin:
+    return req.AwaitPin("ACK", level, timeout_us, POLL)
+
+
+def sleep(deadline_us: int, wakeable: bool = True) -> req.Sleep:
+    return req.Sleep(deadline_us + BOOT_US, wakeable)
+
+
+PAY, READ_ACK = req.Pay(), req.ReadPin("ACK")
+ACK_SEEN_US = {1: 7, 6: 7, 7: 7, 8: 14, 700: 700, 701: 707, 386_002: 386_008}
+BEFORE = -BOOT_US
+CASES = {
+    "charged cycles come first": ((7, PAY, 5, req.ReadTimer()), {}, [(7, None), (12, 112)]),
+    "no cycles take no time": ((PAY,), {}, [(0, None)]),
+    "interrupts extend the work, also that of interrupts, and are too late when it is done": (
+        (100, PAY),
+        {"work": {60: 20, 110: 3, 124: 1000}},
+        [(123, None)],
+    ),
+    "a pin is read when the work before it is done": (
+        (READ_ACK, 10, READ_ACK),
+        {"ack": [5]},
+        [(0, 0), (PORT_READ + 10, 1)],
+    ),
+    **{
+        f"ACK at {rose} us is seen at the end of a poll": (
+            (awaiting(),),
+            {"ack": [rose]},
+            [(seen, True)],
+        )
+        for rose, seen in ACK_SEEN_US.items()
+    },
+    "a pin that is there already costs one poll": ((awaiting(level=0),), {}, [(POLL, True)]),
+    "a pin that never comes": ((awaiting(timeout_us=12_345),), {}, [(12_345, False)]),
+    "a pin at the timeout": ((awaiting(timeout_us=100),), {"ack": [100]}, [(105, True)]),
+    "a pin after the timeout": ((awaiting(timeout_us=99),), {"ack": [100]}, [(99, False)]),
+    "interrupts during a poll are paid afterwards": (
+        (awaiting(), PAY),
+        {"ack": [70], "work": {30: 25}},
+        [(70, True), (95, None)],
+    ),
+    "interrupts during a sleep are paid afterwards": (
+        (sleep(500), PAY),
+        {"work": {200: 30}},
+        [(500, False), (530, None)],
+    ),
+    "a sleep ends at its deadline": ((sleep(500),), {}, [(500, False)]),
+    "a wake ends a sleep": ((sleep(500),), {"wake": [200]}, [(200, True)]),
+    "a sleep goes on when it is not wakeable, and the wake is kept": (
+        (sleep(500, wakeable=False), sleep(900)),
+        {"wake": [200]},
+        [(500, False), (500, True)],
+    ),
+    "a wake before a sleep is not lost": (
+        (sleep(500), sleep(900)),
+        {"wake": [BEFORE]},
+        [(0, True), (900, False)],
+    ),
+    "two wakes end one sleep": (
+        (sleep(500), sleep(900)),
+        {"wake": [100, 100]},
+        [(100, True), (900, False)],
+    ),
+    "a wake survives a sleep whose deadline has passed": (
+        (sleep(0), sleep(900)),
+        {"wake": [BEFORE]},
+        [(0, False), (0, True)],
+    ),
+}
+
+
+@pytest.mark.parametrize(("steps", "events", "log"), CASES.values(), ids=CASES)
+def test_when_requests_are_answered(desk_of, steps, events, log):
+    desk = desk_of(script(*steps))
+    desk.ack_at(*events.get("ack", ()))
+    for us, cycles in events.get("work", {}).items():
+        desk.at(us, lambda cycles=cycles: desk.work(cycles))
+    for us in events.get("wake", ()):
+        desk.at(us, desk.processor.wake)
+    assert desk.run().log == log
 
 
 def test_main_starts_after_the_boot_time(desk_of):
-    def body(desk):
-        desk.note("main")
-        yield Pay()
-
-    desk = desk_of(body)
+    desk = desk_of(script(PAY))
     desk.kernel.advance_to(BOOT_US * PS_PER_US - 1)
     assert not desk.log
-    assert desk.run().log == [(0, "main")]
+    assert desk.run().log == [(0, None)]
     assert desk.causes == [POWER_ON]
-
-
-def test_charged_cycles_take_their_time_before_the_next_request(desk_of):
-    def body(desk):
-        desk.work(7)
-        desk.note()
-        yield Pay()
-        desk.note()
-        desk.work(5)
-        desk.note((yield ReadTimer()))
-
-    assert desk_of(body).run().log == [(0, None), (7, None), (12, BOOT_US + 12)]
-
-
-def test_no_cycles_take_no_time(desk_of):
-    def body(desk):
-        yield Pay()
-        desk.note()
-
-    assert desk_of(body).run().log == [(0, None)]
-
-
-def test_interrupts_extend_the_running_work(desk_of):
-    """One comes during the work, a second one during what the first one added."""
-
-    def body(desk):
-        desk.work(100)
-        yield Pay()
-        desk.note()
-
-    desk = desk_of(body)
-    desk.at(60, lambda: desk.work(20))
-    desk.at(110, lambda: desk.work(3))
-    desk.at(124, lambda: desk.work(1000))  # too late: the work is done
-    assert desk.run().log == [(123, None)]
 
 
 # --- pins --------------------------------------------------------------------------------------
 
 
 def test_pin_is_driven_when_the_work_before_it_is_done(desk_of):
-    def body(desk):
-        desk.work(10)
-        yield SetPin("ENABLE", 1)
-        desk.note()
-        yield SetPin("RNW", 1)
-
-    desk = desk_of(body).run()
+    desk = desk_of(script(10, req.SetPin("ENABLE", 1), req.SetPin("RNW", 1))).run()
     rises = [((time // PS_PER_US) - BOOT_US, pin, level) for time, pin, level in desk.engine.pins]
     assert rises == [(10, "ENABLE", 1), (10 + PORT_WRITE, "RNW", 1)]
     assert desk.pins_told == [("ENABLE", 1), ("RNW", 1)]
-    assert desk.log == [(10, None)]
+    assert desk.log[0] == (10, None)
 
 
 def test_pin_that_does_not_lead_to_the_fpga(desk_of):
-    def body(desk):
-        yield SetPin("LINE", 1)
-        desk.note((yield ReadPin("LINE")))
-        yield SetPin("LINE", 0)
-        desk.note((yield ReadPin("LINE")))
-
-    desk = desk_of(body).run()
-    first = PORT_WRITE
-    assert desk.log == [(first, 0), (first + PORT_READ + PORT_WRITE, 1)]
+    steps = (req.SetPin("LINE", 1), req.ReadPin("LINE"), req.SetPin("LINE", 0), req.ReadPin("LINE"))
+    desk = desk_of(script(*steps)).run()
+    first, second = PORT_WRITE, PORT_WRITE + PORT_READ
+    assert desk.log == [(0, None), (first, 0), (second, None), (second + PORT_WRITE, 1)]
     assert desk.engine.pins == []
     assert desk.pins_told == [("LINE", 1), ("LINE", 0)]
-
-
-def test_pin_of_the_fpga_is_read_when_the_work_before_it_is_done(desk_of):
-    def body(desk):
-        desk.note((yield ReadPin("ACK")))
-        desk.work(10)
-        desk.note((yield ReadPin("ACK")))
-
-    desk = desk_of(body)
-    desk.ack_at(5)
-    assert desk.run().log == [(0, 0), (PORT_READ + 10, 1)]
-
-
-POLL = 7
-
-
-def awaiting(level: int = 1, timeout_us: int = 500_000):
-    def body(desk):
-        desk.note((yield AwaitPin("ACK", level, timeout_us, POLL)))
-
-    return body
-
-
-@pytest.mark.parametrize(
-    ("ack_us", "goes_on_us"),
-    [(1, 7), (6, 7), (7, 7), (8, 14), (700, 700), (701, 707), (386_002, 386_008)],
-)
-def test_program_goes_on_at_the_end_of_the_poll_that_sees_the_pin(desk_of, ack_us, goes_on_us):
-    desk = desk_of(awaiting())
-    desk.ack_at(ack_us)
-    assert desk.run().log == [(goes_on_us, True)]
-
-
-def test_pin_that_is_there_already_costs_one_poll(desk_of):
-    assert desk_of(awaiting(level=0)).run().log == [(POLL, True)]
-
-
-def test_pin_that_never_comes_times_out(desk_of):
-    desk = desk_of(awaiting(timeout_us=12_345))
-    assert desk.run().log == [(12_345, False)]
-
-
-@pytest.mark.parametrize(("timeout_us", "seen"), [(100, True), (99, False)])
-def test_pin_at_the_timeout(desk_of, timeout_us, seen):
-    desk = desk_of(awaiting(timeout_us=timeout_us))
-    desk.ack_at(100)
-    desk.run()
-    assert [answer for _, answer in desk.log] == [seen]
 
 
 @pytest.mark.parametrize("other_us", [0, 1, 99, 100, 101, 104, 105, 106])
 def test_other_events_do_not_move_the_poll(desk_of, other_us):
     """They happen at their own time, before, while and after the pin gets its level."""
-    desk = desk_of(awaiting())
+    desk = desk_of(script(awaiting()))
     desk.ack_at(100)
     happened = []
     desk.at(other_us, lambda: happened.append(desk.us))
-    desk.run()
+    assert desk.run().log == [(105, True)]
     assert happened == [other_us]
-    assert desk.log == [(105, True)]
 
 
 def test_event_may_take_the_level_away(desk_of):
     """A supply that is cut when ACK rises: the program sees no ACK before the next one."""
-    desk = desk_of(awaiting())
+    desk = desk_of(script(awaiting()))
     desk.ack_at(100)
     desk.at(100, lambda: desk.ack_at(200))
     assert desk.run().log == [(203, True)]
 
 
-def test_engine_never_runs_past_an_event(desk_of):
-    desk = desk_of(awaiting())
-    desk.ack_at(5000)
+def test_engine_never_runs_past_an_event_and_looks_ahead_so_far_only(desk_of):
+    """A host that writes in between is late for the FPGA by no more than that."""
+    desk = desk_of(script(awaiting(timeout_us=200_000)))
     events = [10, 777, 778, 4999]
     for us in events:
         desk.at(us, lambda: None)
-    desk.run()
+    bursts = desk.run().engine.bursts
     for us in events:
         time = (us + BOOT_US) * PS_PER_US
-        assert not [burst for burst in desk.engine.bursts if burst[0] < time < burst[1]]
-
-
-def test_look_ahead_is_bounded(desk_of):
-    """So that a host that writes in between is late for the FPGA by no more than that."""
-    desk = desk_of(awaiting(timeout_us=200_000)).run()
-    longest = max(end - start for start, end in desk.engine.bursts)
-    assert longest == LOOK_AHEAD_PS
-
-
-def test_interrupts_during_a_poll_are_paid_afterwards(desk_of):
-    def body(desk):
-        yield AwaitPin("ACK", 1, 1000, POLL)
-        desk.note()
-        yield Pay()
-        desk.note()
-
-    desk = desk_of(body)
-    desk.ack_at(70)
-    desk.at(30, lambda: desk.work(25))
-    assert desk.run().log == [(70, None), (95, None)]
+        assert not [burst for burst in bursts if burst[0] < time < burst[1]]
+    assert max(end - start for start, end in bursts) == LOOK_AHEAD_PS
 
 
 # --- camera bus, reset, mistakes ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize("answer", [b"\x12", None])
-def test_camera_transfer_takes_the_time_of_the_bus(desk_of, answer):
-    request = CameraTransfer(b"\x81\x00", read=1)
+def test_camera_transfer_takes_the_time_of_the_bus_and_the_engine_follows(desk_of, answer):
+    request, performed = req.CameraTransfer(b"\x81\x00", read=1), []
 
-    def body(desk):
-        desk.work(5)
-        desk.note((yield request))
+    def transfer(*told):
+        performed.append((*told, desk.engine.now_ps))
+        return answer
 
-    desk = desk_of(body)
-    desk.camera_bus.answer = answer
-    desk.run()
-    assert desk.log == [(155, answer)]
-    assert desk.camera_bus.performed == [((BOOT_US + 155) * PS_PER_US, request)]
-
-
-def test_engine_is_up_to_date_when_the_camera_is_told(desk_of):
-    times = []
-
-    def body(desk):
-        yield CameraTransfer(b"\x81\x00")
-
-    desk = desk_of(body)
-    desk.camera_bus.transfer = lambda _request, _now: times.append(desk.engine.now_ps)
-    desk.run()
-    assert times == [(BOOT_US + 100) * PS_PER_US]
+    desk = desk_of(script(5, request))
+    desk.camera_bus.transfer = transfer
+    assert desk.run().log == [(155, answer)]
+    assert performed == [(request, *[(BOOT_US + 155) * PS_PER_US] * 2)]
 
 
-def test_reset_starts_anew_with_its_cause(desk_of):
-    def first(desk):
-        desk.work(10)
-        yield Reset(5)
-        desk.note("never")
-
-    def second(desk):
-        desk.note("second")
-        yield Pay()
-
-    desk = desk_of(first, second)
-    assert desk.processor.resets == 0
-    desk.run()
-    assert desk.causes == [POWER_ON, 5]
-    assert desk.processor.resets == 1
-    assert desk.log == [(10 + BOOT_US, "second")]
-
-
-def test_reset_closes_the_program(desk_of):
+def test_reset_closes_the_program_forgets_a_wake_and_starts_anew_with_its_cause(desk_of):
     closed = []
 
-    def first(_desk):
-        try:
-            yield Reset(5)
-        finally:
-            closed.append(True)
-
-    desk_of(first).run()
-    assert closed == [True]
-
-
-def test_reset_forgets_a_pending_wake(desk_of):
     def first(desk):
         desk.processor.wake()
-        yield Reset(5)
+        desk.work(10)
+        try:
+            yield req.Reset(5)
+        finally:
+            closed.append(desk.us)
 
-    def second(desk):
-        desk.note((yield Sleep(500 + BOOT_US)))
-
-    desk = desk_of(first, second).run()
-    assert desk.log == [(500, False)]
-
-
-def test_interrupts_reach_the_program_that_runs_now(desk_of):
-    def first(_desk):
-        yield Reset(5)
-
-    desk = desk_of(first)
+    desk = desk_of(first, script(PAY, sleep(500)))
     before = desk.processor.program
-    desk.run(1000)
+    assert desk.processor.resets == 0
+    assert desk.run().log == [(10 + BOOT_US, None), (500, False)]
+    assert (closed, desk.causes, desk.processor.resets) == ([10], [POWER_ON, 5], 1)
     assert desk.processor.program is not before
 
 
-def test_unknown_request(desk_of):
-    def body(_desk):
-        yield "please"
+@pytest.mark.parametrize(
+    ("step", "error", "text"),
+    [
+        ("please", TypeError, "a program can not request 'please'"),
+        (req.Sleep(None, wakeable=False), ValueError, "give a deadline or make it wakeable"),
+    ],
+)
+def test_request_that_can_not_be(desk_of, step, error, text):
+    with pytest.raises(error, match=text):
+        desk_of(script(step)).run()
 
-    with pytest.raises(TypeError, match="a program can not request 'please'"):
-        desk_of(body).run()
+
+@pytest.mark.parametrize(
+    "request_",
+    [req.SetPin("ENABLE", 1), READ_ACK, awaiting(), req.StrobeRead(np.zeros(1, np.uint8), 4)],
+)
+def test_a_board_without_an_fpga_refuses_what_needs_one(desk_of, request_):
+    desk = desk_of(script(req.CameraTransfer(b""), req.SetPin("LINE", 1), request_))
+    desk.processor.fpga = None
+    with pytest.raises(ValueError, match="this board has no FPGA"):
+        desk.run()
+    assert desk.pins_told == [("LINE", 1)]
 
 
 def test_program_that_returns(desk_of):
-    desk = desk_of(lambda _desk: iter(()))
-    desk.processor.program.main = lambda: (request for request in [Pay()])
+    desk = desk_of()
+    desk.processor.program.main = lambda: (request for request in [PAY])
     with pytest.raises(RuntimeError, match="must end in Reset"):
         desk.run()
+
+
+# --- sleep -------------------------------------------------------------------------------------
+
+
+def test_wake_at_the_deadline_is_told_once(desk_of):
+    desk = desk_of(script(sleep(500), sleep(900)))
+    desk.at(500, desk.processor.wake)
+    assert sorted(answer for _, answer in desk.run().log) == [False, True]
+
+
+def test_activity_is_told(desk_of):
+    desk = desk_of(script(sleep(500), sleep(900))).run()
+    assert desk.activity == [
+        (-BOOT_US, True), (0, False), (500, True), (500, False), (900, True), (900, False)
+    ]  # fmt: skip
+
+
+def test_dozing_is_to_sleep_until_an_interrupt_and_waiting_without_a_deadline(desk_of):
+    desk = desk_of(script(sleep(500, wakeable=False), sleep(900), req.Sleep(None)))
+    for us, waiting, dozing in ((499, False, False), (899, False, True), (1999, True, True)):
+        processor = desk.run(us).processor
+        assert (processor.waiting, processor.dozing) == (waiting, dozing)
+    assert len(desk.log) == 2
+    desk.at(2000, desk.processor.wake)
+    assert desk.run().log[2:] == [(2000, True)]
+
+
+# --- transfer loop -----------------------------------------------------------------------------
+
+CYCLES = 38
+HZ = 48_000_000  # 38 cycles are 791 666 2/3 ps
+
+
+def exact_ps(cycles: int) -> int:
+    return cycles * PS_PER_S // HZ
+
+
+def transfer(count: int, work: int = 0):
+    """Notes how many ps a transfer takes, and what it brings."""
+
+    def body(desk):
+        out, start = np.zeros(count, np.uint8), desk.kernel.now
+        desk.work(work)
+        yield req.StrobeRead(out, CYCLES)
+        desk.note((desk.kernel.now - start, out.tolist()))
+
+    return body
+
+
+@pytest.mark.parametrize(
+    ("count", "events_ps"),
+    [
+        (0, []),
+        (1000, []),
+        (1000, [PS_PER_US]),
+        (1000, [us * PS_PER_US for us in (5, 6, 7)]),
+        (1000, range(PS_PER_US, 200 * PS_PER_US, 3 * PS_PER_US)),
+        # Every half turn something happens: the loop still makes one turn at a time.
+        (50, range(0, 120 * exact_ps(CYCLES // 2), exact_ps(CYCLES // 2))),
+    ],
+)
+def test_transfer_takes_its_cycles_whatever_happens_in_between(desk_of, count, events_ps):
+    desk = desk_of(transfer(count), hz=HZ)
+    for time_ps in events_ps:
+        desk.kernel.timeout(BOOT_US * PS_PER_US + time_ps)
+    expected = (exact_ps(count * CYCLES), [i % 256 for i in range(count)])
+    assert [found for _, found in desk.run(10_000).log] == [expected]
+
+
+@pytest.mark.parametrize(("work", "interrupts_us"), [(481, []), (0, [10, 11, 300])])
+def test_cycles_of_others_are_paid_before_and_within_a_transfer(desk_of, work, interrupts_us):
+    """Where an interrupt breaks the loop, a fraction of a picosecond is lost."""
+    desk = desk_of(transfer(1000, work), hz=HZ)
+    for us in interrupts_us:
+        desk.at(us, lambda: desk.work(80))
+    ((_, (took_ps, _)),) = desk.run(10_000).log
+    exact = exact_ps(work + 1000 * CYCLES + 80 * len(interrupts_us))
+    assert took_ps == pytest.approx(exact, abs=1 + 3 * len(interrupts_us))

@@ -40,12 +40,11 @@ def desk_with(body: Callable[[Desk], Body], tick_ns: int | None = None) -> Desk:
 
     desk = Desk(enabled, table=CORTEX_M3, engine=engine)
 
-    def tick(period_ps: int) -> Body:
-        while True:
-            yield desk.kernel.timeout(period_ps)
+    def tick() -> Body:
+        while tick_ns is not None:
+            yield desk.kernel.timeout(1000 * tick_ns)
 
-    if tick_ns is not None:
-        desk.kernel.process(tick(1000 * tick_ns))
+    desk.kernel.process(tick())
     return desk
 
 
