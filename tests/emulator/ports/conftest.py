@@ -1,4 +1,4 @@
-"""Clients of the ports, and a UART in front of a program that echoes, or only listens.
+"""Clients of the ports, and a UART in front of a program that answers, or only listens.
 
 Clients block with a timeout; nothing sleeps.
 """
@@ -17,35 +17,36 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.endpoint import Endpoint, poll_now
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
+from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.emulator.sim.virtual_time import Kernel
 
+ALL_BYTES = bytes(range(256))
+LOOPBACK = "127.0.0.1"
 TIMEOUT_S = 20.0  # of a client that waits for what must come
 
 
 class Device:
-    """A UART at 1 Mbaud: a byte takes 10 us.
+    """A UART at 1 Mbaud unless told otherwise: a byte takes 10 us.
 
     Attributes:
-        echoes: whether every byte is sent back.
+        answers: how often every byte is sent back.
         received: all bytes that came.
     """
 
-    def __init__(self) -> None:
-        self.kernel = Kernel()
+    def __init__(self, kernel: Kernel, baud: int = 1_000_000, answers: int = 0) -> None:
+        self.kernel = kernel
         self.received = bytearray()
-        self.echoes = False
-        self.uart = Uart(
-            self.kernel, 1_000_000, self._on_byte, lambda: None, silence_bytes=1_000_000
-        )
+        self.answers = answers
+        self.uart = Uart(kernel, baud, self._on_byte, lambda: None, silence_bytes=1_000_000)
 
     def _on_byte(self, byte: int) -> None:
         self.received.append(byte)
-        if self.echoes:
-            self.uart.send(bytes([byte]))
+        if self.uart.backlog < 10_000:
+            self.uart.send(bytes([byte]) * self.answers)
 
     def advance(self, byte_times: int) -> int:
         """Let so many byte times pass, with all that happens at the last instant; the time then."""
@@ -75,126 +76,71 @@ class Device:
             doing()
 
 
-class Terminal:
-    """A program with the slave open, without blocking."""
+class Client:
+    """A program at a terminal or a socket, which blocks in ``read`` alone."""
 
-    def __init__(self, path: Path) -> None:
-        self.fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    def __init__(self, end: int | socket.socket) -> None:
+        self.socket = None if isinstance(end, int) else end
+        self.fd = end if isinstance(end, int) else end.fileno()
+        os.set_blocking(self.fd, False)
 
     def read(self, count: int) -> bytes:
         data = b""
         while len(data) < count:
             assert select.select([self.fd], [], [], TIMEOUT_S)[0], f"only {len(data)} bytes came"
-            data += os.read(self.fd, count - len(data))
+            part = os.read(self.fd, count - len(data))
+            assert part, f"closed after {len(data)} bytes"
+            data += part
         return data
 
     def read_now(self) -> bytes:
-        """What is there; BlockingIOError when there is nothing."""
-        return os.read(self.fd, 1 << 16)
+        """What is there."""
+        try:
+            return os.read(self.fd, 1 << 16)
+        except BlockingIOError:
+            return b""
 
     def write(self, data: bytes) -> int:
+        """As much as there is room for."""
         try:
             return os.write(self.fd, data)
         except BlockingIOError:
             return 0
 
     def close(self) -> None:
-        os.close(self.fd)
-
-
-class Connection:
-    """A client of a TCP port, which blocks."""
-
-    def __init__(self, address: tuple[str, int]) -> None:
-        self.socket = socket.create_connection(address, TIMEOUT_S)
-
-    def receive(self, count: int) -> bytes:
-        data = b""
-        while len(data) < count:
-            part = self.socket.recv(count - len(data))
-            assert part, f"closed after {len(data)} bytes"
-            data += part
-        return data
-
-    def close(self) -> None:
-        self.socket.close()
+        if self.socket is None:
+            os.close(self.fd)
+        else:
+            self.socket.close()
 
     def reset(self) -> None:
-        """Die: the connection is torn down without a word."""
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-        self.socket.close()
+        """Die: a connection is torn down without a word."""
+        if self.socket is not None:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self.close()
 
 
-@pytest.fixture
-def device() -> Device:
-    return Device()
+def open_port(kind: str, path: Path, uart: Uart) -> Any:
+    if kind == "pty":
+        return PtyEndpoint(path, uart)
+    return {"tcp": TcpEndpoint, "rfc2217": Rfc2217Endpoint}[kind](LOOPBACK, 0, uart)
 
 
-@pytest.fixture
-def path(tmp_path) -> Path:
-    return tmp_path / "ttyTEST"
+def open_client(port: Any) -> Client:
+    """Whoever serves the port may notice."""
+    if isinstance(port, PtyEndpoint):
+        return Client(os.open(port.name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK))
+    return Client(socket.create_connection(port.address, TIMEOUT_S))
 
 
-@pytest.fixture
-def pty(device, path) -> Iterator[PtyEndpoint]:
-    endpoint = PtyEndpoint(path, device.uart)
-    yield endpoint
-    endpoint.close()
-
-
-@pytest.fixture
-def open_terminal(pty, device, path) -> Iterator[Callable[[], Terminal]]:
-    """Opens the slave and lets the port notice."""
-    opened: list[Terminal] = []
-
-    def open_one() -> Terminal:
-        opened.append(Terminal(path))
-        pty.exchange(device.kernel.now)
-        return opened[-1]
-
-    yield open_one
-    for terminal in opened:
-        with contextlib.suppress(OSError):
-            terminal.close()
-
-
-@pytest.fixture
-def tcp(device) -> Iterator[TcpEndpoint]:
-    endpoint = TcpEndpoint("127.0.0.1", 0, device.uart)
-    yield endpoint
-    endpoint.close()
-
-
-@pytest.fixture
-def connect(tcp, device) -> Iterator[Callable[[], Connection]]:
-    """Connects and lets the port notice."""
-    opened: list[Connection] = []
-
-    def connect_one() -> Connection:
-        opened.append(Connection(tcp.address))
-        wait_ready(tcp.watched(), TIMEOUT_S)
-        tcp.exchange(device.kernel.now)
-        return opened[-1]
-
-    yield connect_one
-    for client in opened:
-        client.close()
-
-
-@pytest.fixture
-def terminal_at() -> type[Terminal]:
-    """Opens the slave; whoever serves the port may notice."""
-    return Terminal
-
-
-@pytest.fixture
-def connection_to() -> type[Connection]:
-    """Connects; whoever serves the port may notice."""
-    return Connection
+def ready(port: Endpoint) -> list[int]:
+    """Which of the port's descriptors would wake the scheduler at once."""
+    return [fd for fd, events in port.watched() if poll_now(fd, events)]
 
 
 @contextlib.contextmanager
-def _served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
+def served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
+    """The endpoint is served by a scheduler in a thread."""
     scheduler = RealtimeScheduler(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
     thread = threading.Thread(target=scheduler.run)
     thread.start()
@@ -207,6 +153,40 @@ def _served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
 
 
 @pytest.fixture
-def served() -> Callable[..., contextlib.AbstractContextManager[None]]:
-    """served(device, endpoint, pace): the endpoint is served by a scheduler in a thread."""
-    return _served
+def device() -> Device:
+    return Device(Kernel())
+
+
+@pytest.fixture
+def path(tmp_path) -> Path:
+    return tmp_path / "ttyTEST"
+
+
+@pytest.fixture(params=["pty", "tcp"])
+def kind(request) -> str:
+    return request.param
+
+
+@pytest.fixture
+def port(kind, device, path) -> Iterator[Any]:
+    endpoint = open_port(kind, path, device.uart)
+    yield endpoint
+    endpoint.close()
+
+
+@pytest.fixture
+def connect(port, device) -> Iterator[Callable[[], Client]]:
+    """Opens a client and lets the port notice."""
+    opened: list[Client] = []
+
+    def connect_one() -> Client:
+        opened.append(open_client(port))
+        if not isinstance(port, PtyEndpoint):
+            wait_ready(port.watched(), TIMEOUT_S)
+        port.exchange(device.kernel.now)
+        return opened[-1]
+
+    yield connect_one
+    for client in opened:
+        with contextlib.suppress(OSError):
+            client.close()

@@ -6,28 +6,19 @@
 import contextlib
 import socket
 import tracemalloc
-from collections.abc import Callable
 from typing import Any
 
 from cubestack.emulator.bus.i2c import I2cBus
-from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
-from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
-from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.formats.linux_i2c import (
-    LENGTH,
-    Call,
-    Ioctl,
-    RdwrMessage,
-    pack_ioctl,
-    pack_rdwr,
-    request,
-)
+from cubestack.firmware_model.formats import linux_i2c
+
+from ..bus.ends import Memory
+from .conftest import Client, Device, open_client, open_port
 
 NS_PER_MS = 1_000_000
 SPARE_BYTES = 1_000_000
@@ -36,36 +27,6 @@ HALF_A_FRAME = b"\x1f\x7f\x14"
 SERIAL = ("pty", "tcp", "rfc2217")
 ROLES = {"flood": 1, "unread": 2000, "stopped": 1, "polite": 1}
 """Who is at a line, and how many bytes the device answers to each byte on it."""
-
-
-class Line:
-    """A line of a device that answers every byte with ``answers`` bytes."""
-
-    def __init__(self, kernel: Kernel, answers: int) -> None:
-        self.received = bytearray()
-        self.heard = 0
-        self._answers = answers
-        self.uart = Uart(kernel, 115_200, self._on_byte, lambda: None, silence_bytes=1000)
-
-    def _on_byte(self, byte: int) -> None:
-        self.heard += 1
-        self.received = self.received[-100:] + bytes([byte])
-        if self.uart.backlog < 10_000:
-            self.uart.send(bytes([byte]) * self._answers)
-
-
-class Target:
-    """Answers any read with zeros."""
-
-    def i2c_start(self, read: bool) -> None: ...
-
-    def i2c_write(self, byte: int) -> bool:
-        return True
-
-    def i2c_read(self) -> int:
-        return 0
-
-    def i2c_stop(self) -> None: ...
 
 
 class Wall:
@@ -87,85 +48,55 @@ class Wall:
         self.ns += max(NS_PER_MS, int(timeout_s * 1e9))
 
 
-class Client:
-    """A program at any port, which never blocks."""
-
-    def __init__(self, write: Callable[[bytes], object], read: Callable[[], bytes]) -> None:
-        self._write = write
-        self._read = read
-
-    def write(self, data: bytes) -> None:
-        with contextlib.suppress(BlockingIOError):
-            self._write(data)
-
-    def read(self) -> bytes:
-        try:
-            return self._read()
-        except BlockingIOError:
-            return b""
+def call(kind: linux_i2c.Call, body: bytes) -> bytes:
+    data = linux_i2c.request(0, kind, body)
+    return linux_i2c.LENGTH.pack(len(data)) + data
 
 
-def call(kind: Call, body: bytes) -> bytes:
-    data = request(0, kind, body)
-    return LENGTH.pack(len(data)) + data
-
-
-SET_ADDRESS = call(Call.IOCTL, pack_ioctl(Ioctl.SLAVE, ADDRESS))
-READ_BYTES = call(Call.RDWR, pack_rdwr([RdwrMessage(ADDRESS, 1, 8)]))
+SLAVE = linux_i2c.pack_ioctl(linux_i2c.Ioctl.SLAVE, ADDRESS)
+SET_ADDRESS = call(linux_i2c.Call.IOCTL, SLAVE)
+READING = linux_i2c.pack_rdwr([linux_i2c.RdwrMessage(ADDRESS, 1, 8)])
+READ_BYTES = call(linux_i2c.Call.RDWR, READING)
 
 
 class Desk:
     """Every bad client and a polite one on each kind of port, and a bus for four of them."""
 
-    def __init__(self, folder, terminal_at, connection_to, stack: contextlib.ExitStack) -> None:
+    def __init__(self, folder, stack: contextlib.ExitStack) -> None:
         self.kernel = Kernel()
-        self.lines: dict[tuple[str, str], Line] = {}
+        self.lines: dict[tuple[str, str], Device] = {}
         self.ports: dict[tuple[str, str], Any] = {}
         self.clients: dict[tuple[str, str], Client] = {}
         for kind in SERIAL:
             for role, answers in ROLES.items():
-                line = self.lines[kind, role] = Line(self.kernel, answers)
-                path = folder / f"tty{role}"
-                if kind == "pty":
-                    port: Any = PtyEndpoint(path, line.uart)
-                    opened = terminal_at(path)
-                    client = Client(opened.write, opened.read_now)
-                else:
-                    make = TcpEndpoint if kind == "tcp" else Rfc2217Endpoint
-                    port = make("127.0.0.1", 0, line.uart)
-                    opened = connection_to(port.address)
-                    client = self._of_socket(opened.socket)
+                line = self.lines[kind, role] = Device(self.kernel, 115_200, answers)
+                port = self.ports[kind, role] = open_port(kind, folder / f"tty{role}", line.uart)
                 stack.callback(port.close)
-                stack.callback(opened.close)
-                self.ports[kind, role], self.clients[kind, role] = port, client
+                self.clients[kind, role] = open_client(port)
         bus = I2cBus(self.kernel)
-        bus.attach(ADDRESS, Target())
+        bus.attach(ADDRESS, Memory())
         self.adapter = I2cAdapter(self.kernel, bus)
         self.server = I2cServer(folder / "i2c" / "bus", self.adapter)
         stack.callback(self.server.close)
         for role in ROLES:
             connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            stack.callback(connection.close)
             connection.connect(self.server.name)
-            self.clients["i2c", role] = self._of_socket(connection)
-
-    @staticmethod
-    def _of_socket(connection: socket.socket) -> Client:
-        connection.setblocking(False)
-        return Client(connection.send, lambda: connection.recv(1 << 16))
+            self.clients["i2c", role] = Client(connection)
+        for client in self.clients.values():
+            stack.callback(client.close)
 
     def busy(self) -> bool:
         return self.adapter.busy or any(line.uart.busy for line in self.lines.values())
 
 
-def test_polite_clients_are_served_beside_bad_ones(tmp_path, terminal_at, connection_to):
+def test_polite_clients_are_served_beside_bad_ones(tmp_path):
     """On each kind of port one floods, one never reads, one stops in mid-frame.
 
     The fourth exchanges a byte a wait.
     """
     wall = Wall()
     with contextlib.ExitStack() as stack:
-        desk = Desk(tmp_path, terminal_at, connection_to, stack)
+        desk = Desk(tmp_path, stack)
         for kind in SERIAL:
             desk.clients[kind, "stopped"].write(HALF_A_FRAME)
         desk.clients["i2c", "stopped"].write(READ_BYTES[:-1])
@@ -186,9 +117,9 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path, terminal_at, connec
             for kind, count in got.items():
                 question = READ_BYTES if kind == "i2c" else b"?"
                 desk.clients[kind, "flood"].write((SET_ADDRESS + question) * 2000)
-                desk.clients[kind, "flood"].read()
+                desk.clients[kind, "flood"].read_now()
                 desk.clients[kind, "unread"].write(question * 100)
-                got[kind] = count + len(desk.clients[kind, "polite"].read())
+                got[kind] = count + len(desk.clients[kind, "polite"].read_now())
                 desk.clients[kind, "polite"].write(question)
             if steps == 200:
                 tracemalloc.start()
@@ -203,33 +134,30 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path, terminal_at, connec
         full = 0.8 * desk.kernel.now / PS_PER_S * 11_520
         assert full > 1000
         for kind in SERIAL:
-            assert desk.lines[kind, "polite"].heard >= 590
+            assert len(desk.lines[kind, "polite"].received) >= 590
             assert got[kind] >= 580
-            assert desk.lines[kind, "flood"].heard > full  # its wire is
+            assert len(desk.lines[kind, "flood"].received) > full  # its wire is
             assert desk.lines[kind, "flood"].uart.host_backlog <= MAX_UNSENT
-            assert bytes(desk.lines[kind, "stopped"].received) == HALF_A_FRAME
+            assert desk.lines[kind, "stopped"].received == HALF_A_FRAME
             assert len(desk.ports[kind, "unread"]._unread) <= MAX_UNREAD
-        assert got["i2c"] > 200 * (LENGTH.size + 4 + 8)
+        assert got["i2c"] > 200 * (linux_i2c.LENGTH.size + 4 + 8)
         assert desk.server.clients == len(ROLES)
         assert (grown, peak) < (SPARE_BYTES, SPARE_BYTES)
 
 
-def test_two_lines_of_a_device_at_once(tmp_path, terminal_at):
+def test_two_lines_of_a_device_at_once(tmp_path):
     """As a CubeSense has them, with rates of their own."""
     kernel, wall = Kernel(), Wall()
-    node, bench = Line(kernel, 1), Line(kernel, 3)
+    lines = [Device(kernel, 115_200, answers) for answers in (1, 3)]
     with contextlib.ExitStack() as stack:
-        ports = [
-            PtyEndpoint(tmp_path / name, line.uart)
-            for name, line in (("tty", node), ("tty.bench", bench))
-        ]
-        clients = [terminal_at(tmp_path / name) for name in ("tty", "tty.bench")]
+        ports = [PtyEndpoint(tmp_path / f"tty{line.answers}", line.uart) for line in lines]
+        clients = [open_client(port) for port in ports]
         for thing in (*ports, *clients):
             stack.callback(thing.close)
         scheduler = RealtimeScheduler(
             kernel,
             ports,
-            lambda: node.uart.busy or bench.uart.busy,
+            lambda: any(line.uart.busy for line in lines),
             pace="real",
             clock_ns=wall.clock,
             wait=wall.wait,

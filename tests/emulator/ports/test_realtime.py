@@ -10,13 +10,9 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.realtime import (
-    IDLE_S,
-    LAG_REPORT_S,
-    SLICE_S,
-    RealtimeScheduler,
-    wait_ready,
-)
+from cubestack.emulator.ports import realtime
+from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.realtime import IDLE_S, SLICE_S, RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
 NS_PER_MS = 1_000_000
@@ -25,45 +21,37 @@ ORIGIN_NS = 123_456_789_012_345
 
 
 class Wall:
-    """Wall time of the test. Attributes: the waits so far in s, and what happens in them."""
+    """Wall time of the test. Attributes: the waits so far in s, and the ns of odd ones."""
 
     def __init__(self) -> None:
         self.ns = ORIGIN_NS
         self.waits: list[float] = []
-        self.during_wait: dict[int, Callable[[], object]] = {}
+        self.during_wait: dict[int, int] = {}
 
     def clock(self) -> int:
         self.ns += 10_000
         return self.ns
 
     def wait(self, _watched: Any, timeout_s: float) -> None:
-        action = self.during_wait.get(len(self.waits))
+        self.ns += self.during_wait.get(len(self.waits), int(timeout_s * 1e9))
         self.waits.append(timeout_s)
-        if action is None:
-            self.ns += int(timeout_s * 1e9)
-        else:
-            action()
 
     @property
     def ms(self) -> float:
         return (self.ns - ORIGIN_NS) / NS_PER_MS
 
 
-class FakePort:
-    """An endpoint that takes note of its calls and stops the scheduler in the end."""
+class FakePort(Endpoint):
+    """Takes note of its calls and stops the scheduler in the end."""
 
-    name = "fake"
+    congested = False
 
     def __init__(self, wall: Wall) -> None:
         self._wall = wall
-        self.congested = False
         self.exchanges: list[int] = []
         self.wall_ms: list[float] = []
         self.releases: list[int] = []
         self.on_exchange: Callable[[], object] = lambda: None
-
-    def watched(self) -> list[tuple[int, int]]:
-        return []
 
     def exchange(self, now_ps: int) -> None:
         self.exchanges.append(now_ps)
@@ -133,16 +121,11 @@ def test_idle_scheduler_sleeps(bench, pace):
 def test_virtual_time_follows_wall_time(bench):
     ticks = bench.tick(7 * PS_PER_MS)
     bench.run("real", 5000)
+    assert bench.wall.waits[0] == pytest.approx(0.007, abs=0.0002)  # until something is due
+    assert len(bench.wall.waits) == pytest.approx(5000 / 7, abs=15)
     assert len(ticks) == pytest.approx(5000 / 7, abs=1)
     assert max(abs(wall - virtual) for virtual, wall in ticks) < 0.2
     assert bench.kernel.now / PS_PER_MS == pytest.approx(5000, abs=IDLE_S * 1000 + 1)
-
-
-def test_scheduler_sleeps_until_something_is_due(bench):
-    bench.tick(7 * PS_PER_MS)
-    bench.run("real", 1000)
-    assert bench.wall.waits[0] == pytest.approx(0.007, abs=0.0002)
-    assert len(bench.wall.waits) == pytest.approx(1000 / 7, abs=3)
 
 
 def test_scheduler_sleeps_until_a_byte_is_due(bench):
@@ -160,11 +143,7 @@ def test_virtual_time_starts_where_it_stands(bench):
 
 def test_what_a_client_writes_comes_at_the_time_of_its_writing(bench):
     """Not at the time when the scheduler went to sleep."""
-
-    def write() -> None:
-        bench.wall.ns += 11 * NS_PER_MS
-
-    bench.wall.during_wait[3] = write
+    bench.wall.during_wait[3] = 11 * NS_PER_MS
     bench.run("real", 200)
     before = 3 * IDLE_S * 1000
     assert bench.port.exchanges[4] / PS_PER_MS == pytest.approx(before + 11, abs=0.5)
@@ -175,7 +154,7 @@ def test_lag_is_told(bench):
     bench.tick(PS_PER_MS, cost_ns=2 * NS_PER_MS)
     bench.run("real", 10_100)
     times = [time for time, _ in bench.reports]
-    assert times == [pytest.approx(LAG_REPORT_S * 1000 * i, abs=20) for i in (1, 2)]
+    assert times == [pytest.approx(realtime.LAG_REPORT_S * 1000 * i, abs=20) for i in (1, 2)]
     lags = [float(text.split()[5]) for _, text in bench.reports]
     assert lags == [pytest.approx(2.5, abs=0.1), pytest.approx(5.0, abs=0.1)]
     assert bench.reports[0][1].startswith("can not keep real time: ")
@@ -308,21 +287,13 @@ def test_error_of_the_device_ends_the_run(bench):
         bench.run("real", 100)
 
 
-def test_waiting_ends_with_input():
+@pytest.mark.parametrize(
+    ("sent", "events", "timeout_s"),
+    [(b"x", select.POLLIN, 3600), (b"", select.POLLOUT, 3600), (b"", select.POLLIN, 0.0001)],
+)
+def test_waiting_ends_with_input_with_room_for_output_or_in_time(sent, events, timeout_s):
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        theirs.send(b"x")
-        wait_ready([(ours.fileno(), select.POLLIN)], 3600)  # hangs, if it does not
-
-
-def test_waiting_ends_with_room_for_output():
-    ours, theirs = socket.socketpair()
-    with ours, theirs:
-        wait_ready([(ours.fileno(), select.POLLOUT)], 3600)
-
-
-def test_waiting_ends_with_the_timeout():
-    ours, theirs = socket.socketpair()
-    with ours, theirs:
-        wait_ready([(ours.fileno(), select.POLLIN)], 0.0001)
-        wait_ready([], 0.0)
+        theirs.send(sent)
+        realtime.wait_ready([(ours.fileno(), events)], timeout_s)  # hangs, if it does not
+    realtime.wait_ready([], 0.0)

@@ -1,0 +1,331 @@
+"""The ports against real programs, with every look of the scheduler made by the test."""
+
+import contextlib
+import fcntl
+import os
+import socket
+import struct
+import subprocess
+import termios
+import tty
+
+import pytest
+
+from cubestack.emulator.ports.endpoint import PortError
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
+from cubestack.emulator.ports.realtime import wait_ready
+from cubestack.emulator.ports.serial_port import MAX_UNSENT
+from cubestack.emulator.ports.tcp import TcpEndpoint
+
+from .conftest import ALL_BYTES, LOOPBACK, TIMEOUT_S, open_client, ready
+
+TIOCGEXCL = 0x80045440  # linux/asm-generic/ioctls.h; termios has the setters only
+
+a_pty = pytest.mark.parametrize("kind", ["pty"])
+a_tcp = pytest.mark.parametrize("kind", ["tcp"])
+
+
+def assert_transparent(port, device, client) -> None:
+    device.sends(port, ALL_BYTES)
+    assert client.read(256) == ALL_BYTES
+    assert client.write(ALL_BYTES) == 256
+    assert device.hears(port, 256) == ALL_BYTES
+
+
+def assert_fresh(port, device, client) -> None:
+    """What the device says now is all that it gets."""
+    device.sends(port, b"fresh")
+    assert client.read(5) == b"fresh"
+
+
+def test_transparent_both_ways(port, device, connect):
+    assert_transparent(port, device, connect())
+
+
+@pytest.mark.parametrize("leave", ["close", "reset"])
+@pytest.mark.parametrize("unread", [1, 100, 60_000, 500_000])
+def test_client_gets_nothing_that_the_one_before_left(port, device, connect, unread, leave):
+    first = connect()
+    for _ in range(0, unread, 10_000):
+        device.sends(port, b"stale" * min(unread, 2000))
+    getattr(first, leave)()
+    port.exchange(device.kernel.now)
+    assert_fresh(port, device, connect())
+
+
+def test_output_without_a_client_is_dropped(port, device, connect):
+    device.sends(port, b"stale")
+    assert_fresh(port, device, connect())
+
+
+def test_input_of_a_client_that_closes_at_once_arrives(port, device):
+    with contextlib.closing(open_client(port)) as client:
+        client.write(b"last words")
+    assert device.hears(port, 10) == b"last words"
+
+
+@pytest.mark.parametrize("leave", ["close", "reset"])
+def test_client_that_dies_in_mid_frame(port, device, connect, leave):
+    first = connect()
+    first.write(b"half a fra")
+    assert device.hears(port, 10) == b"half a fra"
+    getattr(first, leave)()
+    for _ in range(3):
+        device.sends(port, b"to nobody")
+    second = connect()
+    second.write(b"whole")
+    assert device.hears(port, 15) == b"half a frawhole"
+    assert_fresh(port, device, second)
+
+
+def test_client_can_not_flood_the_line(port, device, connect):
+    client = connect()
+    sent = bytes(i * 37 % 251 for i in range(100_000))
+    position, backlogs = 0, set()
+
+    def serve() -> None:
+        nonlocal position
+        position += client.write(sent[position:])
+        port.exchange(device.advance(500))
+        backlogs.add(device.uart.host_backlog)
+
+    device.wait_for(lambda: len(device.received) == len(sent), doing=serve)
+    assert device.received == sent
+    assert max(backlogs) == MAX_UNSENT
+
+
+def test_client_that_floods_wakes_nobody_and_makes_room_when_it_dies(kind, port, device, connect):
+    first, sent = connect(), 0
+    while count := first.write(bytes(1 << 20)):
+        sent += count
+    device.wait_for(
+        lambda: device.uart.host_backlog == MAX_UNSENT,
+        doing=lambda: (first.write(bytes(1 << 20)), port.exchange(device.kernel.now)),
+    )
+    first.write(b"more")
+    port.exchange(device.kernel.now)
+    assert ready(port) == []
+    first.reset()
+    assert kind == "pty" or ready(port) == []
+    port.exchange(device.kernel.now)
+    assert_fresh(port, device, connect())
+
+
+def test_port_without_anything_to_do_wakes_nobody(port, device, connect):
+    port.exchange(device.kernel.now)
+    assert ready(port) == []
+    client = connect()
+    port.exchange(device.kernel.now)
+    assert ready(port) == []
+    client.close()
+    wait_ready(port.watched(), TIMEOUT_S)
+    assert ready(port) != []  # the end is noticed at once
+    port.exchange(device.kernel.now)
+    assert ready(port) == []
+
+
+def test_client_that_never_reads_wakes_nobody(port, device, connect):
+    connect()
+    device.wait_for(lambda: port.congested, doing=lambda: device.sends(port, bytes(1 << 17)))
+    device.wait_for(lambda: not ready(port), doing=lambda: port.exchange(device.kernel.now))
+    assert port.congested
+
+
+# --- pseudo-terminals --------------------------------------------------------------------------
+
+
+@a_pty
+def test_pty_link_leads_to_a_terminal(port, path):
+    assert path.is_symlink()
+    with contextlib.closing(open_client(port)) as terminal:
+        assert os.isatty(terminal.fd)
+    assert port.name == str(path)
+
+
+@a_pty
+def test_pty_input_survives_the_tidying_after_its_client(port, device, connect):
+    terminal = connect()
+    sent = bytes(i % 251 for i in range(MAX_UNSENT + 3000))
+    assert terminal.write(sent) == len(sent)
+    port.exchange(device.kernel.now)
+    terminal.close()
+    assert device.hears(port, len(sent)) == sent
+
+
+@a_pty
+def test_pty_stays_open_while_one_of_two_clients_has_it(port, device, connect):
+    first, second = connect(), connect()
+    device.sends(port, b"kept")
+    first.close()
+    port.exchange(device.kernel.now)
+    assert second.read(4) == b"kept"
+
+
+def cooked(fd: int) -> None:
+    attributes = termios.tcgetattr(fd)
+    attributes[tty.IFLAG] |= termios.ICRNL | termios.IXON | termios.ISTRIP
+    attributes[tty.OFLAG] |= termios.OPOST | termios.ONLCR
+    attributes[tty.LFLAG] |= termios.ICANON | termios.ECHO | termios.ISIG
+    attributes[tty.ISPEED] = attributes[tty.OSPEED] = termios.B115200
+    termios.tcsetattr(fd, termios.TCSANOW, attributes)
+
+
+@a_pty
+def test_pty_leaves_a_client_its_settings_and_is_raw_again_after_it(port, device, connect):
+    terminal = connect()
+    original = termios.tcgetattr(terminal.fd)
+    cooked(terminal.fd)
+    assert (chosen := termios.tcgetattr(terminal.fd)) != original
+    port.exchange(device.kernel.now)
+    assert termios.tcgetattr(terminal.fd) == chosen
+    terminal.close()
+    port.exchange(device.kernel.now)
+    terminal = connect()
+    assert termios.tcgetattr(terminal.fd) == original
+    assert_transparent(port, device, terminal)
+
+
+@a_pty
+@pytest.mark.parametrize("settings", ["sane", "cooked echo 9600", "raw -echo 115200"])
+def test_pty_is_raw_again_after_stty(port, device, path, connect, settings):
+    """The program comes and goes between two looks of the scheduler."""
+    subprocess.run(["stty", "-F", path, *settings.split()], check=True, timeout=TIMEOUT_S)
+    port.exchange(device.kernel.now)
+    terminal = connect()
+    device.sends(port, ALL_BYTES)
+    assert terminal.read(256) == ALL_BYTES
+    port.exchange(device.advance(1000))
+    assert not device.received  # no echo
+
+
+def exclusive(fd: int) -> int:
+    return int(struct.unpack("i", fcntl.ioctl(fd, TIOCGEXCL, bytes(4)))[0])
+
+
+@a_pty
+def test_pty_exclusive_use_ends_with_the_client(port, device, connect):
+    terminal = connect()
+    fcntl.ioctl(terminal.fd, termios.TIOCEXCL)
+    assert exclusive(terminal.fd)
+    terminal.close()
+    port.exchange(device.kernel.now)
+    assert not exclusive(connect().fd)
+
+
+@a_pty
+def test_pty_that_can_not_be_unlocked_is_replaced(port, device, path, connect, monkeypatch):
+    """For a user who is not root, TIOCEXCL of a client that has gone locks everyone out."""
+    terminal = connect()
+    before = path.readlink()
+
+    def refuse(*_arguments: object) -> int:
+        raise OSError(16, "Device or resource busy")
+
+    with monkeypatch.context() as patch:
+        terminal.close()
+        patch.setattr(os, "open", refuse)
+        port.exchange(device.kernel.now)
+    assert path.readlink() != before
+    assert [entry.name for entry in path.parent.iterdir()] == [path.name]
+    assert_transparent(port, device, connect())
+
+
+@pytest.mark.parametrize("kind", ["file", "directory", "link"])
+def test_pty_takes_no_path_that_exists_and_leaves_the_line_alone(device, path, kind):
+    if kind == "file":
+        path.touch()
+    elif kind == "directory":
+        path.mkdir()
+    else:
+        path.symlink_to("/dev/null")
+    heard = []
+    device.uart.line = lambda data, _first, _step: heard.append(data)
+    with pytest.raises(PortError, match="ttyTEST exists already: choose another --pty path"):
+        PtyEndpoint(path, device.uart)
+    device.uart.send(b"x")
+    assert heard == [b"x"]
+
+
+def test_pty_path_in_no_directory(device, tmp_path):
+    with pytest.raises(PortError, match="nowhere/ttyTEST: No such file or directory"):
+        PtyEndpoint(tmp_path / "nowhere" / "ttyTEST", device.uart)
+
+
+def test_pty_replaces_the_link_of_a_run_that_died_and_removes_its_own_only(device, path):
+    path.symlink_to("/dev/pts/987654")
+    endpoint = PtyEndpoint(path, device.uart)
+    assert os.path.realpath(path) != "/dev/pts/987654"
+    endpoint.close()
+    assert not path.is_symlink()
+    endpoint = PtyEndpoint(path, device.uart)
+    path.unlink()
+    path.write_text("somebody else's")
+    endpoint.close()
+    assert path.read_text() == "somebody else's"
+
+
+# --- TCP ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "text"),
+    [
+        (LOOPBACK, -1, r"TCP port -1 is not in 0\.\.65535"),
+        (LOOPBACK, 65536, r"TCP port 65536 is not in 0\.\.65535"),
+        ("0.0.0.0", 0, "0.0.0.0 is open to other machines"),
+        ("::", 0, ":: is open to other machines"),
+        *((host, 0, "no address of this machine") for host in ("", "no.such.invalid", "a" * 70)),
+    ],
+)
+def test_tcp_address_that_can_not_be(device, host, port, text):
+    with pytest.raises(PortError, match=text):
+        TcpEndpoint(host, port, device.uart)
+
+
+def test_tcp_for_other_machines_when_allowed(device):
+    endpoint = TcpEndpoint("0.0.0.0", 0, device.uart, allow_remote=True)
+    assert endpoint.address[0] == "0.0.0.0"
+    endpoint.close()
+
+
+def test_tcp_port_is_taken_until_it_is_closed_which_drops_the_client(device):
+    first = TcpEndpoint(LOOPBACK, 0, device.uart)
+    number = first.address[1]
+    assert first.name == f"tcp://127.0.0.1:{number}"
+    with pytest.raises(PortError, match=r"can not listen on 127\.0\.0\.1:\d+: .*another port"):
+        TcpEndpoint(LOOPBACK, number, device.uart)
+    with contextlib.closing(open_client(first)) as client:
+        first.exchange(0)
+        first.close()
+        assert client.socket.recv(1) == b""
+        TcpEndpoint(LOOPBACK, number, device.uart).close()
+
+
+@a_tcp
+def test_tcp_second_client_is_refused_with_a_line(port, device, connect):
+    first, second = connect(), connect()
+    assert b"has a client already" in second.read(43)
+    assert second.socket.recv(1) == b""
+    assert_fresh(port, device, first)
+
+
+@a_tcp
+@pytest.mark.parametrize("leave", ["close", "reset"])
+def test_tcp_client_that_reconnects_at_once_is_served(port, device, connect, leave):
+    """Both happen before the port gets a look in."""
+    for _ in range(5):
+        client = connect()
+        assert_fresh(port, device, client)
+        device.sends(port, b"never read")
+        getattr(client, leave)()
+
+
+@a_tcp
+def test_tcp_client_that_has_sent_all_still_gets_the_answer(port, device, connect):
+    device.answers = 1
+    client = connect()
+    client.write(b"question")
+    client.socket.shutdown(socket.SHUT_WR)
+    assert device.hears(port, 8) == b"question"
+    port.exchange(device.advance(20))
+    assert client.read(8) == b"question"
