@@ -1,6 +1,7 @@
 """Options of serial ports: what opens for which line, and what is refused."""
 
 import argparse
+from collections.abc import Sequence
 from contextlib import ExitStack
 from types import SimpleNamespace
 
@@ -37,33 +38,22 @@ def emulated(title: str, *lines: tuple[str, str]) -> SimpleNamespace:
 def ports(opened, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: str, devices: int = 1) -> list[str]:
+    def call(*arguments: str, devices: Sequence[SimpleNamespace] = (opened,)) -> list[str]:
         parser = argparse.ArgumentParser(exit_on_error=False)
         add_port_arguments(parser)
         with ExitStack() as stack:
-            served = open_ports(parser.parse_args(arguments), [opened] * devices, stack)
+            served = open_ports(parser.parse_args(arguments), devices, stack)
             return [port.name for _, _, port in served]
 
-    return run
+    return call
 
 
-def test_terminals_by_default(ports):
+def test_terminals_by_default_and_by_name(ports, opened):
     assert ports() == ["ttyCUBESENSE", "ttyCUBESENSE.bench"]
-
-
-def test_terminals_by_name(ports):
     assert ports("--pty", "y") == ["y", "y.bench"]
-
-
-def test_of_several_devices_the_name_is_what_comes_before_theirs(opened, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    parser = argparse.ArgumentParser()
-    add_port_arguments(parser)
-    other = emulated("CubeStar", ("node protocol", ""))
-    with ExitStack() as stack:
-        served = open_ports(parser.parse_args(["--pty", "x_"]), [other, opened], stack)
-        names = [port.name for _, _, port in served]
-    assert names == ["x_CUBESTAR", "x_CUBESENSE", "x_CUBESENSE.bench"]
+    devices = [emulated("CubeStar", ("node protocol", "")), opened]
+    names = ["x_CUBESTAR", "x_CUBESENSE", "x_CUBESENSE.bench"]  # the given name comes before theirs
+    assert ports("--pty", "x_", devices=devices) == names
 
 
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
@@ -74,9 +64,9 @@ def test_free_tcp_ports(ports, kind):
 
 
 @pytest.mark.parametrize("devices", [1, 2])
-def test_not_enough_ports(ports, devices):
+def test_not_enough_ports(ports, opened, devices):
     with pytest.raises(ValueError, match=f"CubeSense needs {2 * devices} ports from 65535 on"):
-        ports("--rfc2217", "65535", devices=devices)
+        ports("--rfc2217", "65535", devices=[opened] * devices)
 
 
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])

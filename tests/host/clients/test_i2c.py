@@ -15,24 +15,15 @@ def client(i2c: I2cLink) -> I2cClient:
     return I2cClient(i2c, INTERFACE, wait=i2c.waits.append)
 
 
-def test_telemetry_arrives(client: I2cClient, node: Any) -> None:
-    node.values["AttitudeData"] = {"Qbar0": -0.5, "Qbar3": 0.5, "BSVZ": 1.0}
-    answer = client.telemetry("attitudedata")
-    assert (answer["Qbar0"], answer["Qbar3"], answer["BSVZ"]) == (-0.5, 0.5, 1.0)
-
-
-def test_a_telecommand_waits_until_it_is_processed(client: I2cClient, node: Any, i2c: Any) -> None:
+def test_a_telecommand_waits_until_it_is_processed_or_is_late(node: Any, i2c: Any) -> None:
+    client = I2cClient(i2c, INTERFACE, wait=i2c.waits.append, processing_timeout_s=0.5)
     node.busy = 4
     client.command("CaptureImage")
     assert len(i2c.waits) == 4
-
-
-def test_a_telecommand_that_never_ends_is_told(node: Any, i2c: Any) -> None:
     node.busy = 10**6
-    client = I2cClient(i2c, INTERFACE, wait=i2c.waits.append, processing_timeout_s=0.5)
     with pytest.raises(NoAnswerError, match=r"not processed within 0.5 s"):
         client.command("CaptureImage")
-    assert sum(i2c.waits) == pytest.approx(0.5)
+    assert sum(i2c.waits[4:]) == pytest.approx(0.5)
 
 
 def test_what_the_node_could_not_refuse_visibly_is_not_sent(client: I2cClient, node: Any) -> None:

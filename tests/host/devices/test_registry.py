@@ -59,26 +59,26 @@ def test_a_name_in_any_case_is_found_and_an_unknown_one_told() -> None:
         device("cubestart")
 
 
-def test_another_distribution_can_register_one(registered: list[EntryPoint]) -> None:
-    registered.append(EntryPoint("other", "cubestack.host.errors:TargetError", registry.GROUP))
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("cubestack.host.errors:TargetError", "TargetError is no Device of that name"),
+        ("no_such_module:DEVICE", "device other: no_such_module:DEVICE does not load"),
+    ],
+)
+def test_a_wrong_registration_is_told_by_name_and_left_out_of_lists(
+    registered: list[EntryPoint], value: str, message: str
+) -> None:
+    registered.append(EntryPoint("other", value, registry.GROUP))
     assert device_names()[-1] == "other"
-    with pytest.raises(TargetError, match=r"host\.errors:TargetError is no Device of that name"):
+    assert "other" not in [one.name for one in devices()]
+    with pytest.raises(TargetError, match=message):
         device("other")
 
 
 def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]) -> None:
     registered.append(EntryPoint("cubestar", "nowhere:NOTHING", registry.GROUP))
     assert device("cubestar").title == "CubeStar"
-
-
-def test_one_that_does_not_load_is_told_by_name_and_left_out_of_lists(
-    registered: list[EntryPoint],
-) -> None:
-    registered.append(EntryPoint("broken", "no_such_module:DEVICE", registry.GROUP))
-    assert "broken" in device_names()
-    assert "broken" not in [one.name for one in devices()]
-    with pytest.raises(TargetError, match="device broken: no_such_module:DEVICE does not load"):
-        device("broken")
 
 
 @pytest.mark.parametrize(

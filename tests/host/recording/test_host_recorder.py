@@ -1,6 +1,7 @@
 """A session on tape is a recording that the same session runs on."""
 
 import io
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -16,17 +17,6 @@ from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
 
 
-class Clock:
-    """Every look at it costs 1 ms."""
-
-    def __init__(self) -> None:
-        self.ns = 10**15
-
-    def __call__(self) -> int:
-        self.ns += 1_000_000
-        return self.ns
-
-
 @pytest.fixture
 def stream() -> io.StringIO:
     return io.StringIO()
@@ -34,7 +24,8 @@ def stream() -> io.StringIO:
 
 @pytest.fixture
 def tape(stream) -> HostRecorder:
-    made = HostRecorder(stream, clock_ns=Clock())
+    looks = count(10**15, 1_000_000)  # every look at the clock costs 1 ms
+    made = HostRecorder(stream, clock_ns=lambda: next(looks))
     made.begin("cubestar", {"uart": 57_600})
     return made
 

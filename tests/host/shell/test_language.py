@@ -1,7 +1,7 @@
 """The shell on nodes in memory: every name completes, every line gives rows and data."""
 
 import contextlib
-from typing import ClassVar
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
@@ -23,35 +24,15 @@ from cubestack.host.shell.registers import parse_value, parse_values
 
 from ..conftest import LetterLine, Slave
 
-
-class Controls:
-    faults = ("latch-up SRAM1", "latch-up SRAM2", "camera sun")
-    fault_parameters: ClassVar = {"latch-up": ("extra_ma", "at_s"), "camera": ("for_s",)}
-    channels = ("SRAM1", "SRAM2")
-
-    def __init__(self) -> None:
-        self.calls: list[object] = []
-
-    def fault(self, words: list[str]) -> None:
-        self.calls.append(words)
-
-    def fault_log(self) -> list[str]:
-        return [f"0.1 s {' '.join(call)}" for call in self.calls]
-
-    def scene(self, path) -> None:
-        self.calls.append(path)
-
-    def currents(self) -> dict[str, float]:
-        return {"total": 71.94}
-
-    def switch(self, channel: str, on: bool) -> None:
-        self.calls.append((channel, on))
-
-    def time_s(self) -> float:
-        return 1.5
-
-    def advance(self, seconds: float) -> None:
-        self.calls.append(seconds)
+#: What controls of an emulated device have and answer.
+CONTROLS = {
+    "faults": ("latch-up SRAM1", "latch-up SRAM2", "camera sun"),
+    "fault_parameters": {"latch-up": ("extra_ma", "at_s"), "camera": ("for_s",)},
+    "channels": ("SRAM1", "SRAM2"),
+    "fault_log.return_value": ["0.1 s latch-up SRAM1"],
+    "currents.return_value": {"total": 71.94},
+    "time_s.return_value": 1.5,
+}
 
 
 @pytest.fixture
@@ -65,7 +46,8 @@ def sense_shell(sense, sense_uart) -> Shell:
     registers = RegisterClient(Slave(), CUBESENSE.registers, wait=lambda _s: None)
     client = NodeClient(sense_uart, CUBESENSE)
     letters = LetterLine(q=b"Y", s=bytes(100))
-    return Shell(Target("fake", CUBESENSE, client, sense_uart, registers, letters, Controls()))
+    controls = Mock(EmulatedControls, **CONTROLS)
+    return Shell(Target("fake", CUBESENSE, client, sense_uart, registers, letters, controls))
 
 
 def test_every_telemetry_is_read(shell):
@@ -176,7 +158,9 @@ def test_controls(sense_shell):
     sense_shell.execute("power SRAM2 off")
     assert sense_shell.execute("power").rows == [("total", "71.9 mA")]
     assert sense_shell.execute("time 0.5").rows == [("time", "1.500000 s")]
-    assert controls.calls == [["latch-up", "SRAM1"], ("SRAM2", False), 0.5]
+    controls.fault.assert_called_once_with(["latch-up", "SRAM1"])
+    controls.switch.assert_called_once_with("SRAM2", False)
+    controls.advance.assert_called_once_with(0.5)
 
 
 @pytest.mark.parametrize("command", ["scene x.toml", "fault", "power", "time"])

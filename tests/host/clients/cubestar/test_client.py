@@ -53,8 +53,8 @@ def test_coarse_quaternion(cubestar: CubeStar, node: Any) -> None:
     np.testing.assert_allclose(cubestar.coarse_quaternion(), [0.6, 0, 0, -0.8], atol=5e-5)
 
 
-def test_download(cubestar: CubeStar, node: Any, rng: np.random.Generator) -> None:
-    node.memory[:] = rng.integers(0, 256, node.memory.size)
+def test_download(cubestar: CubeStar, node: Any) -> None:
+    node.memory[:] = np.random.default_rng(5).integers(0, 256, node.memory.size)
     seen: list[tuple[int, int]] = []
     image = cubestar.download_image(lambda done, total: seen.append((done, total)))
     assert (image.shape, image.dtype) == ((ROWS, COLUMNS), np.uint8)
@@ -62,12 +62,10 @@ def test_download(cubestar: CubeStar, node: Any, rng: np.random.Generator) -> No
     assert seen == [(number, 4096) for number in range(1, 4097)]
 
 
-def test_upload_sends_the_lit_blocks_only(
-    cubestar: CubeStar, node: Any, rng: np.random.Generator
-) -> None:
+def test_upload_sends_the_lit_blocks_only(cubestar: CubeStar, node: Any) -> None:
     node.memory[:] = 9
     image = np.zeros((ROWS, COLUMNS), np.uint8)
-    image[100:103, 200:260] = rng.integers(1, 256, (3, 60))
+    image[100:103, 200:260] = np.random.default_rng(5).integers(1, 256, (3, 60))
     image[511, 1023] = 1
     seen: list[tuple[int, int]] = []
     cubestar.upload_image(image, lambda done, total: seen.append((done, total)))
@@ -164,8 +162,3 @@ def test_phase_times(cubestar: CubeStar, node: Any) -> None:
     known = {"idle": 140.0, "transfer": 404.123, "loop_total": 1000.0}
     names = ["idle", "discard", "capture", "transfer", "detect", "match", "attitude", "loop_total"]
     assert list(cubestar.phase_times().items()) == [(name, known.get(name, 0.0)) for name in names]
-
-
-@pytest.fixture
-def rng() -> np.random.Generator:
-    return np.random.default_rng(5)
