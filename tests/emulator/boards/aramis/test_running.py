@@ -8,11 +8,8 @@ import pytest
 from cubestack.emulator.boards.aramis.board import ARAMIS_POWER
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
-from cubestack.firmware_model.interface import aramis as interface
 from cubestack.firmware_model.interface.aramis import INTERFACE, MeasurementMode, Reason
-from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.clients.i2c import I2cClient
-from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import CommandRefusedError
 
 from .desk import Desk, scene
@@ -99,12 +96,9 @@ def test_a_turning_satellite_s_attitude_is_that_of_its_image_time() -> None:
         assert desk.error_deg()[0] < 0.01
 
 
-def test_the_same_node_answers_on_i2c() -> None:
-    bus = Desk().board.i2c()
+def test_a_telecommand_is_refused_on_i2c_too(desk: Desk) -> None:
+    bus = desk.board.i2c()
     client = I2cClient(bus, INTERFACE, wait=bus.wait)
-    aramis = Aramis(client)
-    assert aramis.activate() is interface.CatalogueState.GOOD
-    assert aramis.measure().valid
     assert client.telemetry("Identification")["NodeType"] == 6
     with pytest.raises(CommandRefusedError, match="BAD_PARAMETER"):
         client.command("SetExposure", Rows=0)
@@ -149,30 +143,6 @@ def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
         assert (active.client.telemetry("Exposure")["Rows"] == 1234) is save
     active.command("ClearConfig")
     assert active.client.telemetry("Exposure")["Rows"] == 6299
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_nothing_that_a_host_sends_stops_the_node(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    desk = Desk(scene(mag_limit=3.0), with_catalogue=False, seed=seed)
-    line = desk.board.serial()
-    commands = [m for m in INTERFACE.telecommands if m.name != "StreamDownImage"]
-    for _ in range(60):
-        message = commands[int(rng.integers(len(commands)))]
-        kind = rng.integers(4)
-        payload = bytes([message.id]) + rng.bytes(message.length)
-        if kind == 0:
-            line.write(rng.bytes(int(rng.integers(1, 60))))
-        elif kind == 1:
-            line.write(b"\x1f\x7f" + payload[: int(rng.integers(len(payload) + 1))])
-        else:
-            line.write(b"\x1f\x7f" + payload.replace(b"\x1f", b"\x1f\x1f") + b"\x1f\xff")
-        line.read(10_000, float(rng.uniform(0, 0.05)))
-    while line.read(10_000, 1.0):  # what is still on its way in either direction
-        pass
-    client = NodeClient(line, INTERFACE)
-    assert client.telemetry("Identification")["NodeType"] == 6
-    client.wait_processed(60)
 
 
 def test_power_follows_what_runs(desk: Desk) -> None:

@@ -13,9 +13,10 @@ from ..sky import database
 class Desk:
     """A store whose flash holds a catalogue."""
 
-    def __init__(self) -> None:
+    def __init__(self, image: bytes | None = None) -> None:
         self.unit = Harness()
-        self.image = database(CatalogueParameters(step_deg=10, stars_per_field=5)).pack()
+        real = database(CatalogueParameters(step_deg=10, stars_per_field=5)).pack()
+        self.image = real if image is None else image
         self.coded = flash_image(self.image)
         self.unit.catalogue_flash[: len(self.coded)] = self.coded
         self.store = CatalogueStore(self.unit, self.unit.meter)
@@ -38,11 +39,10 @@ def desk() -> Desk:
 
 
 def test_what_was_written_is_loaded(desk: Desk) -> None:
-    assert desk.load()
-    assert desk.store.state is CatalogueState.GOOD
-    assert desk.ram.tobytes() == desk.image
-    assert desk.store.database.pack() == desk.image
     store = desk.store
+    assert desk.load()
+    assert store.state is CatalogueState.GOOD
+    assert desk.ram.tobytes() == store.database.pack() == desk.image
     assert (store.corrected, store.lost, store.loads, store.failures) == (0, 0, 1, 0)
     assert store.length == len(desk.image)
 
@@ -89,23 +89,18 @@ def test_three_errors_that_look_like_one_do_not_pass_the_checksum(desk: Desk) ->
         pytest.fail("no triple error was miscorrected")
 
 
-def test_an_erased_flash_holds_no_catalogue() -> None:
-    unit = Harness()
-    store = CatalogueStore(unit, unit.meter)
+def test_an_erased_flash_holds_no_catalogue(desk: Desk) -> None:
     for content in (0xFF, 0):
-        unit.catalogue_flash[:] = content
-        assert not unit.perform(store.load())
-        assert store.state is CatalogueState.MISSING
+        desk.unit.catalogue_flash[:] = content
+        assert not desk.load()
+        assert desk.store.state is CatalogueState.MISSING
 
 
 @pytest.mark.parametrize("content", [b"", b"x", b"ARAM" + bytes(100)])
 def test_contents_that_are_no_catalogue_are_refused(content: bytes) -> None:
-    unit = Harness()
-    coded = flash_image(content)
-    unit.catalogue_flash[: len(coded)] = coded
-    store = CatalogueStore(unit, unit.meter)
-    assert not unit.perform(store.load())
-    assert store.state in (CatalogueState.DAMAGED, CatalogueState.MISSING)
+    desk = Desk(content)
+    assert not desk.load()
+    assert desk.store.state in (CatalogueState.DAMAGED, CatalogueState.MISSING)
 
 
 def test_a_catalogue_longer_than_the_flash_is_refused() -> None:

@@ -37,7 +37,9 @@ def test_what_is_not_damaged_comes_back(data: bytes) -> None:
 def test_each_single_error_is_corrected(data: bytes) -> None:
     coded = encode(data)
     copies = np.concatenate([flipped(coded, bit) for bit in range(72)])
+    before = copies.copy()
     decoded = decode(copies, meter())
+    np.testing.assert_array_equal(copies, before)
     assert decoded.data.tobytes() == data * 72
     assert (decoded.corrected, len(decoded.lost)) == (72, 0)
 
@@ -67,14 +69,6 @@ def test_the_cost_is_that_of_the_words_read() -> None:
     decode(encode(bytes(800)), counter)
     assert counter.counts["coded_word"] == 100
     assert counter.counts["flash_read"] == 100 * hamming.CODED_BYTES // 2
-
-
-@pytest.mark.parametrize("size", [8, 16])
-def test_decoding_leaves_the_coded_words_alone(size: int) -> None:
-    damaged = flipped(encode(bytes(size)), 3)
-    before = damaged.copy()
-    assert decode(damaged, meter()).corrected == 1
-    np.testing.assert_array_equal(damaged, before)
 
 
 def test_parts_of_words_are_refused() -> None:

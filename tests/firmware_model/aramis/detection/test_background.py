@@ -17,10 +17,16 @@ def noise(level: float, sigma: float, seed: int) -> np.ndarray:
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
-def test_mean_plus_two_sigma_of_all_pixels() -> None:
-    background, pictures = Background(), [noise(20, 3, seed) for seed in range(FRAMES)]
+def after(*pictures: np.ndarray, field: Field = FLAT) -> Background:
+    background = Background()
     for picture in pictures:
-        background.add(picture, FLAT, meter())
+        background.add(picture, field, meter())
+    return background
+
+
+def test_mean_plus_two_sigma_of_all_pixels() -> None:
+    pictures = [noise(20, 3, seed) for seed in range(FRAMES)]
+    background = after(*pictures)
     pixels = np.stack(pictures)
     assert background.mean(meter()) == round(pixels.mean())
     assert background.threshold(2, meter()) == int(pixels.mean() + 2 * pixels.std())
@@ -28,40 +34,29 @@ def test_mean_plus_two_sigma_of_all_pixels() -> None:
 
 
 def test_only_the_last_five_count() -> None:
-    background = Background()
-    for level in (200, 200, 10, 10, 10, 10, 10):
-        background.add(np.full((48, 64), level, dtype=np.uint8), FLAT, meter())
+    levels = (200, 200, 10, 10, 10, 10, 10)
+    background = after(*(np.full((48, 64), level, dtype=np.uint8) for level in levels))
     assert len(background.sums) == FRAMES
-    assert background.mean(meter()) == 10
-    assert background.threshold(2, meter()) == 10
+    assert background.mean(meter()) == background.threshold(2, meter()) == 10
 
 
 def test_fewer_pictures_do() -> None:
-    background = Background()
-    assert background.mean(meter()) == background.threshold(2, meter()) == 0
-    background.add(noise(50, 5, 1), FLAT, meter())
-    assert background.threshold(2, meter()) == pytest.approx(60, abs=1)
+    assert Background().mean(meter()) == Background().threshold(2, meter()) == 0
+    assert after(noise(50, 5, 1)).threshold(2, meter()) == pytest.approx(60, abs=1)
 
 
 def test_a_change_of_level_is_followed_slowly() -> None:
-    background = Background()
-    for _ in range(4):
-        background.add(noise(20, 2, 1), FLAT, meter())
-    background.add(noise(40, 2, 2), FLAT, meter())
-    assert background.mean(meter()) == 24
+    assert after(*[noise(20, 2, 1)] * 4, noise(40, 2, 2)).mean(meter()) == 24
 
 
 def test_what_is_outside_the_field_does_not_count() -> None:
-    picture = np.where(ROUND.mask, 30, 255).astype(np.uint8)
-    background = Background()
-    background.add(picture, ROUND, meter())
+    background = after(np.where(ROUND.mask, 30, 255).astype(np.uint8), field=ROUND)
     assert background.mean(meter()) == background.threshold(5, meter()) == 30
 
 
 def test_the_largest_sums() -> None:
     """All white at full size: the squares of five pictures exceed 32 bits."""
-    field, background = Field(round=False), Background()
-    for _ in range(FRAMES):
-        background.add(np.full((1024, 1280), 255, dtype=np.uint8), field, meter())
+    white = np.full((1024, 1280), 255, dtype=np.uint8)
+    background = after(*[white] * FRAMES, field=Field(round=False))
     assert background.sums[0][2] < 2**39
     assert background.threshold(2, meter()) == 255

@@ -5,15 +5,15 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
-from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-from cubestack.firmware_model.mcu.costs import Meter
+
+from ..sky import meter
 
 Mask = NDArray[np.bool_]
 SHAPES = [(20, 25), (21, 28), (24, 22), (5, 5), (3, 4), (1, 1)]
 
 
 def run(mask: Mask, method: SpikeRemoval, needed: int = HALF) -> Mask:
-    return remove_spikes(mask, method, needed, Meter(BLACKFIN_BF533))
+    return remove_spikes(mask, method, needed, meter())
 
 
 def slowly(mask: Mask, method: SpikeRemoval, needed: int) -> Mask:
@@ -45,8 +45,7 @@ def test_each_window_by_itself(method: SpikeRemoval, shape: tuple[int, int], nee
 
 @pytest.mark.parametrize("method", [SpikeRemoval.CENTRE, SpikeRemoval.WINDOW])
 def test_spikes_go_and_stars_stay(method: SpikeRemoval) -> None:
-    rng = np.random.default_rng(1)
-    spikes = rng.random((100, 100)) < 0.05
+    spikes = np.random.default_rng(1).random((100, 100)) < 0.05
     assert not run(spikes, method).any()
     star = np.zeros((100, 100), dtype=bool)
     star[40:50, 40:50] = True
@@ -67,11 +66,10 @@ def test_off_changes_nothing() -> None:
 
 
 def test_the_second_method_is_the_quicker_one() -> None:
-    mask = np.zeros((100, 100), dtype=bool)
-    meters = [Meter(BLACKFIN_BF533) for _ in range(2)]
-    for meter, method in zip(meters, (SpikeRemoval.CENTRE, SpikeRemoval.WINDOW), strict=True):
-        remove_spikes(mask, method, HALF, meter)
-        assert meter.phases == {"spikes": meter.total}
-    assert meters[0].counts["table_byte"] == (100 * 5 - 6) ** 2
-    assert meters[1].counts["table_byte"] == 100**2
-    assert meters[0].total > 10 * meters[1].total
+    first, second = meter(), meter()
+    for spent, method in ((first, SpikeRemoval.CENTRE), (second, SpikeRemoval.WINDOW)):
+        remove_spikes(np.zeros((100, 100), dtype=bool), method, HALF, spent)
+        assert spent.phases == {"spikes": spent.total}
+    looks = [spent.counts["table_byte"] for spent in (first, second)]
+    assert looks == [(100 * 5 - 6) ** 2, 100**2]
+    assert first.total > 10 * second.total

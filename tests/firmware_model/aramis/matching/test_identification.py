@@ -14,7 +14,7 @@ from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
-from ..campaign import COARSE, rates
+from ..campaign import COARSE, NOTHING, rates
 from ..sky import FIELD, Light, Picture, database, errors_deg, meter, pictures
 
 NOISY = replace(COARSE, noise_px=1.0)
@@ -73,14 +73,13 @@ def test_a_rough_direction_rules_out_what_is_far_away() -> None:
 def test_verification_is_right(
     light: Light, hint_error_deg: float | None, right: float, field: Field
 ) -> None:
-    found = rates(50, VERIFIED.profile, field, light, hint_error_deg, seed=1)
+    found = rates(50, VERIFIED.profile, light, hint_error_deg, field, seed=1)
     assert found["wrong"] == 0
     assert found["right"] >= right
 
 
 def test_false_stars_alone_give_no_attitude() -> None:
-    light = Light(mag_limit=-2, false_stars=20, false_mags=(2, 6))
-    for solution in map(run, pictures(20, 2, light)):
+    for solution in map(run, pictures(20, 2, NOTHING)):
         assert (solution.outcome, solution.quaternion) == (MeasurementOutcome.NONE, None)
         assert (solution.stars == NONE).all()
 
