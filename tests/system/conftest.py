@@ -41,12 +41,6 @@ def _compiler() -> None:
 
 
 @pytest.fixture
-def root() -> Path:
-    """The repository."""
-    return ROOT
-
-
-@pytest.fixture
 def photographs() -> Path:
     """Folder with photographs of the sky and their truth, which are no part of the project."""
     folder = ROOT.parent / "shared" / "data" / "sky"

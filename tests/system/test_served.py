@@ -10,33 +10,30 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.conftest import Emulate
+from tests.system.conftest import ROOT, Emulate
 
 POINTING_RAD = (1.4661, -0.0175)  # right ascension 84, declination -1 degrees: what emulate shows
 TOLERANCE_RAD = 3e-4  # telemetry counts in steps of 1e-4
 
 
-def run_script(script: str | Path, *arguments: str, folder: Path) -> str:
+EXAMPLE = ROOT / "examples" / "plain_pyserial.py"
+
+
+def run_python(*arguments: object, folder: Path) -> str:
     """Run a Python program as a user would; what it prints."""
-    source = ["-c", script] if isinstance(script, str) else [str(script)]
-    result = subprocess.run(
-        [sys.executable, *source, *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    command = [sys.executable, *map(str, arguments)]
+    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     return result.stdout
 
 
 @pytest.mark.parametrize("options", [("--pty", "./port"), ("--tcp", "0")])
 def test_plain_pyserial_on_a_pseudo_terminal_and_over_tcp(
-    emulate: Emulate, root: Path, tmp_path: Path, options: tuple[str, str]
+    emulate: Emulate, tmp_path: Path, options: tuple[str, str]
 ) -> None:
     with emulate(*options, "--pace", "fast") as served:
         target = served.port.replace("tcp://", "socket://")
-        output = run_script(root / "examples" / "plain_pyserial.py", target, folder=tmp_path)
+        output = run_python(EXAMPLE, target, folder=tmp_path)
     found = re.search(r"right ascension (\S+) rad, declination (\S+) rad", output)
     assert found is not None, output
     angles = [float(angle) for angle in found.groups()]
@@ -44,8 +41,8 @@ def test_plain_pyserial_on_a_pseudo_terminal_and_over_tcp(
     assert served.process.returncode == 0
 
 
-def test_the_example_is_short_and_knows_only_the_protocol(root: Path) -> None:
-    text = (root / "examples" / "plain_pyserial.py").read_text(encoding="utf-8")
+def test_the_example_is_short_and_knows_only_the_protocol() -> None:
+    text = EXAMPLE.read_text(encoding="utf-8")
     assert "cubestack" not in text
     assert len(text.splitlines()) <= 40
 
@@ -59,13 +56,11 @@ def test_a_signal_ends_it_cleanly(emulate: Emulate, tmp_path: Path, number: int)
     assert not os.path.lexists(tmp_path / "port")
 
 
-def test_a_scene_file_is_served(emulate: Emulate, root: Path, tmp_path: Path) -> None:
+def test_a_scene_file_is_served(emulate: Emulate, tmp_path: Path) -> None:
     scene = tmp_path / "crux.toml"
-    scene.write_text(
-        'kind = "sky"\nra_deg = 186.0\ndec_deg = -60.0\nmag_limit = 3.8\n', encoding="utf-8"
-    )
+    scene.write_text('kind = "sky"\nra_deg = 186.0\ndec_deg = -60.0\nmag_limit = 3.8\n')
     with emulate("--scene", scene, "--pty", "port", "--pace", "fast"):
-        output = run_script(root / "examples" / "plain_pyserial.py", "port", folder=tmp_path)
+        output = run_python(EXAMPLE, "port", folder=tmp_path)
     assert "right ascension -3.03" in output  # 186 degrees, in the range -pi to pi
     assert "declination -1.04" in output
 
@@ -79,21 +74,20 @@ def test_a_second_emulator_is_refused_the_same_port(emulate: Emulate) -> None:
             pass  # the first one still serves
 
 
-def code_block(text: str, language: str, word: str) -> str:
-    """The block of ``language`` in a Markdown text that has ``word`` in it."""
-    blocks = re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+def code_block(language: str, word: str) -> str:
+    """The block of ``language`` in the README that has ``word`` in it."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(rf"```{language}\n(.*?)```", readme, re.DOTALL)
     (block,) = (block for block in blocks if word in block)
     return str(block)
 
 
-def test_first_script_of_the_readme(emulate: Emulate, root: Path, tmp_path: Path) -> None:
-    readme = (root / "README.md").read_text(encoding="utf-8")
-    command = code_block(readme, "sh", "emulate cubestar --pty").split()
+def test_first_script_of_the_readme(emulate: Emulate, tmp_path: Path) -> None:
+    command = code_block("sh", "emulate cubestar --pty").split()
     assert command[:3] == [".venv/bin/cubestack", "emulate", "cubestar"]
-    script = code_block(readme, "python", "cubestack.connect")
+    script = code_block("python", "cubestack.connect")
     with emulate(*command[3:]):
-        output = run_script(script, folder=tmp_path)
-    first, *stars = output.splitlines()
+        first, *stars = run_python("-c", script, folder=tmp_path).splitlines()
     assert "valid=True" in first
     identified = [star.split()[0] for star in stars if not star.startswith("None")]
     assert len(identified) >= 4

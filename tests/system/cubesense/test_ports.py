@@ -18,7 +18,7 @@ from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
-from tests.system.conftest import Emulate, Open
+from tests.system.conftest import ROOT, Emulate, Open
 
 from .conftest import NADIR_DEG, SUN_DEG, check_right, sent
 
@@ -36,9 +36,9 @@ def served(emulate: Emulate, tmp_path: Path) -> Iterator[Path]:
 
 
 def test_the_bench_client_of_the_document_gets_the_nadir_picture(
-    served: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+    served: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (root / "docs" / "protocols-cubesense.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "protocols-cubesense.md").read_text(encoding="utf-8")
     client = text.split("```python\n")[1].split("```")[0]
     timeout_s = re.search(r"timeout=(\d+)", client)
     assert timeout_s is not None
