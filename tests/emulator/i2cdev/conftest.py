@@ -1,6 +1,5 @@
 """Targets on a bus, and clients of its socket."""
 
-import select
 import socket
 import struct
 from collections.abc import Callable, Iterator
@@ -12,6 +11,7 @@ from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.pacing import wait_precisely
 from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.ports.endpoint import poll_now
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, request, split_reply
 
@@ -88,6 +88,12 @@ def adapter(kernel: Kernel, bus: I2cBus) -> I2cAdapter:
     return I2cAdapter(kernel, bus)
 
 
+def packed(call: Call, body: bytes, key: int = 0) -> bytes:
+    """A request as it goes over the socket."""
+    data = request(key, call, body)
+    return LENGTH.pack(len(data)) + data
+
+
 class Client:
     """A program with a connection to the server; it blocks with a timeout."""
 
@@ -97,8 +103,7 @@ class Client:
         self.socket.connect(path)
 
     def send(self, call: Call, body: bytes = b"", key: int = 0) -> None:
-        data = request(key, call, body)
-        self.socket.sendall(LENGTH.pack(len(data)) + data)
+        self.socket.sendall(packed(call, body, key))
 
     def receive(self) -> tuple[int, bytes]:
         (length,) = LENGTH.unpack(self._exactly(LENGTH.size))
@@ -150,10 +155,7 @@ class Served:
                 self.kernel.step()
 
     def _ready(self) -> bool:
-        poller = select.poll()
-        for fileno, events in self.server.watched():
-            poller.register(fileno, events)
-        return bool(poller.poll(0))
+        return any(poll_now(*watched) for watched in self.server.watched())
 
     def wait(self, timeout_s: float) -> None:
         wait_precisely(self.server.watched(), timeout_s)

@@ -2,6 +2,7 @@
 
 import errno
 import os
+from unittest.mock import Mock
 
 import pytest
 
@@ -13,10 +14,8 @@ needs_abi = pytest.mark.skipif(native_abi() is None, reason="no filter for this 
 
 
 def start(*command: str) -> None:
-    def files():
-        raise AssertionError("nobody opens a device file here")
-
-    program.start_filtered(command, {}, DeviceNode(7), files)
+    nobody = Mock(side_effect=AssertionError("nobody opens a device file here"))
+    program.start_filtered(command, {}, DeviceNode(7), nobody)
 
 
 def test_an_unknown_machine(monkeypatch):
@@ -27,9 +26,7 @@ def test_an_unknown_machine(monkeypatch):
 
 @needs_abi
 def test_memory_out_of_reach(monkeypatch):
-    def refuse(_pid: int, _address: int, _count: int) -> bytes:
-        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
-
+    refuse = Mock(side_effect=PermissionError(errno.EPERM, os.strerror(errno.EPERM)))
     monkeypatch.setattr(program, "read_memory", refuse)
     with pytest.raises(program.RouteError, match=r"no access to the program's memory \(Operation"):
         start("true")
@@ -45,18 +42,13 @@ def test_a_filter_that_the_kernel_does_not_take(monkeypatch):
 def test_exit_codes(tmp_path):
     for script, code in (("exit 3", 3), ("kill -9 $$", 128 + 9)):
         running = program.start_preloaded(["sh", "-c", script], {}, tmp_path / "none.so")
-        assert running.exit_code == code
-        assert running.ended
-        assert running.watched() == []
+        assert (running.exit_code, running.ended, running.watched()) == (code, True, [])
         running.close()
 
 
-def test_a_library_that_can_not_be_named(tmp_path):
+def test_what_can_not_be_preloaded(tmp_path, monkeypatch):
     with pytest.raises(program.RouteError, match="has a blank or colon"):
         program.start_preloaded(["sh"], {}, tmp_path / "a b.so")
-
-
-def test_a_static_program_is_not_preloaded(tmp_path, monkeypatch):
     monkeypatch.setattr(program, "is_static", lambda _path: True)
     with pytest.raises(program.RouteError, match=r"sh is linked statically, so no library"):
         program.start_preloaded(["sh"], {}, tmp_path / "none.so")

@@ -1,11 +1,13 @@
 """Waiting awake, in a made-up wall time."""
 
 import os
+from collections.abc import Callable
 
 import pytest
 
 from cubestack.emulator.i2cdev import pacing
 from cubestack.emulator.i2cdev.pacing import ALONE_AGAIN_NS, CROWDED_NS, Watch
+from cubestack.emulator.ports.endpoint import Endpoint
 
 TIMEOUT_NS = 100_000
 QUICK_NS = 1_000
@@ -35,17 +37,13 @@ class World:
     def close(self) -> None: ...
 
 
-class Port:
+class Port(Endpoint):
     FD = 5
-    name = "port"
-    congested = False
 
     def watched(self) -> list[tuple[int, int]]:
         return [(self.FD, 1)]
 
     def exchange(self, now_ps: int) -> None: ...
-
-    def release_ps(self, count: int) -> int | None: ...
 
     def close(self) -> None: ...
 
@@ -58,54 +56,49 @@ def world(monkeypatch: pytest.MonkeyPatch) -> World:
     return made
 
 
-def watch(world: World, monkeypatch: pytest.MonkeyPatch, *, first: bool, **options: bool) -> Watch:
-    monkeypatch.setattr(os, "sched_getscheduler", lambda _pid: os.SCHED_FIFO if first else 0)
-    made = Watch([Port()], **options)
-    made.close()
-    made._poller = world  # type: ignore[assignment]
-    made._watched = {Port.FD: Port()}
-    monkeypatch.setattr(made, "_change", lambda watched: setattr(made, "_watched", watched))
-    return made
+@pytest.fixture
+def watch(world: World, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Watch]:
+    def make(*, first: bool, **options: bool) -> Watch:
+        monkeypatch.setattr(os, "sched_getscheduler", lambda _pid: os.SCHED_FIFO if first else 0)
+        made = Watch([Port()], **options)
+        made.close()
+        made._poller = world  # type: ignore[assignment]
+        monkeypatch.setattr(made, "_change", lambda _watched: None)
+        return made
+
+    return make
 
 
 @pytest.mark.parametrize("first", [False, True])
-def test_a_call_that_comes_is_seen_at_once(world, monkeypatch, first):
-    waiting = watch(world, monkeypatch, first=first)
+def test_a_call_that_comes_is_seen_at_once(world, watch, first):
+    waiting = watch(first=first)
     world.due_ns = world.now_ns + 30_500
     assert len(waiting.wait(TIMEOUT_NS, awake=True)) == 1
     assert world.now_ns - world.due_ns < QUICK_NS
     assert world.yields == 31
 
 
-def test_a_wait_ends_in_time(world, monkeypatch):
-    waiting = watch(world, monkeypatch, first=False)
+def test_a_wait_ends_in_time(world, watch):
+    waiting = watch(first=False)
     for awake in (True, False):
         began_ns = world.now_ns
         assert waiting.wait(TIMEOUT_NS, awake=awake) == []
         assert world.now_ns - began_ns == TIMEOUT_NS
 
 
-def test_who_is_not_alone_sleeps_for_a_while(world, monkeypatch):
-    waiting = watch(world, monkeypatch, first=False)
+def test_who_is_not_alone_sleeps_for_a_while(world, watch):
+    waiting = watch(first=False)
     world.yield_ns = 2 * CROWDED_NS
-    waiting.wait(TIMEOUT_NS, awake=True)
-    assert world.yields == 1
-    waiting.wait(TIMEOUT_NS, awake=True)
-    assert world.yields == 1
-    world.now_ns += ALONE_AGAIN_NS
-    waiting.wait(TIMEOUT_NS, awake=True)
-    assert world.yields == 2
-
-
-def test_who_has_priority_never_sleeps(world, monkeypatch):
-    waiting = watch(world, monkeypatch, first=True)
-    world.yield_ns = 2 * CROWDED_NS
-    for count in range(1, 4):
+    for pause_ns, yields in ((0, 1), (0, 1), (ALONE_AGAIN_NS, 2)):
+        world.now_ns += pause_ns
         waiting.wait(TIMEOUT_NS, awake=True)
-        assert world.yields == count
+        assert world.yields == yields
 
 
-def test_who_is_woken_quickly_always_sleeps(world, monkeypatch):
-    waiting = watch(world, monkeypatch, first=True, always_asleep=True)
-    waiting.wait(TIMEOUT_NS, awake=True)
-    assert world.yields == 0
+def test_who_has_priority_never_sleeps_but_always_where_it_is_woken_quickly(world, watch):
+    world.yield_ns = 2 * CROWDED_NS
+    for always_asleep, yields in ((False, 3), (True, 3)):
+        waiting = watch(first=True, always_asleep=always_asleep)
+        for _ in range(3):
+            waiting.wait(TIMEOUT_NS, awake=True)
+        assert world.yields == yields

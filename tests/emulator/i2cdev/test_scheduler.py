@@ -3,6 +3,7 @@
 import heapq
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 
 import pytest
@@ -13,8 +14,11 @@ from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
 from cubestack.emulator.i2cdev import scheduler as module
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, I2cScheduler
+from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import Kernel
+
+from .conftest import Registers
 
 US = 1000
 BIT_NS = 2500
@@ -22,20 +26,9 @@ READ_BITS = (1 + 9 + 9) + (1 + 9 + 9) + 1
 READ_NS = READ_BITS * BIT_NS
 """A register's byte at 400 kHz."""
 
+POINTER = I2cMessage(0x1A, bytearray(1))
 WAY_NS = 15 * US
 """From a program to the emulation, or back."""
-
-
-class Registers:
-    def i2c_start(self, read: bool) -> None: ...
-
-    def i2c_write(self, byte: int) -> bool:
-        return True
-
-    def i2c_read(self) -> int:
-        return 7
-
-    def i2c_stop(self) -> None: ...
 
 
 class World:
@@ -75,69 +68,52 @@ class World:
         return True
 
 
-class Port:
+@dataclass
+class Port(Endpoint):
     """Where all calls come from."""
 
-    name = "calls"
-    congested = False
-
-    def __init__(self, world: World) -> None:
-        self._world = world
-
-    def watched(self) -> list[tuple[int, int]]:
-        return []
+    world: World
 
     def exchange(self, now_ps: int) -> None:
-        self._world.take()
-
-    def release_ps(self, count: int) -> int | None:
-        return None
+        self.world.take()
 
     def close(self) -> None: ...
 
 
+@dataclass
 class GuestProcess:
     """Calls again and again, as often as it has messages.
 
     Attributes:
+        calls: that are left.
         times: wall time before and after each call, as the program sees it, in ns.
         ends: virtual time of the ends, in ps.
     """
 
-    def __init__(
-        self,
-        bench: "ScheduledWorld",
-        wait_ns: int,
-        think_ns: int,
-        calls: int,
-        message: Callable[[], list[I2cMessage]],
-    ) -> None:
-        self.times: list[tuple[int, int]] = []
-        self.ends: list[int] = []
-        self._bench = bench
-        self._think_ns = think_ns
-        self._left = calls
-        self._message = message
-        self._began_ns = 0
-        self._next(bench.world.now_ns + wait_ns)
+    bench: "ScheduledWorld"
+    think_ns: int
+    calls: int
+    message: Callable[[], list[I2cMessage]]
+    times: list[tuple[int, int]] = field(default_factory=list)
+    ends: list[int] = field(default_factory=list)
 
-    def _next(self, now_ns: int) -> None:
-        self._began_ns = now_ns + self._think_ns
-        self._bench.world.arrive(self._began_ns + WAY_NS, self._submit)
+    def next(self, now_ns: int) -> None:
+        began_ns = now_ns + self.think_ns
+        self.bench.world.arrive(began_ns + WAY_NS, partial(self._submit, began_ns))
 
-    def _submit(self) -> None:
-        self._bench.adapter.submit(self._message(), self._done)
+    def _submit(self, began_ns: int) -> None:
+        self.bench.adapter.submit(self.message(), partial(self._done, began_ns))
 
-    def _done(self, result: int) -> None:
+    def _done(self, began_ns: int, result: int) -> None:
         assert result == 0
-        seen_ns = self._bench.world.now_ns + WAY_NS
-        self.times.append((self._began_ns, seen_ns))
-        self.ends.append(self._bench.kernel.now)
-        self._left -= 1
-        if self._left:
-            self._next(seen_ns)
+        seen_ns = self.bench.world.now_ns + WAY_NS
+        self.times.append((began_ns, seen_ns))
+        self.ends.append(self.bench.kernel.now)
+        self.calls -= 1
+        if self.calls:
+            self.next(seen_ns)
         else:
-            self._bench.running -= 1
+            self.bench.running -= 1
 
     @property
     def durations(self) -> list[int]:
@@ -187,16 +163,15 @@ class ScheduledWorld:
         self,
         think_ns: int,
         calls: int,
-        message: Callable[[], list[I2cMessage]] = lambda: [
-            I2cMessage(0x1A, bytearray(1)),
-            I2cMessage(0x1A, read=1),
-        ],
+        message: Callable[[], list[I2cMessage]] = lambda: [POINTER, I2cMessage(0x1A, read=1)],
         *,
         wait_ns: int = 0,
     ) -> GuestProcess:
         """One that starts after ``wait_ns``."""
         self.running += 1
-        return GuestProcess(self, wait_ns, think_ns, calls, message)
+        made = GuestProcess(self, think_ns, calls, message)
+        made.next(self.world.now_ns + wait_ns)
+        return made
 
     def quick_and_slow(self, think_ns: int, calls: int) -> GuestProcess:
         """A program that shows how long the way of a call is, then another one."""
@@ -210,7 +185,7 @@ class AtWork:
     def __init__(self, ports: list[Port], *, always_asleep: bool) -> None:
         assert not always_asleep
         self._ports = ports
-        self._world = ports[0]._world
+        self._world = ports[0].world
 
     def wait(self, timeout_ns: int, *, awake: bool = False) -> list[Port]:
         return self._ports if self._world.sleep(timeout_ns) else []
@@ -252,9 +227,7 @@ def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
     bench = make()
     program = bench.quick_and_slow(think_ns=think_us * US, calls=20)
     bench.scheduler.run()
-    assert len(program.durations) == 20
-    for duration in program.durations:
-        assert duration == pytest.approx(READ_NS, abs=5 * US)
+    assert program.durations == pytest.approx([READ_NS] * 20, abs=5 * US)
 
 
 def test_nothing_is_known_of_the_first_call(make):
@@ -303,8 +276,8 @@ def test_programs_take_turns_on_the_wire(make):
     bench = make()
     programs = [bench.program(think_ns=8 * US, calls=51) for _ in range(3)]
     bench.scheduler.run()
-    for program in programs:
-        assert program.span / 50 == pytest.approx(3 * READ_NS, rel=0.05)
+    spans = [program.span / 50 for program in programs]
+    assert spans == pytest.approx([3 * READ_NS] * 3, rel=0.05)
 
 
 def test_as_fast_as_possible_virtual_time_is_that_of_the_wire(make):

@@ -5,6 +5,7 @@ import os
 import select
 import socket
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -15,21 +16,18 @@ from cubestack.emulator.i2cdev.server import MAX_CLIENTS, _Client
 from cubestack.emulator.ports.endpoint import PortError
 from cubestack.firmware_model.formats import linux_i2c as linux
 
+from .conftest import packed
+
 SLAVE = linux.pack_ioctl(linux.Ioctl.SLAVE, 0x1A)
+LARGEST = linux.pack_rdwr([linux.RdwrMessage(0x1A, 1, 8192)] * 42)
 
 
-def test_a_client_has_a_device_file(served):
-    client = served.connect()
-    assert served.ask(client, linux.Call.IOCTL, SLAVE) == (0, b"")
-    assert served.ask(client, linux.Call.WRITE, b"\x41") == (1, b"")
-    assert served.ask(client, linux.Call.READ, linux.pack_read(3)) == (3, b"ABC")
-
-
-def test_each_client_has_its_own(served):
+def test_each_client_has_its_own_device_file(served):
     first, second = served.connect(), served.connect()
-    served.ask(first, linux.Call.IOCTL, SLAVE)
+    assert served.ask(first, linux.Call.IOCTL, SLAVE) == (0, b"")
+    assert served.ask(first, linux.Call.WRITE, b"\x41") == (1, b"")
     assert served.ask(second, linux.Call.READ, linux.pack_read(1)) == (-errno.ENXIO, b"")
-    assert served.ask(first, linux.Call.READ, linux.pack_read(1)) == (1, b"\0")
+    assert served.ask(first, linux.Call.READ, linux.pack_read(3)) == (3, b"ABC")
 
 
 def test_a_file_under_its_key(served):
@@ -73,16 +71,14 @@ def test_calls_that_come_together(served):
     """All but the first are read before their turn."""
     client = served.connect()
     served.ask(client, linux.Call.IOCTL, SLAVE)
-    data = linux.request(0, linux.Call.READ, linux.pack_read(1))
-    client.socket.sendall((linux.LENGTH.pack(len(data)) + data) * 3)
+    client.socket.sendall(packed(linux.Call.READ, linux.pack_read(1)) * 3)
     served.serve()
     assert [client.receive() for _ in range(3)] == [(1, b"\0"), (1, b"\1"), (1, b"\2")]
 
 
 def test_largest_transfer(served):
     client = served.connect()
-    messages = [linux.RdwrMessage(0x1A, 1, 8192)] * 42
-    client.send(linux.Call.RDWR, linux.pack_rdwr(messages))
+    client.send(linux.Call.RDWR, LARGEST)
     served.serve()
     client.socket.setblocking(False)  # the rest of the answer waits for room
     received = bytearray()
@@ -96,9 +92,8 @@ def test_largest_transfer(served):
 
 def test_a_client_that_does_not_read_holds_up_nobody(served):
     stuck, other = served.connect(), served.connect()
-    body = linux.pack_rdwr([linux.RdwrMessage(0x1A, 1, 8192)] * 42)
     for _ in range(3):
-        stuck.send(linux.Call.RDWR, body)
+        stuck.send(linux.Call.RDWR, LARGEST)
     served.serve()
     served.ask(other, linux.Call.IOCTL, SLAVE)
     assert served.ask(other, linux.Call.READ, linux.pack_read(1))[0] == 1
@@ -107,17 +102,14 @@ def test_a_client_that_does_not_read_holds_up_nobody(served):
 class Babbler:
     """A connection whose client asks again before the last answer is out."""
 
-    def __init__(self) -> None:
-        data = linux.request(0, linux.Call.IOCTL, SLAVE)
-        self.frame = linux.LENGTH.pack(len(data)) + data
-        self.looks = 0
+    looks = 0
 
     def setblocking(self, _flag: bool) -> None: ...
 
     def recv(self, _size: int) -> bytes:
         self.looks += 1
         assert self.looks < 10
-        return self.frame
+        return packed(linux.Call.IOCTL, SLAVE)
 
     def send(self, data: bytes) -> int:
         return len(data)
@@ -134,14 +126,10 @@ def test_a_client_that_never_pauses_is_left_for_the_next(adapter):
 def test_a_flood_waits_in_the_operating_system(served, registers):
     client = served.connect()
     client.socket.setblocking(False)
-    data = linux.request(0, linux.Call.IOCTL, SLAVE)
-    frame = linux.LENGTH.pack(len(data)) + data
-    sent = 0
-    try:
+    frame, sent = packed(linux.Call.IOCTL, SLAVE), 0
+    with suppress(BlockingIOError):
         while True:
             sent += client.socket.send(frame)
-    except BlockingIOError:
-        pass
     assert sent < 1 << 20
     client.socket.setblocking(True)
     other = served.connect()
@@ -154,8 +142,7 @@ def test_a_flood_waits_in_the_operating_system(served, registers):
 @pytest.mark.parametrize("cut", [1, 4, 5, 12])
 def test_a_client_that_dies_in_a_message(served, cut):
     client, other = served.connect(), served.connect()
-    data = linux.request(0, linux.Call.READ, linux.pack_read(1))
-    client.socket.sendall((linux.LENGTH.pack(len(data)) + data)[:cut])
+    client.socket.sendall(packed(linux.Call.READ, linux.pack_read(1))[:cut])
     served.serve()
     client.reset()
     assert served.ask(other, linux.Call.IOCTL, SLAVE) == (0, b"")
@@ -225,29 +212,24 @@ def test_a_waiting_server_wakes_up(served):
     assert client.receive() == (0, b"")
 
 
-def test_the_folder_is_private(served):
-    folder = Path(served.server.name).parent
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-
-
-def test_a_folder_open_to_others_is_refused(tmp_path, serve_at):
-    folder = tmp_path / "open"
-    folder.mkdir(mode=0o700)
-    folder.chmod(0o750)
-    with pytest.raises(PortError, match=r"of this user alone: chmod 700"):
-        serve_at(folder / "bus")
-
-
-def test_a_link_to_a_folder_is_refused(tmp_path, serve_at):
-    (tmp_path / "real").mkdir(mode=0o700)
-    (tmp_path / "link").symlink_to(tmp_path / "real")
-    with pytest.raises(PortError, match="of this user alone"):
-        serve_at(tmp_path / "link" / "bus")
-
-
-def test_a_served_socket_is_not_taken_over(served, serve_at):
-    with pytest.raises(PortError, match="is served already"):
-        serve_at(Path(served.server.name))
+def test_only_a_free_place_in_a_folder_of_ones_own_is_taken(served, tmp_path, serve_at):
+    bus = Path(served.server.name)
+    assert stat.S_IMODE(bus.parent.stat().st_mode) == 0o700
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o750)
+    (tmp_path / "link").symlink_to(bus.parent)
+    file = bus.with_name("file")
+    file.write_text("precious")
+    for path, message in (
+        (tmp_path / "open" / "bus", "of this user alone: chmod 700"),
+        (tmp_path / "link" / "new", "of this user alone"),
+        (bus, "is served already"),
+        (file, "is no socket"),
+        (tmp_path / ("x" * 120) / "bus", "too long"),
+    ):
+        with pytest.raises(PortError, match=message):
+            serve_at(path)
+    assert file.read_text() == "precious"
 
 
 def test_the_socket_of_a_dead_emulation_is_replaced(served, serve_at):
@@ -256,20 +238,6 @@ def test_the_socket_of_a_dead_emulation_is_replaced(served, serve_at):
     dead.bind(str(path))
     dead.close()
     assert serve_at(path).name == str(path)
-
-
-def test_a_file_is_not_overwritten(served, serve_at):
-    path = Path(served.server.name).with_name("file")
-    path.write_text("precious")
-    with pytest.raises(PortError, match="is no socket"):
-        serve_at(path)
-    assert path.read_text() == "precious"
-
-
-def test_a_path_too_long_is_an_error_of_ours(tmp_path, serve_at):
-    folder = tmp_path / ("x" * 120)
-    with pytest.raises((PortError, OSError), match="too long"):
-        serve_at(folder / "bus")
 
 
 def test_closing_removes_the_socket(tmp_path, serve_at):

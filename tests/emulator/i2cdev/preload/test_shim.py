@@ -1,8 +1,13 @@
-"""The library of the preload route: built once, cached by its source and compiler."""
+"""The library of the preload route: built once, and the programs that can not load it."""
 
 import stat
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from cubestack.emulator.i2cdev.preload import shim
 from cubestack.emulator.rtl.cxxrtl.build import CompilerError, NoCompilerError
@@ -11,21 +16,17 @@ needs_c = pytest.mark.skipif(shim.find_c_compiler() is None, reason="no C compil
 
 
 @needs_c
-def test_built_once(tmp_path, monkeypatch):
+def test_built_once_of_each_source(tmp_path, monkeypatch):
     library = shim.shim_library(tmp_path)
     log = library.with_suffix(".log").read_text()
     assert len(log.splitlines()) == 1, log  # the command, and no warning
-    monkeypatch.setattr(shim, "_compile", None)
-    assert shim.shim_library(tmp_path) == library
-
-
-@needs_c
-def test_another_source_is_another_library(tmp_path, monkeypatch):
-    first = shim.shim_library(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(shim, "_compile", None)
+        assert shim.shim_library(tmp_path) == library
     source = tmp_path / "shim.c"
     source.write_bytes(shim.SOURCE.read_bytes() + b"\n")
     monkeypatch.setattr(shim, "SOURCE", source)
-    assert shim.shim_library(tmp_path) != first
+    assert shim.shim_library(tmp_path) != library
 
 
 def test_a_compiler_that_fails(tmp_path, monkeypatch):
@@ -36,8 +37,7 @@ def test_a_compiler_that_fails(tmp_path, monkeypatch):
     with pytest.raises(CompilerError, match=r"failed; its log is .*\.log") as raised:
         shim.shim_library(tmp_path)
     log = str(raised.value).rsplit(" ", 1)[1]
-    with open(log, encoding="utf-8") as text:
-        assert "cannot" in text.read()
+    assert "cannot" in Path(log).read_text()
 
 
 def test_without_a_compiler(tmp_path, monkeypatch):
@@ -51,3 +51,30 @@ def test_a_cache_that_can_not_be_written(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(CompilerError, match="can not use the cache folder"):
         shim.shim_library(tmp_path / "file" / "cache")
+
+
+@needs_c
+@pytest.mark.parametrize("static", [True, False])
+def test_compiled_programs(tmp_path, static):
+    source, program = tmp_path / "program.c", tmp_path / "program"
+    source.write_text("int main(void) { return 0; }\n")
+    options = ["-static"] if static else []
+    command = [*shim.find_c_compiler(), *options, "-o", program, source]
+    if subprocess.run(command, capture_output=True, timeout=120).returncode:
+        pytest.skip("no static C library here")
+    assert shim.is_static(program) is static
+
+
+def test_what_is_no_static_program(tmp_path):
+    script = tmp_path / "script"
+    script.write_text("#!/bin/sh\n" + "#" * 100)
+    for path in (Path(sys.executable), script, tmp_path, tmp_path / "missing"):
+        assert not shim.is_static(path)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=120))
+def test_any_bytes(tmp_path, rest):
+    program = tmp_path / "noise"
+    program.write_bytes(b"\x7fELF\x02\x01" + rest)
+    assert shim.is_static(program) in (True, False)
