@@ -17,6 +17,8 @@ from cubestack.emulator.scene.sky import Pose, SkyScene
 LINE = Fraction(132_200_000)
 LONG = RollingShutter(10**12, LINE, 2917, 2917)
 VEGA = 91262
+SKY = load_sky(2026.0)
+ORION = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
 
 
 def light(scene: SkyScene, shutter: RollingShutter = LONG, lens: Optics = LENS) -> np.ndarray:
@@ -24,13 +26,11 @@ def light(scene: SkyScene, shutter: RollingShutter = LONG, lens: Optics = LENS) 
 
 
 def star(hip: int) -> np.ndarray:
-    sky = load_sky(2026.0)
-    return sky.vectors[np.searchsorted(sky.hip, hip)].copy()
+    return SKY.vectors[np.searchsorted(SKY.hip, hip)].copy()
 
 
 def magnitude(hip: int) -> float:
-    sky = load_sky(2026.0)
-    return float(sky.v_mag[np.searchsorted(sky.hip, hip)])
+    return float(SKY.v_mag[np.searchsorted(SKY.hip, hip)])
 
 
 def vega_at(pixel: tuple[float, float], time_s: float, rate: tuple[float, ...]) -> SkyScene:
@@ -38,8 +38,7 @@ def vega_at(pixel: tuple[float, float], time_s: float, rate: tuple[float, ...]) 
     target = LENS.unproject(np.array([pixel]))[0]
     turn, _ = Rotation.align_vectors([target], [star(VEGA)])
     start = Rotation.from_rotvec(np.radians(rate) * time_s) * turn
-    quaternion = start.as_quat()
-    return SkyScene(quaternion, rate, mag_limit=0.1)
+    return SkyScene(start.as_quat(), rate, mag_limit=0.1)
 
 
 def light_around(image: np.ndarray, x: float, y: float, half: int = 12) -> tuple[float, np.ndarray]:
@@ -53,21 +52,19 @@ def light_around(image: np.ndarray, x: float, y: float, half: int = 12) -> tuple
 
 def brute_force(scene: SkyScene, shutter: RollingShutter, instants: int) -> np.ndarray:
     """Vega's light, every row integrated over its own exposure, pixel by pixel."""
-    lens = LENS
     image = np.zeros((512, 1024))
     electrons = LENS.electrons_per_second(magnitude(VEGA)) * shutter.exposure_s / instants
     start = Rotation.from_quat(np.asarray(scene.quaternion))
-    columns = np.arange(1024)
     for row in range(512):
         end = shutter.readout_ps / 1e12 + row * shutter.line_s
         times = end - shutter.exposure_s * (np.arange(instants) + 0.5) / instants
         turns = Rotation.from_rotvec(-np.radians(scene.rate_deg_s) * times[:, None]) * start
-        x, y = lens.project(turns.apply(star(VEGA))).T
-        sigma = lens.psf_sigma_px
+        x, y = LENS.project(turns.apply(star(VEGA))).T
+        sigma = LENS.psf_sigma_px
         down = ndtr((row + 0.5 - y) / sigma) - ndtr((row - 0.5 - y) / sigma)
         if down.max() < 1e-9:
             continue
-        edges = (np.append(columns, 1024)[:, None] - 0.5 - x) / sigma
+        edges = (np.arange(1025)[:, None] - 0.5 - x) / sigma
         image[row] = (np.diff(ndtr(edges), axis=0) * down).sum(axis=1) * electrons
     return image
 
@@ -83,7 +80,7 @@ def test_stars_are_where_scipy_and_the_lens_put_them() -> None:
 
 
 def test_orion_stands_upright() -> None:
-    hips, pixels = star_pixels(replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.0), LENS, LONG)
+    hips, pixels = star_pixels(ORION, LENS, LONG)
     place = dict(zip(hips, pixels, strict=True))
     rigel, betelgeuse, bellatrix = place[24436], place[27989], place[25336]
     assert betelgeuse[1] < rigel[1]  # north is up
@@ -93,8 +90,7 @@ def test_orion_stands_upright() -> None:
 def test_light_of_a_star_is_complete_and_centred() -> None:
     scene = replace(SkyScene.pointing(83.8, -1.0, 40.0), mag_limit=1.0)
     image = light(scene)
-    assert image.shape == (512, 1024)
-    assert image.dtype == np.float32
+    assert (image.shape, image.dtype) == ((512, 1024), np.float32)
     hips, pixels = star_pixels(scene, LENS, LONG)
     assert len(hips) >= 2
     for hip, (x, y) in zip(hips, pixels, strict=True):
@@ -104,14 +100,10 @@ def test_light_of_a_star_is_complete_and_centred() -> None:
         np.testing.assert_allclose(centroid, (x, y), atol=1e-4)
 
 
-def test_spot_is_the_gaussian_over_each_pixels_square() -> None:
+def test_spot_is_the_gaussian_over_each_pixels_square_and_defocus_widens_it() -> None:
     scene = vega_at((400.3, 200.8), 0.0, (0, 0, 0))
     np.testing.assert_allclose(light(scene), brute_force(scene, LONG, 1), atol=0.3)
     assert light(scene).max() > 50_000
-
-
-def test_defocus_widens_the_spot() -> None:
-    scene = vega_at((400.3, 200.8), 0.0, (0, 0, 0))
     x = np.arange(1024)
     for sigma in (0.9, 2.5):
         image = light(scene, lens=replace(LENS, psf_sigma_px=sigma))
@@ -120,16 +112,8 @@ def test_defocus_widens_the_spot() -> None:
         assert variance == pytest.approx(sigma**2 + 1 / 12, rel=1e-3)  # the pixel's own width
 
 
-@pytest.mark.parametrize(
-    "rate",
-    [
-        (2.0, 0, 0),  # the star sinks, with the read-out
-        (-2.0, 0, 0),
-        (0, -2.0, 0),
-        (1.0, 0.7, 5.0),
-        (0, 0, 6.0),
-    ],
-)
+# By the first rate the star sinks, with the read-out.
+@pytest.mark.parametrize("rate", [(2, 0, 0), (-2, 0, 0), (0, -2, 0), (1.0, 0.7, 5.0), (0, 0, 6)])
 def test_streak_against_brute_force(rate: tuple[float, ...]) -> None:
     # Long lines make the rolling shutter plain to see.
     shutter = RollingShutter(2 * 10**12, 4 * LINE, 700, 700)
@@ -143,10 +127,8 @@ def test_streak_against_brute_force(rate: tuple[float, ...]) -> None:
 def test_rolling_shutter_shifts_lower_rows_later() -> None:
     # Turning about y by 1 deg/s moves stars 20 px/s along x; row 511 is 67.6 ms after row 0.
     early = replace(LONG, readout_ps=0)
-    top, bottom = (
-        star_pixels(vega_at((539.0, row), 0.0, (0, 1.0, 0)), LENS, early)[1][0]
-        for row in (20.0, 490.0)
-    )
+    scenes = [vega_at((539.0, row), 0.0, (0, 1.0, 0)) for row in (20.0, 490.0)]
+    top, bottom = (star_pixels(scene, LENS, early)[1][0] for scene in scenes)
     # Both were on column 539 at time 0; the exposure of the bottom row is 470 lines later.
     speed = -np.radians(1) * 6.28 / 0.0056
     assert bottom[0] - top[0] == pytest.approx(speed * 470 * 132.2e-6, rel=0.2)
@@ -169,50 +151,43 @@ def test_rolling_shutter_stretches_streaks_that_move_with_it() -> None:
 
 
 def test_static_scene_does_not_depend_on_time() -> None:
-    scene = replace(SkyScene.pointing(10.0, 20.0), mag_limit=3.8)
     later = replace(LONG, readout_ps=7 * 10**14)
-    np.testing.assert_array_equal(light(scene), light(scene, later))
+    np.testing.assert_array_equal(light(ORION), light(ORION, later))
 
 
 def test_poses_follow_each_other() -> None:
-    q = SkyScene.pointing(83.8, -1.0).quaternion
-    scene = replace(SkyScene.pointing(10.0, 20.0), poses=(Pose(q, start_s=5.0),), mag_limit=3.8)
+    poses = (Pose(ORION.quaternion, start_s=5.0),)
+    scene = replace(SkyScene.pointing(10.0, 20.0), poses=poses, mag_limit=3.8)
     late = replace(LONG, readout_ps=6 * 10**12)
-    orion = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
-    np.testing.assert_allclose(light(scene, late), light(orion, late), atol=1e-2)
-    assert np.abs(light(scene) - light(orion)).max() > 1000
+    np.testing.assert_allclose(light(scene, late), light(ORION, late), atol=1e-2)
+    assert np.abs(light(scene) - light(ORION)).max() > 1000
 
 
 def test_stars_at_the_limit_and_at_the_detection_limit() -> None:
     # A V 3.8 star: about 300 counts of 8 bits in the default exposure; V 8: below one at its peak.
-    sky = load_sky(2026.0)
-    hip = int(sky.hip[np.abs(sky.v_mag - 3.8).argmin()])
+    hip = int(SKY.hip[np.abs(SKY.v_mag - 3.8).argmin()])
     x, y, z = star(hip)
     dec, ra = np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x))
     scene = replace(SkyScene.pointing(ra, dec), mag_limit=3.81)
-    counts = ideal_counts(light(scene))
-    total, _ = light_around(counts, 539, 175, half=5)
+    total, _ = light_around(ideal_counts(light(scene)), 539, 175, half=5)
     assert 275 < total < 301  # truncation to whole counts takes some
     peak = LENS.electrons_per_second(FAINTEST_V) * LONG.exposure_s * 0.39**2 / 0.81
     assert peak / ELECTRONS_PER_DN12 / DN12_PER_DN8 < 1.3
 
 
 def test_magnitude_limit_leaves_stars_out() -> None:
-    scene = SkyScene.pointing(83.8, -1.0)
-    count = {
-        limit: len(star_pixels(replace(scene, mag_limit=limit), LENS, LONG)[0])
-        for limit in (3.0, 3.8, 6.0, None)
-    }
-    assert 5 < count[3.0] < count[3.8] < count[6.0] < count[None]
-    assert light(replace(scene, mag_limit=-5)).max() == 0
+    scenes = [replace(ORION, mag_limit=limit) for limit in (3.0, 3.8, 6.0, None)]
+    few, some, many, most = (len(star_pixels(scene, LENS, LONG)[0]) for scene in scenes)
+    assert 5 < few < some < many < most
+    assert light(replace(ORION, mag_limit=-5)).max() == 0
 
 
 def test_false_stars() -> None:
     empty = replace(SkyScene.pointing(0.0, 0.0), mag_limit=-5, seed=4)
-    images = [
-        light(replace(empty, false_stars=n, seed=s)) for n, s in ((1, 4), (5, 4), (5, 4), (5, 5))
-    ]
-    one, five, again, other = (image.astype(float) for image in images)
+    one, five, again, other = (
+        light(replace(empty, false_stars=number, seed=seed)).astype(float)
+        for number, seed in ((1, 4), (5, 4), (5, 4), (5, 5))
+    )
     assert (one > 0).sum() < 400
     np.testing.assert_array_equal(five, again)
     assert np.abs(five - other).max() > 100
@@ -226,8 +201,7 @@ def test_the_aperture_s_area_counts_and_vignetting_dims_the_corners() -> None:
     wide = light(scene, lens=replace(LENS, aperture_mm=2 * LENS.aperture_mm))
     np.testing.assert_allclose(wide, 4 * light(scene), rtol=1e-5)
     off_axis = LENS.unproject(np.array([[30.0, 480.0]]))[0, 2]
-    ratio = dimmed.sum() / light(scene).sum()
-    assert ratio == pytest.approx(off_axis**4, rel=1e-5)
+    assert dimmed.sum() / light(scene).sum() == pytest.approx(off_axis**4, rel=1e-5)
 
 
 def test_published_centroiding_error_of_18_noise_free_stars() -> None:
@@ -247,6 +221,4 @@ def test_published_centroiding_error_of_18_noise_free_stars() -> None:
             _, centroid = light_around(counts, column + dx - 1, row + dy - 1, half=2)
             errors.append(np.abs(centroid - (x, y)))
     assert len(errors) > 200
-    mean_x, mean_y = np.mean(errors, axis=0)
-    assert mean_x <= 0.0244
-    assert mean_y <= 0.0427
+    assert np.all(np.mean(errors, axis=0) <= (0.0244, 0.0427))
