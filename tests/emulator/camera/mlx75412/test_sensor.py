@@ -9,7 +9,7 @@ import pytest
 
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
-from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
+from cubestack.emulator.camera.mlx75412.sensor import Mlx75412, exposure_lines, frame_lines
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 
@@ -73,22 +73,15 @@ def test_registers_are_read_back_with_auto_increment(camera: Mlx75412) -> None:
 
 @pytest.mark.parametrize("how", ["power", "reset"])
 def test_without_power_or_in_reset_there_is_nothing(camera: Mlx75412, how: str) -> None:
-    def switch(on: bool, now_ps: int) -> None:
-        if how == "power":
-            camera.power(on, now_ps)
-        else:
-            camera.set_reset_pin(int(on), now_ps)
-
+    switch = camera.power if how == "power" else camera.set_reset_pin
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     switch(False, 1 * MS)
-    assert not camera.running
-    assert camera.segment_at(1 * MS) is None
+    assert (camera.running, camera.segment_at(1 * MS)) == (False, None)
     assert not camera.i2c_write(ADDRESS, b"\x81\x00\x01", 1 * MS)
     assert camera.i2c_read(ADDRESS, 1, 1 * MS) is None
     switch(True, 2 * MS + 33)
-    segment = camera.segment_at(2 * MS + 33)
-    assert segment.start_ps == 2 * MS + 33  # the grid starts anew
+    assert camera.segment_at(2 * MS + 33).start_ps == 2 * MS + 33  # the grid starts anew
     switch(True, 3 * MS)
     assert len(changes) == 2
     camera.i2c_write(ADDRESS, b"\x85\x1c", 3 * MS)
@@ -120,30 +113,15 @@ def test_sequence_after_enable(camera: Mlx75412) -> None:
     assert found[0].start_ps == 5 * MS + 100_000  # the first edge of the grid
     for before, after in itertools.pairwise(found):
         assert after.start_ps == before.start_ps + before.clocks * 100_000
-
-
-def test_vsync_before_the_first_good_frame_is_a_parameter() -> None:
-    camera = configured(vsync_before_first_frame=True)
-    enable(camera, 0)
-    assert [s.vsync for s in segments(camera, 0, 4)] == [1, 0, 1, 0]
-
-
-@pytest.mark.parametrize(
-    ("register", "fps"), [(30, 11.11), (9, 3.33), (8, 2.96), (7, 2.59), (6, 2.22)]
-)
-def test_published_frame_rates(camera: Mlx75412, register: int, fps: float) -> None:
-    configure(camera, register)
-    enable(camera, 0)
-    starts = [s.start_ps for s in segments(camera, 0, 8) if s.rows]
-    assert np.unique(np.diff(starts)).size == 1
-    assert round(10**12 / (starts[1] - starts[0]), 2) == fps
+    other = configured(vsync_before_first_frame=True)
+    enable(other, 0)
+    assert [s.vsync for s in segments(other, 0, 4)] == [1, 0, 1, 0]
 
 
 def test_longest_exposure_follows_the_frame_rate(camera: Mlx75412) -> None:
     enable(camera, 0)
-    shutters = [camera.frame_from(s.start_ps) for s in segments(camera, 0, 5) if s.rows]
-    assert [s.exposure_lines for s in shutters if s][1:] == [FRAME_LINES - 1] * 2
-    assert all(s.programmed_lines == s.exposure_lines for s in shutters[1:] if s)
+    shutters = [camera.frame_from(s.start_ps) for s in segments(camera, 0, 5)[2::2]]
+    assert [(s.exposure_lines, s.programmed_lines) for s in shutters] == [(2917, 2917)] * 2
 
 
 def test_values_wait_for_sync_and_for_the_next_frame(camera: Mlx75412) -> None:
@@ -165,16 +143,6 @@ def test_values_wait_for_sync_and_for_the_next_frame(camera: Mlx75412) -> None:
     assert [s.exposure_lines for s in shutters if s][1:] == [FRAME_LINES - 1, 1000]
 
 
-def test_exposure_register_is_limited_by_the_frame(camera: Mlx75412) -> None:
-    write(camera, "EXPOSURE_RULE", 0)
-    write(camera, "EXPOSURE", 0xFFFF)
-    write(camera, "SYNC", chip.SYNC_APPLY)
-    enable(camera, 0)
-    second = segments(camera, 0, 3)[2]
-    shutter = camera.frame_from(second.start_ps)
-    assert shutter.exposure_lines == FRAME_LINES - 1
-
-
 def test_first_exposure_is_undefined_but_repeatable() -> None:
     def exposures(seed: int) -> list[int]:
         camera = configured(seed=seed)
@@ -188,10 +156,9 @@ def test_first_exposure_is_undefined_but_repeatable() -> None:
             enable(camera, now + 100 * MS, on=False)
         return found
 
-    assert exposures(1) == exposures(1)
-    assert exposures(1) != exposures(2)
-    assert len(set(exposures(1))) == 6
-    assert all(1 <= lines < FRAME_LINES for lines in exposures(1))
+    assert (first := exposures(1)) == exposures(1) != exposures(2)
+    assert len(set(first)) == 6
+    assert all(1 <= lines < FRAME_LINES for lines in first)
 
 
 def test_disabling_cuts_the_output_at_once(camera: Mlx75412) -> None:
@@ -201,22 +168,18 @@ def test_disabling_cuts_the_output_at_once(camera: Mlx75412) -> None:
     enable(camera, now, on=False)
     rest = camera.segment_at(now)
     assert (rest.start_ps, rest.rows, rest.vsync) == (30 * MS + 100_000, 0, 0)
-    shutter = camera.frame_from(0)
-    assert shutter.readout_ps == 0
+    assert camera.frame_from(0).readout_ps == 0
     assert camera.frame_from(1) is None  # the frames that were looked up will never be
     enable(camera, 900 * MS)
-    again = camera.segment_at(900 * MS)
+    again, following = segments(camera, 900 * MS, 2)
     assert (again.start_ps, again.rows, again.vsync) == (900 * MS, 512, 1)
-    following = segments(camera, 900 * MS, 2)[1]
     assert following.vsync == 1  # it starts with an undefined frame again
-
-
-def test_two_changes_at_one_instant(camera: Mlx75412) -> None:
-    enable(camera, 0)
-    enable(camera, 30 * MS + 1, on=False)
-    enable(camera, 30 * MS + 1)
-    assert [s.rows for s in segments(camera, 30 * MS + 1, 2)] == [512, 0]
-    assert segments(camera, 30 * MS + 1, 1)[0].start_ps == 30 * MS + 100_000
+    # Two changes at one instant.
+    enable(camera, 930 * MS + 1, on=False)
+    enable(camera, 930 * MS + 1)
+    undefined, blanking = segments(camera, 930 * MS + 1, 2)
+    assert (undefined.start_ps, undefined.rows) == (930 * MS + 100_000, 512)
+    assert blanking.rows == 0
 
 
 def test_writing_the_same_mode_changes_nothing(camera: Mlx75412) -> None:
@@ -227,11 +190,8 @@ def test_writing_the_same_mode_changes_nothing(camera: Mlx75412) -> None:
     enable(camera, 20 * MS)
     assert [s.start_ps for s in segments(camera, 20 * MS, 3)] == [s.start_ps for s in before]
     assert len(changes) == 1
-
-
-def test_change_after_the_output_was_looked_up_too_far(camera: Mlx75412) -> None:
-    enable(camera, 0)
-    segments(camera, 0, 40)
+    # Nor can it change after the output was looked up too far.
+    segments(camera, 20 * MS, 40)
     with pytest.raises(ValueError, match="after its output was looked up to"):
         enable(camera, 1 * MS, on=False)
 
@@ -243,8 +203,7 @@ def test_odd_crystal_keeps_its_grid() -> None:
     for segment in segments(camera, 1, 20):
         number = round(segment.start_ps / camera.period)
         assert segment.start_ps == number * camera.period // 1
-    shutter = camera.frame_from(0)
-    assert shutter.line_ps == Fraction(1322 * 10**6, 11)
+    assert camera.frame_from(0).line_ps == Fraction(1322 * 10**6, 11)
 
 
 def stored(camera: Mlx75412, fpga_enable_ps: int) -> np.ndarray:
@@ -300,8 +259,7 @@ def test_pixels_are_rendered_on_demand_and_once(camera: Mlx75412) -> None:
     enable(camera, 0)
     segment = segments(camera, 0, 3)[2]
     picture = segment.pixels()
-    assert picture.shape == (512, 1024)
-    assert picture.dtype == np.uint8
+    assert (picture.shape, picture.dtype) == ((512, 1024), np.uint8)
     assert picture.flags.c_contiguous
     assert segment.pixels() is picture
     camera.scene = SkyScene.pointing(200.0, 50.0)
@@ -349,3 +307,37 @@ def test_a_view_brings_its_condition_and_a_scene_leaves_it() -> None:
     assert camera.scene is other
     assert (camera.condition, camera.temperature_c) == (cold, -12.5)
     assert Mlx75412(SkyView(other, cold)).temperature_c == -12.5
+
+
+# CubeStar thesis, table D.2: register, expected and measured rate, approximate exposure in ms.
+@pytest.mark.parametrize(
+    ("register", "expected", "measured", "exposure_ms"),
+    [
+        (30, 11.111, 11.110, 90),
+        (9, 3.333, 3.333, 300),
+        (8, 2.963, 2.966, 337),
+        (7, 2.593, 2.593, 386),
+        (6, 2.222, 2.224, 450),
+    ],
+)
+def test_published_rates_and_exposures(
+    register: int, expected: float, measured: float, exposure_ms: int
+) -> None:
+    lines = frame_lines(27_000_000, register)
+    rate = 10_000_000 / (lines * chip.LINE_CLOCKS)
+    assert rate == pytest.approx(expected, rel=5e-4)
+    assert rate == pytest.approx(measured, rel=2e-3)
+    longest = exposure_lines(chip.LONGEST_EXPOSURE, 1, lines)
+    assert longest == lines - 1
+    assert longest * chip.LINE_CLOCKS / 10_000 == pytest.approx(exposure_ms, abs=0.6)
+
+
+def test_frame_and_exposure_in_lines() -> None:
+    # The lowest rate is published, equation C.0.1: the input clock divided by 5 413 590.
+    for slow in (0, 1, 4):
+        assert frame_lines(27_000_000, slow) * chip.LINE_CLOCKS == 5_413_590
+    # A frame is never shorter than its read-out; the clock register only scales.
+    assert frame_lines(27_000_000, 60) == frame_lines(0, 7) == 520
+    assert frame_lines(10_000_000, 3) == round(10_000_000 / 3 / chip.LINE_CLOCKS)
+    exposures = [exposure_lines(0, lines, 700) for lines in (100, 0, 700, 65535)]
+    assert exposures == [100, 1, 699, 699]
