@@ -33,9 +33,9 @@ def frame(
     return imager.counts(electrons, 1.0, condition, settings, generator)
 
 
-def quantisation_sigma(gain: float, bits: int = 10) -> float:
-    """Standard deviation of the quantisation in electrons, equations 3.5 and 3.6."""
-    return noise.FULL_WELL_ELECTRONS / gain / 2**bits / np.sqrt(12)
+def quantisation_sigma(gain: float = 1.0) -> float:
+    """Standard deviation of 8 bits' quantisation in electrons, equations 3.5 and 3.6."""
+    return LSB8 / gain / np.sqrt(12)
 
 
 def only(**terms: bool) -> noise.NoiseTerms:
@@ -49,9 +49,8 @@ def electrons_sigma(picture: np.ndarray, gain: float = 1.0) -> float:
 
 def test_the_data_sheet_s_ratios_come_out() -> None:
     assert 20 * np.log10(np.sqrt(noise.FULL_WELL_ELECTRONS)) == pytest.approx(45)
-    assert 20 * np.log10(noise.FULL_WELL_ELECTRONS / noise.READ_NOISE_ELECTRONS) == pytest.approx(
-        68.2
-    )
+    ratio = noise.FULL_WELL_ELECTRONS / noise.READ_NOISE_ELECTRONS
+    assert 20 * np.log10(ratio) == pytest.approx(68.2)
 
 
 def test_without_noise_there_is_one_value() -> None:
@@ -60,18 +59,17 @@ def test_without_noise_there_is_one_value() -> None:
     assert np.unique(picture).tolist() == [int(expected + 0.5)]
 
 
-@pytest.mark.parametrize("light", [4_000.0, 25_000.0])
-def test_shot_noise_is_the_root_of_the_light(light: float) -> None:
-    rounding = LSB8 / np.sqrt(12)
-    measured = electrons_sigma(frame(light, only(shot=True)))
-    assert measured == pytest.approx(np.hypot(np.sqrt(light), rounding), rel=0.02)
-
-
-def test_read_out_noise() -> None:
-    gain = 8.0
-    rounding = LSB8 / gain / np.sqrt(12)
-    measured = electrons_sigma(frame(2_000, only(readout=True), gain), gain)
-    assert measured == pytest.approx(np.hypot(noise.READ_NOISE_ELECTRONS, rounding), rel=0.02)
+@pytest.mark.parametrize(
+    ("term", "light", "gain", "sigma"),
+    [
+        ("shot", 4_000, 1.0, np.sqrt(4_000)),
+        ("shot", 25_000, 1.0, np.sqrt(25_000)),
+        ("readout", 2_000, 8.0, noise.READ_NOISE_ELECTRONS),
+    ],
+)
+def test_one_term(term: str, light: float, gain: float, sigma: float) -> None:
+    measured = electrons_sigma(frame(light, only(**{term: True}), gain), gain)
+    assert measured == pytest.approx(np.hypot(sigma, quantisation_sigma(gain)), rel=0.02)
 
 
 def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
@@ -80,7 +78,7 @@ def test_dark_current_doubles_and_leaves_its_noise_but_not_its_mean() -> None:
     dark = noise.dark_electrons_per_s(warm)
     condition = replace(QUIET, temperature_c=warm)
     picture = frame(1_500, only(dark=True), gain, condition)
-    rounding = LSB8 / gain / np.sqrt(12)
+    rounding = quantisation_sigma(gain)
     assert electrons_sigma(picture, gain) == pytest.approx(np.hypot(dark**0.5, rounding), rel=0.02)
     plain = frame(1_500, only(), gain, condition)
     assert picture.mean() == pytest.approx(plain.mean(), abs=0.5)
@@ -91,7 +89,7 @@ def test_background_adds_its_mean_and_its_noise() -> None:
     picture = frame(500, only(background=True), gain, background=1_000.0)
     plain = frame(500, only(), gain)
     assert picture.mean() - plain.mean() == pytest.approx(1_000 * gain / LSB8, abs=0.5)
-    rounding = LSB8 / gain / np.sqrt(12)
+    rounding = quantisation_sigma(gain)
     assert electrons_sigma(picture, gain) == pytest.approx(np.hypot(1_000**0.5, rounding), rel=0.03)
 
 
@@ -104,18 +102,16 @@ def test_quantisation_follows_its_formula() -> None:
 
     wired = error(only(quantisation=True))
     # The upper 8 of 10 bits: the error of 8 bits, and on the average what is cut off.
-    assert wired.std() == pytest.approx(quantisation_sigma(1.0, bits=8), rel=0.02)
+    assert wired.std() == pytest.approx(quantisation_sigma(), rel=0.02)
     assert wired.mean() == pytest.approx(1.5 * LSB8 / 4, rel=0.05)
     assert error(only()).mean() == pytest.approx(0, abs=0.02 * LSB8)
 
 
 def test_the_terms_add_up_as_variances() -> None:
-    light, gain = 800.0, 8.0
-    everything = noise.NoiseTerms()
-    dark, background = noise.dark_electrons_per_s(20.0), 15.0
-    variance = light + dark + background + noise.READ_NOISE_ELECTRONS**2
-    variance += quantisation_sigma(gain, bits=8) ** 2
-    measured = electrons_sigma(frame(light, everything, gain), gain)
+    light, gain, background = 800.0, 8.0, 15.0
+    variance = light + noise.dark_electrons_per_s(20.0) + background
+    variance += noise.READ_NOISE_ELECTRONS**2 + quantisation_sigma(gain) ** 2
+    measured = electrons_sigma(frame(light, noise.NoiseTerms(), gain), gain)
     assert measured == pytest.approx(np.sqrt(variance), rel=0.02)
 
 

@@ -9,6 +9,7 @@ import pytest
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412 import lens as other_lens
 from cubestack.emulator.camera.mt9m001.lens import CONDITION, double_gauss
+from cubestack.emulator.camera.mt9m001.registers import GAINS
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
@@ -42,9 +43,9 @@ def get(camera: Mt9m001, name: str) -> int:
     return int.from_bytes(answer, "big")
 
 
-def frame_starts(camera: Mt9m001, start_ps: int, until_ps: int) -> list[int]:
+def starts(segments: list[tuple[int, int, int, int]]) -> list[int]:
     """When FRAME_VALID rises."""
-    return [s[0] for s in stream(camera, start_ps, until_ps) if s[1] == 242]
+    return [start for start, clocks, *_ in segments if clocks == 242]
 
 
 def stream(camera: Mt9m001, start_ps: int, until_ps: int) -> list[tuple[int, int, int, int]]:
@@ -71,23 +72,16 @@ def frame(camera: Mt9m001, after_ps: int) -> np.ndarray:
 
 def test_default_frames_follow_the_data_sheet(camera: Mt9m001) -> None:
     segments = stream(camera, 0, 100 * PS_PER_MS)
-    first_frame = next(i for i, s in enumerate(segments) if s[2])
-    assert segments[first_frame : first_frame + 4] == [
-        (segments[first_frame][0], 242, 1, 0),
-        (segments[first_frame + 1][0], 1023 * ROW_CLOCKS, 1, 1023),
-        (segments[first_frame + 2][0], 1282, 1, 1),  # the last line ends 2 clocks after its pixels
-        (segments[first_frame + 3][0], 26 * ROW_CLOCKS, 0, 0),
+    first = next(i for i, s in enumerate(segments) if s[2])
+    assert [s[1:] for s in segments[first : first + 4]] == [
+        (242, 1, 0),
+        (1023 * ROW_CLOCKS, 1, 1023),
+        (1282, 1, 1),  # the last line ends 2 clocks after its pixels
+        (26 * ROW_CLOCKS, 0, 0),
     ]
-    starts = [s[0] for s in segments if s[1] == 242]
-    assert np.diff(starts) == pytest.approx(1050 * ROW_S * PS_PER_S)
-    assert starts[0] == pytest.approx(1050 * ROW_S * PS_PER_S)  # one exposure and a row
-
-
-def test_segments_leave_no_gap_and_no_overlap(camera: Mt9m001) -> None:
-    put(camera, "SHUTTER_WIDTH", 1500)
-    segments = stream(camera, 0, 300 * PS_PER_MS)
-    for (start, clocks, *_), (following, *_) in pairwise(segments):
-        assert following - (start + clocks * PS_PER_S // chip.PIXEL_CLOCK_HZ) in (0, 1)
+    begun = starts(segments)
+    assert np.diff(begun) == pytest.approx(1050 * ROW_S * PS_PER_S)
+    assert begun[0] == pytest.approx(1050 * ROW_S * PS_PER_S)  # one exposure and a row
 
 
 @pytest.mark.parametrize(
@@ -95,13 +89,14 @@ def test_segments_leave_no_gap_and_no_overlap(camera: Mt9m001) -> None:
 )
 def test_a_long_exposure_makes_the_frame_longer(camera: Mt9m001, shutter: int, rows: int) -> None:
     put(camera, "SHUTTER_WIDTH", shutter)
-    starts = frame_starts(camera, 0, PS_PER_S)
-    assert np.diff(starts) == pytest.approx(rows * ROW_S * PS_PER_S)
-    exposure = camera.frame_from(starts[-1])
+    segments = stream(camera, 0, PS_PER_S)
+    for (start, clocks, *_), (following, *_) in pairwise(segments):
+        assert following - (start + clocks * PS_PER_S // chip.PIXEL_CLOCK_HZ) in (0, 1)
+    *_, last = begun = starts(segments)
+    assert np.diff(begun) == pytest.approx(rows * ROW_S * PS_PER_S)
+    exposure = camera.frame_from(last)
     assert exposure.exposure_s == pytest.approx(shutter * ROW_S)
-    assert exposure.readout_ps == pytest.approx(
-        starts[-1] + 242 / chip.PIXEL_CLOCK_HZ * PS_PER_S, abs=1
-    )
+    assert exposure.readout_ps == pytest.approx(last + 242 / chip.PIXEL_CLOCK_HZ * PS_PER_S, abs=1)
 
 
 def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(camera: Mt9m001) -> None:
@@ -109,19 +104,17 @@ def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(camera: Mt9m00
     change = 50 * PS_PER_MS  # in the read-out of the first frame, which lasts to 67.5 ms
     put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
     segments = stream(camera, change, PS_PER_S)
-    first = segments[0]
-    assert first[2] == 1  # the frame under way goes on
-    starts = [s[0] for s in segments if s[1] == 242]
+    assert segments[0][2] == 1  # the frame under way goes on
     end_of_old = 1050 * ROW_S + 1024 * ROW_S
-    assert starts[0] / PS_PER_S == pytest.approx(end_of_old + 3001 * ROW_S, abs=1e-7)
+    assert starts(segments)[0] / PS_PER_S == pytest.approx(end_of_old + 3001 * ROW_S, abs=1e-7)
 
 
 def test_a_change_between_frames_counts_from_its_own_time(camera: Mt9m001) -> None:
     change = 662 * PS_PER_MS // 10  # the first frame ended at 65.85 ms, the next is due at 66.68
     stream(camera, 0, change)
     put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
-    starts = frame_starts(camera, change, PS_PER_S)
-    assert starts[0] / PS_PER_S == pytest.approx(0.0662 + 3001 * ROW_S, abs=1e-7)
+    first = starts(stream(camera, change, PS_PER_S))[0]
+    assert first / PS_PER_S == pytest.approx(0.0662 + 3001 * ROW_S, abs=1e-7)
 
 
 def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:
@@ -137,9 +130,7 @@ def test_registers_answer_as_declared(camera: Mt9m001) -> None:
     for register in chip.REGISTERS:
         assert get(camera, register.name) == register.reset, register.name
     put(camera, "GLOBAL_GAIN", 0x51)
-    assert {get(camera, n) for n in ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")} == {
-        0x51
-    }
+    assert {get(camera, name) for name in GAINS} == {0x51}
     put(camera, "CHIP_VERSION", 1)  # read-only
     assert get(camera, "CHIP_VERSION") == 0x8431
     put(camera, "CHIP_ENABLE", 0)
@@ -156,12 +147,8 @@ def test_registers_answer_as_declared(camera: Mt9m001) -> None:
 
 def test_consecutive_registers_half_words_and_strangers(camera: Mt9m001) -> None:
     put(camera, "ROW_START", 20, 40, 255, 639)
-    assert [get(camera, n) for n in ("ROW_START", "COLUMN_START", "ROW_SIZE", "COLUMN_SIZE")] == [
-        20,
-        40,
-        255,
-        639,
-    ]
+    names = ("ROW_START", "COLUMN_START", "ROW_SIZE", "COLUMN_SIZE")
+    assert [get(camera, name) for name in names] == [20, 40, 255, 639]
     assert camera.i2c_write(ADDRESS, b"\x09\x12", 0)
     assert get(camera, "SHUTTER_WIDTH") == 0x0419
     assert camera.i2c_write(ADDRESS, b"", 0)
@@ -171,12 +158,11 @@ def test_consecutive_registers_half_words_and_strangers(camera: Mt9m001) -> None
 
 def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs(camera: Mt9m001) -> None:
     put(camera, "SHUTTER_WIDTH", 77)
-    for off, on in ((camera.power, camera.power), (camera.set_reset_pin, camera.set_reset_pin)):
-        off(False, 10)
-        assert camera.segment_at(20) is None
-        assert camera.frame_from(20) is None
+    for switch in (camera.power, camera.set_reset_pin):
+        switch(False, 10)
+        assert camera.segment_at(20) is camera.frame_from(20) is None
         assert not camera.i2c_write(ADDRESS, b"\x00", 20)
-        on(True, 30)
+        switch(True, 30)
         assert get(camera, "SHUTTER_WIDTH") == 0x0419
 
 
@@ -189,27 +175,26 @@ def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure(camera: Mt9m
     assert changes
     assert all(s[2:] == (0, 0) for s in stream(camera, stop, start))
     put(camera, "OUTPUT_CONTROL", 2, now_ps=start)
-    frames = frame_starts(camera, start, 200 * PS_PER_MS)
-    assert frames[0] == pytest.approx(start + 1050 * ROW_S * PS_PER_S, rel=1e-6)
+    exposed_ps = 1050 * ROW_S * PS_PER_S
+    first = starts(stream(camera, start, 200 * PS_PER_MS))[0]
+    assert first == pytest.approx(start + exposed_ps, rel=1e-6)
     put(camera, "RESTART", 1, now_ps=250 * PS_PER_MS)
-    frames = frame_starts(camera, 250 * PS_PER_MS, 350 * PS_PER_MS)
-    assert frames[0] == pytest.approx(250 * PS_PER_MS + 1050 * ROW_S * PS_PER_S, rel=1e-6)
+    first = starts(stream(camera, 250 * PS_PER_MS, 350 * PS_PER_MS))[0]
+    assert first == pytest.approx(250 * PS_PER_MS + exposed_ps, rel=1e-6)
 
 
 def test_a_window_is_a_part_of_the_picture() -> None:
-    still = SkyView(scene(), QUIET)
-    camera = Mt9m001(still)
-    put(camera, "SHUTTER_WIDTH", 6000)
-    whole = frame(camera, 0)
+    def taken(shutter: int, *window: int) -> np.ndarray:
+        made = Mt9m001(SkyView(scene(), QUIET))
+        put(made, "ROW_START", *window)
+        put(made, "SHUTTER_WIDTH", shutter)
+        return frame(made, 0)
+
+    whole = taken(6000)
     assert whole.shape == (chip.ROWS, chip.COLUMNS)
-    small = Mt9m001(still)
-    put(small, "ROW_START", 12 + 300, 20 + 200, 399, 517)  # lines of half the length
-    put(small, "SHUTTER_WIDTH", 12_000)
-    np.testing.assert_array_equal(frame(small, 0), whole[300:700, 200:718])
-    beyond = Mt9m001(still)
-    put(beyond, "ROW_START", 2, 10, 99, 517)  # ten rows and ten columns before the active ones
-    put(beyond, "SHUTTER_WIDTH", 12_000)
-    picture = frame(beyond, 0)
+    small = taken(12_000, 12 + 300, 20 + 200, 399, 517)  # lines of half the length
+    np.testing.assert_array_equal(small, whole[300:700, 200:718])
+    picture = taken(12_000, 2, 10, 99, 517)  # ten rows and ten columns before the active ones
     np.testing.assert_array_equal(picture[10:, 10:], whole[:90, :508])
     assert (picture[:10] == 1).all()
 
@@ -217,8 +202,7 @@ def test_a_window_is_a_part_of_the_picture() -> None:
 def test_gain_multiplies_and_can_differ_by_rows_and_columns() -> None:
     camera = Mt9m001(scene(mag_limit=-5.0), condition=QUIET)
     assert np.unique(frame(camera, 0)).tolist() == [2]  # the black level, rounded
-    wide = replace(QUIET, optics=double_gauss(spot_sigma_px=4))
-    bright = Mt9m001(scene(), condition=wide)
+    bright = Mt9m001(scene(), condition=replace(QUIET, optics=double_gauss(spot_sigma_px=4)))
     put(bright, "SHUTTER_WIDTH", 6000)
     once = frame(bright, 0).astype(int) - 1.5
     put(bright, "GLOBAL_GAIN", chip.gain_register(8.0), now_ps=PS_PER_S)
@@ -265,10 +249,10 @@ def test_a_turning_camera_smears_along_its_motion() -> None:
         row, column = divmod(int(np.argmax(picture)), chip.COLUMNS)
         around = picture[row - 12 : row + 13, column - 12 : column + 13].astype(float) - 2
         y, x = np.mgrid[:25, :25]
-        total = around.sum()
+        means = [np.average(axis, weights=around) for axis in (x, y)]
         return tuple(
-            float((around * axis**2).sum() / total - ((around * axis).sum() / total) ** 2)
-            for axis in (x, y)
+            float(np.average((axis - mean) ** 2, weights=around))
+            for axis, mean in zip((x, y), means, strict=True)
         )
 
     wide, high = spread(turning)
