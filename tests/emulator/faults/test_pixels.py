@@ -135,38 +135,33 @@ def test_drawn_places_repeat_with_the_seed() -> None:
     assert len(set(logs[0])) > 5
 
 
-def rendered(*faults: Any) -> np.ndarray:
-    segment = faulty(*faults)[0].segment_at(0)
-    assert segment is not None
-    assert segment.pixels is not None
-    return segment.pixels()
+def rendered(source: FaultySource) -> np.ndarray:
+    return source.segment_at(0).pixels()
 
 
 def test_pixels() -> None:
     clean = Camera().picture
     expected = clean.copy()
     expected[1, 2], expected[3, 4], expected[:, 5] = 255, 0, 9
-    found = rendered(
+    source, _ = faulty(
         table.PixelHot(x=2, y=1), table.PixelDead(x=4, y=3), table.ColumnDefect(x=5, level=9)
     )
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(rendered(source), expected)
     assert clean[1, 2] == 8  # the camera's own picture is not touched
 
 
 def test_blooming_goes_along_the_column() -> None:
     expected = Camera().picture.copy()
     expected[2:, 5] = 255
-    np.testing.assert_array_equal(rendered(table.Blooming(threshold=29, length=2)), expected)
+    source, _ = faulty(table.Blooming(threshold=29, length=2))
+    np.testing.assert_array_equal(rendered(source), expected)
 
 
 def test_lines_outside_of_the_time_are_good() -> None:
     source, _ = faulty(table.ColumnDefect(x=0))
     source.injections[0].start_ps = int(LINE * PERIOD)
     source.injections[0].end_ps = int(3 * LINE * PERIOD)
-    segment = source.segment_at(0)
-    assert segment is not None
-    assert segment.pixels is not None
-    assert list(segment.pixels()[:, 0] == 255) == [False, True, True, False, False]
+    assert list(rendered(source)[:, 0] == 255) == [False, True, True, False, False]
 
 
 def test_a_dead_camera_has_no_clock() -> None:

@@ -30,16 +30,12 @@ def test_a_plan(tmp_path: Path) -> None:
     path = tmp_path / "plan.toml"
     path.write_text(PLAN)
     plan = load_plan(path)
-    assert plan.seed == 7
-    assert plan.name == str(path)
+    assert (plan.seed, plan.name) == (7, str(path))
     assert plan.faults == (
         PlannedFault(UartDrop(rate=0.25), None, 2, 0.5),
         PlannedFault(LatchUp(lasting=True), "memory"),
         PlannedFault(AckLost()),
     )
-
-
-def test_an_empty_plan_does_nothing() -> None:
     assert parse_plan("").faults == ()
 
 

@@ -80,7 +80,7 @@ def test_reading_what_is_not_modelled_is_logged(
     with caplog.at_level(logging.INFO):
         registers.select(0x13)
         assert [registers.read(), registers.read(), registers.read()] == [0, 0x42, 0]
-    assert [r.message for r in caplog.records] == [
+    assert caplog.messages == [
         "TEST1: read FANCY, which is not modelled",
         "TEST1: read 0x0015, where no register is known",
     ]

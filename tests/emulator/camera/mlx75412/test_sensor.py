@@ -292,7 +292,7 @@ def test_published_set_up_only_logs_what_is_not_modelled(caplog: pytest.LogCaptu
         assert not caplog.records
         write(camera, "LINEARITY", 0)
         write(camera, "HARDWARE_FEATURES", 0x4E)
-    messages = [r.message for r in caplog.records]
+    messages = caplog.messages
     assert messages == ["MLX75412: wrote LINEARITY, which is not modelled"] * 21 + [
         "MLX75412: set HISTOGRAM_REMAP of HARDWARE_FEATURES, which is not modelled"
     ]
