@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.thumbnail import frame_pixels
-from cubestack.firmware_model.cubesense.vision.edges import NadirLines
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.interface.cubesense.codes import ImageSize
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, SUN_NOT_FOUND, ReadOut
+from cubestack.firmware_model.mcu.costs import Meter
 
 COLUMNS, ROWS = FULL_SIZE.columns, FULL_SIZE.rows
 NADIR_BORESIGHT, SUN_BORESIGHT = (371.0, 236.0), (369.0, 250.0)
@@ -169,12 +170,19 @@ def window(picture: NDArray[np.uint8], threshold: int = 200) -> NDArray[np.uint8
     return np.concatenate([coordinates, picture[top : top + 15, left : left + 15].reshape(-1)])
 
 
-def feed(lines: NadirLines, data: NDArray[np.uint8]) -> None:
-    """Let ``lines`` take all of a scan's bytes."""
+def edges_in(
+    picture: NDArray[np.uint8],
+    meter: Meter,
+    config: EdgeConfig | None = None,
+    read_out: ReadOut = FULL_SIZE,
+) -> EdgeList:
+    """What the nadir scan of ``picture`` finds."""
+    lines, data = NadirLines(config or EdgeConfig(), meter, read_out), scan(picture, read_out)
     for size in iter(lambda: lines.wanted, 0):
         lines.space[:], data = data[:size], data[size:]
         lines.filled()
     assert not len(data)
+    return lines.edges
 
 
 def thumbnail(picture: NDArray[np.uint8], size: ImageSize) -> NDArray[np.uint8]:

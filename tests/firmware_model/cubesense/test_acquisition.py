@@ -1,6 +1,7 @@
 """Commands to the FPGAs, the wait for ACK, and bytes in sequence or by address."""
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,47 +17,35 @@ from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
 from cubestack.firmware_model.cubesense.vision.sample_search import around_samples
-from cubestack.firmware_model.interface.cubesense.codes import (
-    COLUMNS,
-    IMAGE_BYTES,
-    ROWS,
-    Camera,
-    CaptureResult,
-    Sram,
-)
+from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, Actions, actions
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
-from .scenery import earth, feed, scan, sun, window
+from .scenery import COLUMNS, ROWS, earth, edges_in, sun, window
 
 
-class Rig:
-    """Acquisition alone, on a harness.
-
-    Attributes:
-        doing: what the FPGAs did, one entry each time that an enable had just gone low.
-    """
+class Rig(Harness):
+    """Acquisition alone, on a harness."""
 
     def __init__(self, *, mcu_addressing: bool = False) -> None:
-        self.unit = Harness(mcu_addressing=mcu_addressing)
-        self.supply = Supply(self.unit, self.unit.meter, State())
-        self.acquisition = Acquisition(self.unit, self.unit.meter, self.supply)
-        self.run(self.supply.start())
+        super().__init__(mcu_addressing=mcu_addressing)
+        supply = Supply(self, self.meter, State())
+        self.acquisition = Acquisition(self, self.meter, supply)
+        self.perform(supply.start())
         rng = np.random.default_rng(3)
         for sram in Sram:
-            self.unit.memories[sram] = rng.integers(0, 256, (ROWS, COLUMNS), np.uint8)
-        self.doing: list[Actions] = []
-        self.unit.log.clear()
+            self.memories[sram] = rng.integers(0, 256, (ROWS, COLUMNS), np.uint8)
+        self.log.clear()
 
-    def run(self, routine: object) -> object:
-        return self.unit.perform(routine)
+    def store(self, camera: Camera, sram: Sram) -> CaptureResult:
+        return self.perform(self.acquisition.store(camera, sram))
 
     def entered(self) -> list[Actions]:
         """Rows of the command table that the log went through, standby left out."""
         levels = {"SHIFT": 0, "EDGE": 0, "RNW": 0, "SUNEN": 1, "NADEN": 1}
         rows = []
-        for _, request in self.unit.log:
+        for _, request in self.log:
             if isinstance(request, SetPin) and request.pin in levels:
                 levels[request.pin] = request.level
                 row = actions(*levels.values())
@@ -71,6 +60,7 @@ def rig() -> Rig:
 
 
 S = Action.STANDBY
+IMAGE_BYTES = ROWS * COLUMNS
 
 
 @pytest.mark.parametrize(
@@ -83,64 +73,59 @@ S = Action.STANDBY
     ],
 )
 def test_a_picture_goes_to_its_memory(rig: Rig, camera: Camera, sram: Sram, row: Actions) -> None:
-    rig.unit.scenes[camera] = picture = earth(0, 0)
+    rig.scenes[camera] = picture = earth(0, 0)
     other = Sram(1 - sram)
-    kept = rig.unit.memories[other].copy()
-    result = rig.run(rig.acquisition.store(camera, sram))
+    kept = rig.memories[other].copy()
     own = sram.value == camera.value
-    expected = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
-    assert result is expected
-    assert np.array_equal(rig.unit.memories[sram], picture)
-    assert np.array_equal(rig.unit.memories[other], kept)
+    stored = CaptureResult.STORED_OWN_SRAM if own else CaptureResult.STORED_OTHER_SRAM
+    assert rig.store(camera, sram) is stored
+    assert np.array_equal(rig.memories[sram], picture)
+    assert np.array_equal(rig.memories[other], kept)
     assert rig.entered()[-1] == row
-    assert rig.unit.pins["SUNEN"] == rig.unit.pins["NADEN"] == 1
+    assert rig.pins["SUNEN"] == rig.pins["NADEN"] == 1
 
 
 @pytest.mark.parametrize("sram", Sram)
 def test_a_dead_camera_costs_two_frames_and_no_picture(rig: Rig, sram: Sram) -> None:
-    rig.unit.scenes[Camera.SUN] = None
-    kept = rig.unit.memories[sram].copy()
-    start_us = rig.unit.now_us
-    assert rig.run(rig.acquisition.store(Camera.SUN, sram)) is CaptureResult.CAMERA_TIMEOUT
-    assert 2 * FRAME_US < rig.unit.now_us - start_us < ACK_TIMEOUT_US + 300
-    assert np.array_equal(rig.unit.memories[sram], kept)
-    assert rig.unit.pins["SUNEN"] == rig.unit.pins["NADEN"] == 1
+    rig.scenes[Camera.SUN] = None
+    kept = rig.memories[sram].copy()
+    start_us = rig.now_us
+    assert rig.store(Camera.SUN, sram) is CaptureResult.CAMERA_TIMEOUT
+    assert 2 * FRAME_US < rig.now_us - start_us < ACK_TIMEOUT_US + 300
+    assert np.array_equal(rig.memories[sram], kept)
+    assert rig.pins["SUNEN"] == rig.pins["NADEN"] == 1
 
 
 def test_the_longest_wait_for_a_live_camera_is_no_timeout(rig: Rig) -> None:
-    rig.unit.wait_us = 2 * FRAME_US - READ_OUT_US
-    assert rig.run(rig.acquisition.store(Camera.SUN, Sram.SRAM1)) is CaptureResult.STORED_OWN_SRAM
+    rig.wait_us = 2 * FRAME_US - READ_OUT_US
+    assert rig.store(Camera.SUN, Sram.SRAM1) is CaptureResult.STORED_OWN_SRAM
 
 
 @pytest.mark.parametrize("camera", Camera)
 def test_a_latch_up_ends_the_wait_at_once(rig: Rig, camera: Camera) -> None:
-    rig.unit.latched.add(Sram.SRAM2)
-    start_us = rig.unit.now_us
-    result = rig.run(rig.acquisition.store(camera, Sram.SRAM2))
-    assert result is CaptureResult.SRAM_OVER_CURRENT
-    assert rig.unit.now_us - start_us < SAMPLE_US + 200
-    assert rig.unit.cut() == {Sram.SRAM2}
-    rig.unit.log.clear()
-    again = rig.run(rig.acquisition.store(camera, Sram.SRAM2))
-    assert again is CaptureResult.SRAM_OVER_CURRENT
-    assert rig.unit.log == []  # nothing is tried with a memory that is off
+    rig.latched.add(Sram.SRAM2)
+    start_us = rig.now_us
+    assert rig.store(camera, Sram.SRAM2) is CaptureResult.SRAM_OVER_CURRENT
+    assert rig.now_us - start_us < SAMPLE_US + 200
+    assert rig.cut() == {Sram.SRAM2}
+    rig.log.clear()
+    assert rig.store(camera, Sram.SRAM2) is CaptureResult.SRAM_OVER_CURRENT
+    assert rig.log == []  # nothing is tried with a memory that is off
 
 
 def test_a_latch_up_of_the_other_memory_does_not_disturb(rig: Rig) -> None:
-    rig.unit.latched.add(Sram.SRAM2)
-    assert rig.run(rig.acquisition.store(Camera.SUN, Sram.SRAM1)) is CaptureResult.STORED_OWN_SRAM
-    assert rig.unit.cut() == {Sram.SRAM2}
+    rig.latched.add(Sram.SRAM2)
+    assert rig.store(Camera.SUN, Sram.SRAM1) is CaptureResult.STORED_OWN_SRAM
+    assert rig.cut() == {Sram.SRAM2}
 
 
 @pytest.mark.parametrize("sram", Sram)
 def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
-    rig.unit.memories[sram] = picture = earth(5, 5)
-    lines = NadirLines(EdgeConfig(), rig.unit.meter, buffer=rig.acquisition.buffers[0])
-    assert rig.run(rig.acquisition.scan(sram, lines)) is True
-    expected = NadirLines(EdgeConfig(), rig.unit.meter)
-    feed(expected, scan(picture))
+    rig.memories[sram] = picture = earth(5, 5)
+    lines = NadirLines(EdgeConfig(), rig.meter, buffer=rig.acquisition.buffers[0])
+    assert rig.perform(rig.acquisition.scan(sram, lines)) is True
     assert len(lines.edges) > 10
-    assert np.array_equal(lines.edges.points, expected.edges.points)
+    assert np.array_equal(lines.edges.points, edges_in(picture, rig.meter).points)
     assert lines.wanted == 0
     linked = Actions(Action.SEND_EDGE, Action.PASS_EDGE)
     assert rig.entered() == [linked if sram is Sram.SRAM1 else Actions(S, Action.EDGE)]
@@ -148,9 +133,8 @@ def test_the_nadir_scan_from_either_memory(rig: Rig, sram: Sram) -> None:
 
 @pytest.mark.parametrize("sram", Sram)
 def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
-    rig.unit.memories[sram] = picture = sun(np.array([300.0, 200.0]), 6)
-    data = rig.run(rig.acquisition.window(sram))
-    assert isinstance(data, np.ndarray)
+    rig.memories[sram] = picture = sun(np.array([300.0, 200.0]), 6)
+    data = rig.perform(rig.acquisition.window(sram))
     assert np.array_equal(data, window(picture))
     linked = Actions(Action.PASS_EDGE, Action.SEND_EDGE)
     assert rig.entered() == [linked if sram is Sram.SRAM2 else Actions(Action.EDGE, S)]
@@ -171,18 +155,18 @@ def latch_after(unit: Harness, sram: Sram, strobed: int) -> None:
 
 
 def test_a_latch_up_is_noticed_before_the_next_line_is_read(rig: Rig) -> None:
-    latch_after(rig.unit, Sram.SRAM2, 3000)
-    lines = NadirLines(EdgeConfig(), rig.unit.meter)
-    assert rig.run(rig.acquisition.scan(Sram.SRAM2, lines)) is False
-    read = [len(r.target) for _, r in rig.unit.log if isinstance(r, StrobeRead)]
+    latch_after(rig, Sram.SRAM2, 3000)
+    lines = NadirLines(EdgeConfig(), rig.meter)
+    assert rig.perform(rig.acquisition.scan(Sram.SRAM2, lines)) is False
+    read = [len(r.target) for _, r in rig.log if isinstance(r, StrobeRead)]
     assert 3000 <= sum(read) <= 3000 + SAMPLE_BYTES + CHUNK
-    assert rig.unit.cut() == {Sram.SRAM2}
-    assert rig.unit.pins["SUNEN"] == rig.unit.pins["NADEN"] == 1
+    assert rig.cut() == {Sram.SRAM2}
+    assert rig.pins["SUNEN"] == rig.pins["NADEN"] == 1
 
 
 def test_a_latch_up_spoils_the_suns_window(rig: Rig) -> None:
-    latch_after(rig.unit, Sram.SRAM1, 1)
-    assert rig.run(rig.acquisition.window(Sram.SRAM1)) is None
+    latch_after(rig, Sram.SRAM1, 1)
+    assert rig.perform(rig.acquisition.window(Sram.SRAM1)) is None
 
 
 def parts(rng: np.random.Generator) -> Iterator[tuple[int, int]]:
@@ -199,27 +183,27 @@ def parts(rng: np.random.Generator) -> Iterator[tuple[int, int]]:
 @pytest.mark.parametrize("sram", Sram)
 def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
     rig = Rig(mcu_addressing=mcu_addressing)
-    acquisition, picture = rig.acquisition, rig.unit.memories[sram].reshape(-1)
-    assert rig.run(acquisition.open_picture(sram)) is True
+    acquisition, picture = rig.acquisition, rig.memories[sram].reshape(-1)
+    assert rig.perform(acquisition.open_picture(sram)) is True
     at = 0
     for skip, read in parts(np.random.default_rng(sram)):
-        rig.run(acquisition.skip_bytes(skip))
+        rig.perform(acquisition.skip_bytes(skip))
         target = np.zeros(read, np.uint8)
-        rig.run(acquisition.read_bytes(target))
+        rig.perform(acquisition.read_bytes(target))
         at += skip + read
         assert np.array_equal(target, picture[at - read : at])
     assert acquisition.picture_open
-    assert np.array_equal(rig.unit.memories[sram].reshape(-1), picture)
+    assert np.array_equal(rig.memories[sram].reshape(-1), picture)
 
 
 def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
     times = []
     for mcu_addressing in (False, True):
         rig = Rig(mcu_addressing=mcu_addressing)
-        rig.run(rig.acquisition.open_picture(Sram.SRAM1))
-        start_us = rig.unit.now_us
-        rig.run(rig.acquisition.skip_bytes(IMAGE_BYTES - 64))
-        times.append(rig.unit.now_us - start_us)
+        rig.perform(rig.acquisition.open_picture(Sram.SRAM1))
+        start_us = rig.now_us
+        rig.perform(rig.acquisition.skip_bytes(IMAGE_BYTES - 64))
+        times.append(rig.now_us - start_us)
     clocked_us, addressed_us = times
     assert clocked_us == pytest.approx(IMAGE_BYTES * 4, rel=0.03)
     assert addressed_us < 30
@@ -230,48 +214,43 @@ def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
     for other in (
         rig.acquisition.store(Camera.NADIR, Sram.SRAM2),
         rig.acquisition.window(Sram.SRAM1),
-        rig.acquisition.scan(Sram.SRAM2, NadirLines(EdgeConfig(), rig.unit.meter)),
+        rig.acquisition.scan(Sram.SRAM2, NadirLines(EdgeConfig(), rig.meter)),
     ):
-        rig.run(rig.acquisition.open_picture(Sram.SRAM1))
-        rig.run(rig.acquisition.read_bytes(target))
+        rig.perform(rig.acquisition.open_picture(Sram.SRAM1))
+        rig.perform(rig.acquisition.read_bytes(target))
         assert rig.acquisition.picture_open
-        rig.run(other)
+        rig.perform(other)
         assert not rig.acquisition.picture_open
 
 
 def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
     target = np.zeros(5000, np.uint8)
-    rig.run(rig.acquisition.open_picture(Sram.SRAM1))
-    latch_after(rig.unit, Sram.SRAM1, 1000)
-    rig.run(rig.acquisition.read_bytes(target))
+    rig.perform(rig.acquisition.open_picture(Sram.SRAM1))
+    latch_after(rig, Sram.SRAM1, 1000)
+    rig.perform(rig.acquisition.read_bytes(target))
     assert not rig.acquisition.picture_open
     assert not target[1000 + SAMPLE_BYTES + CHUNK :].any()
-    assert rig.run(rig.acquisition.open_picture(Sram.SRAM1)) is False
+    assert rig.perform(rig.acquisition.open_picture(Sram.SRAM1)) is False
 
 
 def test_single_pixels_by_address() -> None:
     rig = Rig(mcu_addressing=True)
-    rig.unit.memories[Sram.SRAM2] = picture = earth(-12, 4)
-    meter = rig.unit.meter
-    answer = rig.run(rig.acquisition.answer(Sram.SRAM2, around_samples(EdgeConfig(), meter)))
-    assert isinstance(answer, tuple)
-    edges, pixels = answer
-    lines = NadirLines(EdgeConfig(), meter)
-    feed(lines, scan(picture))
-    assert {*map(tuple, edges.points)} == {*map(tuple, lines.edges.points)}
-    assert pixels < 250
-    latch_after(rig.unit, Sram.SRAM2, 10)
+    rig.memories[Sram.SRAM2] = picture = earth(-12, 4)
+    meter = rig.meter
     search = around_samples(EdgeConfig(), meter)
-    assert rig.run(rig.acquisition.answer(Sram.SRAM2, search)) is None
+    edges, pixels = rig.perform(rig.acquisition.answer(Sram.SRAM2, search))
+    assert {*map(tuple, edges.points)} == {*map(tuple, edges_in(picture, meter).points)}
+    assert pixels < 250
+    latch_after(rig, Sram.SRAM2, 10)
+    search = around_samples(EdgeConfig(), meter)
+    assert rig.perform(rig.acquisition.answer(Sram.SRAM2, search)) is None
 
 
 def test_which_pictures_can_be_addressed() -> None:
-    for mcu_addressing in (False, True):
-        acquisition = Rig(mcu_addressing=mcu_addressing).acquisition
-        for camera in Camera:
-            for sram in Sram:
-                own = camera.value == sram.value
-                assert acquisition.can_address(camera, sram) == (own and mcu_addressing)
+    own = {(Camera.SUN, Sram.SRAM1), (Camera.NADIR, Sram.SRAM2)}
+    for mcu_addressing, expected in ((False, set()), (True, own)):
+        can_address = Rig(mcu_addressing=mcu_addressing).acquisition.can_address
+        assert {pair for pair in product(Camera, Sram) if can_address(*pair)} == expected
 
 
 def test_an_addressed_pixel_costs_what_the_table_says() -> None:
@@ -281,9 +260,9 @@ def test_an_addressed_pixel_costs_what_the_table_says() -> None:
     def search() -> Iterator[tuple[int, int]]:
         for x, y in asked:
             value = yield int(x), int(y)
-            assert value == rig.unit.memories[Sram.SRAM1][y, x]
+            assert value == rig.memories[Sram.SRAM1][y, x]
 
-    rig.run(rig.acquisition.answer(Sram.SRAM1, search()))
-    strobed = [us for us, r in rig.unit.log if isinstance(r, StrobeRead)]
-    cost = rig.unit.meter.table.operations["address_byte"].cycles
+    rig.perform(rig.acquisition.answer(Sram.SRAM1, search()))
+    strobed = [us for us, r in rig.log if isinstance(r, StrobeRead)]
+    cost = rig.meter.table.operations["address_byte"].cycles
     assert np.diff(strobed) == pytest.approx(cost / 5, abs=1)

@@ -10,7 +10,6 @@ from cubestack.firmware_model.cubesense.measurement import READ_OUT_TICKS
 from cubestack.firmware_model.cubesense.state import distortion_of
 from cubestack.firmware_model.cubesense.timer import microseconds
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, fine_table
-from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -27,7 +26,7 @@ from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
-from .scenery import SUN_BORESIGHT, chequered, earth, error_deg, feed, place, scan, sun, window
+from .scenery import SUN_BORESIGHT, chequered, earth, edges_in, error_deg, place, sun, window
 
 TICK_US = 51.2
 
@@ -98,15 +97,14 @@ def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[floa
     assert error_deg((measured["Alpha"], measured["Beta"]), truth) < 0.2
     factors = distortion_of(INTERFACE.telecommand("Distortion2").reset_values())
     meter = Meter(PIC18F45K20)
-    lines = NadirLines(EdgeConfig(), meter)
-    feed(lines, scan(picture))
+    edges = edges_in(picture, meter)
     table = fine_table(meter, Projection.STEREOGRAPHIC, factors)
-    expected = find_nadir(lines.edges, NadirConfig(table), meter)
+    expected = find_nadir(edges, NadirConfig(table), meter)
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)
     assert (measured["Points"], measured["Sram"]) == (expected.edges, sram)
     assert measured["Radius"] == pytest.approx(63.5 * 2.9, abs=0.5)
     assert (measured["FirstX"], measured["FirstY"], measured["PixelsRead"]) == (0, 0, 9920)
-    assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in lines.edges.points}
+    assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in edges.points}
 
 
 def no_memory(unit: Harness, sram: Sram) -> None:

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
-from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun, window_bytes
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu import pic18
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
 
-from .scenery import SUN_BORESIGHT, earth, feed, scan, sun, window
+from .scenery import SUN_BORESIGHT, earth, edges_in, sun, window
 
 IMAGING_S = 0.048
 
@@ -31,11 +32,9 @@ def nadir_seconds(table: CostTable, config: NadirConfig, edges: EdgeConfig) -> f
     times = []
     for alpha, beta in ((0, 0), (10, 0), (0, 10), (7, -9), (20, 5)):
         meter = Meter(table)
-        data = scan(earth(alpha, beta))
-        meter.charge(scan_byte=len(data))
-        lines = NadirLines(edges, meter)
-        feed(lines, data)
-        assert find_nadir(lines.edges, config, meter).detect is DetectResult.SUCCESS
+        meter.charge(scan_byte=FULL_SIZE.scan_clocks)
+        found = edges_in(earth(alpha, beta), meter, edges)
+        assert find_nadir(found, config, meter).detect is DetectResult.SUCCESS
         times.append(table.seconds(meter.total))
     return float(np.mean(times))
 

@@ -4,28 +4,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.vision.edges import (
-    MAX_EDGES,
-    EdgeConfig,
-    EdgeList,
-    NadirLines,
-)
+from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig, NadirLines
 from cubestack.firmware_model.cubesense.vision.masks import Mask
-from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
 
-from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, distort, earth, feed, place, scan
+from ..scenery import COLUMNS, NADIR_BORESIGHT, ROWS, distort, earth, edges_in, place
 
 WHOLE = EdgeConfig(sub_pixel=False)
 NO_RIM = EdgeConfig(sub_pixel=False, rim_px=1000)
-
-
-def search(
-    picture: NDArray[np.uint8], config: EdgeConfig, meter: Meter, read_out: ReadOut = FULL_SIZE
-) -> EdgeList:
-    lines = NadirLines(config, meter, read_out)
-    feed(lines, scan(picture, read_out))
-    return lines.edges
 
 
 def literal(picture: NDArray[np.uint8], config: EdgeConfig) -> list[list[int]]:
@@ -60,7 +47,7 @@ def test_whole_pixels_agree_with_the_literal_search_in_roughness(meter: Meter, s
     picture = rng.integers(0, 90, (ROWS, COLUMNS)).astype(np.uint8)
     picture[rng.integers(0, 2, (ROWS // 40, COLUMNS // 40)).repeat(40, 0).repeat(40, 1) > 0] += 60
     config = EdgeConfig(sub_pixel=False, threshold=80, rim_px=float(rng.uniform(100, 230)))
-    edges = search(picture, config, meter)
+    edges = edges_in(picture, meter, config)
     expected = literal(picture, config)
     assert len(expected) > 8
     assert (edges.points // 32).tolist() == expected[:MAX_EDGES]
@@ -81,7 +68,7 @@ def test_the_buffer_asks_for_64_pixels_and_32_at_a_column_s_end(meter: Meter) ->
 def test_steps_of_the_binary_search(meter: Meter, start: int, end: int, steps: int) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[start:end, 127] = 200
-    edges = search(picture, NO_RIM, meter)
+    edges = edges_in(picture, meter, NO_RIM)
     on_rows = edges.points[:, 1] % (64 * 32) == 15 * 32
     assert (edges.points[~on_rows] // 32).tolist() == [[127, start], [127, end - 1]]
     row_edges = int(on_rows.sum())
@@ -92,7 +79,7 @@ def test_steps_of_the_binary_search(meter: Meter, start: int, end: int, steps: i
 def test_an_edge_on_any_pixel_of_the_buffer_is_exact(meter: Meter, first: int) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[15, first:320] = 70
-    edges = search(picture, NO_RIM, meter)
+    edges = edges_in(picture, meter, NO_RIM)
     on_the_row = [point // 32 for point in edges.points if point[1] == 15 * 32]
     assert [point[0] for point in on_the_row][:2] == [first, 319]
 
@@ -101,7 +88,7 @@ def test_sub_pixel_edges_lie_where_the_threshold_is_met(meter: Meter) -> None:
     picture = np.zeros((ROWS, COLUMNS), np.uint8)
     picture[79, 300:400] = 100
     picture[79, [299, 400]] = 40  # 70 is half-way from 40 to 100
-    edges = search(picture, EdgeConfig(), meter)
+    edges = edges_in(picture, meter)
     assert edges.points.tolist()[:2] == [[32 * 300 - 16, 79 * 32], [32 * 399 + 16, 79 * 32]]
     assert edges.offsets()[0].tolist() == [299.5 - 371, 79 - 236]
 
@@ -114,7 +101,7 @@ def test_sub_pixel_edges_follow_the_limb(meter: Meter) -> None:
         distance: list[float] = []
         for _ in range(8):
             picture = earth(0, 0, altitude_km=float(rng.uniform(500, 1500)))
-            edges = search(picture, EdgeConfig(sub_pixel=sub_pixel), meter)
+            edges = edges_in(picture, meter, EdgeConfig(sub_pixel=sub_pixel))
             radii = np.hypot(*edges.offsets().T)
             distance += (radii - radii.mean()).tolist()
         spread[sub_pixel] = float(np.std(distance))
@@ -123,13 +110,13 @@ def test_sub_pixel_edges_follow_the_limb(meter: Meter) -> None:
 
 def test_the_rim_makes_no_edges(meter: Meter) -> None:
     # The Earth fills one side of the field of view and ends at its rim.
-    edges = search(earth(75, 20), EdgeConfig(), meter)
+    edges = edges_in(earth(75, 20), meter)
     assert edges.false > 3
     assert np.hypot(*edges.offsets().T).max() < 226
     outward = edges.offsets() @ np.array([75, 20]) / np.hypot(75, 20)
     assert outward.max() < distort(2.9 * 90)
     for config, expected in ((WHOLE, True), (EdgeConfig(), False)):
-        offsets = search(earth(75, 20), config, meter).offsets()
+        offsets = edges_in(earth(75, 20), meter, config).offsets()
         assert bool((np.hypot(*offsets.T) > 225).any()) is expected
 
 
@@ -137,14 +124,14 @@ def test_the_rim_makes_no_edges(meter: Meter) -> None:
 @pytest.mark.parametrize("tilt", [0, 15, 30])
 def test_a_full_earth_at_750_km_gives_18_to_24_edges(meter: Meter, turn: int, tilt: int) -> None:
     a, b = tilt * np.cos(np.radians(turn)), tilt * np.sin(np.radians(turn))
-    assert 18 <= len(search(earth(a, b), EdgeConfig(), meter)) <= 24
+    assert 18 <= len(edges_in(earth(a, b), meter)) <= 24
 
 
 def test_edges_in_a_mask_are_dropped(meter: Meter) -> None:
     x, y = place(0, 0, NADIR_BORESIGHT)
     mask = Mask(0, int(x), 0, ROWS - 1)
-    everything = search(earth(0, 0), EdgeConfig(), meter).points
-    kept = search(earth(0, 0), EdgeConfig(masks=(Mask(), mask)), meter)
+    everything = edges_in(earth(0, 0), meter).points
+    kept = edges_in(earth(0, 0), meter, EdgeConfig(masks=(Mask(), mask)))
     assert kept.points.tolist() == [p for p in everything.tolist() if p[0] >= 32 * x + 32]
     assert kept.false == len(everything) - len(kept) > 0
     assert int(y) == 236
@@ -156,7 +143,7 @@ def test_small_frames(meter: Meter, seed: int) -> None:
     small = ReadOut(columns=24, rows=20, scan_step=8, first_row=3, first_column=7, window=7)
     picture = rng.integers(0, 255, (20, 24)).astype(np.uint8)
     config = EdgeConfig(threshold=128, boresight=(12, 10), rim_px=100, sub_pixel=False)
-    for x, y in search(picture, config, meter, small).points.tolist():
+    for x, y in edges_in(picture, meter, config, small).points.tolist():
         neighbours = []
         if y // 32 in small.scan_rows:
             neighbours += [(x // 32 + d, y // 32) for d in (-1, 1)]

@@ -3,22 +3,20 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
-from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, NadirResult, find_nadir
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
-from ..scenery import COLUMNS, ROWS, angular_radius_deg, earth, error_deg, feed, scan
+from ..scenery import COLUMNS, ROWS, angular_radius_deg, earth, edges_in, error_deg
 
 
 def measure(
     picture: NDArray[np.uint8], config: NadirConfig, edges: EdgeConfig | None = None
 ) -> NadirResult:
     meter = Meter(PIC18F45K20)
-    lines = NadirLines(edges or EdgeConfig(), meter)
-    feed(lines, scan(picture))
-    return find_nadir(lines.edges, config, meter)
+    return find_nadir(edges_in(picture, meter, edges), config, meter)
 
 
 @pytest.fixture
@@ -111,12 +109,10 @@ def test_not_every_edge_may_be_dropped(ours: NadirConfig) -> None:
 
 
 def test_phases_are_charged(ours: NadirConfig, meter: Meter) -> None:
-    lines = NadirLines(EdgeConfig(), meter)
-    feed(lines, scan(earth(0, 0)))
-    find_nadir(lines.edges, ours, meter)
+    edges = edges_in(earth(0, 0), meter)
+    find_nadir(edges, ours, meter)
     assert set(meter.phases) == {"undistort", "fit"}
-    assert meter.phases["undistort"] > 1000 * len(lines.edges)
-    assert meter.phases["fit"] > 1000 * len(lines.edges)
+    assert min(meter.phases.values()) > 1000 * len(edges)
 
 
 @pytest.mark.parametrize("turn", [0, 90, 180, 270])

@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.vision.distortion import RadiusTable
-from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, NadirLines, answered
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, answered
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sample_search import Between, around_samples
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu.costs import Meter
 
-from ..scenery import earth, error_deg, feed, scan
+from ..scenery import earth, edges_in, error_deg
 
 
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize(("alpha", "beta"), [(0, 0), (12, -7), (-20, 20)])
 def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float) -> None:
     picture = earth(alpha, beta, rng=np.random.default_rng(4))
-    lines = NadirLines(EdgeConfig(), meter)
-    feed(lines, scan(picture))
+    lines = edges_in(picture, meter)
     edges = answered(
         around_samples(EdgeConfig(), meter, between), lambda at: int(picture[at[1], at[0]])
     )
@@ -28,7 +28,7 @@ def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float
         return sorted((x, y) for x, y in points if y in rows)
 
     assert len(on_rows(edges.points.tolist())) > 8
-    assert on_rows(edges.points.tolist()) == on_rows(lines.edges.points.tolist())
+    assert on_rows(edges.points.tolist()) == on_rows(lines.points.tolist())
 
 
 @pytest.mark.parametrize("between", Between)
@@ -59,12 +59,9 @@ def test_as_good_from_few_pixels(
 
 def test_the_searches_cost_less_in_the_order_expected(meter: Meter) -> None:
     picture = earth(5, 5)
-    cycles = []
-    lines = NadirLines(EdgeConfig(), meter)
-    data = scan(picture)
-    meter.charge(scan_byte=len(data))
-    feed(lines, data)
-    cycles.append(meter.take())
+    meter.charge(scan_byte=FULL_SIZE.scan_clocks)
+    edges_in(picture, meter)
+    cycles = [meter.take()]
     for between in (Between.SEQUENTIAL, Between.BINARY):
 
         def read(at: tuple[int, int]) -> int:
