@@ -17,8 +17,8 @@ LINE_MS = 1322 / 10_000.0  # clocks a line at 10 MHz
 READ_OUT_MS = ROWS * LINE_MS
 
 
-def enable_to_ack_ms(cubestar: Any, delay_ms: int) -> float:
-    """From enabling the sensor to ACK, as telemetry tells it."""
+def capture_ms(cubestar: Any, delay_ms: int) -> float:
+    """Of a capture, from enabling the sensor to ACK, as telemetry tells it."""
     cubestar.client.command("SetDiscardDelay", Delay=delay_ms)
     cubestar.capture()
     phases = cubestar.phase_times()
@@ -32,9 +32,9 @@ def test_frame_rate_register(session: Any, register: int, published_fps: float) 
     with session(SkyScene.pointing(0, 0)) as opened:
         opened.client.client.command("SetFrameRate", FrameRate=register)
         period_ms = 1000 / published_fps
-        first = enable_to_ack_ms(opened.client, 70)
+        first = capture_ms(opened.client, 70)
         # Enabled just after that frame began: it is dropped, and the next one is stored.
-        second = enable_to_ack_ms(opened.client, round(period_ms) + 5)
+        second = capture_ms(opened.client, round(period_ms) + 5)
     assert second - first == pytest.approx(period_ms, rel=2e-3)
     assert first == pytest.approx(period_ms + READ_OUT_MS, abs=2)  # line-rounded, and set-up
 
@@ -47,24 +47,16 @@ def striped(tmp_path: Path) -> PictureScene:
     return PictureScene(tmp_path / "striped.png", exposure_ms=385.6)
 
 
-def stored_rows(session: Any, scene: PictureScene, delay_ms: int) -> Any:
-    """One column of the picture that a capture with this discard delay stores, from telemetry."""
-    with session(scene) as opened:
-        opened.client.client.command("SetDiscardDelay", Delay=delay_ms)
-        opened.client.capture()
-        return opened.client.stream_image()[:, 500].astype(float)
-
-
 @pytest.mark.parametrize("delay_ms", [10, 66])
 def test_too_short_a_delay_splits_the_picture(
     session: Any, striped: PictureScene, delay_ms: int
 ) -> None:
-    rows = stored_rows(session, striped, delay_ms)
+    with session(striped) as opened:
+        capture_ms(opened.client, delay_ms)
+        rows = opened.board.program._capture.pictures.image[:, 500].astype(float)
     # The rows of the undefined frame that were still to come, then the first of the good one.
     rest = ROWS - 1 - int(delay_ms / LINE_MS)
-    seams = [at for at in range(rest - 2, rest + 2) if abs(rows[at] - rows[at - 1]) > 5]
-    assert len(seams) == 1
-    seam = seams[0]
+    (seam,) = (at for at in range(rest - 2, rest + 2) if abs(rows[at] - rows[at - 1]) > 5)
     light = striped.pixels[:, 500].astype(float)
     upper, lower = light[ROWS - seam :], light[: ROWS - seam]
     assert np.abs(rows[seam:] - lower).max() <= 1
@@ -74,5 +66,7 @@ def test_too_short_a_delay_splits_the_picture(
 
 
 def test_the_published_delay_does_not(session: Any, striped: PictureScene) -> None:
-    rows = stored_rows(session, striped, 70)
-    assert np.abs(rows - striped.pixels[:, 500]).max() <= 1
+    with session(striped) as opened:
+        capture_ms(opened.client, 70)
+        streamed = opened.client.stream_image().astype(float)
+    assert np.abs(streamed - striped.pixels)[:, 500].max() <= 1
