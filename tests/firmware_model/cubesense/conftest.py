@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
@@ -5,6 +6,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
 from .harness import Harness
+from .links_harness import Links
 
 
 @pytest.fixture
@@ -20,6 +22,13 @@ def equidistant() -> RadiusTable:
 @pytest.fixture(scope="session")
 def stereographic() -> RadiusTable:
     return fine_table(Meter(PIC18F45K20), Projection.STEREOGRAPHIC)
+
+
+@pytest.fixture
+def node() -> Links:
+    node = Links()
+    node.pictures[:] = np.random.default_rng(5).integers(0, 256, node.pictures.shape)
+    return node
 
 
 @pytest.fixture

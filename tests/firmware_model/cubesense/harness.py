@@ -115,7 +115,7 @@ class Harness(Runner, HostSide):
         outputs = (*LINES, "CLK", "DATA_I", *pins.CAMERA_SCL.values(), *pins.CAMERA_SDA.values())
         self.pins = {**dict.fromkeys(outputs, 0), **dict.fromkeys(pins.ENABLE, 1)}
         self._doing = actions(0, 0, 0, 1, 1)
-        self._ack_ns: dict[Sram, int] = {}
+        self._coming: dict[Sram, tuple[int, NDArray[np.uint8]]] = {}
         self._position = 0
         for pin in (*pins.CAMERA_POWER.values(), *pins.SRAM_POWER.values()):
             self.set_pin(pin, 0)
@@ -174,10 +174,9 @@ class Harness(Runner, HostSide):
 
     def latch_on(self, wanted: Request | type, sram: Sram) -> None:
         """``sram`` latches up at each such request from now on."""
-        kind = wanted if isinstance(wanted, type) else None
 
         def latch(request: Request) -> None:
-            if request == wanted or (kind is not None and isinstance(request, kind)):
+            if wanted in (request, type(request)):
                 self.latched.add(sram)
 
         self.on_request = latch
@@ -206,7 +205,9 @@ class Harness(Runner, HostSide):
         if was == level or pin not in (*LINES, *pins.ENABLE, "CLK"):
             return
         if pin == "CLK":
-            self._clock(level)
+            if level:
+                assert Action.TAKE_ADDRESS in self._doing
+                self._position = (self._position << 8 | self.pins["DATA_I"]) & 0xFFFFFF
             return
         enabled = not all(self.pins.get(name, 1) for name in pins.ENABLE)
         if pin in LINES and enabled:
@@ -219,31 +220,23 @@ class Harness(Runner, HostSide):
         moved = ADDRESSING & {*doing} and ADDRESSING & {*self._doing}
         self._doing = doing
         self._position = self._position if moved else 0
-        self._ack_ns = {}
+        self._coming = {}
         for half, action in zip(Sram, doing, strict=True):
-            camera = Camera(1 - half if action is Action.STORE_OTHER else half)
-            if action in (Action.STORE, Action.STORE_OTHER) and self.scenes[camera] is not None:
-                delay_us = self.wait_us + READ_OUT_US
-                self._ack_ns[half] = self.now_ns + 1000 * delay_us
-
-    def _clock(self, level: int) -> None:
-        if level:
-            assert Action.TAKE_ADDRESS in self._doing
-            self._position = (self._position << 8 | self.pins["DATA_I"]) & 0xFFFFFF
+            picture = self.scenes[Camera(1 - half if action is Action.STORE_OTHER else half)]
+            if action in (Action.STORE, Action.STORE_OTHER) and picture is not None:
+                ack_ns = self.now_ns + 1000 * (self.wait_us + READ_OUT_US)
+                self._coming[half] = ack_ns, picture
 
     def await_pin(self, request: AwaitPin) -> bool:
         half = ACK[request.pin]
         deadline_ns = self.now_ns + 1000 * request.timeout_us
-        ack_ns = self._ack_ns.get(half)
-        if ack_ns is None or ack_ns > deadline_ns:
+        ack_ns, picture = self._coming.get(half, (deadline_ns + 1, None))
+        if ack_ns > deadline_ns:
             self.now_ns = deadline_ns
             return False
         poll_ns = request.poll_cycles * CYCLE_NS
         polls = max(1, -(-(ack_ns - self.now_ns) // poll_ns))
         self.now_ns += polls * poll_ns
-        action = self._doing[half]
-        picture = self.scenes[Camera(1 - half if action is Action.STORE_OTHER else half)]
-        assert picture is not None
         if self.pins[pins.SRAM_POWER[half]]:
             self.memories[half] = picture.copy()
         return True

@@ -10,13 +10,6 @@ from .links_harness import Links
 from .scenery import thumbnail
 
 
-@pytest.fixture
-def node() -> Links:
-    node = Links()
-    node.pictures[:] = np.random.default_rng(5).integers(0, 256, node.pictures.shape)
-    return node
-
-
 def ready(node: Links) -> int:
     return int(node.telemetry("ImageFrameInfo")["FrameNumber"])
 

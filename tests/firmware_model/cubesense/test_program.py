@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.firmware_model.cubesense.program import DRAIN_US
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US
-from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
+from cubestack.firmware_model.interface.cubesense import codes, pins
 from cubestack.firmware_model.mcu.requests import Request, Reset, SetPin, Sleep
 
 from .harness import LOST, Harness
@@ -61,8 +61,7 @@ def test_a_reset_lets_the_acknowledge_out_but_not_for_ever(unit: Harness, stuck:
             reset_us.append(unit.now_us - start_us)
 
     unit.on_request = send
-    message = INTERFACE.telecommand("Reset")
-    unit.i2c_write(bytes([message.id]) + message.pack(Target=codes.ResetTarget.MCU))
+    unit.i2c_write(bytes([0, codes.ResetTarget.MCU]))
     unit.run()
     (waited_us,) = reset_us
     assert waited_us == pytest.approx(DRAIN_US if stuck else 4_500, abs=2_000)

@@ -3,7 +3,7 @@
 import pytest
 
 from cubestack.firmware_model.cubesense.supply import OFF_TIME_US, OVER_CURRENT_MA, SAMPLE_US
-from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
+from cubestack.firmware_model.interface.cubesense import codes, pins
 from cubestack.firmware_model.mcu.requests import Request, SetPin, Sleep
 
 from .harness import Harness
@@ -41,8 +41,7 @@ def test_the_memories_are_watched_through_every_wait(
             unit.latched.add(codes.Sram.SRAM1)
 
     unit.log.clear()
-    message = INTERFACE.telecommand("Reset")
-    unit.i2c_write(bytes([message.id]) + message.pack(Target=target))
+    unit.i2c_write(bytes([0, target]))
     unit.on_request = latch
     unit.run()
     cut_us = next(us for us, request in unit.log if request == SetPin("SRAM1_POWER", 0))
@@ -93,13 +92,8 @@ def test_the_limit(unit: Harness, ma: float, cut: bool) -> None:
 
 def test_currents_are_shown_to_a_tenth_within_the_converters_step(unit: Harness) -> None:
     power = unit.telemetry("Power")
-    shown = {
-        pins.Monitor.SUPPLY_3V3: power["Current3V3"],
-        pins.Monitor.SRAM1: power["CurrentSram1"],
-        pins.Monitor.SRAM2: power["CurrentSram2"],
-        pins.Monitor.SUPPLY_5V: power["Current5V"],
-    }
-    for monitor, ma in shown.items():
+    for monitor in pins.Monitor:
+        ma = power[f"Current{monitor.replace('SRAM', 'Sram')}"]
         assert ma == pytest.approx(unit.supply_ma.get(monitor, unit.memory_ma), abs=0.16)
     unit.latched.add(codes.Sram.SRAM1)
     unit.run(until_us=unit.now_us + 10_000)

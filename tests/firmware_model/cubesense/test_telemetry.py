@@ -21,11 +21,6 @@ UPTIME_US = 70_123_456
 OVER = 0x10000
 
 
-@pytest.fixture
-def node() -> Links:
-    return Links()
-
-
 def no_two_alike(node: Links) -> None:
     """Give everything that telemetry shows a value of its own."""
     node.now_us = UPTIME_US
@@ -207,13 +202,6 @@ def test_after_start_up(node: Links) -> None:
         assert set(node.telemetry(f"Masks{number}").values()) == {0}
     assert node.telemetry("ImageFrameInfo") == {"FrameNumber": codes.EMPTY_FRAME, "Checksum": 0}
     assert node.telemetry("TcmdProcessed") == {"LastTcmd": 0, "Processed": 1, "Error": 0}
-    shown = node.telemetry("Configuration")
-    for telecommand in ("DetectionThreshold", "AutoAdjust", "CameraSettings"):
-        for number in (1, 2):
-            resets = INTERFACE.telecommand(f"{telecommand}{number}").reset_values()
-            names = {"Enabled": "AutoAdjust"}
-            for name, value in resets.items():
-                assert shown[f"{names.get(name, name)}{number}"] == value
 
 
 def test_uptime_wraps_at_16_bits_of_seconds(node: Links) -> None:

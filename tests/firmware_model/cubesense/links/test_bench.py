@@ -1,6 +1,5 @@
 """The one-letter bench protocol."""
 
-import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
@@ -19,13 +18,6 @@ from cubestack.firmware_model.mcu.requests import Request
 from ..links_harness import BENCH_BYTE_US, Links
 
 IMAGE = REGISTERS["IMAGE"].address
-
-
-@pytest.fixture
-def node() -> Links:
-    node = Links()
-    node.pictures[:] = np.random.default_rng(8).integers(0, 256, node.pictures.shape)
-    return node
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,6 @@ from ..links_harness import Links
 OK = bytes.fromhex("1F7F 00 1FFF")
 
 
-@pytest.fixture
-def node() -> Links:
-    return Links()
-
-
 def test_identification_answers_eight_bytes(node: Links) -> None:
     node.now_us = 16_100_000
     answer = node.wire(bytes.fromhex("1F7F 80 1FFF"))

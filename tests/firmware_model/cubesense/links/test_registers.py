@@ -2,7 +2,6 @@
 
 from dataclasses import asdict
 
-import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
@@ -16,9 +15,8 @@ IMAGE = REGISTERS["IMAGE"].address
 
 
 @pytest.fixture
-def node() -> Links:
-    node = Links(mcu_addressing=True)
-    node.pictures[:] = np.random.default_rng(7).integers(0, 256, node.pictures.shape)
+def node(node: Links) -> Links:
+    node.mcu_addressing = True
     return node
 
 

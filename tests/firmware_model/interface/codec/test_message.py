@@ -44,12 +44,8 @@ def test_every_declared_bit_survives(data: bytes) -> None:
     assert packed == bytes((data[0], data[1] & 0x81)) + data[2:]
 
 
-def test_kind_follows_from_the_identifier() -> None:
-    assert MIXED.kind is Kind.TELEMETRY
-    assert WINDOW.kind is Kind.TELECOMMAND
-
-
 def test_telemetry_saturates_and_telecommands_do_not() -> None:
+    assert (MIXED.kind, WINDOW.kind) == (Kind.TELEMETRY, Kind.TELECOMMAND)
     assert MIXED.pack(a=999, b=0, c=0, d=0, e=0)[0] == 255
     with pytest.raises(InterfaceError, match="Window: field low: 256 does not fit"):
         WINDOW.pack(low=256, high=9)
@@ -91,10 +87,6 @@ def test_errors_name_the_offender_in_one_line(call: Callable[[], object], messag
     assert "\n" not in str(caught.value)
 
 
-def test_fields_are_found_in_any_case() -> None:
-    assert WINDOW.field("LOW").name == "low"
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -117,7 +109,8 @@ def test_an_order_is_one_of_its_own_fields() -> None:
 NODE = Interface("Node", 1, 0x1A, 57_600, (WINDOW,), (MIXED,), AckError)
 
 
-def test_messages_are_found_by_name_in_any_case_and_by_identifier() -> None:
+def test_messages_and_fields_are_found_by_name_in_any_case_and_messages_by_identifier() -> None:
+    assert WINDOW.field("LOW").name == "low"
     assert NODE.telecommand("window") is NODE.telecommand(20) is NODE.find(20) is WINDOW
     assert NODE.telemetry("MIXED") is NODE.telemetry(200) is NODE.find(200) is MIXED
     assert NODE.find(21) is None
