@@ -9,12 +9,11 @@ from cubestack.firmware_model.mcu.requests import CameraTransfer
 from cubestack.firmware_model.node.hardware import NodeHardware
 
 
+@dataclass(eq=False)
 class NodePeripherals(NodeHardware):
-    """What every node's program uses; a board's own class adds the rest."""
+    """What every node's program uses of its board; the board's own class adds the rest."""
 
-    def __init__(self, board: Board) -> None:
-        """Be part of ``board``."""
-        self._board = board
+    _board: Board
 
     def uart_send(self, data: bytes) -> None:
         """Queue ``data`` for the satellite."""

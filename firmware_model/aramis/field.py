@@ -100,9 +100,8 @@ class Field:
         x, y = self._tangents(points, meter)
         z = _ONE / np.sqrt(_ONE + x * x + y * y)
         count = len(points)
-        meter.charge(
-            f32_add=2 * count, f32_mul=4 * count, f32_div=count, f32_sqrt=count, loop=count
-        )
+        meter.charge(f32_add=2 * count, f32_mul=4 * count)
+        meter.charge(f32_div=count, f32_sqrt=count, loop=count)
         return np.stack([x * z, y * z, z], axis=1).astype(np.float32)
 
     def inside(self, points: Floats, meter: Meter) -> Mask:

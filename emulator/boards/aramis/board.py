@@ -96,8 +96,7 @@ class AramisBoard(Board):
             self.catalogue_flash[: len(coded)] = coded
         self.camera = Mt9m001(scene, seed=seed, noise=noise)
         self.ppi = Ppi(self.kernel, self.camera)
-        self.ppi.on_end = self._frame_ended
-        self.camera.on_change = self._camera_changed
+        self.ppi.on_end, self.camera.on_change = self._frame_ended, self._camera_changed
         self._node_link(lambda: self.program.link, baud, i2c_address)
         self._hardware = _Blackfin(self)
         self._frames: deque[RollingShutter] = deque(maxlen=REMEMBERED)
@@ -121,7 +120,7 @@ class AramisBoard(Board):
             boot_us=BOOT_US,
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
         )
-        self.power.on_switch = self._supply_switched
+        self.power.on_switch = lambda _channel, on: self.camera.power(on, self.kernel.now)
         self._show_camera()
 
     @property
@@ -157,8 +156,7 @@ class AramisBoard(Board):
         age = 0 if frame is None else self._frame - frame
         if not 0 <= age < len(self._frames):
             return None
-        shutter = self._frames[-1 - age]
-        return self.camera.scene.truth(shutter.mid_exposure_ps((ROWS - 1) / 2))
+        return self.scene.truth(self._frames[-1 - age].mid_exposure_ps((ROWS - 1) / 2))
 
     def irradiate(self, memory: Literal["flash", "sdram"], rate: float) -> int:
         """Turn over each bit of the catalogue's flash or of the SDRAM with probability ``rate``.
@@ -178,9 +176,6 @@ class AramisBoard(Board):
             self._frames.append(self.ppi.stored)
             self._frame += 1
         self.program.frame_ended(end)
-
-    def _supply_switched(self, _channel: str, on: bool) -> None:
-        self.camera.power(on, self.kernel.now)
 
     def _camera_changed(self) -> None:
         self.ppi.lines_changed()

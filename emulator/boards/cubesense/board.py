@@ -20,7 +20,6 @@ from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
-from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
@@ -43,11 +42,8 @@ HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
 STORING = (Action.STORE, Action.STORE_OTHER)
 CLOCKED = (*STORING, Action.SEND_PICTURE)
 
-
-@lru_cache(maxsize=2)
-def _wiring(mcu_addressing: bool) -> Wiring:
-    """Of both FPGAs; kept, as an engine knows its library by the design's text, a slow thing."""
-    return cubesense_wiring(mcu_addressing=mcu_addressing)
+_wiring = lru_cache(maxsize=2)(cubesense_wiring)
+"""Kept, as an engine knows its library by the design's text, a slow thing."""
 
 
 class CubeSenseBoard(Board):
@@ -87,7 +83,7 @@ class CubeSenseBoard(Board):
             i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
-        self.engine = make_engine(_wiring(mcu_addressing), engine)
+        self.engine = make_engine(_wiring(mcu_addressing=mcu_addressing), engine)
         self.cameras = {camera: Ov7620(scene, Target[camera.name]) for camera in Camera}
         self._node_link(lambda: self.program.node, baud, i2c_address)
         self.bench_uart = self._serial_line(
@@ -220,8 +216,7 @@ class CubeSenseBoard(Board):
     def _supply_switched(self, channel: str, on: bool) -> None:
         self._advance_engine()
         for camera, half in HALVES.items():
-            sram = Sram(camera)
-            if channel == sram.name:
+            if channel == Sram(camera).name:
                 self.engine.power_memory(half, on)
                 if not on:
                     self._scramble(self.engine.memories[half])

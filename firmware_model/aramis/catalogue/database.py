@@ -100,23 +100,9 @@ class Database:
     def pack(self) -> bytes:
         """The image."""
         area, moment = self.area_index, self.moment_index
-        header = HEADER.pack(
-            MAGIC,
-            VERSION,
-            0,
-            len(self.numbers),
-            len(self),
-            area.bins,
-            moment.bins,
-            len(self.sphere),
-            self.sphere.neighbours.shape[1],
-            self.epoch,
-            self.fov_deg,
-            area.lowest,
-            area.highest,
-            moment.lowest,
-            moment.highest,
-        )
+        counts = len(self.numbers), len(self), area.bins, moment.bins, *self.sphere.neighbours.shape
+        bounds = area.lowest, area.highest, moment.lowest, moment.highest
+        header = HEADER.pack(MAGIC, VERSION, 0, *counts, self.epoch, self.fov_deg, *bounds)
         parts = (self._array(name).astype(kind).tobytes() for name, kind, _ in LAYOUT)
         body = header + b"".join(parts)
         return body + struct.pack("<I", crc32(body))

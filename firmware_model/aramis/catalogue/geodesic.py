@@ -43,9 +43,8 @@ class GeodesicSphere:
         (x, y, z), along = self.centres.T, direction.astype(np.float32)
         cosine = x * along[0] + y * along[1] + z * along[2]
         count = len(self)
-        meter.charge(
-            ram_read=3 * count, f32_mul=3 * count, f32_add=2 * count, f32_compare=count, loop=count
-        )
+        meter.charge(ram_read=3 * count, f32_mul=3 * count, f32_add=2 * count)
+        meter.charge(f32_compare=count, loop=count)
         return int(np.argmax(cosine))
 
     def around(self, direction: Floats, meter: Meter) -> Mask:

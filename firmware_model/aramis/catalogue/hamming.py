@@ -92,13 +92,8 @@ def decode(coded: NDArray[np.uint8], meter: Meter) -> Decoded:
     in_data = single & (bits < DATA_BITS)
     at, bit = wrong[in_data], bits[in_data]
     data[at, bit // 8] ^= (1 << bit % 8).astype(np.uint8)
-    meter.charge(
-        flash_read=-(-len(coded) // 2),
-        coded_word=len(words),
-        loop=len(words),
-        ram_write=2 * len(words),
-        correction=len(wrong),
-    )
+    meter.charge(flash_read=-(-len(coded) // 2), coded_word=len(words), correction=len(wrong))
+    meter.charge(loop=len(words), ram_write=2 * len(words))
     return Decoded(data.reshape(-1), int(single.sum()), wrong[~single])
 
 

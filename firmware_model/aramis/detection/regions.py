@@ -80,16 +80,8 @@ def locate_stars(
     across = np.bincount(labels, weight * (regions.columns - left[labels]), count)
     sizes = np.bincount(labels, minlength=count)
     pixels = len(labels)
-    meter.charge(
-        pixel_read=pixels,
-        ram_read=2 * pixels,
-        i32_add=6 * pixels,
-        i32_mul=2 * pixels,
-        loop=pixels + count,
-        f32_convert=5 * count,
-        f32_div=2 * count,
-        f32_add=2 * count,
-    )
+    meter.charge(pixel_read=pixels, ram_read=2 * pixels, i32_add=6 * pixels, i32_mul=2 * pixels)
+    meter.charge(f32_convert=5 * count, f32_div=2 * count, f32_add=2 * count, loop=pixels + count)
     used = np.flatnonzero((sizes >= min_pixels) & (sizes <= max_pixels) & (total > 0))
     scale = total[used].astype(np.float32)
     corner = np.stack([left, top])[:, used].astype(np.float32)
@@ -122,10 +114,7 @@ def _join(starts: Indices, stops: Indices, width: int, meter: Meter) -> Indices:
             parents[second] = first
             other += 1
             looks += 1
-    meter.charge(
-        ram_read=6 * looks + 2 * len(begins),
-        ram_write=looks + 3 * len(begins),
-        i32_add=4 * looks + 2 * len(begins),
-        loop=looks + len(begins),
-    )
-    return np.array([root(run) for run in range(len(parents))], dtype=np.intp)
+    runs = len(begins)
+    meter.charge(ram_read=6 * looks + 2 * runs, ram_write=looks + 3 * runs)
+    meter.charge(i32_add=4 * looks + 2 * runs, loop=looks + runs)
+    return np.array([root(run) for run in range(runs)], dtype=np.intp)

@@ -47,9 +47,8 @@ def _centre(mask: Mask, needed: int, meter: Meter) -> Mask:
     bright = _sliding(_sliding(mask.astype(np.uint8)).T).T
     present = np.outer(_present(rows), _present(columns))
     looks = int(_present(rows).sum()) * int(_present(columns).sum())
-    meter.charge(
-        table_byte=looks, i32_add=looks + mask.size, loop=looks + mask.size, ram_write=mask.size
-    )
+    meter.charge(table_byte=looks, i32_add=looks, loop=looks)
+    meter.charge(i32_add=mask.size, loop=mask.size, ram_write=mask.size)
     return WINDOW**2 * bright.astype(np.int32) >= needed * present
 
 
@@ -59,13 +58,9 @@ def _window(mask: Mask, needed: int, meter: Meter) -> Mask:
     bright = np.add.reduceat(np.add.reduceat(mask, tops, axis=0, dtype=np.int32), lefts, axis=1)
     heights, widths = np.diff(np.append(tops, rows)), np.diff(np.append(lefts, columns))
     enough = WINDOW**2 * bright >= needed * np.outer(heights, widths)
-    windows = enough.size
-    meter.charge(
-        table_byte=mask.size,
-        i32_add=mask.size + windows,
-        loop=mask.size + windows,
-        ram_write=int((~enough & (bright > 0)).sum()) * WINDOW**2,
-    )
+    steps = mask.size + enough.size
+    meter.charge(table_byte=mask.size, i32_add=steps, loop=steps)
+    meter.charge(ram_write=int((~enough & (bright > 0)).sum()) * WINDOW**2)
     return mask & np.repeat(np.repeat(enough, heights, axis=0), widths, axis=1)
 
 

@@ -85,25 +85,20 @@ def confirm(
         turn = dcm(quaternion, meter)
         seen = _in_field(database.vectors, turn, field, meter)
         predicted = turned(database.vectors[seen], turn)
-        compared = len(seen) * len(vectors)
-        meter.charge(
-            ram_read=6 * len(seen) + 3 * compared,
-            f32_mul=3 * compared,
-            f32_add=5 * compared,
-            f32_compare=compared + len(seen),
-            loop=compared,
-        )
+        expected, compared = len(seen), len(seen) * len(vectors)
+        meter.charge(ram_read=6 * expected + 3 * compared, f32_compare=compared + expected)
+        meter.charge(f32_mul=3 * compared, f32_add=5 * compared, loop=compared)
         apart = vectors[None, :, :] - predicted[:, None, :]
         chord2 = apart[..., 0] ** 2 + apart[..., 1] ** 2 + apart[..., 2] ** 2
         measured, stars = _nearest(chord2, np.float32(tolerance_rad) ** 2)
         reach = len(vectors) * np.pi * tolerance_rad**2 / field.solid_angle_sr
-        further, found = len(seen) - 3, len(measured) - 3
+        further, found = expected - 3, len(measured) - 3
         chance = float(hypotheses)
         if found > 0:
             chance *= comb(further, found) * reach**found
             meter.charge(f32_mul=3 * found + 3, f32_div=found + 1)
         spread_rad = _spread(vectors[measured], meter)
-        return Confirmation(measured, seen[stars], len(seen), chance, spread_rad)
+        return Confirmation(measured, seen[stars], expected, chance, spread_rad)
 
 
 def _spread(vectors: Floats, meter: Meter) -> float:
@@ -132,11 +127,6 @@ def _in_field(stars: Floats, turn: Floats, field: Field, meter: Meter) -> Indice
     x, y, z = stars.T
     along = x * turn[2, 0] + y * turn[2, 1] + z * turn[2, 2]
     near = np.flatnonzero(along >= np.float32(field.smallest_cosine))
-    meter.charge(
-        ram_read=3 * count,
-        f32_mul=3 * count + 9 * len(near),
-        f32_add=2 * count + 6 * len(near),
-        f32_compare=count,
-        loop=count,
-    )
+    meter.charge(ram_read=3 * count, f32_mul=3 * count, f32_add=2 * count)
+    meter.charge(f32_mul=9 * len(near), f32_add=6 * len(near), f32_compare=count, loop=count)
     return near[field.contains(turned(stars[near], turn), meter)]
