@@ -73,17 +73,14 @@ def probed(board: Board, name: str) -> list[tuple[int, object]]:
 def test_boards_that_share_a_kernel_do_what_they_do_alone(stack: ExitStack) -> None:
     """Each on a bus of its own: on one bus they would wait for each other."""
     alone = []
-    for name, make in BOARDS.items():
-        board = make()
-        stack.callback(board.close)
+    for name, board in powered(stack).items():
         alone.append(probed(board, name))
         board.kernel.advance_to(200 * PS_PER_MS)
     kernel = Kernel()
-    boards = powered(stack, kernel=kernel)
-    together = [probed(board, name) for name, board in boards.items()]
+    together = [probed(board, name) for name, board in powered(stack, kernel=kernel).items()]
     kernel.advance_to(200 * PS_PER_MS)
     assert together == alone
-    assert all(len(answer) > 8 for (_, answer) in (found[-1] for found in alone))
+    assert all(len(found[-1][1]) > 8 for found in alone)
 
 
 def test_boards_share_a_bus(stack: ExitStack) -> None:

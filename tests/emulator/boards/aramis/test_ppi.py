@@ -27,10 +27,10 @@ class Lines:
     line_clocks, active_columns = LINE, COLUMNS
     period = Fraction(PERIOD)
 
-    def __init__(self, phase: int = 0) -> None:
-        self.on_change: Callable[[], None] = lambda: None
-        self.alive = True
-        self.rows = ROWS
+    on_change: Callable[[], None]
+    alive, rows = True, ROWS
+
+    def __init__(self, phase: int) -> None:
         self.phase = phase
 
     def segment_at(self, time_ps: int) -> StreamSegment | None:
@@ -76,8 +76,7 @@ def test_the_frame_under_way_is_skipped_and_the_next_one_stored_at_its_last_pixe
 
 
 def test_only_the_lines_wanted_are_taken() -> None:
-    bench = Bench()
-    target = np.zeros((2, COLUMNS), np.uint8)
+    bench, target = Bench(), np.zeros((2, COLUMNS), np.uint8)
     bench.ppi.start(target)
     assert bench.run(FRAME) == [((BLANK + LINE + COLUMNS) * PERIOD, FrameEnd.STORED)]
     assert (target == 1).all()
@@ -113,8 +112,7 @@ def test_a_dead_camera_never_ends_a_frame_and_stopping_helps() -> None:
 
 
 def test_starting_again_gives_up_the_frame_before() -> None:
-    bench = Bench()
-    other = np.zeros((ROWS, COLUMNS), np.uint8)
+    bench, other = Bench(), np.zeros((ROWS, COLUMNS), np.uint8)
     bench.ppi.start(bench.target)
     bench.run(BLANK + 2 * LINE)
     bench.ppi.start(other)
@@ -135,19 +133,16 @@ def test_a_change_that_leaves_the_frame_alone_does_not_disturb_it() -> None:
 
 @pytest.mark.parametrize("start_ms", [0, 40, 66])
 def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> None:
-    kernel = Kernel()
-    sky = SkyScene([0, 0, 0, 1], mag_limit=3.0)
-    camera = Mt9m001(sky, condition=replace(CONDITION, noise=False))
-    ppi = Ppi(kernel, camera)
+    kernel, sky = Kernel(), SkyScene([0, 0, 0, 1], mag_limit=3.0)
+    ppi = Ppi(kernel, Mt9m001(sky, condition=replace(CONDITION, noise=False)))
     ends: list[tuple[int, FrameEnd]] = []
     ppi.on_end = lambda end: ends.append((kernel.now, end))
     target = np.zeros((1024, 1280), np.uint8)
     kernel.advance_to(start_ms * PS_PER_MS)
     ppi.start(target)
     kernel.advance_to(200 * PS_PER_MS)
-    row_s = 1524 / 48e6
-    number = 1 if start_ms < 33 else 2
-    expected = number * 1050 * row_s + (242 + 1023 * 1524 + 1280) / 48e6
-    assert ends == [(pytest.approx(expected * PS_PER_S, abs=2), FrameEnd.STORED)]
-    assert ppi.stored.readout_ps == pytest.approx((number * 1050 * row_s + 242 / 48e6) * PS_PER_S)
+    starts_s = (1 if start_ms < 33 else 2) * 1050 * 1524 / 48e6 + 242 / 48e6
+    ends_s = starts_s + (1023 * 1524 + 1280) / 48e6
+    assert ends == [(pytest.approx(ends_s * PS_PER_S, abs=2), FrameEnd.STORED)]
+    assert ppi.stored.readout_ps == pytest.approx(starts_s * PS_PER_S)
     assert target.min() > 0

@@ -54,9 +54,8 @@ def test_firmware_switches_everything_on_at_the_published_power(board: CubeSense
 
 
 def test_the_firmware_has_set_the_cameras_by_their_control_lines(board: CubeSenseBoard) -> None:
-    for camera, exposure_lines in ((Camera.SUN, 2), (Camera.NADIR, 8)):
-        shutter = board.cameras[camera].frame_from(board.kernel.now)
-        assert shutter.exposure_lines == exposure_lines
+    shutters = [board.cameras[camera].frame_from(board.kernel.now) for camera in Camera]
+    assert [shutter.exposure_lines for shutter in shutters] == [2, 8]
 
 
 def test_monitors_show_what_the_parts_draw(board: CubeSenseBoard) -> None:
@@ -137,8 +136,7 @@ def test_ports_are_separate(board: CubeSenseBoard) -> None:
     board.hardware.uart_send(b"node")
     assert bench.read(10, 0.1)[:1] == b"b"
     let_pass(board, 2)
-    assert node.read(10, 0.1) == b"node"
-    assert bench.read(10, 0.0) == b"ench"
+    assert (node.read(10, 0.1), bench.read(10, 0.0)) == (b"node", b"ench")
 
 
 def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> None:
@@ -154,11 +152,9 @@ def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> N
 def test_busy_while_it_works_and_not_while_it_waits(board: CubeSenseBoard) -> None:
     assert not board.busy()
     board.serial().write(DETECT)
-    assert board.busy()
-    let_pass(board, 50)
-    assert board.busy()
-    let_pass(board, 500)
-    assert not board.busy()
+    for ms, busy in ((0, True), (50, True), (500, False)):
+        let_pass(board, ms)
+        assert board.busy() is busy
 
 
 def test_reset_of_the_processor_releases_every_pin(board: CubeSenseBoard) -> None:

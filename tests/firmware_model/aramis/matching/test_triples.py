@@ -29,6 +29,12 @@ def match(vectors: Vectors, pivots: Sequence[int], sigma: float, enough: int = 1
     return match_triple(vectors, (0, 1, 2), pivots, sigma, database(), None, meter(), enough)
 
 
+def within(values: Vectors, middle: np.float32, sigma: np.float32) -> NDArray[np.bool_]:
+    """Three standard deviations."""
+    reach = np.float32(3) * sigma
+    return (values >= middle - reach) & (values <= middle + reach)
+
+
 def triangle_of(hip: NDArray[np.int32]) -> int | None:
     """Where the database has the triangle of three Hipparcos numbers."""
     onboard = database()
@@ -51,14 +57,8 @@ def test_candidates_are_those_of_comparing_everything(sigma: float, aided: bool)
             continue
         faces = onboard.sphere.around(made.boresight.astype(np.float32), meter()) if aided else None
         found = find_triangles(triangle, onboard, faces, meter())
-        area_reach = np.float32(3) * triangle.area_sigma
-        moment_reach = np.float32(3) * triangle.moment_sigma
-        expected = (
-            (onboard.areas >= triangle.area - area_reach)
-            & (onboard.areas <= triangle.area + area_reach)
-            & (all_moments >= triangle.moment - moment_reach)
-            & (all_moments <= triangle.moment + moment_reach)
-        )
+        expected = within(onboard.areas, triangle.area, triangle.area_sigma)
+        expected &= within(all_moments, triangle.moment, triangle.moment_sigma)
         if faces is not None:
             expected &= faces[onboard.faces]
         assert sorted(found.tolist()) == np.flatnonzero(expected).tolist()
@@ -137,15 +137,13 @@ def test_survivors_of_pivots_share_two_stars_with_a_candidate_of_each() -> None:
 def test_bounds_of_the_area_hold_to_the_last_triangle() -> None:
     """With a moment that excludes nothing, the candidates are a stretch of the list of areas."""
     onboard, rng = database(), np.random.default_rng(7)
-    every = float(onboard.moments[-1])
     for _ in range(20):
         first, last = np.sort(rng.integers(0, len(onboard), 2))
         low, high = float(onboard.areas[first]), float(onboard.areas[last])
         middle, sigma = np.float32((low + high) / 2), np.float32((high - low) / 6)
         sides = np.ones(3, dtype=np.float32)
-        triangle = Triangle(sides, middle, np.float32(0), sigma, np.float32(every))
-        reach = np.float32(3) * triangle.area_sigma
-        inside = (onboard.areas >= triangle.area - reach) & (onboard.areas <= triangle.area + reach)
+        triangle = Triangle(sides, middle, np.float32(0), sigma, onboard.moments[-1])
+        inside = within(onboard.areas, triangle.area, triangle.area_sigma)
         found = find_triangles(triangle, onboard, None, meter())
         assert np.sort(found).tolist() == np.flatnonzero(inside).tolist()
 
