@@ -254,6 +254,7 @@ class Slave:
         self.content: dict[int, bytes] = {}
         self.written: list[bytes] = []
         self.failures: list[int] = []  # numbers of the transfers that are not acknowledged
+        self.waits: list[float] = []
         self.transfers = 0
         self.longest = 0
         self._rest = b""
@@ -310,8 +311,3 @@ def either_client(request: pytest.FixtureRequest, node: FakeNode) -> NodeClient 
 @pytest.fixture
 def sense() -> FakeCubeSense:
     return FakeCubeSense()
-
-
-@pytest.fixture
-def sense_uart(sense: FakeCubeSense) -> UartLink:
-    return UartLink(sense)

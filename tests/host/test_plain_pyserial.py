@@ -42,13 +42,9 @@ def run_against(uart: Any) -> "subprocess.CompletedProcess[str]":
 @pytest.mark.parametrize("qbar0", [0.1, 0.7967])  # the second is 1F 1F on the wire
 def test_it_prints_the_attitude(uart: Any, node: Any, qbar0: float) -> None:
     node.values["TaskStatus"] = {"taskStatus": 29}
-    node.values["AttitudeData"] = {
-        "Qbar0": qbar0,
-        "Qbar3": -0.6044,
-        "RightAscension": -3.1,
-        "Declination": 1.5,
-        "BSVZ": 0.7967,  # ends in 1F 1F, right before the frame's end
-    }
+    node.values["AttitudeData"] = {"Qbar0": qbar0, "Qbar3": -0.6044}
+    node.values["AttitudeData"] |= {"RightAscension": -3.1, "Declination": 1.5}
+    node.values["AttitudeData"]["BSVZ"] = 0.7967  # ends in 1F 1F, right before the frame's end
     result = run_against(uart)
     assert result.returncode == 0, result.stderr
     assert result.stdout == (

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -79,7 +78,6 @@ def test_what_a_marker_gets_wrong(run: Run) -> None:
     )
     assert done.returncode == 1
     told = re.findall(r"^E  +(.*)", done.stdout, re.MULTILINE)
-    assert len(told) == len(WRONG_MARKERS)
     for line, message in zip(told, WRONG_MARKERS.values(), strict=True):
         assert message in line
 
@@ -101,5 +99,5 @@ def test_the_plugin_costs_nothing_before_it_is_used(run: Run) -> None:
 
 
 def test_the_entry_point_leads_to_the_plugin() -> None:
-    root: Any = Path(__file__).parents[2]
-    assert f'cubestack = "{PLUGIN}"' in (root / "pyproject.toml").read_text()
+    project = Path(__file__).parents[2] / "pyproject.toml"
+    assert f'cubestack = "{PLUGIN}"' in project.read_text()

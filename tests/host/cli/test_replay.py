@@ -23,9 +23,7 @@ def recording(tmp_path):
     """Some telemetry of a CubeSense."""
     path = tmp_path / "a.rec"
     args = argparse.Namespace(record=path, trace=tmp_path / "a.vcd")
-    with ExitStack() as stack:
-        opened = open_device("cubesense", seed=3)
-        stack.callback(opened.close)
+    with open_device("cubesense", seed=3) as opened, ExitStack() as stack:
         record(args, opened, stack, emulated_setup(3, None))
         client = opened.client.client
         client.telemetry("Configuration")
@@ -130,9 +128,7 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, run, monkeypatch
     plan.write_text('seed = 9\n[[fault]]\nkind = "uart-drop"\nrate = 0.2\n')
     made = tmp_path / "a.rec"
     args = argparse.Namespace(record=made, trace=None)
-    with ExitStack() as stack:
-        opened = open_device("cubesense", seed=3, baud=9600)
-        stack.callback(opened.close)
+    with open_device("cubesense", seed=3, baud=9600) as opened, ExitStack() as stack:
         inject_plan(opened.board.faults, plan)
         setup = emulated_setup(3, None, plan, {"mcu_addressing": True})
         record(args, opened, stack, setup)

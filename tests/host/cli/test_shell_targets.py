@@ -39,9 +39,8 @@ KINDS = ("pty", "tcp", "rfc2217", "i2c", "recorded", "recorded i2c")
 @contextlib.contextmanager
 def serving(kind, folder):
     """A CubeSense on a port of that kind, and the target that leads to it."""
-    board = open_device("cubesense").board
-    with contextlib.ExitStack() as stack:
-        stack.callback(board.close)
+    with open_device("cubesense") as opened, contextlib.ExitStack() as stack:
+        board = opened.board
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         if kind == "pty":
             port, target = PtyEndpoint(folder / "tty", board.uart), str(folder / "tty")

@@ -82,12 +82,9 @@ def test_what_the_tables_lack_is_never_sent(
     assert node.log == []
 
 
-def test_telemetry_is_asked_for_again(client: NodeClient, node: Any) -> None:
+def test_telemetry_is_asked_for_three_times(client: NodeClient, node: Any, uart: Any) -> None:
     node.lost = 2
     assert client.telemetry("Identification")["InterfaceVersion"] == 0
-
-
-def test_silence_names_the_telemetry(client: NodeClient, node: Any, uart: Any) -> None:
     node.lost = 3
     uart.silences.clear()
     with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags within 1 s in 3 attempts"):

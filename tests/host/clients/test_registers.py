@@ -17,13 +17,8 @@ def slave() -> Slave:
 
 
 @pytest.fixture
-def waits() -> list[float]:
-    return []
-
-
-@pytest.fixture
-def client(slave: Slave, waits: list[float]) -> RegisterClient:
-    return RegisterClient(slave, REGISTERS, wait=waits.append)
+def client(slave: Slave) -> RegisterClient:
+    return RegisterClient(slave, REGISTERS, wait=slave.waits.append)
 
 
 def test_measurements_are_signed_with_the_most_significant_byte_first(
@@ -44,7 +39,7 @@ def test_configuration_is_one_byte(client: RegisterClient, slave: Slave) -> None
 
 
 def test_the_picture_comes_in_reads_that_a_bus_driver_takes_and_begins_anew(
-    client: RegisterClient, slave: Slave, waits: list[float]
+    client: RegisterClient, slave: Slave
 ) -> None:
     picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
     slave.content[REGISTERS["IMAGE"].address] = picture
@@ -53,7 +48,7 @@ def test_the_picture_comes_in_reads_that_a_bus_driver_takes_and_begins_anew(
     assert (slave.longest, len(seen), seen[-1]) == (8192, 38, (307_200, 307_200))
     slave.failures = [slave.transfers + 7, slave.transfers + 20]
     assert client.read_stream("IMAGE") == picture
-    assert len(waits) == 2
+    assert len(slave.waits) == 2
 
 
 @pytest.mark.parametrize(
@@ -91,8 +86,8 @@ def test_reads_are_repeated_and_writes_are_not(client: RegisterClient, slave: Sl
     assert slave.written == []
 
 
-def test_a_silent_address_is_named(slave: Slave, waits: list[float]) -> None:
-    client = RegisterClient(slave, REGISTERS, 0x33, wait=waits.append)
+def test_a_silent_address_is_named(slave: Slave) -> None:
+    client = RegisterClient(slave, REGISTERS, 0x33, wait=slave.waits.append)
     with pytest.raises(NoAnswerError, match=r"register SUN_X .* address 0x33 in 3 attempts"):
         client.read("SUN_X")
-    assert len(waits) == 2
+    assert len(slave.waits) == 2

@@ -207,8 +207,7 @@ def test_answer_to_an_unknown_telemetry_is_found(good, uart, monkeypatch):
 def test_deaf_decoder_is_found(good, uart, monkeypatch):
     write = uart.write
     monkeypatch.setattr(uart, "write", lambda data: write(data) if data[:1] == b"\x1f" else None)
-    found = failures(suite(good, uart))
-    assert set(found) == {"framing: noise before a frame"}
+    assert set(failures(suite(good, uart))) == {"framing: noise before a frame"}
 
 
 @pytest.mark.parametrize(("late", "failed"), [(1, False), (3, True)])
@@ -251,9 +250,8 @@ def runs(*checks: CheckResult) -> CheckRun:
 
 
 def test_comparison_shows_the_first_difference():
-    one = CheckResult("a", Verdict.PASSED, "", ("Gain=1",))
+    one, other = (CheckResult("a", Verdict.PASSED, "", (f"Gain={n}",)) for n in (1, 2))
     assert compare(runs(one), runs(one)) is None
-    other = CheckResult("a", Verdict.PASSED, "", ("Gain=2",))
     assert compare(runs(one), runs(other)) == "a: Gain=1 on x, Gain=2 on x"
     failed = CheckResult("a", Verdict.FAILED, "why", ("Gain=1",))
     assert compare(runs(one), runs(failed)) == "a: passed on x, failed on x (why)"

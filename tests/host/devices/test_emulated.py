@@ -18,9 +18,8 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 @pytest.fixture
 def device() -> Iterator[Any]:
-    device = open_device("cubestar", seed=4)
-    yield device
-    device.close()
+    with open_device("cubestar", seed=4) as device:
+        yield device
 
 
 def test_a_read_waits_for_all_its_bytes_or_the_timeout(device: Any) -> None:
@@ -45,15 +44,12 @@ def test_what_arrived_can_be_counted_and_dropped(device: Any) -> None:
     assert port.in_waiting == 0
 
 
-def test_the_client_takes_the_line_back(device: Any) -> None:
+def test_the_client_takes_the_line_back_and_i2c_reaches_the_same_device(device: Any) -> None:
     assert device.client.client.telemetry("Identification")["NodeType"] == 5
     port = device.serial()
     port.write(ASK)
     assert port.read(2) == b"\x1f\x7f"
     assert device.client.client.telemetry("Identification")["NodeType"] == 5
-
-
-def test_i2c_and_serial_reach_the_same_device(device: Any) -> None:
     with device.smbus() as bus:
         assert bus.read_i2c_block_data(0x1A, 128, 1) == [5]
 

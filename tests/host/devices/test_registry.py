@@ -9,7 +9,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from cubestack.host.devices import registry
-from cubestack.host.devices.emulated import check_options, open_device
+from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.errors import TargetError
 
@@ -91,8 +91,6 @@ def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]
     ],
 )
 def test_options_that_make_no_sense(name: str, options: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        check_options(device(name), options)
     with pytest.raises(ValueError, match=message):
         open_device(name, **options)
 

@@ -1,6 +1,5 @@
 """Texts that name targets: what opens, and what is said of those that do not."""
 
-import io
 import os
 
 import pytest
@@ -44,11 +43,11 @@ def test_target_that_does_not_open(text, error):
 
 
 def write(path, events) -> None:
-    stream = io.StringIO()
-    writer = recording.RecordingWriter(stream, "cubesense", {"uart": 57_600, "bench_uart": 115_200})
-    for event in events:
-        writer.write(event)
-    path.write_text(stream.getvalue())
+    bauds = {"uart": 57_600, "bench_uart": 115_200}
+    with path.open("w") as stream:
+        writer = recording.RecordingWriter(stream, "cubesense", bauds)
+        for event in events:
+            writer.write(event)
 
 
 def test_recording_tells_its_device(tmp_path):

@@ -22,7 +22,7 @@ from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetErro
 from cubestack.host.shell.language import Shell, ShellError
 from cubestack.host.shell.registers import parse_value, parse_values
 
-from ..conftest import LetterLine, Slave
+from ..conftest import LetterLine, Slave, UartLink
 
 #: What controls of an emulated device have and answer.
 CONTROLS = {
@@ -42,12 +42,11 @@ def shell(node, uart) -> Shell:
 
 
 @pytest.fixture
-def sense_shell(sense, sense_uart) -> Shell:
+def sense_shell(sense) -> Shell:
     registers = RegisterClient(Slave(), CUBESENSE.registers, wait=lambda _s: None)
-    client = NodeClient(sense_uart, CUBESENSE)
-    letters = LetterLine(q=b"Y", s=bytes(100))
-    controls = Mock(EmulatedControls, **CONTROLS)
-    return Shell(Target("fake", CUBESENSE, client, sense_uart, registers, letters, controls))
+    line, letters = UartLink(sense), LetterLine(q=b"Y", s=bytes(100))
+    node, controls = NodeClient(line, CUBESENSE), Mock(EmulatedControls, **CONTROLS)
+    return Shell(Target("fake", CUBESENSE, node, line, registers, letters, controls))
 
 
 def test_every_telemetry_is_read(shell):

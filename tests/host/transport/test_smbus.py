@@ -127,19 +127,15 @@ def test_packet_error_codes(bus: Any, echo: Echo) -> None:
     assert bus.read_byte_data(ADDRESS, 5) == 5
 
 
-def test_a_closed_bus(bus: Any) -> None:
+def test_a_closed_bus_and_none_yet(bus: Any) -> None:
     with bus:
         bus.read_byte(ADDRESS)
     with pytest.raises(PortClosedError, match=r"call open\(\) first"):
         bus.read_byte(ADDRESS)
     bus.close()
-
-
-def test_no_bus_yet() -> None:
-    bus = CubeSMBus()
-    assert bus.fd is None
+    assert CubeSMBus().fd is None
     with pytest.raises(TypeError, match="a number or a path"):
-        bus.open(1.5)  # type: ignore[arg-type]
+        bus.open(1.5)
 
 
 @pytest.mark.parametrize("bus", [199, "/dev/i2c-199", "/no/such/socket"])

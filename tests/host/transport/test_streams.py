@@ -39,8 +39,7 @@ def tcp_line() -> Iterator[Ends]:
 
 @pytest.fixture(params=["serial_line", "tcp_line"])
 def line(request: pytest.FixtureRequest) -> Ends:
-    found: Ends = request.getfixturevalue(request.param)
-    return found
+    return request.getfixturevalue(request.param)
 
 
 def test_bytes_go_both_ways_unchanged(line: Ends) -> None:

@@ -110,13 +110,10 @@ def test_measuring_sends_what_is_known(
 
 
 def test_julian_dates_are_split_exactly(node: FakeAramis, aramis: Aramis) -> None:
-    for date, day, millisecond in (
-        (2_461_366.25, 2_461_366, 21_600_000),
-        (2_461_366.0, 2_461_366, 0),
-        (2_461_366.9999999999, 2_461_367, 0),
-    ):
-        aramis.set_time(date)
-        assert node.log[-1] == ("SetSystemTime", {"JulianDay": day, "Millisecond": millisecond})
+    for more, days, millisecond in ((0.25, 0, 21_600_000), (0.0, 0, 0), (0.9999999999, 1, 0)):
+        aramis.set_time(2_461_366 + more)
+        sent = {"JulianDay": 2_461_366 + days, "Millisecond": millisecond}
+        assert node.log[-1] == ("SetSystemTime", sent)
 
 
 def test_the_latch_up_action_is_off_then_on(node: FakeAramis, aramis: Aramis) -> None:

@@ -10,23 +10,17 @@ from ...conftest import LetterLine
 PICTURE = np.random.default_rng(4).integers(0, 256, (480, 640), np.uint8)
 
 
-@pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"a"), (Camera.SUN, b"q")])
-def test_taking_a_picture(camera: Camera, letter: bytes) -> None:
-    line = LetterLine(a=b"Y", q=b"Y")
+@pytest.mark.parametrize(("camera", "letters"), [(Camera.NADIR, "as"), (Camera.SUN, "qw")])
+def test_taking_and_downloading_a_picture(camera: Camera, letters: str) -> None:
+    take, send = letters
+    line = LetterLine(**{take: b"Y", send: PICTURE.tobytes()})
     ServicePortClient(line).take(camera)
-    assert line.requests == letter
-
-
-@pytest.mark.parametrize(("camera", "letter"), [(Camera.NADIR, b"s"), (Camera.SUN, b"w")])
-def test_downloading_a_picture(camera: Camera, letter: bytes) -> None:
-    line = LetterLine(**{letter.decode(): PICTURE.tobytes()})
     line.chunk = 1000
     seen: list[tuple[int, int]] = []
     picture = ServicePortClient(line).download(camera, lambda *done: seen.append(done))
-    assert line.requests == letter
+    assert line.requests == letters.encode()
     np.testing.assert_array_equal(picture, PICTURE)
-    assert seen[0] == (1000, 307_200)
-    assert seen[-1] == (307_200, 307_200)
+    assert (seen[0], seen[-1]) == ((1000, 307_200), (307_200, 307_200))
 
 
 def test_what_came_before_is_dropped() -> None:

@@ -46,9 +46,6 @@ def test_attitude(cubestar: CubeStar, node: Any) -> None:
     assert attitude.mode is MatchMode.ASSISTED
     assert (attitude.valid, attitude.matched, attitude.frame) == (True, 9, 12)
     assert attitude.image_time_s == 34.567
-
-
-def test_coarse_quaternion(cubestar: CubeStar, node: Any) -> None:
     node.values["AttitudeData"] = {"Qbar0": 0.6, "Qbar3": -0.8}
     np.testing.assert_allclose(cubestar.coarse_quaternion(), [0.6, 0, 0, -0.8], atol=5e-5)
 

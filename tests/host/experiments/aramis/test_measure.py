@@ -16,7 +16,7 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.registers import read_settings
-from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
+from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
@@ -92,17 +92,15 @@ def test_a_scene_file_and_a_scene(tmp_path: Path) -> None:
 
 
 def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
-    pointing = quaternion_from_pointing(84.0, -1.0, 20.0)
-    scene = SkyScene(pointing)
+    scene = SkyScene.pointing(84.0, -1.0, 20.0)
     settings = read_settings(RegisterFile(REGISTERS))
     settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
     shutter = RollingShutter(10**12, Fraction(31_750_000), 6299, 6299)
     sky = Mt9m001Imager().picture(scene, CONDITION, shutter, settings)
-    wide = np.pad(sky, ((0, 20), (7, 0)))
-    Image.fromarray(wide).save(tmp_path / "sky.png")
+    Image.fromarray(np.pad(sky, ((0, 20), (7, 0)))).save(tmp_path / "sky.png")
     (frame,) = measure(image=tmp_path / "sky.png", crop=(7, 0))
     assert (frame.solved, frame.right, frame.truth) == (True, None, None)
-    assert attitude_error_deg(np.array(frame.quaternion), pointing)[0] < 0.01
+    assert attitude_error_deg(np.array(frame.quaternion), scene.quaternion)[0] < 0.01
 
 
 def test_a_table_for_readers(run: Run) -> None:
