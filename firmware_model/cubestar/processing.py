@@ -74,12 +74,9 @@ class Results:
 
 @dataclass(eq=False)
 class Processing:
-    """The processing functions, and what they found.
+    """The processing functions, what they found in the latest picture, and how long each took.
 
     Attributes:
-        capture: where the picture is from.
-        catalogue: star list and pair list in flash.
-        results: of the latest picture.
         latest_ms, longest_ms: time of each step by name, since the last reset.
     """
 

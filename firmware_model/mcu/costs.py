@@ -38,13 +38,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class CostTable:
-    """The operations of one processor at one clock.
-
-    Attributes:
-        name: the part, for messages and reports.
-        clock_hz: cycles in a second.
-        operations: cost of each operation by name.
-    """
+    """The operations of one processor, by name, at one clock."""
 
     name: str
     clock_hz: int
@@ -57,14 +51,7 @@ class CostTable:
 
 @dataclass(eq=False)
 class Meter:
-    """Counts the operations of a program and their cycles.
-
-    Attributes:
-        table: where the costs come from.
-        total: cycles since the meter was made.
-        counts: how often each operation was charged.
-        phases: cycles charged inside each `phase`, added up over its visits.
-    """
+    """Counts a program's operations by name, and cycles: in all, and over all visits of a phase."""
 
     table: CostTable
     total: int = 0

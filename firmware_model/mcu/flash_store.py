@@ -5,12 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(eq=False)
 class FlashStore:
-    """Flash pages by name: survives resets and power cycles.
-
-    Attributes:
-        pages: contents by page name.
-        writes: how often each page was written, for the wear report.
-    """
+    """Flash pages by name, which survive power cycles, and how often each was written."""
 
     pages: dict[str, bytes] = field(default_factory=dict)
     writes: dict[str, int] = field(default_factory=dict)

@@ -15,14 +15,7 @@ class Memory(Enum):
 
 @dataclass(frozen=True)
 class Buffer:
-    """One buffer.
-
-    Attributes:
-        name: what it holds.
-        memory: where it lies.
-        size: in bytes.
-        inside: name of the buffer whose place it shares; empty when it has its own.
-    """
+    """One buffer of ``size`` bytes, which may lie ``inside`` the place of the one of that name."""
 
     name: str
     memory: Memory

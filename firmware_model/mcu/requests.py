@@ -110,11 +110,7 @@ class CameraTransfer:
 
 @dataclass(frozen=True)
 class Reset:
-    """The program ends here and starts anew; RAM is lost.
-
-    Attributes:
-        cause: number of the bit in the reset-cause register, counted from 1.
-    """
+    """The program starts anew, RAM is lost; ``cause``: bit in the reset-cause register, from 1."""
 
     cause: int
 

@@ -14,13 +14,7 @@ Job = TypeVar("Job")
 
 @dataclass(frozen=True)
 class QueuedCommand:
-    """An accepted telecommand.
-
-    Attributes:
-        message: which one.
-        values: its parameters, decoded.
-        came_us: uptime when it came.
-    """
+    """An accepted telecommand with its decoded parameters, and the uptime when it came."""
 
     message: Message
     values: dict[str, Any]
@@ -37,7 +31,7 @@ class BoundedQueue(deque[Job]):
 
     def put(self, job: Job) -> bool:
         """Append ``job``; False when the queue is full."""
-        if self.full:
-            return False
-        self.append(job)
-        return True
+        accepted = not self.full
+        if accepted:
+            self.append(job)
+        return accepted

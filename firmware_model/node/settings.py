@@ -10,11 +10,7 @@ from cubestack.firmware_model.interface.codec.message import Interface
 
 
 class Settings:
-    """Current parameters of every setting telecommand.
-
-    Attributes:
-        commands: names of these telecommands.
-    """
+    """Current parameters of the setting telecommands, which ``commands`` names."""
 
     def __init__(self, interface: Interface, commands: Iterable[str]) -> None:
         """Start with the reset values that ``interface`` declares for ``commands``."""

@@ -4,11 +4,7 @@ from collections.abc import Iterable
 
 
 class NodeState:
-    """What the RAM of every node's program holds.
-
-    Attributes:
-        flags: names of the raised error flags.
-    """
+    """What the RAM of every node's program holds: ``flags``, the names of the raised ones."""
 
     def __init__(self, declared: Iterable[str]) -> None:
         """Start with none of the ``declared`` flags raised."""

@@ -7,7 +7,6 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 
 from .harness import Harness
-from .sky import Sky
 
 UART_BYTES = 100_000
 I2C_MESSAGES = 10_000
@@ -42,9 +41,8 @@ def test_random_bytes_on_the_uart(lit: Harness, seed: int) -> None:
     stays_sane(lit)
 
 
-def test_random_frames_on_the_uart(unit: Harness, sky: Sky) -> None:
+def test_random_frames_on_the_uart(lit: Harness) -> None:
     """Frames as they should be, with random IDs, lengths and parameters."""
-    unit.picture = sky.picture
     rng = np.random.default_rng(11)
     for _ in range(3000):
         identifier = int(rng.integers(0, 256))
@@ -53,7 +51,7 @@ def test_random_frames_on_the_uart(unit: Harness, sky: Sky) -> None:
         length = right if rng.random() < 0.8 else int(rng.integers(0, 200))
         if identifier == STREAM:
             continue  # 90 s of unit time each
-        answers = unit.uart(encode_frame(bytes([identifier]) + rng.bytes(length)))
+        answers = lit.uart(encode_frame(bytes([identifier]) + rng.bytes(length)))
         if identifier < 128:
             (answer,) = answers
             assert AckError(answer[0]) in AckError
@@ -61,9 +59,9 @@ def test_random_frames_on_the_uart(unit: Harness, sky: Sky) -> None:
             assert answers == []
         else:
             assert [len(answer) for answer in answers] == [message.length]
-        unit.run(until_us=unit.now_us + int(rng.integers(0, 200_000)))
-        assert not unit.received()
-    stays_sane(unit)
+        lit.run(until_us=lit.now_us + int(rng.integers(0, 200_000)))
+        assert not lit.received()
+    stays_sane(lit)
 
 
 def test_random_messages_on_i2c(lit: Harness) -> None:
@@ -92,12 +90,11 @@ def test_random_messages_on_i2c(lit: Harness) -> None:
     stays_sane(lit)
 
 
-def test_random_transitions_on_i2c(unit: Harness, sky: Sky) -> None:
+def test_random_transitions_on_i2c(lit: Harness) -> None:
     """Starts, bytes and stops in any order, as a disturbed bus may bring them."""
-    unit.picture = sky.picture
     rng = np.random.default_rng(13)
     for _ in range(I2C_MESSAGES):
-        link = unit.program.link
+        link = lit.program.link
         match rng.integers(0, 5):
             case 0:
                 link.i2c_start(bool(rng.integers(0, 2)))
@@ -108,9 +105,9 @@ def test_random_transitions_on_i2c(unit: Harness, sky: Sky) -> None:
                 assert 0 <= link.i2c_read() <= 255
             case 4:
                 link.i2c_stop()
-        unit.run(until_us=unit.now_us + int(rng.integers(0, 10_000)))
-    unit.program.link.i2c_stop()
-    stays_sane(unit)
+        lit.run(until_us=lit.now_us + int(rng.integers(0, 10_000)))
+    lit.program.link.i2c_stop()
+    stays_sane(lit)
 
 
 def test_a_flood_of_good_frames_whose_answers_find_no_room(lit: Harness) -> None:

@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.attitude.quest import AttitudeError
-from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 
 from .harness import Harness
@@ -48,9 +47,9 @@ DARK = np.zeros((512, 1024), np.uint8)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_picture_gives_its_attitude(unit: Harness, catalogue: StarCatalogue, seed: int) -> None:
+def test_a_picture_gives_its_attitude(unit: Harness, seed: int) -> None:
     true = Rotation.random(rng=np.random.default_rng(seed))
-    sky = take(catalogue, true)
+    sky = take(unit.catalogue, true)
     values = process(unit, sky.picture)
     assert unit.status() is TaskStatus.CALCULATED
     assert values["Valid"]
@@ -69,7 +68,7 @@ def test_the_attitude_belongs_to_the_picture_of_the_stars(lit: Harness) -> None:
 
 
 def test_stars_weigh_as_much_as_they_were_confirmed(
-    unit: Harness, monkeypatch: pytest.MonkeyPatch, catalogue: StarCatalogue, pose: Rotation
+    unit: Harness, monkeypatch: pytest.MonkeyPatch, pose: Rotation
 ) -> None:
     given: list[np.ndarray] = []
 
@@ -77,7 +76,7 @@ def test_stars_weigh_as_much_as_they_were_confirmed(
         given.extend(arguments[:3])
         return np.array([0, 0, 0, 1], np.float32)
 
-    sky = take(catalogue, pose)
+    sky = take(unit.catalogue, pose)
     monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", weigh)
     process(unit, sky.picture)
     details = [unit.telemetry("IDStarsDetails") for _ in sky.stars]
@@ -117,11 +116,11 @@ def test_a_step_without_its_input(unit: Harness, name: str, failed: TaskStatus, 
     assert unit.flags() == {flag}
 
 
-def test_too_few_stars(unit: Harness, catalogue: StarCatalogue, pose: Rotation) -> None:
+def test_too_few_stars(unit: Harness, pose: Rotation) -> None:
     process(unit, DARK)
     assert unit.status() is TaskStatus.DETECTION_FAILED
     assert unit.flags() == {"LessThanThreeStarsDetected"}
-    process(unit, take(catalogue, pose, most=2).picture)
+    process(unit, take(unit.catalogue, pose, most=2).picture)
     assert unit.status() is TaskStatus.IDENTIFICATION_FAILED
     assert unit.flags() == {"LessThanThreeStarsDetected"}
     assert unit.telemetry("DetectionSummary")["NumStarsDetected"] == 2
@@ -171,40 +170,31 @@ def test_a_wrong_hint_leads_to_lost_in_space(tracking: Harness, sky: Sky, pose: 
     assert "IDModeError" not in tracking.flags()  # there was a hint
 
 
-def test_a_new_hint_replaces_the_attitude(
-    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
-) -> None:
+def test_a_new_hint_replaces_the_attitude(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     process(tracking, sky.picture)
     elsewhere = turned(pose, 90)
     hint(tracking, elsewhere)
-    values = process(tracking, take(catalogue, elsewhere).picture)
+    values = process(tracking, take(tracking.catalogue, elsewhere).picture)
     assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
     assert error_deg(attitude_of(values), elsewhere) < 0.01
 
 
-def test_a_hint_is_used_up_by_the_first_fix(
-    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
-) -> None:
+def test_a_hint_is_used_up_by_the_first_fix(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, pose)
     process(tracking, sky.picture)
     nearby = turned(pose, 2)  # too far to track
-    assert not process(tracking, take(catalogue, nearby).picture)["Valid"]
-    values = process(tracking, take(catalogue, nearby).picture)
+    assert not process(tracking, take(tracking.catalogue, nearby).picture)["Valid"]
+    values = process(tracking, take(tracking.catalogue, nearby).picture)
     assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
 
 
 @pytest.mark.parametrize(("degrees", "kept"), [(0.1333, True), (0.29, True), (0.35, False)])
 def test_tracking_follows_up_to_its_rate(
-    tracking: Harness,
-    catalogue: StarCatalogue,
-    sky: Sky,
-    pose: Rotation,
-    degrees: float,
-    kept: bool,
+    tracking: Harness, sky: Sky, pose: Rotation, degrees: float, kept: bool
 ) -> None:
     process(tracking, sky.picture)
     moved = turned(pose, degrees)
-    values = process(tracking, take(catalogue, moved).picture)
+    values = process(tracking, take(tracking.catalogue, moved).picture)
     assert values["Valid"] == kept
     if kept:
         assert values["Mode"] == MatchMode.TRACKING
@@ -227,20 +217,16 @@ def test_failures_lead_one_step_back_each(tracking: Harness, sky: Sky) -> None:
     assert mode_flag(tracking) is MatchMode.TRACKING
 
 
-def test_two_stars_are_enough_for_tracking(
-    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
-) -> None:
+def test_two_stars_are_enough_for_tracking(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     process(tracking, sky.picture)
-    values = process(tracking, take(catalogue, pose, most=2).picture)
+    values = process(tracking, take(tracking.catalogue, pose, most=2).picture)
     assert (values["Valid"], values["Matched"]) == (True, 2)
     assert error_deg(attitude_of(values), pose) < 0.05
 
 
-def test_too_few_stars_are_no_sign_of_a_rate(
-    tracking: Harness, catalogue: StarCatalogue, sky: Sky, pose: Rotation
-) -> None:
+def test_too_few_stars_are_no_sign_of_a_rate(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     process(tracking, sky.picture)
-    process(tracking, take(catalogue, pose, most=1).picture)
+    process(tracking, take(tracking.catalogue, pose, most=1).picture)
     assert tracking.flags() == {"LessThanThreeStarsDetected"}
 
 

@@ -65,16 +65,15 @@ def test_a_frame_that_is_not_supported_is_not_answered(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize("name", SUPPORTED)
-def test_every_frame_is_whole_at_any_time(name: str, unit: Harness, sky: Sky) -> None:
+def test_every_frame_is_whole_at_any_time(name: str, lit: Harness) -> None:
     message = INTERFACE.telemetry(name)
 
-    def asked() -> None:
-        (answer,) = unit.uart(encode_frame(bytes([message.id])))
+    def asked(_request: object = None) -> None:
+        (answer,) = lit.uart(encode_frame(bytes([message.id])))
         assert len(answer) == message.length
 
-    unit.picture = sky.picture
-    unit.on_request = lambda _request: asked()
-    unit.command("CaptureAndProcess")
+    lit.on_request = asked
+    lit.command("CaptureAndProcess")
     asked()
 
 
@@ -107,11 +106,10 @@ def test_extended_identification(unit: Harness) -> None:
 
 
 @telemetry("TaskStatus")
-def test_task_status(unit: Harness, sky: Sky) -> None:
+def test_task_status(lit: Harness) -> None:
     seen = []
-    unit.picture = sky.picture
-    unit.on_request = lambda _request: seen.append(unit.telemetry("TaskStatus")["taskStatus"])
-    unit.command("CaptureAndProcess")
+    lit.on_request = lambda _request: seen.append(lit.telemetry("TaskStatus")["taskStatus"])
+    lit.command("CaptureAndProcess")
     steps = [TaskStatus(value) for value in dict.fromkeys(seen)]
     assert steps == [  # between some of them no time passes
         TaskStatus.POWERED_UP,
@@ -121,7 +119,7 @@ def test_task_status(unit: Harness, sky: Sky) -> None:
         TaskStatus.CALCULATING,
         TaskStatus.CALCULATED,
     ]
-    assert unit.telemetry("TaskStatus")["taskStatus"] == TaskStatus.CALCULATED
+    assert lit.status() is TaskStatus.CALCULATED
 
 
 @telemetry("LogStatus")
@@ -205,17 +203,16 @@ def test_counters_wrap_or_saturate_on_the_wire(unit: Harness) -> None:
     assert unit.telemetry("StartAndLoopTime")["MaxLoopTime"] == 65_535
 
 
-def test_asking_changes_nothing_but_the_count_of_requests(unit: Harness, sky: Sky) -> None:
-    unit.command("setIDMode", IdMode=IdMode.TRACKING)
-    unit.picture = sky.picture
-    unit.command("CaptureAndProcess")
+def test_asking_changes_nothing_but_the_count_of_requests(lit: Harness) -> None:
+    lit.command("setIDMode", IdMode=IdMode.TRACKING)
+    lit.command("CaptureAndProcess")
     steady = [
         name
         for name in SUPPORTED
         if not INTERFACE.telemetry(name).steps and name != "ExtendedIdentification"
     ]
-    first = {name: unit.telemetry(name) for name in steady}
-    assert first == {name: unit.telemetry(name) for name in steady}
+    first = {name: lit.telemetry(name) for name in steady}
+    assert first == {name: lit.telemetry(name) for name in steady}
 
 
 # --- tables ---------------------------------------------------------------------------------------
