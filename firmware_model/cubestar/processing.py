@@ -15,14 +15,9 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.geometry import direction_of, undistort, unit_vectors
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
-from cubestack.firmware_model.cubestar import phases
+from cubestack.firmware_model.cubestar import configuration, phases
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.configuration import (
-    camera_parameters,
-    detection_config,
-    field_radius_deg,
-)
 from cubestack.firmware_model.cubestar.detection import Detection, SearchEnd
 from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
 from cubestack.firmware_model.cubestar.matching.tracking import track
@@ -134,8 +129,10 @@ class Processing:
         self.state.task_status = TaskStatus.DETECTING
         started_us: int = yield ReadTimer()
         with self._cycles():
-            detection = yield from self.capture.pictures.search(detection_config(settings))
-            camera = camera_parameters(settings)
+            detection = yield from self.capture.pictures.search(
+                configuration.detection_config(settings)
+            )
+            camera = configuration.camera_parameters(settings)
             with self.meter.phase("correction"):
                 points = undistort(detection.centroids, camera, self.meter)
             with self.meter.phase("vectors"):
@@ -213,7 +210,9 @@ class Processing:
         if mode is MatchMode.TRACKING and too_few:
             self.state.raise_flag("RateExceeded")
         boresight = self._expected_boresight()
-        radius_deg = field_radius_deg(camera_parameters(self.state.settings))
+        radius_deg = configuration.field_radius_deg(
+            configuration.camera_parameters(self.state.settings)
+        )
         in_field = self.catalogue.near(boresight, radius_deg, self.meter)
         if len(in_field) < FEWEST_STARS:
             self.state.raise_flag("LessThanThreeStarsInFoV")

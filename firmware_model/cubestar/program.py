@@ -64,11 +64,8 @@ class CubeStarProgram:
         """Run until a reset."""
         yield from phases.started(self.state)
         yield from self._pictures.start()
-        retained = self.state.retained
-        if (
-            self.state.hardware.reset_cause != ResetCause.SYSTEM_REQUEST
-            or not retained.camera_setup
-        ):
+        retained, cause = self.state.retained, self.state.hardware.reset_cause
+        if cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
             yield from self._capture.sensor.power_up()
         while True:
             served = yield from self._serve()
