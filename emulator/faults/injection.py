@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -40,7 +41,6 @@ class Injection:
         start_ps: when it begins.
         end_ps: when it is over; None for never.
         seed: of everything random about it.
-        generator: random numbers in the order of what it does.
         hits: how often it did something.
     """
 
@@ -50,12 +50,12 @@ class Injection:
     start_ps: int
     end_ps: int | None
     seed: int
-    generator: np.random.Generator = field(init=False)
     hits: int = 0
 
-    def __post_init__(self) -> None:
-        """Seed it."""
-        self.generator = self.generator_at()
+    @cached_property
+    def generator(self) -> np.random.Generator:
+        """Random numbers in the order of what it does."""
+        return self.generator_at()
 
     def active(self, time_ps: int) -> bool:
         """Whether it acts at that time."""

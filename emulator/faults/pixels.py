@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.camera.common.stream import StreamSegment
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.injection import Injection, Report, active
 from cubestack.emulator.rtl.pixel_clock import PixelSegment, PixelSource
@@ -23,14 +24,9 @@ _PIXEL_FAULTS = (table.PixelHot, table.PixelDead, table.ColumnDefect, table.Bloo
 
 
 @dataclass(frozen=True)
-class _Piece:
-    """A segment with a grid of its own; see PixelSegment and PixelSource."""
+class _Piece(StreamSegment):
+    """A segment with a grid of its own; see PixelSource."""
 
-    start_ps: int
-    clocks: int
-    vsync: int
-    rows: int
-    pixels: Callable[[], Picture] | None
     period: Fraction
     line_clocks: int
     active_columns: int

@@ -106,26 +106,19 @@ class Listener:
         self, call: Notification, fd: int, number: int, *, close_on_exec: bool
     ) -> None:
         """Put a copy of ``fd`` into the process as ``number``, and let the call return that."""
+        how = _AT_NUMBER | _AND_SEND if self._one_step else _AT_NUMBER
         flags = os.O_CLOEXEC if close_on_exec else 0
-        if self._one_step:
-            wanted = _ADDITION.pack(call.id, _AT_NUMBER | _AND_SEND, fd, number, flags)
-            try:
-                fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, wanted)
-                return
-            except OSError as error:
-                if error.errno == errno.ENOENT:
-                    return
-                if error.errno != errno.EINVAL:
-                    self.answer(call, -(error.errno or errno.EIO))
-                    return
-                self._one_step = False  # before Linux 5.14
-        wanted = _ADDITION.pack(call.id, _AT_NUMBER, fd, number, flags)
         try:
-            fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, wanted)
+            fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, _ADDITION.pack(call.id, how, fd, number, flags))
         except OSError as error:
-            self.answer(call, -(error.errno or errno.EIO))
-            return
-        self.answer(call, number)
+            if not self._one_step or error.errno != errno.EINVAL:
+                self.answer(call, -(error.errno or errno.EIO))
+                return
+            self._one_step = False  # before Linux 5.14
+            self.answer_with_descriptor(call, fd, number, close_on_exec=close_on_exec)
+        else:
+            if not self._one_step:
+                self.answer(call, number)
 
     def _send(self, response: bytes) -> None:
         try:

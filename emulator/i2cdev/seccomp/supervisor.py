@@ -137,6 +137,7 @@ class Supervisor(Endpoint):
     def _by_path(self) -> dict[str, Handler]:
         here = partial(self._on_path, folder=None, path=0)
         there = partial(self._on_path, folder=0, path=1)
+        statx = partial(self._stat, buffer=4, extended=True)
         exists, no_link, no_attribute = (
             partial(self._end, result=result) for result in (0, -errno.EINVAL, -errno.EOPNOTSUPP)
         )
@@ -147,7 +148,7 @@ class Supervisor(Endpoint):
             "stat": partial(here, handle=partial(self._stat, buffer=1)),
             "lstat": partial(here, handle=partial(self._stat, buffer=1)),
             "newfstatat": partial(self._stat_at, flags=3, handle=partial(self._stat, buffer=2)),
-            "statx": partial(self._stat_at, flags=2, handle=self._statx),
+            "statx": partial(self._stat_at, flags=2, handle=statx),
             "access": partial(here, handle=exists),
             "faccessat": partial(there, handle=exists),
             "faccessat2": partial(there, handle=exists),
@@ -216,18 +217,15 @@ class Supervisor(Endpoint):
             raise OSError(errno.EMFILE, f"{DESCRIPTORS} device files are open already")
         return min(free)
 
-    def _stat(self, call: Notification, found: Found, buffer: int) -> None:
-        data = self._node.stat(compact=self._abi.compact_stat)
-        self._put_stat(call, found, call.arguments[buffer], data)
-
-    def _statx(self, call: Notification, found: Found) -> None:
-        self._put_stat(call, found, call.arguments[4], self._node.statx())
-
-    def _put_stat(self, call: Notification, found: Found, place: int, data: bytes) -> None:
+    def _stat(
+        self, call: Notification, found: Found, buffer: int, *, extended: bool = False
+    ) -> None:
         if found is Found.LISTING:  # nobody looks before reading it
             self._listener.let_pass(call)
             return
-        write_memory(call.pid, place, data)
+        node = self._node
+        data = node.statx() if extended else node.stat(compact=self._abi.compact_stat)
+        write_memory(call.pid, call.arguments[buffer], data)
         self._listener.answer(call, 0)
 
     def _stat_at(

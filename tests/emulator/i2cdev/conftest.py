@@ -15,7 +15,7 @@ from cubestack.emulator.ports.endpoint import poll_now
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.formats.linux_i2c import LENGTH, Call, request, split_reply
 
-TIMEOUT_S = 20.0
+TIMEOUT = struct.pack("ll", 20, 0)  # 20 s, for a socket
 
 
 class Registers:
@@ -99,24 +99,15 @@ class Client:
 
     def __init__(self, path: str) -> None:
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.socket.settimeout(TIMEOUT_S)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, TIMEOUT)
         self.socket.connect(path)
 
     def send(self, call: Call, body: bytes = b"", key: int = 0) -> None:
         self.socket.sendall(packed(call, body, key))
 
     def receive(self) -> tuple[int, bytes]:
-        (length,) = LENGTH.unpack(self._exactly(LENGTH.size))
-        return split_reply(self._exactly(length))
-
-    def _exactly(self, count: int) -> bytes:
-        data = b""
-        while len(data) < count:
-            part = self.socket.recv(count - len(data))
-            if not part:
-                raise EOFError
-            data += part
-        return data
+        (length,) = LENGTH.unpack(self.socket.recv(LENGTH.size, socket.MSG_WAITALL))
+        return split_reply(self.socket.recv(length, socket.MSG_WAITALL))
 
     def hung_up(self) -> bool:
         try:
