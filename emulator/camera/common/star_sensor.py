@@ -4,9 +4,8 @@ from abc import abstractmethod
 from typing import ClassVar
 
 from cubestack.emulator.camera.common.image_sensor import ImageSensor
-from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
-from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 
 
 class StarSensor(ImageSensor[Scene, SkyCondition]):
@@ -22,13 +21,6 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
     columns: ClassVar[int]
     rows: ClassVar[int]
     word_bytes: ClassVar[int]
-
-    def __init__(
-        self, seen: Scene | SkyView, condition: SkyCondition, table: CameraRegisterMap, hz: int
-    ) -> None:
-        """Power up with the reset pin high; see ``ImageSensor``."""
-        self._table = table
-        super().__init__(seen, condition, table, hz)
 
     def _check(self, scene: Scene, condition: SkyCondition) -> None:
         lens = condition.optics

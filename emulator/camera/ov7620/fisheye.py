@@ -91,7 +91,23 @@ class Fisheye:
     @cached_property
     def field(self) -> "FieldOfView":
         """Directions of all pixels that see anything."""
-        return FieldOfView.of(self)
+        rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
+        radius = np.hypot(columns - self.cx, rows - self.cy)
+        rim = float(distorted(FIELD_DEG * PIXELS_PER_DEGREE))
+        lit = np.clip(rim - radius + 0.5, 0, 1)
+        index = np.flatnonzero(lit)
+        wide = undistorted(np.minimum(radius[index], rim))
+        # Across the radius a pixel is 1 / radius of a turn, along it as long as the slope says.
+        along = 1 / np.polyval(np.polyder(DISTORTION), wide)
+        across = np.sin(np.radians(wide / PIXELS_PER_DEGREE)) / np.maximum(radius[index], 1)
+        along_rad = np.radians(along / PIXELS_PER_DEGREE)
+        across_rad = np.where(radius[index] < 1, along_rad, across)
+        return FieldOfView(
+            index,
+            self.unproject(np.stack([columns[index], rows[index]], axis=1)).astype(np.float32),
+            np.sqrt(along_rad * across_rad).astype(np.float32),
+            lit[index].astype(np.float32),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,27 +125,6 @@ class FieldOfView:
     vectors: NDArray[np.float32]
     pixel_rad: NDArray[np.float32]
     lit: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, lens: Fisheye) -> "FieldOfView":
-        """Work it out for ``lens``."""
-        rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
-        radius = np.hypot(columns - lens.cx, rows - lens.cy)
-        rim = float(distorted(FIELD_DEG * PIXELS_PER_DEGREE))
-        lit = np.clip(rim - radius + 0.5, 0, 1)
-        index = np.flatnonzero(lit)
-        wide = undistorted(np.minimum(radius[index], rim))
-        # Across the radius a pixel is 1 / radius of a turn, along it as long as the slope says.
-        along = 1 / np.polyval(np.polyder(DISTORTION), wide)
-        across = np.sin(np.radians(wide / PIXELS_PER_DEGREE)) / np.maximum(radius[index], 1)
-        along_rad = np.radians(along / PIXELS_PER_DEGREE)
-        across_rad = np.where(radius[index] < 1, along_rad, across)
-        return cls(
-            index,
-            lens.unproject(np.stack([columns[index], rows[index]], axis=1)).astype(np.float32),
-            np.sqrt(along_rad * across_rad).astype(np.float32),
-            lit[index].astype(np.float32),
-        )
 
 
 LENSES = {Target.SUN: Fisheye(369, 250), Target.NADIR: Fisheye(371, 236)}

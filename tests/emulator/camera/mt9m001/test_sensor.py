@@ -99,22 +99,23 @@ def test_a_long_exposure_makes_the_frame_longer(camera: Mt9m001, shutter: int, r
     assert exposure.readout_ps == pytest.approx(last + 242 / chip.PIXEL_CLOCK_HZ * PS_PER_S, abs=1)
 
 
-def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(camera: Mt9m001) -> None:
-    stream(camera, 0, 40 * PS_PER_MS)
-    change = 50 * PS_PER_MS  # in the read-out of the first frame, which lasts to 67.5 ms
-    put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
-    segments = stream(camera, change, PS_PER_S)
-    assert segments[0][2] == 1  # the frame under way goes on
-    end_of_old = 1050 * ROW_S + 1024 * ROW_S
-    assert starts(segments)[0] / PS_PER_S == pytest.approx(end_of_old + 3001 * ROW_S, abs=1e-7)
-
-
-def test_a_change_between_frames_counts_from_its_own_time(camera: Mt9m001) -> None:
-    change = 662 * PS_PER_MS // 10  # the first frame ended at 65.85 ms, the next is due at 66.68
+@pytest.mark.parametrize(
+    ("change_ms", "read_out", "counts_from_s"),
+    [
+        (50, 1, (1050 + 1024) * ROW_S),  # in the read-out of the first frame, which goes on
+        (66.2, 0, 0.0662),  # that frame ended at 65.85 ms, the next is due at 66.68
+    ],
+)
+def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(
+    camera: Mt9m001, change_ms: float, read_out: int, counts_from_s: float
+) -> None:
+    change = round(change_ms * PS_PER_MS)
     stream(camera, 0, change)
     put(camera, "SHUTTER_WIDTH", 3000, now_ps=change)
-    first = starts(stream(camera, change, PS_PER_S))[0]
-    assert first / PS_PER_S == pytest.approx(0.0662 + 3001 * ROW_S, abs=1e-7)
+    segments = stream(camera, change, PS_PER_S)
+    assert segments[0][2] == read_out
+    first = starts(segments)[0] / PS_PER_S
+    assert first == pytest.approx(counts_from_s + 3001 * ROW_S, abs=1e-7)
 
 
 def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:
