@@ -43,19 +43,9 @@ PUBLISHED_PAIR_LIMIT_DEG = 42.1
 SIDEREAL_DEG_S = 360 / 86164.1
 
 #: The field of table 4.4: 54 x 28 degrees, no distortion.
-FOCAL_PX = 512 / math.tan(math.radians(27))
-PLAIN = replace(
-    LENS,
-    focal_length_mm=FOCAL_PX * 0.0056,
-    fx=FOCAL_PX,
-    fy=FOCAL_PX,
-    cx=511.5,
-    cy=255.5,
-    k1=0,
-    k2=0,
-    p1=0,
-    p2=0,
-)
+PX = 512 / math.tan(math.radians(27))
+CENTRED = {"cx": 511.5, "cy": 255.5, "k1": 0, "k2": 0, "p1": 0, "p2": 0}
+PLAIN = replace(LENS, focal_length_mm=PX * 0.0056, fx=PX, fy=PX, **CENTRED)
 PLAIN_SETTINGS = {
     "setFocalLength": {"FocalLength": PLAIN.focal_length_mm},
     "setFocalLengthComponents": {"Fx": PLAIN.fx, "Fy": PLAIN.fy},
@@ -111,22 +101,34 @@ class Stack:
         right = attitude.valid and is_right(cross, roll)
         return Shot(attitude.valid, right, detected, matched, cross, roll, phases)
 
+    def print_rates(self, frames: int, title: str, *modes: str, **scene: Any) -> None:
+        """Percentages over random poses; the same ones in every mode."""
+        for mode in modes:
+            rng, error_deg = np.random.default_rng(1), MODES[mode]
+            hint = None if error_deg is None else (error_deg, rng)
+            shots = [
+                self.shoot(hint, quaternion=random_quaternion(rng), seed=number, **scene)
+                for number in range(frames)
+            ]
+            wrong = sum(shot.valid and not shot.right for shot in shots)
+            print(
+                f"{title}, {mode}: {percent(shots, 'right')} right, {wrong} wrong, "
+                f"{matched_share(shots)}",
+                flush=True,
+            )
 
-def rates(stack: Stack, frames: int, error_deg: float | None, **scene: Any) -> str:
-    """Percentages over random poses; the same ones in every call."""
-    rng = np.random.default_rng(1)
-    hint = None if error_deg is None else (error_deg, rng)
-    shots = [
-        stack.shoot(hint, quaternion=random_quaternion(rng), seed=number, **scene)
-        for number in range(frames)
-    ]
-    right = 100 * np.mean([shot.right for shot in shots])
-    wrong = sum(shot.valid and not shot.right for shot in shots)
-    share = 100 * sum(s.matched for s in shots) / sum(s.detected for s in shots)
-    return f"{right:5.1f} % right, {wrong} wrong, {share:5.1f} % of the detected stars matched"
+
+def percent(shots: list[Shot], key: str) -> str:
+    return f"{100 * np.mean([getattr(shot, key) for shot in shots]):5.1f} %"
 
 
-MODES = {"lost in space": None, "assisted 5 deg": 5.0, "assisted exact": 0.0}
+def matched_share(shots: list[Shot]) -> str:
+    share = 100 * sum(shot.matched for shot in shots) / sum(shot.detected for shot in shots)
+    return f"{share:5.1f} % of the detected stars matched"
+
+
+LOST, ROUGH, EXACT = "lost in space", "assisted 5 deg", "assisted exact"
+MODES = {LOST: None, ROUGH: 5.0, EXACT: 0.0}
 
 
 def field(frames: int) -> None:
@@ -134,22 +136,18 @@ def field(frames: int) -> None:
     for limit in (PUBLISHED_PAIR_LIMIT_DEG, PAIR_LIMIT_DEG):
         with closing(Stack(limit, optics=PLAIN)) as stack:
             for magnitude in (3.6, 3.7, 3.8):
-                for mode, error in MODES.items():
-                    found = rates(stack, frames, error, mag_limit=magnitude)
-                    print(f"pairs {limit} deg, V < {magnitude}, {mode}: {found}", flush=True)
+                title = f"pairs {limit} deg, V < {magnitude}"
+                stack.print_rates(frames, title, *MODES, mag_limit=magnitude)
             for false in (1, 5, 10):
-                for mode in ("lost in space", "assisted 5 deg"):
-                    found = rates(stack, frames, MODES[mode], mag_limit=3.8, false_stars=false)
-                    print(f"pairs {limit} deg, {false} false stars, {mode}: {found}", flush=True)
+                title = f"pairs {limit} deg, {false} false stars"
+                stack.print_rates(frames, title, LOST, ROUGH, mag_limit=3.8, false_stars=false)
 
 
 def pairs(frames: int) -> None:
     """The default lens, with two catalogues."""
     for limit in (PUBLISHED_PAIR_LIMIT_DEG, PAIR_LIMIT_DEG):
         with closing(Stack(limit)) as stack:
-            for mode in ("lost in space", "assisted 5 deg"):
-                found = rates(stack, frames, MODES[mode], mag_limit=3.8)
-                print(f"pairs {limit} deg, {mode}: {found}", flush=True)
+            stack.print_rates(frames, f"pairs {limit} deg", LOST, ROUGH, mag_limit=3.8)
 
 
 def times(frames: int) -> None:
@@ -178,9 +176,7 @@ def thresholds(frames: int) -> None:
             stack.cubestar.client.command(
                 "setDetectionThresholds", DetectionThreshold=threshold, StarThreshold=threshold
             )
-            for mode in ("lost in space", "assisted 5 deg"):
-                found = rates(stack, frames, MODES[mode])
-                print(f"threshold {threshold:2} DN, {mode}: {found}", flush=True)
+            stack.print_rates(frames, f"threshold {threshold:2} DN", LOST, ROUGH)
 
 
 def repeatability(frames: int) -> None:
@@ -192,12 +188,8 @@ def repeatability(frames: int) -> None:
             axis_in_camera = matrix_from_quaternion(pose)[:, 2]
             scatter, counts = [], []
             for number in range(frames):
-                shot = stack.shoot(
-                    quaternion=pose,
-                    rate_deg_s=SIDEREAL_DEG_S * axis_in_camera,
-                    mag_limit=3.8,
-                    seed=number,
-                )
+                turning = {"quaternion": pose, "rate_deg_s": SIDEREAL_DEG_S * axis_in_camera}
+                shot = stack.shoot(**turning, mag_limit=3.8, seed=number)
                 if shot.right:
                     truth = stack.board.truth()
                     assert truth is not None
@@ -229,13 +221,10 @@ def slew(frames: int) -> None:
                 shots.append(
                     stack.shoot(quaternion=pose, rate_deg_s=turning, seed=number, mag_limit=3.8)
                 )
-        right = 100 * np.mean([shot.right for shot in shots])
-        valid = 100 * np.mean([shot.valid for shot in shots])
-        share = 100 * sum(s.matched for s in shots) / sum(s.detected for s in shots)
         cross = [shot.cross for shot in shots if shot.right] or [math.nan]
         print(
-            f"{rate} deg/s: {valid:5.1f} % solved, {right:5.1f} % right, {share:5.1f} % of the "
-            f"detected stars matched, median error {np.median(cross):.4f} deg across",
+            f"{rate} deg/s: {percent(shots, 'valid')} solved, {percent(shots, 'right')} right, "
+            f"{matched_share(shots)}, median error {np.median(cross):.4f} deg across",
             flush=True,
         )
 

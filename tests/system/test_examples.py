@@ -10,32 +10,36 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.host.devices.emulated import open_device
 from cubestack.host.experiments.attitude import errors
+from tests.system.conftest import ROOT
 
-HERE = Path(__file__).parents[2] / "examples"
+HERE = ROOT / "examples"
 PLUGIN = "cubestack.host.pytest_plugin"
 TIMEOUT_S = 120
 
 
 @pytest.fixture
 def device() -> Any:
-    device = open_device("cubestar", seed=4)
-    yield device
-    device.close()
+    with open_device("cubestar", seed=4) as device:
+        yield device
 
 
 @pytest.fixture(scope="session")
 def flight_driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The C driver, compiled without a warning."""
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    compiler = find_c_compiler()
     if compiler is None:
         pytest.skip("no C compiler")
     program = tmp_path_factory.mktemp("flight") / "flight_driver"
-    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1"]
-    command = [compiler, *flags, "-o", program, HERE / "flight_driver.c"]
-    subprocess.run(command, check=True, timeout=TIMEOUT_S)
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o", program]
+    subprocess.run([*compiler, *flags, HERE / "flight_driver.c"], check=True, timeout=TIMEOUT_S)
     return program
+
+
+def run(*command: str | Path, cwd: Path | None = None) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=TIMEOUT_S)
 
 
 def check_attitude(device: Any, output: str) -> None:
@@ -69,9 +73,7 @@ def test_flight_driver_with_a_dead_camera(device: Any, flight_driver: Path) -> N
 
 
 def test_flight_driver_without_a_port(flight_driver: Path) -> None:
-    done = subprocess.run(
-        [flight_driver, "/nowhere"], capture_output=True, text=True, timeout=TIMEOUT_S
-    )
+    done = run(flight_driver, "/nowhere")
     assert (done.returncode, done.stderr) == (1, "flight_driver: No such file or directory\n")
 
 
@@ -100,13 +102,8 @@ def test_suite_of_a_driver(tmp_path: Path) -> None:
     # An installation that is older than the entry point has to be told.
     installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
     plugin = [] if installed else ["-p", PLUGIN]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *plugin, "-q", f"--junitxml={report}", str(suite)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT_S,
-    )
+    command = (sys.executable, "-m", "pytest", *plugin, "-q", f"--junitxml={report}", suite)
+    done = run(*command, cwd=tmp_path)
     assert done.returncode == 0, done.stdout
     assert "5 passed" in done.stdout
     assert 'name="cubestack.cubestar.fault_events"' in report.read_text(encoding="utf-8")

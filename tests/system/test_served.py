@@ -13,8 +13,8 @@ import pytest
 from tests.system.conftest import ROOT, Emulate
 
 POINTING_RAD = (1.4661, -0.0175)  # right ascension 84, declination -1 degrees: what emulate shows
-TOLERANCE_RAD = 3e-4  # telemetry counts in steps of 1e-4
-
+CRUX_RAD = (-3.0369, -1.0472)  # 186, in the range -pi to pi, and -60 degrees
+CRUX = 'kind = "sky"\nra_deg = 186.0\ndec_deg = -60.0\nmag_limit = 3.8\n'
 
 EXAMPLE = ROOT / "examples" / "plain_pyserial.py"
 
@@ -27,17 +27,25 @@ def run_python(*arguments: object, folder: Path) -> str:
     return result.stdout
 
 
-@pytest.mark.parametrize("options", [("--pty", "./port"), ("--tcp", "0")])
+@pytest.mark.parametrize(
+    ("options", "expected_rad"),
+    [
+        (("--pty", "./port"), POINTING_RAD),
+        (("--tcp", "0"), POINTING_RAD),
+        (("--pty", "port", "--scene", "crux.toml"), CRUX_RAD),
+    ],
+)
 def test_plain_pyserial_on_a_pseudo_terminal_and_over_tcp(
-    emulate: Emulate, tmp_path: Path, options: tuple[str, str]
+    emulate: Emulate, tmp_path: Path, options: tuple[str, ...], expected_rad: tuple[float, float]
 ) -> None:
+    (tmp_path / "crux.toml").write_text(CRUX)
     with emulate(*options, "--pace", "fast") as served:
         target = served.port.replace("tcp://", "socket://")
         output = run_python(EXAMPLE, target, folder=tmp_path)
     found = re.search(r"right ascension (\S+) rad, declination (\S+) rad", output)
     assert found is not None, output
     angles = [float(angle) for angle in found.groups()]
-    assert angles == pytest.approx(POINTING_RAD, abs=TOLERANCE_RAD)
+    assert angles == pytest.approx(expected_rad, abs=3e-4)  # telemetry counts in steps of 1e-4
     assert served.process.returncode == 0
 
 
@@ -54,15 +62,6 @@ def test_a_signal_ends_it_cleanly(emulate: Emulate, tmp_path: Path, number: int)
         served.process.send_signal(number)
         assert served.process.wait(timeout=30) == 0
     assert not os.path.lexists(tmp_path / "port")
-
-
-def test_a_scene_file_is_served(emulate: Emulate, tmp_path: Path) -> None:
-    scene = tmp_path / "crux.toml"
-    scene.write_text('kind = "sky"\nra_deg = 186.0\ndec_deg = -60.0\nmag_limit = 3.8\n')
-    with emulate("--scene", scene, "--pty", "port", "--pace", "fast"):
-        output = run_python(EXAMPLE, "port", folder=tmp_path)
-    assert "right ascension -3.03" in output  # 186 degrees, in the range -pi to pi
-    assert "declination -1.04" in output
 
 
 def test_a_second_emulator_is_refused_the_same_port(emulate: Emulate) -> None:

@@ -6,16 +6,16 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
-from cubestack.emulator.i2cdev.pacing import wait_precisely
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.ports.realtime import RealtimeScheduler
+from cubestack.emulator.i2cdev.serving import open_scheduler
 from cubestack.host.devices.emulated import open_device
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
@@ -63,25 +63,21 @@ class Latch:
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The socket of an emulation that runs in this process."""
     path = tmp_path_factory.mktemp("private", numbered=True) / "bus"
-    opened = open_device("cubestar")
-    board = opened.board
-    board.i2c_bus.attach(LATCH, Latch(), general_call=True)
-    adapter = I2cAdapter(board.kernel, board.i2c_bus)
-    server = I2cServer(path, adapter)
-    scheduler = RealtimeScheduler(
-        board.kernel,
-        [server],
-        lambda: board.busy() or adapter.busy,
-        pace="fast",
-        wait=wait_precisely,
-    )
-    thread = threading.Thread(target=scheduler.run)
-    thread.start()
-    yield path
-    scheduler.stop()
-    thread.join(TIMEOUT_S)
-    server.close()
-    board.close()
+    with open_device("cubestar") as opened:
+        board = opened.board
+        board.i2c_bus.attach(LATCH, Latch(), general_call=True)
+        adapter = I2cAdapter(board.kernel, board.i2c_bus)
+        with (
+            closing(I2cServer(path, adapter)) as server,
+            open_scheduler(
+                board.kernel, [], board.busy, pace="fast", i2c=adapter, i2c_ports=[server]
+            ) as scheduler,
+        ):
+            thread = threading.Thread(target=scheduler.run)
+            thread.start()
+            yield path
+            scheduler.stop()
+            thread.join(TIMEOUT_S)
 
 
 @pytest.fixture(scope="session", params=ROUTES)
