@@ -19,10 +19,33 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.jobs import FrameRequest
-from cubestack.firmware_model.cubesense.thumbnail import OUTSIDE, frame_pixels
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
+
+#: Number of a pixel that lies outside of the picture.
+OUTSIDE = -1
+
+
+def frame_pixels(size: codes.ImageSize, frame: int) -> NDArray[np.int32]:
+    """Where the 128 bytes of a frame come from, int32 (128,).
+
+    Each is a pixel's number in the picture, row after row from 0 to 307199, or ``OUTSIDE`` for a
+    byte that is zero. Numbers ascend within a frame and from frame to frame. Assumed: the picture
+    lies in the middle of 1024 x 1024 pixels, and a smaller square takes every 2nd, 4th, 8th or 16th
+    pixel of every such row, from the first on. The margins, 192 columns and 272 rows, are multiples
+    of 16, so every square takes the picture's first pixel. Nothing is averaged, because the
+    processor has neither the memory nor the time.
+
+    Raises ValueError for a frame that ``size`` lacks.
+    """
+    if not 0 <= frame < size.frames:
+        raise ValueError(f"{size.name} has frames 0 to {size.frames - 1}, not {frame}")
+    position = frame * codes.FRAME_BYTES + np.arange(codes.FRAME_BYTES)
+    row = (position // size.side - size.top) * size.step
+    column = (position % size.side - size.left) * size.step
+    inside = (row >= 0) & (row < codes.ROWS) & (column >= 0) & (column < codes.COLUMNS)
+    return np.where(inside, row * codes.COLUMNS + column, OUTSIDE).astype(np.int32)
 
 
 @dataclass(eq=False)

@@ -3,9 +3,9 @@
 CubeSense thesis, sections 6.5, 6.6 and 7.4. What a picture holds is looked at in the memory; it
 stays whole until the next one is stored there.
 
-Times are those of the part's timer, in steps of 51.2 us, from the command to the FPGAs on. The FPGA
-shows a picture's end only. So the first row's time is ACK's, less the time in which a camera sends
-480 rows.
+Times are those of the part's timer behind its prescaler of 256, from the command to the FPGAs on:
+time = ticks x 256 / 5 MHz, so a tick is 51.2 us and 16 bits hold 3.4 s. The FPGA shows a picture's
+end only. So the first row's time is ACK's, less the time in which a camera sends 480 rows.
 """
 
 from functools import cache
@@ -13,7 +13,6 @@ from functools import cache
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
-from cubestack.firmware_model.cubesense.timer import microseconds, read_ticks, ticks_of, ticks_since
 from cubestack.firmware_model.cubesense.vision import distortion, sun_centroid
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
@@ -22,8 +21,35 @@ from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, P
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import Pay, Routine, pause
+from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ, PIC18F45K20
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
+
+PRESCALER = 256
+
+_CYCLES_PER_US = INSTRUCTION_HZ // 1_000_000
+
+
+def ticks_of(us: int) -> int:
+    """Whole ticks in so many microseconds, not wrapped."""
+    return us * _CYCLES_PER_US // PRESCALER
+
+
+def microseconds(ticks: int) -> int:
+    """Duration of so many ticks, rounded down."""
+    return ticks * PRESCALER // _CYCLES_PER_US
+
+
+def read_ticks() -> Routine[int]:
+    """The timer's 16 bits."""
+    now_us: int = yield ReadTimer()
+    return ticks_of(now_us) & 0xFFFF
+
+
+def ticks_since(started: int) -> Routine[int]:
+    """Ticks since the timer showed ``started``, right for up to 3.35 s."""
+    now = yield from read_ticks()
+    return now - started & 0xFFFF
+
 
 READ_OUT_TICKS = ticks_of(codes.ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
 """From a picture's first row to its end: 30.5 ms."""

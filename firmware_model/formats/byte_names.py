@@ -6,7 +6,6 @@ A device answers one request at a time, so its bytes belong to the last whole re
 from bisect import bisect_right
 
 from cubestack.firmware_model.formats.recording import BusTransfer, Recording
-from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.frames import ESCAPE, START, FrameDecoder, FrameEvent
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 
@@ -120,14 +119,13 @@ def _last_frame(wire: bytes) -> bytes:
 def _part(message: Message, offset: int | None) -> str:
     if offset is None or not 0 <= offset < message.length:
         return _framing(offset, message.length)
-    fields = [f.name for f in message.fields if _covers(f, offset)]
+    fields = [
+        f.name
+        for f in message.fields
+        if f.bit_offset // 8 <= offset <= (f.bit_offset + f.bits - 1) // 8
+    ]
     names = ", ".join(fields) if fields else "no field"
     return f"{'field' if len(fields) <= 1 else 'fields'} {names}"
-
-
-def _covers(field: Field, offset: int) -> bool:
-    first, last = field.bit_offset // 8, (field.bit_offset + field.bits - 1) // 8
-    return first <= offset <= last
 
 
 def _framing(offset: int | None, length: int) -> str:

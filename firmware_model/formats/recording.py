@@ -41,16 +41,6 @@ class LineBytes:
     data: bytes
     byte_ps: int
 
-    def to_json(self) -> dict[str, object]:
-        """These bytes as the object of a recording's line."""
-        return {
-            "ps": self.time_ps,
-            "port": self.port,
-            "from": self.side,
-            "data": self.data.hex(),
-            "byte_ps": self.byte_ps,
-        }
-
 
 @dataclass(frozen=True)
 class LineError:
@@ -58,10 +48,6 @@ class LineError:
 
     time_ps: int
     port: str
-
-    def to_json(self) -> dict[str, object]:
-        """This error as the object of a recording's line."""
-        return {"ps": self.time_ps, "port": self.port, "error": "framing"}
 
 
 @dataclass(frozen=True)
@@ -83,15 +69,6 @@ class BusTransfer:
     messages: tuple[BusMessage, ...]
     errno: int = 0
 
-    def to_json(self) -> dict[str, object]:
-        """This transfer as the object of a recording's line."""
-        messages = [
-            {"address": m.address, "read" if m.read else "write": m.data.hex()}
-            for m in self.messages
-        ]
-        event = {"ps": self.time_ps, "port": self.port, "end_ps": self.end_ps, "messages": messages}
-        return event | ({"errno": self.errno} if self.errno else {})
-
 
 @dataclass(frozen=True)
 class Control:
@@ -106,11 +83,6 @@ class Control:
     time_ps: int
     words: tuple[str, ...]
     text: str = ""
-
-    def to_json(self) -> dict[str, object]:
-        """This act as the object of a recording's line."""
-        event: dict[str, object] = {"ps": self.time_ps, "control": list(self.words)}
-        return event | ({"text": self.text} if self.text else {})
 
 
 Event = LineBytes | LineError | BusTransfer | Control
@@ -173,10 +145,29 @@ class RecordingWriter:
 
     def write(self, event: Event) -> None:
         """Write an event."""
-        self._line(event.to_json())
+        self._line(_to_json(event))
 
     def _line(self, content: dict[str, object]) -> None:
         self._stream.write(json.dumps(content, separators=(",", ":")) + "\n")
+
+
+def _to_json(event: Event) -> dict[str, object]:
+    """The object of a recording's line."""
+    match event:
+        case LineBytes(time_ps, port, side, data, byte_ps):
+            known = {"ps": time_ps, "port": port, "from": side}
+            return known | {"data": data.hex(), "byte_ps": byte_ps}
+        case LineError(time_ps, port):
+            return {"ps": time_ps, "port": port, "error": "framing"}
+        case BusTransfer(time_ps, port, end_ps, messages, errno):
+            shown = [
+                {"address": m.address, "read" if m.read else "write": m.data.hex()}
+                for m in messages
+            ]
+            transfer = {"ps": time_ps, "port": port, "end_ps": end_ps, "messages": shown}
+            return transfer | ({"errno": errno} if errno else {})
+        case Control(time_ps, words, text):
+            return {"ps": time_ps, "control": list(words)} | ({"text": text} if text else {})
 
 
 def load_recording(path: Path) -> Recording:

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.thumbnail import frame_pixels
+from cubestack.firmware_model.cubesense.download import frame_pixels
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.interface.cubesense.codes import ImageSize
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, SUN_NOT_FOUND, ReadOut

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cubestack.firmware_model.cubesense.download import frame_pixels
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.requests import Request
 
@@ -142,3 +143,18 @@ def test_frames_beyond_the_picture_need_no_memory(node: Links) -> None:
     node.command("StartImageDownload", Size=codes.ImageSize.SIDE_64)
     assert shown(node, 0) == bytes(128)
     assert node.opened == []
+
+
+@pytest.mark.parametrize("size", codes.ImageSize)
+def test_the_square_is_padded_and_thinned(size: codes.ImageSize) -> None:
+    picture = np.random.default_rng(3).integers(1, 256, (480, 640), np.uint8)
+    canvas = np.pad(picture, ((272, 272), (192, 192)))
+    assert canvas.shape == (1024, 1024)
+    step = 1024 // size.side
+    np.testing.assert_array_equal(thumbnail(picture, size), canvas[::step, ::step])
+
+
+def test_what_does_not_exist_is_told() -> None:
+    for frame in (-1, 32):
+        with pytest.raises(ValueError, match=f"SIDE_64 has frames 0 to 31, not {frame}"):
+            frame_pixels(codes.ImageSize.SIDE_64, frame)

@@ -4,11 +4,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.measurement import READ_OUT_TICKS
+from cubestack.firmware_model.cubesense.measurement import (
+    READ_OUT_TICKS,
+    microseconds,
+    read_ticks,
+    ticks_of,
+    ticks_since,
+)
 from cubestack.firmware_model.cubesense.state import distortion_of
-from cubestack.firmware_model.cubesense.timer import microseconds
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, fine_table
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
@@ -23,7 +30,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import Request, SetPin, StrobeRead
+from cubestack.firmware_model.mcu.requests import ReadTimer, Request, Routine, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
 from .scenery import SUN_BORESIGHT, chequered, earth, edges_in, error_deg, place, sun, window
@@ -339,3 +346,26 @@ def test_a_search_around_samples_finds_the_same(search: NadirSearch, most: int) 
     linked = measure(unit, Camera.NADIR, Sram.SRAM1)  # no addresses over the link
     assert linked["PixelsRead"] == 9920
     assert (linked["X"], linked["Y"]) == (lines["X"], lines["Y"])
+
+
+def answered(routine: Routine[int], now_us: int) -> int:
+    assert next(routine) == ReadTimer()
+    with pytest.raises(StopIteration) as end:
+        routine.send(now_us)
+    value: int = end.value.value
+    return value
+
+
+@given(st.integers(0, 10**12), st.integers(0, 3_350_000))
+def test_a_duration_is_right_to_a_tick_across_the_timers_overflow(start: int, us: int) -> None:
+    started = answered(read_ticks(), start)
+    assert 0 <= started < 65536
+    measured = microseconds(answered(ticks_since(started), start + us))
+    assert abs(measured - us) <= 52
+    assert -measured * 5 % 256 < 5  # whole ticks, rounded down to 1 us
+
+
+def test_a_tick_is_51_2_us() -> None:
+    assert microseconds(1000) == 51_200
+    assert ticks_of(51_200) == 1000
+    assert ticks_of(51_199) == 999
