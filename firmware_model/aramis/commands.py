@@ -74,7 +74,7 @@ class Commands(CommandExecutor):
             "RefreshCatalogue": self._refresh,
             "StreamDownImage": self._stream_image,
             "WriteCameraRegister": self._write_register,
-            "SelectCameraRegister": self._select_register,
+            "SelectCameraRegister": lambda command: camera.select(command.values["Address"]),
         }
 
     def urgent(self, command: QueuedCommand) -> None:
@@ -208,6 +208,3 @@ class Commands(CommandExecutor):
         self._camera.forget_set_up()
         if not (yield from self._camera.write(command.values["Address"], command.values["Value"])):
             self._state.raise_flag("CameraSilent")
-
-    def _select_register(self, command: QueuedCommand) -> Routine[None]:
-        yield from self._camera.select(command.values["Address"])

@@ -40,18 +40,12 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
         # then the pause between two frames is counted.
         settling_clocks=8 + pair.read_out.frame_gap,
         contention=pins.CONTENTION,
-        burst_levels=tuple(((pins.CLK, 0), *levels.items()) for levels in _storing_levels()),
+        burst_levels=tuple(
+            ((pins.CLK, 0), *zip(CONTROLS, (level or 0 for level in command.levels), strict=True))
+            for command in COMMANDS
+            if {Action.STORE, Action.STORE_OTHER} & {*command.actions}
+        ),
     )
-
-
-def _storing_levels() -> list[dict[str, int]]:
-    """Levels of the control lines in each command that stores a picture."""
-    storing = {Action.STORE, Action.STORE_OTHER}
-    return [
-        dict(zip(CONTROLS, (level or 0 for level in command.levels), strict=True))
-        for command in COMMANDS
-        if storing & {*command.actions}
-    ]
 
 
 @cache

@@ -132,41 +132,27 @@ class _Search:
         yield from triples[: self.profile.triples]
 
     def _match(self, main: tuple[int, int, int]) -> Match:
-        others = [star for star in range(len(self.measured)) if star not in main]
+        profile, count = self.profile, len(self.measured)
+        pivots = [star for star in range(count) if star not in main][: profile.pivots]
+        enough, sigma_rad = profile.candidates if profile.verify else 1, profile.sigma_rad
         return match_triple(
-            self.vectors,
-            main,
-            others[: self.profile.pivots],
-            self.profile.sigma_rad,
-            self.database,
-            self.faces,
-            self.meter,
-            self.profile.candidates if self.profile.verify else 1,
+            self.vectors, main, pivots, sigma_rad, self.database, self.faces, self.meter, enough
         )
 
     def _identities(self, main: tuple[int, int, int], match: Match, triangle: int) -> list[Indices]:
         """Star of the database for each of the three, by the score; then by the other criterion."""
         assert match.main is not None
         database, stars = self.database, self.database.stars[triangle].astype(np.intp)
+        brightness, known = self.measured.brightness[list(main)], database.vectors[stars]
         with self.meter.phase("identities"):
-            found = assign(
-                self.measured.brightness[list(main)],
-                match.main.sides,
-                database.v_mag[stars],
-                database.vectors[stars],
-                self.meter,
-            )
+            found = assign(brightness, match.main.sides, database.v_mag[stars], known, self.meter)
         differ = (found.order != found.other).any()
         return [stars[order] for order in (found.order, found.other)[: 1 + differ]]
 
     def _sides_agree(self, main: tuple[int, int, int], identities: Indices) -> bool:
+        measured, known = self.vectors[list(main)], self.database.vectors[identities]
         with self.meter.phase("verification"):
-            return sides_agree(
-                self.vectors[list(main)],
-                self.database.vectors[identities],
-                self.profile.side_tolerance_rad,
-                self.meter,
-            )
+            return sides_agree(measured, known, self.profile.side_tolerance_rad, self.meter)
 
     def _attitude(
         self,
@@ -196,18 +182,13 @@ class _Search:
         return not np.dot(boresight, self.hint.astype(np.float32)) >= np.float32(limit)
 
     def _confirm(
-        self, quaternion: Floats, hypotheses: int
+        self, quaternion: Floats, tried: int
     ) -> tuple[Floats, Indices, Indices, int] | None:
         """Confirmed attitude of all stars that agree, those stars, and how many were expected."""
+        reach_rad = self.profile.tolerance_rad
         for _ in range(2):
             found = confirm(
-                quaternion,
-                self.vectors,
-                self.database,
-                self.field,
-                self.profile.tolerance_rad,
-                hypotheses,
-                self.meter,
+                quaternion, self.vectors, self.database, self.field, reach_rad, tried, self.meter
             )
             close = found.spread_rad < self.profile.spread_rad
             if close or found.chance > self.profile.largest_chance:
@@ -226,15 +207,12 @@ class _Search:
         if still or len(measured) < FEWEST:
             return quaternion
         heights = self.measured.centroids[measured, 1] / np.float32(self.field.rows)
+        heights, moved_rad = heights - np.float32(0.5), self.measured.skew_px * self.field.scale[1]
         with self.meter.phase("attitude"):
             predicted = self.database.vectors[stars] @ dcm(quaternion, self.meter).T
             self.meter.charge(f32_mul=9 * len(stars), f32_add=6 * len(stars), loop=len(stars))
             straight, weights, sigma_rad = at_middle_row(
-                self.vectors[measured],
-                predicted,
-                heights - np.float32(0.5),
-                self.measured.skew_px * self.field.scale[1],
-                self.meter,
+                self.vectors[measured], predicted, heights, moved_rad, self.meter
             )
         doubtful = sigma_rad > self.profile.motion_sigma_rad
         if doubtful and self.measured.skew_px > self.profile.moved_px:
