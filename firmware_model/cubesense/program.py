@@ -51,8 +51,7 @@ class CubeSenseProgram:
         self._jobs = jobs = JobQueue()
         self.commands = Commands(meter, state, self._supply, self.cameras, acquisition, measurement)
         reader, download = self.commands.reader, self.commands.download
-        telemetry = Telemetry(hardware, meter, state, self._supply, download)
-        self.node = NodeLink(hardware, meter, state, jobs, telemetry, download)
+        self.node = NodeLink(jobs, Telemetry(hardware, meter, state, self._supply, download))
         self.registers = RegisterLink(hardware, meter, state, jobs, reader)
         self.bench = BenchLink(hardware, meter, state, jobs, reader, measurement)
 

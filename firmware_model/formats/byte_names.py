@@ -6,7 +6,7 @@ A device answers one request at a time, so its bytes belong to the last whole re
 from bisect import bisect_right
 
 from cubestack.firmware_model.formats.recording import BusTransfer, Recording
-from cubestack.firmware_model.interface.codec.frames import ESCAPE, START, FrameDecoder, FrameEvent
+from cubestack.firmware_model.interface.codec.frames import ESCAPE, FrameDecoder
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 
 LONGEST_PAYLOAD = 4096
@@ -24,7 +24,7 @@ def name_answer_byte(interface: Interface, recording: Recording, port: str, inde
     if interface.service_port is not None and port.startswith("bench"):
         letter = interface.service_port.find(known[-1]) if known else None
         return place if letter is None else f"{place}, answer to letter {letter.letter!r}"
-    payload = _last_frame(known)
+    payload = _fed(known).payload
     if not payload:
         return f"{place}, before any request"
     message = interface.find(payload[0])
@@ -47,7 +47,7 @@ def name_request_byte(interface: Interface, written: bytes, index: int, port: st
         return f"{place}, outside of a frame's payload"
     if offset == 0:
         return f"{place}, the ID"
-    identifier = (_walk(written[:index])[0] or b"\0")[0]
+    identifier = (_fed(written[:index]).begun or b"\0")[0]
     message = interface.find(identifier)
     if message is None:
         return f"{place}, behind unknown ID {identifier}"
@@ -78,42 +78,25 @@ def payload_offset(wire: bytes, index: int) -> int | None:
 
     Both bytes of an escaped pair count as the byte that they carry.
     """
-    payload, escaped = _walk(wire[:index])
-    if payload is None:
+    decoder = _fed(wire[:index])
+    if decoder.begun is None:
         return None
+    offset = len(decoder.begun)
     here, following = wire[index : index + 1], wire[index + 1 : index + 2]
     escape = bytes([ESCAPE])
-    if escaped:
-        return len(payload) if here == escape else None
+    if decoder.escaped:
+        return offset if here == escape else None
     if here == escape and following not in (b"", escape):
         return None
-    return len(payload)
+    return offset
 
 
-def _walk(wire: bytes) -> tuple[bytes | None, bool]:
-    """Payload of the frame that is open at the end, None outside; and whether an escape is."""
-    payload: bytearray | None = None
-    escaped = False
+def _fed(wire: bytes) -> FrameDecoder:
+    """A decoder that ``wire`` went through."""
+    decoder = FrameDecoder(LONGEST_PAYLOAD)
     for byte in wire:
-        if not escaped and byte == ESCAPE:
-            escaped = True
-            continue
-        if escaped and byte == START:
-            payload = bytearray()
-        elif escaped and byte != ESCAPE:
-            payload = None
-        elif payload is not None:
-            payload.append(byte)
-        escaped = False
-    return None if payload is None else bytes(payload), escaped
-
-
-def _last_frame(wire: bytes) -> bytes:
-    decoder, payload = FrameDecoder(LONGEST_PAYLOAD), b""
-    for byte in wire:
-        if decoder.feed(byte) is FrameEvent.FRAME:
-            payload = decoder.payload
-    return payload
+        decoder.feed(byte)
+    return decoder
 
 
 def _part(message: Message, offset: int | None) -> str:

@@ -10,10 +10,8 @@ scheduled, the result stays, and TcmdBufferOverrun is raised.
 from collections.abc import Collection
 from typing import Any
 
-from cubestack.firmware_model.cubesense.download import Download
-from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import JobQueue, Measure, TelecommandJob
-from cubestack.firmware_model.cubesense.state import State, distortion_of
+from cubestack.firmware_model.cubesense.state import distortion_of
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.interface.codec.frames import encode_frame
@@ -21,7 +19,6 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes
 from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
-from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
 
 SEND_BYTES = len(encode_frame(b"")) + 2 * codes.FRAME_BYTES
@@ -39,22 +36,14 @@ _FLAGS = LinkFlags(
 class NodeLink(SatelliteLink):
     """Decodes what the host sends and answers it."""
 
-    def __init__(
-        self,
-        hardware: CubeSenseHardware,
-        meter: Meter,
-        state: State,
-        queue: JobQueue,
-        telemetry: Telemetry,
-        download: Download,
-    ) -> None:
-        """Fill ``queue``; ``telemetry`` gives values, ``download`` knows which frames exist."""
-        super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BYTES)
+    def __init__(self, queue: JobQueue, telemetry: Telemetry) -> None:
+        """Fill ``queue``; ``telemetry`` gives values, and what it reports on is used here too."""
+        hardware, self._state = telemetry.hardware, telemetry.state
+        super().__init__(hardware, telemetry.meter, self._state, INTERFACE, _FLAGS, SEND_BYTES)
         self._mcu_addressing = hardware.mcu_addressing
-        self._state = state
         self._queue = queue
         self._telemetry = telemetry
-        self._download = download
+        self._download = telemetry.download
         self._latest: TelecommandJob | None = None
 
     # --- telemetry --------------------------------------------------------------------------------

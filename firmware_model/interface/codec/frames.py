@@ -40,27 +40,28 @@ class FrameDecoder:
 
     Attributes:
         payload: payload of the last whole frame, or the front of it.
+        escaped: the last byte was an escape, whose meaning the next one tells.
     """
 
     def __init__(self, max_length: int) -> None:
         """Accept payloads of at most ``max_length`` bytes; memory is bounded by it."""
         self._max_length = max_length
-        self._inside = self._escaped = False
+        self._inside = self.escaped = False
         self._buffer = bytearray()
         self.payload = b""
 
     def feed(self, byte: int) -> FrameEvent | None:
         """Take the next ``byte``; returns what it completed or broke, None while all is well."""
-        inside, escaped = self._inside, self._escaped
-        self._escaped = not escaped and byte == ESCAPE
-        if self._escaped:
+        inside, escaped = self._inside, self.escaped
+        self.escaped = not escaped and byte == ESCAPE
+        if self.escaped:
             return None
         if not escaped or byte == ESCAPE:
             if inside:
                 if len(self._buffer) <= self._max_length:
                     self._buffer.append(byte)
                 return None
-            self._escaped = escaped  # after 1F 1F the second one may still begin a frame
+            self.escaped = escaped  # after 1F 1F the second one may still begin a frame
             return FrameEvent.PROTOCOL_ERROR
         self._inside = byte == START
         if byte == START:
@@ -72,12 +73,17 @@ class FrameDecoder:
         return FrameEvent.TOO_LONG if len(self._buffer) > self._max_length else FrameEvent.FRAME
 
     @property
+    def begun(self) -> bytes | None:
+        """Payload so far of a frame that has not ended; None outside of one."""
+        return bytes(self._buffer) if self._inside else None
+
+    @property
     def unfinished(self) -> bool:
         """Whether a frame has begun and not ended."""
-        return self._inside or self._escaped
+        return self._inside or self.escaped
 
     def reset(self) -> bool:
         """Forget an unfinished frame, as after a silence; returns whether there was one."""
         unfinished = self.unfinished
-        self._inside = self._escaped = False
+        self._inside = self.escaped = False
         return unfinished

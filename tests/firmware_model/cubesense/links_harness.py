@@ -76,7 +76,7 @@ class Links(Runner, HostSide):
         )
         reader, download = self.commands.reader, self.commands.download
         telemetry = Telemetry(self, self.meter, self.state, cast(Supply, self), download)
-        self._link = NodeLink(self, self.meter, self.state, self.queue, telemetry, download)
+        self._link = NodeLink(self.queue, telemetry)
         self.registers = RegisterLink(self, self.meter, self.state, self.queue, reader)
         self.bench = BenchLink(
             self, self.meter, self.state, self.queue, reader, cast(Measurement, self)
