@@ -69,10 +69,7 @@ def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str
 
 
 def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any]:
-    """The board options that were given, but for defaults.
-
-    Raises ValueError for one that is of another device.
-    """
+    """The board options that were given, but for defaults; ValueError for another device's."""
     own = {option.name for option in device.options}
     chosen = {}
     for other in devices():

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     target = open_any_target(args.target, args)
     try:
         shell = Shell(target)
-        show = _show_json if args.json else _show_text
+        show = (lambda result: print(json.dumps(result.data))) if args.json else _show_text
         shell.on_row = (lambda _result: None) if args.json else show
         if lines is None and sys.stdin.isatty():
             return _interactive(shell, show)
@@ -94,10 +94,6 @@ def split_commands(text: str) -> Iterator[str]:
     yield command
 
 
-def _show_json(result: Result) -> None:
-    print(json.dumps(result.data))
-
-
 def _show_text(result: Result) -> None:
     width = max((len(name) for name, _ in result.rows), default=0)
     for name, text in result.rows:
@@ -127,10 +123,7 @@ def _interactive(shell: Shell, show: Callable[[Result], None]) -> int:
 
 @contextmanager
 def _line_editor(shell: Shell) -> Iterator[None]:
-    """Completion and history through the standard library's readline, where there is one.
-
-    It completes words and keeps a history, which is all that is wanted: no further dependency.
-    """
+    """Completion and history through the standard library's readline, where there is one."""
     try:
         import readline
     except ImportError:
@@ -149,7 +142,8 @@ def _line_editor(shell: Shell) -> Iterator[None]:
     readline.set_completer_delims(" ")
     libedit = "libedit" in (readline.__doc__ or "")
     readline.parse_and_bind("bind ^I rl_complete" if libedit else "tab: complete")
-    history = _history_file()
+    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
+    history = state / "cubestack" / "history"
     with suppress(OSError):
         readline.read_history_file(history)
     readline.set_history_length(HISTORY_LINES)
@@ -159,8 +153,3 @@ def _line_editor(shell: Shell) -> Iterator[None]:
         with suppress(OSError):
             history.parent.mkdir(parents=True, exist_ok=True)
             readline.write_history_file(history)
-
-
-def _history_file() -> Path:
-    state = os.environ.get("XDG_STATE_HOME")
-    return (Path(state) if state else Path.home() / ".local/state") / "cubestack" / "history"

@@ -1,7 +1,4 @@
-"""What a client of a node is, whatever the bus, and what the clients of all devices share.
-
-Messages come from the interface tables; nothing about one device is written here.
-"""
+"""What a client of a node is, whatever the bus, and what the clients of all devices share."""
 
 import math
 from abc import ABC, abstractmethod
@@ -98,10 +95,7 @@ class Client(Closable):
         late: str,
         period_s: float = POLL_PERIOD_S,
     ) -> T:
-        """``read`` every ``period_s`` until what it gives is ``done``, and return that.
-
-        Raises NoAnswerError with the text ``late`` after ``timeout_s``.
-        """
+        """``read`` until it gives what is ``done``; NoAnswerError ``late`` after ``timeout_s``."""
         for _ in range(math.ceil(timeout_s / period_s)):
             found = read()
             if done(found):

@@ -75,15 +75,16 @@ class NodeClient(Client):
         )
 
     def request(self, payload: bytes) -> bytes | None:
-        """Send a frame with any ``payload``; returns the next frame's payload, None without one.
-
-        What came before is dropped, so a late answer is not taken for this one's.
-        """
+        """Send a frame and drop what came before; the next frame's payload, None without one."""
         return self.exchange(encode_frame(payload))
 
     def exchange(self, wire: bytes, rest: bytes = b"") -> bytes | None:
         """Send bytes as they are, ``rest`` in a piece of its own; returns as ``request`` does."""
-        self._drop_input()
+        self._decoder.reset()
+        self._unread = iter(b"")
+        for _ in range(MAX_READS):
+            if not self._transport.read(READ_BYTES, 0.0):
+                break
         self._transport.write(wire)
         if rest:
             self._transport.write(rest)
@@ -117,10 +118,3 @@ class NodeClient(Client):
     def close(self) -> None:
         """Close the transport."""
         self._transport.close()
-
-    def _drop_input(self) -> None:
-        self._decoder.reset()
-        self._unread = iter(b"")
-        for _ in range(MAX_READS):
-            if not self._transport.read(READ_BYTES, 0.0):
-                return

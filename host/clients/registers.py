@@ -42,10 +42,7 @@ class RegisterClient:
         self._retries = retries
 
     def read(self, name: str) -> Value:
-        """The value of a register, in the map's unit.
-
-        Raises InterfaceError for a name that the map lacks or can not be read, NoAnswerError.
-        """
+        """The value of a register, in the map's unit; raises InterfaceError, NoAnswerError."""
         register = self._readable(name)
         return register.decode(self._fetch(register, None))
 

@@ -70,10 +70,7 @@ def check_watchdog(run: CheckRun, message: Message, seen: list[str]) -> None:
 def check_camera_register(
     run: CheckRun, message: Message, seen: list[str], *, address: int
 ) -> None:
-    """A register of the camera is read back as written, and put back.
-
-    The one at ``address`` must be one that the firmware sets up anew before it counts.
-    """
+    """A camera register that the firmware sets up anew is read back as written, and put back."""
     before = _camera_register(run, address)
     for value in (before ^ 1, before):
         run.perform(message.name, {"Address": address, "Value": value})

@@ -164,10 +164,7 @@ def _watch(
 
 
 def check_options(device: AnyDevice, options: Mapping[str, object]) -> None:
-    """Refuse board options that ``device`` does not have, or a value that one does not take.
-
-    Raises ValueError with what would be right.
-    """
+    """Refuse options, and values, that ``device`` does not have; ValueError says what it has."""
     own = {option.name: option for option in device.options}
     for name, value in options.items():
         if name not in own:

@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 def start_recorder(
     emulated: AnyEmulated, stream: IO[str], setup: "Setup | None" = None
 ) -> "Recorder":
-    """Record every byte of all ports; before any port is opened.
-
-    ``setup`` goes into the header.
-    """
+    """Record every byte of all ports; before any is opened. ``setup`` is for the header."""
     from cubestack.emulator.recording.recorder import Recorder
 
     board = emulated.board

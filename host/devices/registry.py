@@ -35,11 +35,7 @@ def device_names() -> tuple[str, ...]:
 
 @cache
 def device(name: str) -> AnyDevice:
-    """The device of this name, in any case.
-
-    Raises TargetError for a name that nobody registered, and for a registration that leads to no
-    device, with what is wrong with it.
-    """
+    """The device of this name, in any case; TargetError says what is wrong with it."""
     entry = _entries().get(name.lower())
     if entry is None:
         raise TargetError(f"no device {name!r}; known: {', '.join(device_names())}")

@@ -1,7 +1,4 @@
-"""Renders an interface for readers and other programs: text table, Markdown, C header, JSON.
-
-Everything comes from the interface tables; the C header has a module of its own.
-"""
+"""Renders an interface for readers and other programs: text table, Markdown, C header, JSON."""
 
 import json
 from collections.abc import Callable
@@ -23,7 +20,7 @@ def _table(interface: Interface) -> str:
     lines = [_summary(interface)]
     for kind in Kind:
         lines += ["", f"{kind.value.upper()}  (bit offset, type, name, meaning)"]
-        for message in _of_kind(interface, kind):
+        for message in (m for m in interface.messages if m.kind is kind):
             lines.append(f"{message.id:4d} {message.name}, {message.length} B: {_meaning(message)}")
             lines += [
                 f"     {field.bit_offset:5d} {field_type(field):<13} {field.name:<31} "
@@ -113,10 +110,6 @@ def _summary(interface: Interface) -> str:
         f"{interface.name}, interface version {interface.version}: I2C address "
         f"{interface.i2c_address:#04x} (7 bits), UART {interface.baud} baud 8N1."
     )
-
-
-def _of_kind(interface: Interface, kind: Kind) -> tuple[Message, ...]:
-    return interface.telecommands if kind is Kind.TELECOMMAND else interface.telemetries
 
 
 def _meaning(message: Message) -> str:

@@ -153,10 +153,7 @@ def _plain(value: Value) -> object:
 
 
 def parse_value(field: Field, text: str) -> object:
-    """A number (decimal, 0x, 0b), a choice's name, true or false, or hexadecimal bytes.
-
-    Raises InterfaceError.
-    """
+    """A number (also 0x, 0b), choice, true or false, hexadecimal bytes; raises InterfaceError."""
     if field.type.startswith("bytes"):
         try:
             return bytes.fromhex(text)

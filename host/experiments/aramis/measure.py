@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 
 _Opener: TypeAlias = "Opener[AramisBoard, Aramis]"
+_Emulated: TypeAlias = "EmulatedDevice[AramisBoard, Aramis]"
 
 FIELD_DEG = 21.53463888888889
 """Of the published simulations; the lens that was expected to be built has 18."""
@@ -227,10 +228,7 @@ def _configure(aramis: Aramis, options: AramisOptions) -> None:
 
 
 def _measure(
-    emulated: "EmulatedDevice[AramisBoard, Aramis]",
-    options: AramisOptions,
-    rng: np.random.Generator,
-    flips: int,
+    emulated: _Emulated, options: AramisOptions, rng: np.random.Generator, flips: int
 ) -> AramisResult:
     started = time.perf_counter()
     aramis, client, board = emulated.client, emulated.client.client, emulated.board
@@ -267,9 +265,7 @@ def _measure(
     )
 
 
-def _count_wrong(
-    emulated: "EmulatedDevice[AramisBoard, Aramis]", truth: NDArray[np.float64] | None
-) -> int | None:
+def _count_wrong(emulated: _Emulated, truth: NDArray[np.float64] | None) -> int | None:
     """Identified stars that the truth puts elsewhere; None without a truth."""
     from cubestack.emulator.scene.sky import SkyScene
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
-from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.cubestar.client import Attitude, CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
@@ -110,7 +110,7 @@ def _show(device: "Device[CubeStarBoard, CubeStar]", subject: _Subject, out: Pat
         console.print(f"detection threshold found by trying: {threshold} DN")
         cubestar.capture_and_process()
         attitude = cubestar.attitude()
-        _report_attitude(attitude.valid, attitude.quaternion, attitude.matched, subject.truth)
+        _report(attitude, subject.truth)
         phases = cubestar.phase_times()
         tell_times({name: phases[name] for name in PUBLISHED_PHASES})
         console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)
@@ -125,25 +125,23 @@ def _show(device: "Device[CubeStarBoard, CubeStar]", subject: _Subject, out: Pat
     return attitude.valid
 
 
-def _report_attitude(
-    valid: bool, quaternion: NDArray[np.float64], matched: int, truth: NDArray[np.float64]
-) -> None:
+def _report(found: Attitude, truth: NDArray[np.float64]) -> None:
     from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
 
-    if not valid:
+    if not found.valid:
         console.print("no attitude found in this picture")
         return
-    if quaternion @ truth < 0:
+    if found.quaternion @ truth < 0:
         truth = -truth  # the same attitude
-    console.print(f"attitude from {matched} stars, measured beside the truth:")
-    for name, q in (("measured", quaternion), ("truth", truth)):
+    console.print(f"attitude from {found.matched} stars, measured beside the truth:")
+    for name, q in (("measured", found.quaternion), ("truth", truth)):
         ra, dec, roll = pointing_from_matrix(matrix_from_quaternion(q))
         parts = " ".join(f"{part:+.5f}" for part in q)
         console.print(
             f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]",
             soft_wrap=True,
         )
-    across, about = errors(quaternion, truth)
+    across, about = errors(found.quaternion, truth)
     console.print(
         f"error: {3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight"
     )

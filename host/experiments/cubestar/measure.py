@@ -38,9 +38,9 @@ from cubestack.host.options import ANGLE, CORNER, PATH, option
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-    from cubestack.emulator.scene.sky import Scene
 
 _Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
+_Emulated: TypeAlias = "EmulatedDevice[CubeStarBoard, CubeStar]"
 
 #: Names of --mode for the firmware's modes.
 MODE_NAMES = {
@@ -135,7 +135,7 @@ def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | No
 
 
 def _measure(
-    emulated: "EmulatedDevice[CubeStarBoard, CubeStar]",
+    emulated: _Emulated,
     options: CubeStarOptions,
     picture_truth: NDArray[np.float64] | None,
     rng: np.random.Generator,
@@ -143,9 +143,9 @@ def _measure(
     started = time.perf_counter()
     cubestar, client = emulated.client, emulated.client.client
     client.command("ClearErrorFlags")
-    known, scene = picture_truth, emulated.scene
+    known = picture_truth
     if known is None:
-        known = scene.truth(emulated.board.kernel.now)
+        known = emulated.scene.truth(emulated.board.kernel.now)
     if options.mode == "lis":
         client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
     else:
@@ -157,7 +157,7 @@ def _measure(
             cubestar, attitudes.rough_boresight(known, 0.0 if tracking else options.hint_error, rng)
         )
         if tracking:
-            _prime_tracking(emulated, scene, options.hint_error, rng)
+            _prime_tracking(emulated, options.hint_error, rng)
     status = cubestar.capture_and_process()
     attitude = cubestar.attitude()
     solved = attitude.valid
@@ -190,15 +190,11 @@ def give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
     )
 
 
-def _prime_tracking(
-    emulated: "EmulatedDevice[CubeStarBoard, CubeStar]",
-    scene: "Scene",
-    offset_deg: float,
-    rng: np.random.Generator,
-) -> None:
+def _prime_tracking(emulated: _Emulated, offset_deg: float, rng: np.random.Generator) -> None:
     """Let the device find an attitude at most ``offset_deg`` from the one it will track from."""
     from cubestack.emulator.scene.sky import SkyScene
 
+    scene = emulated.scene
     if not isinstance(scene, SkyScene):
         raise ValueError("--mode tracking needs a sky scene: a picture has no frame before it")
     axis = rng.standard_normal(3)
