@@ -10,7 +10,6 @@ import pytest
 import serial
 from smbus2 import i2c_msg
 
-from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
@@ -112,14 +111,3 @@ def test_image_register_streams_the_picture(ready: Open) -> None:
         head = i2c_msg.read(0x1C, 4 * 640)
         bus.i2c_rdwr(i2c_msg.write(0x1C, [REGISTERS["IMAGE"].address]), head)
         assert bytes(head) == sent(opened, Camera.NADIR)[:4].tobytes()
-
-
-def test_reading_a_result_schedules_the_next_one(ready: Open) -> None:
-    with ready() as opened:
-        cubesense = opened.client
-        cubesense.result_then_schedule(Camera.NADIR)
-        for turned in (0.0, 5.0, 10.0):
-            opened.board.scene = EarthSunScene.facing(nadir_deg=(turned, 0.0))
-            cubesense.result_then_schedule(Camera.NADIR)
-            cubesense.client.pause(1.0)
-            check_right(cubesense.result(Camera.NADIR), (turned, 0.0))

@@ -32,22 +32,23 @@ def test_a_program_that_a_signal_ends(run: Run) -> None:
     assert run("sh", "-c", "kill -TERM $$").code == 128 + 15
 
 
-def test_a_program_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "--", "no-such-program"]) == 2
-    assert "no-such-program: no such program" in capsys.readouterr().err
+MOVES = ("cubestarr=0x2a", "0x1a", "0x1a=", "cubestar=x", "0x1a=0x2a=3")
 
 
-@pytest.mark.parametrize("text", ["cubestarr=0x2a", "0x1a", "0x1a=", "cubestar=x", "0x1a=0x2a=3"])
-def test_a_move_that_makes_no_sense(text: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as raised:
-        main(["run", "--i2c-addr", text, "--", "true"])
-    assert raised.value.code == 2
-    assert "is not NAME=0xNN, as in cubestar=0x2a" in capsys.readouterr().err
-
-
-def test_attached_to_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "--attach", str(tmp_path / "bus"), "--", "true"]) == 1
-    assert "no emulation serves" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        ("-- no-such-program", 2, "no-such-program: no such program"),
+        ("--attach no/bus -- true", 1, "no emulation serves"),
+        *((f"--i2c-addr {move} -- true", 2, "is not NAME=0xNN, as in") for move in MOVES),
+    ],
+)
+def test_what_can_not_run(
+    arguments: str, code: int, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match=str(code)):
+        sys.exit(main(["run", *arguments.split()]))
+    assert text in capsys.readouterr().err
 
 
 def test_preload_takes_over_where_seccomp_is_refused(route: str, served: Path) -> None:

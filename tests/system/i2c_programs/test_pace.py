@@ -4,14 +4,13 @@ How near to it single bytes come depends on the machine: `cubestack bench` measu
 `tests/emulator/i2cdev/test_scheduler.py` holds the rules in a made-up time.
 """
 
-import subprocess
 import sys
 
 import pytest
 
 from cubestack.emulator.i2cdev.scheduler import MAX_DEBT_NS
 
-from .conftest import COMMAND, ENVIRONMENT, TIMEOUT_S
+from .conftest import Run
 
 CLIENT = """
 import sys, time
@@ -35,19 +34,11 @@ LONG_BITS = 1 + 9 + 9 * 600 + 1
     [(100_000, BYTES, BYTES_BITS), (400_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS)],
     ids=["bytes-100k", "bytes-400k", "long-400k"],
 )
-def test_transfers_take_the_time_of_the_wire(route: str, hz: int, calls: str, bits: int) -> None:
+def test_transfers_take_the_time_of_the_wire(run: Run, hz: int, calls: str, bits: int) -> None:
     """All together take no less, but for what was late before them."""
-    options = ("--quiet", "--route", route, "--hz", str(hz))
-    client = (sys.executable, "-c", CLIENT.format(calls))
-    out = subprocess.run(
-        [*COMMAND, *options, "--", *client],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=ENVIRONMENT,
-        timeout=TIMEOUT_S,
-        check=True,
-    ).stdout
-    times = sorted(map(float, out.split()))
+    outcome = run(sys.executable, "-c", CLIENT.format(calls), options=("--hz", hz))
+    assert outcome.code == 0, outcome.err
+    times = sorted(map(float, outcome.out.split()))
     wire_s = bits / hz
     assert sum(times) > len(times) * wire_s - MAX_DEBT_NS / 1e9
     if calls == LONG:  # much longer than any work for it
