@@ -25,14 +25,11 @@ class HostSide:
     """
 
     interface: Interface
+    link: SatelliteLink
 
     def __init__(self) -> None:
         self.sent = bytearray()
         self.backlog = 0
-
-    @property
-    def link(self) -> SatelliteLink:
-        raise NotImplementedError
 
     # --- what the program uses --------------------------------------------------------------------
 

@@ -4,22 +4,16 @@ Pictures, supplies and measurements are as simple as these can tell them apart. 
 a test says so.
 """
 
-from typing import cast
-
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.acquisition import Acquisition
-from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.commands import Commands
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.jobs import JobQueue
 from cubestack.firmware_model.cubesense.links.bench import BenchLink
 from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.links.registers import RegisterLink
-from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import Result, State
-from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
@@ -66,25 +60,14 @@ class Links(Runner, HostSide):
 
         self.state = State()
         self.queue = JobQueue()
+        meter, state, queue = self.meter, self.state, self.queue
         self.commands = Commands(
-            self.meter,
-            self.state,
-            cast(Supply, self),
-            cast(CameraControl, self),
-            cast(Acquisition, self),
-            cast(Measurement, self),
+            meter, state, supply=self, cameras=self, acquisition=self, measurement=self
         )
         reader, download = self.commands.reader, self.commands.download
-        telemetry = Telemetry(self, self.meter, self.state, cast(Supply, self), download)
-        self._link = NodeLink(self.queue, telemetry)
-        self.registers = RegisterLink(self, self.meter, self.state, self.queue, reader)
-        self.bench = BenchLink(
-            self, self.meter, self.state, self.queue, reader, cast(Measurement, self)
-        )
-
-    @property
-    def link(self) -> NodeLink:
-        return self._link
+        self.link = NodeLink(queue, Telemetry(self, meter, state, self, download))
+        self.registers = RegisterLink(self, meter, state, queue, reader)
+        self.bench = BenchLink(self, meter, state, queue, reader, measurement=self)
 
     # --- hardware -------------------------------------------------------------------------------
 
