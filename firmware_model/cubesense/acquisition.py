@@ -72,10 +72,7 @@ class Acquisition:
         return self._mcu_addressing and sram is codes.Sram(camera)
 
     def store(self, camera: codes.Camera, sram: codes.Sram) -> Routine[codes.CaptureResult]:
-        """Store the next whole picture of ``camera`` in ``sram``.
-
-        What ``sram`` holds stays as it is when the camera sends none.
-        """
+        """Store the next whole picture of ``camera``; without one ``sram`` keeps what it holds."""
         if not self._supply.available(sram):
             return codes.CaptureResult.SRAM_OVER_CURRENT
         own = sram is codes.Sram(camera)
@@ -90,10 +87,7 @@ class Acquisition:
         return codes.CaptureResult.STORED_OWN_SRAM if own else codes.CaptureResult.STORED_OTHER_SRAM
 
     def scan(self, sram: codes.Sram, lines: NadirLines) -> Routine[bool]:
-        """Let ``lines`` see the nadir camera's picture in ``sram``.
-
-        False when that memory was cut off meanwhile.
-        """
+        """Let ``lines`` see the nadir picture in ``sram``; False when it was cut off meanwhile."""
         yield from self._enter_edge(codes.Camera.NADIR, sram)
         read = 0
         while lines.wanted and self._supply.available(sram):
@@ -108,10 +102,7 @@ class Acquisition:
         return self._supply.available(sram)
 
     def window(self, sram: codes.Sram) -> Routine[NDArray[np.uint8] | None]:
-        """Coordinates and window of the Sun camera's picture in ``sram``; None as for ``scan``.
-
-        The bytes (229,) count until the next call.
-        """
+        """The Sun window's bytes (229,) in ``sram``, until the next call; None as for ``scan``."""
         yield from self._enter_edge(codes.Camera.SUN, sram)
         yield StrobeRead(self._window, self._strobe_cycles)
         yield from self._supply.sample()

@@ -59,10 +59,7 @@ class PictureReader:
     def read(
         self, sram: codes.Sram, pixels: NDArray[np.int32], target: NDArray[np.uint8]
     ) -> Routine[bool]:
-        """Read ``pixels`` (n,), numbers that ascend, into ``target`` (n,).
-
-        False when the memory is off, or was cut off meanwhile.
-        """
+        """Read ``pixels`` (n,), which ascend, to ``target`` (n,); False when the memory is off."""
         if not len(pixels):
             return True
         breaks = np.flatnonzero(np.diff(pixels) != 1) + 1
@@ -115,10 +112,7 @@ class Download:
         return self._wanted is not None and frame < self._wanted.size.frames
 
     def request(self, values: Mapping[str, Any]) -> FrameRequest:
-        """Interrupt: note which frame is wanted, from the parameters of either telecommand.
-
-        A frame that the selected picture does not have is the caller's mistake; see ``has``.
-        """
+        """Interrupt: note which frame a telecommand asks for, one that the picture ``has``."""
         if "Frame" in values:
             assert self._wanted is not None
             wanted = FrameRequest(self._wanted.sram, self._wanted.size, values["Frame"])

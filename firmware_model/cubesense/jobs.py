@@ -30,8 +30,6 @@ class TelecommandJob:
     """An accepted telecommand.
 
     Attributes:
-        message: its declaration.
-        values: decoded parameters.
         frame: the frame that it asks for, if any.
         latest: no telecommand came after it, so telemetry TcmdProcessed speaks of this one.
     """

@@ -32,9 +32,6 @@ class CubeSenseProgram:
         node: the node protocol; its methods are the interrupts of its UART and I2C address.
         registers: the register protocol; the same of its I2C address.
         bench: the bench protocol; the same of its UART.
-        cameras: the cameras' supplies and registers.
-        acquisition: what comes from the FPGAs.
-        commands: what jobs do.
         idle: nothing waits to be done.
         state: what the program remembers; traces read it.
     """

@@ -72,13 +72,7 @@ class BusTransfer:
 
 @dataclass(frozen=True)
 class Control:
-    """Something was done to an emulated device: a fault, another scene, a switch.
-
-    Attributes:
-        time_ps: when.
-        words: the shell's command.
-        text: of the file that it names, if it names one.
-    """
+    """The shell's command ``words`` changed a device; ``text`` is of a file that it names."""
 
     time_ps: int
     words: tuple[str, ...]

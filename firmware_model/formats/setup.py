@@ -10,12 +10,7 @@ Option = bool | int | float | str
 
 @dataclass(frozen=True)
 class Document:
-    """A file that the device was made from.
-
-    Attributes:
-        name: its path, as the user gave it.
-        text: what was in it.
-    """
+    """A file that the device was made from: its path as the user gave it, and what was in it."""
 
     name: str
     text: str

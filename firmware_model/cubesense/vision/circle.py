@@ -21,12 +21,7 @@ FEWEST = 3
 
 @dataclass(frozen=True)
 class Circle:
-    """A circle in the unit of its points.
-
-    Attributes:
-        x, y: centre.
-        radius: radius.
-    """
+    """A circle in the unit of its points: centre (x, y) and radius."""
 
     x: np.float32
     y: np.float32

@@ -117,8 +117,7 @@ class RadiusTable:
 def byte_table(meter: Meter, coefficients: Sequence[float] = DISTORTION) -> RadiusTable:
     """The published table: whole pixels, rounded up; r_d in px is the sum of coefficients[k] r_u^k.
 
-    Raises:
-        DistortionError: when they have no inverse, or one more than 255 px away.
+    DistortionError when they have no inverse, or one more than 255 px away.
     """
     difference = _undistorted(coefficients, meter) - np.arange(TABLE_ENTRIES, dtype=np.float32)
     return _stored(np.maximum(np.ceil(difference), 0), 255, meter, published=True)

@@ -125,12 +125,7 @@ class EdgeList:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Two neighbouring pixels of a line on different sides of the threshold.
-
-    Attributes:
-        bright, dark: their positions on the line.
-        bright_value, dark_value: their values.
-    """
+    """Two pixels of a line on different sides of the threshold: positions on it, and values."""
 
     bright: int
     dark: int
@@ -199,10 +194,7 @@ class NadirLines:
         read_out: ReadOut = FULL_SIZE,
         buffer: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Wait for the first clock of a scan that ``read_out`` describes.
-
-        ``buffer`` is what the part buffers pixels in, (scan_step,); None makes one.
-        """
+        """Wait for a scan's first clock; ``buffer`` (scan_step,) takes pixels, None makes one."""
         self.edges = EdgeList(config, meter)
         self._threshold = config.threshold
         self._meter = meter

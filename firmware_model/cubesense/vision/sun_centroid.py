@@ -77,10 +77,8 @@ def find_sun(
     """Measure in the bytes of one window read-out; phases: `centroid` and `undistort`.
 
     The bytes' own cost (``strobe_byte`` each) is left to whoever clocks them in. The published
-    program works on each byte as it comes; no step depends on a later one.
-
-    Raises:
-        ValueError: when the bytes are not as many as `window_bytes`.
+    program works on each byte as it comes; no step depends on a later one. ValueError when the
+    bytes are not as many as `window_bytes`.
     """
     if data.shape != (window_bytes(read_out),):
         raise ValueError(f"a window has {window_bytes(read_out)} bytes, not {data.shape}")

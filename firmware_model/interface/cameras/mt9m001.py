@@ -54,10 +54,7 @@ def gain(register: int) -> float:
 
 
 def gain_register(amplification: float) -> int:
-    """The recommended register value of the gain nearest to ``amplification``, 1 to 15.
-
-    Raises ValueError outside of that.
-    """
+    """Recommended value of the gain nearest to ``amplification``; ValueError outside of 1 to 15."""
     if not 1 <= amplification <= HIGHEST_GAIN:
         raise ValueError(f"the gain must be in 1..{HIGHEST_GAIN:g}, not {amplification:g}")
     recommended = (*range(0x08, 0x21), *range(0x51, 0x61), *range(0x61, 0x68))

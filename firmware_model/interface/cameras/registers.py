@@ -24,15 +24,7 @@ class RegisterAccess(Enum):
 
 @dataclass(frozen=True)
 class BitField:
-    """Some adjacent bits of a register.
-
-    Attributes:
-        name: unique within the register.
-        lsb: position of the lowest bit.
-        width: number of bits.
-        meaning: what the value does.
-        modelled: False when the camera model stores the bits and does nothing with them.
-    """
+    """Adjacent bits of a register; not ``modelled``: the camera model does nothing with them."""
 
     name: str
     lsb: int
@@ -122,13 +114,7 @@ class CameraRegister:
 
 @dataclass(eq=False)
 class CameraRegisterMap:
-    """All registers of a camera.
-
-    Attributes:
-        camera: the part's name.
-        i2c_address: 7-bit address on the control bus.
-        address_bytes: bytes of a register address on that bus, most significant first.
-    """
+    """All registers of a camera; an address has its most significant byte first."""
 
     camera: str
     i2c_address: int

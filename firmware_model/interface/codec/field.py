@@ -69,8 +69,7 @@ class Field:
         unit: unit of the value, empty for pure numbers.
         scale: raw counts for one unit.
         choices: the allowed values and their names, or None.
-        minimum: smallest allowed value, in ``unit``.
-        maximum: largest allowed value, in ``unit``.
+        minimum, maximum: smallest and largest allowed value, in ``unit``.
         maximum_by: (other field, {its value: largest allowed value here}), or None.
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.

@@ -10,15 +10,7 @@ from itertools import combinations
 
 @dataclass(frozen=True)
 class Letter:
-    """One request.
-
-    Attributes:
-        letter: the byte on the wire, one ASCII character.
-        name: unique within the protocol.
-        meaning: one phrase for a reader.
-        length: bytes of the answer.
-        answer: the answer when it is always the same, else None.
-    """
+    """A request of one ASCII character; ``answer``, where it is always the same one."""
 
     letter: str
     name: str
@@ -43,12 +35,7 @@ class Letter:
 
 @dataclass(frozen=True)
 class LetterProtocol:
-    """All letters of a port.
-
-    Attributes:
-        baud: default baud rate, 8N1.
-        letters: in the order of a listing.
-    """
+    """All letters of a port (8N1), in the order of a listing."""
 
     baud: int
     letters: tuple[Letter, ...]

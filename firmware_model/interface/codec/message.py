@@ -171,12 +171,10 @@ class Interface:
     """All messages of a node, and what else the device speaks.
 
     Attributes:
-        name: name of the device.
         version: interface version that the node reports.
         i2c_address: default 7-bit address.
         baud: default baud rate of its serial line.
-        telecommands: by ascending ID.
-        telemetries: by ascending ID.
+        telecommands, telemetries: by ascending ID.
         ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
         registers: registers behind another I2C address, or None.
         service_port: one-letter protocol on another serial port, or None.

@@ -90,12 +90,7 @@ class PointerRegister:
 
 
 class PointerMap:
-    """All registers behind one I2C address.
-
-    Attributes:
-        i2c_address: default 7-bit address.
-        note: one sentence for a reader, on the map as a whole.
-    """
+    """All registers behind one I2C address; ``note`` is a sentence on the map as a whole."""
 
     def __init__(
         self, i2c_address: int, registers: tuple[PointerRegister, ...], note: str = ""

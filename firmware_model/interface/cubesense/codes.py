@@ -184,10 +184,7 @@ def coefficient(mantissa: int, exponent: int) -> float:
 
 
 def split_coefficient(value: float) -> tuple[int, int]:
-    """Mantissa and exponent that carry ``value`` best, to 1.6e-4 of it or better.
-
-    Raises ValueError for a value beyond the mantissa's range (32767) and for not-a-number.
-    """
+    """Mantissa and exponent of ``value``, to 1.6e-4 of it; ValueError beyond 32767 and for NaN."""
     if not abs(value) <= 32767:
         raise ValueError(f"a distortion coefficient is within +-32767, not {value}")
     if value == 0:

@@ -35,10 +35,7 @@ class Actions(NamedTuple):
 
 @dataclass(frozen=True)
 class FpgaCommand:
-    """One row of the command table: levels of the control lines, None for either level.
-
-    The two enables are low active.
-    """
+    """One row of the command table: levels, None for either; the two enables are low active."""
 
     shift: int | None
     edge: int | None
@@ -91,10 +88,7 @@ ADDRESSING_COMMANDS = (
 def actions(
     shift: int, edge: int, rnw: int, sunen: int, naden: int, *, mcu_addressing: bool = False
 ) -> Actions:
-    """What both FPGAs do at these levels; an unlisted row is standby for both.
-
-    ``mcu_addressing`` lists ADDRESSING_COMMANDS too.
-    """
+    """What both FPGAs do; an unlisted row is standby. ``mcu_addressing`` lists its rows too."""
     for command in COMMANDS + ADDRESSING_COMMANDS * mcu_addressing:
         if command.fits(shift, edge, rnw, sunen, naden):
             return command.actions
@@ -214,10 +208,7 @@ class ReadOut:
             yield from ((x, y) for y in range(self.rows))
 
     def window_origin(self, x: int, y: int) -> tuple[int, int]:
-        """First pixel (x, y) of the window around first Sun pixel (x, y).
-
-        Clamped, so that the whole window is inside of the picture.
-        """
+        """First pixel (x, y) of the window around first Sun pixel (x, y), inside of the picture."""
         return (
             min(max(x - self.window_left, 0), self.columns - self.window),
             min(max(y - self.window_above, 0), self.rows - self.window),
@@ -229,10 +220,7 @@ FULL_SIZE = ReadOut()
 
 
 def address_bytes(x: int, y: int, size: ReadOut = FULL_SIZE) -> bytes:
-    """What takes the address of pixel (x, y): row : column, highest byte first.
-
-    ValueError when the pixel is not inside of the picture.
-    """
+    """Address of pixel (x, y), row : column, highest byte first; ValueError outside the picture."""
     if not (0 <= x < size.columns and 0 <= y < size.rows):
         raise ValueError(f"pixel ({x}, {y}) is not inside of {size.columns} x {size.rows} pixels")
     address = y << size.column_bits | x

@@ -12,15 +12,7 @@ from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
 @dataclass(frozen=True)
 class ErrorFlag:
-    """An error flag.
-
-    Attributes:
-        bit: position in the block.
-        name: printed name.
-        cause: what raises it.
-        log_name: name in LogStatus, if other.
-        never: why this node does not raise it; empty when it does.
-    """
+    """A flag: ``log_name`` in LogStatus, if other; ``never``: why this node does not raise it."""
 
     bit: int
     name: str
