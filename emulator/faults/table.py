@@ -200,7 +200,7 @@ class LatchUp(Fault, kind="latch-up", site=Site.SUPPLY, momentary=True):
 FAULTS: dict[str, type[Fault]] = {fault.kind: fault for fault in Fault.__subclasses__()}
 
 
-def make_fault(kind: str, **parameters: object) -> Fault:
+def make_fault(kind: str, /, **parameters: object) -> Fault:
     """A fault of that kind; FaultError for an unknown kind, or for a parameter that is wrong."""
     if kind not in FAULTS:
         raise FaultError(f"no fault {kind!r}; there are {', '.join(FAULTS)}")

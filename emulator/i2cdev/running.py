@@ -14,10 +14,9 @@ from cubestack.emulator.i2cdev.device_node import DeviceNode
 from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers
 from cubestack.emulator.i2cdev.preload.shim import shim_library
 from cubestack.emulator.i2cdev.remote import RemoteBus
-from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS
+from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, open_scheduler
 from cubestack.emulator.i2cdev.seccomp.supervisor import Files, Supervisor
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.i2cdev.serving import open_scheduler
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.sim.virtual_time import Kernel
 

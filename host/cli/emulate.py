@@ -63,8 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
+    from cubestack.emulator.i2cdev.scheduler import open_scheduler
     from cubestack.emulator.i2cdev.server import I2cServer
-    from cubestack.emulator.i2cdev.serving import open_scheduler
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")

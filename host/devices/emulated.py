@@ -103,7 +103,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         Every "{port}" in ``command`` becomes the path of a pseudo-terminal. Raises
         subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
         """
-        from cubestack.emulator.i2cdev.serving import open_scheduler
+        from cubestack.emulator.i2cdev.scheduler import open_scheduler
         from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 
         self._client = None

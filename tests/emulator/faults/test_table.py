@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cubestack.emulator.faults import table
@@ -40,6 +40,7 @@ def test_a_wrong_value_is_refused_by_name(kind: str, name: str) -> None:
             make_fault(kind, **{name: value})
 
 
+@example("kind", 1)
 @given(st.text(max_size=8), st.one_of(st.none(), st.text(), st.integers(), st.floats()))
 def test_no_value_does_worse_than_a_fault_error(name: str, value: object) -> None:
     for kind, fault in FAULTS.items():

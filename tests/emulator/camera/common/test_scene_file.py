@@ -20,33 +20,31 @@ def load(path: Path) -> SkyView:
     return load_scene(path, CONDITION)
 
 
+SCENE = """
+kind = "sky"
+ra_deg = 83.8
+dec_deg = -5
+roll_deg = 30.0
+rate_deg_s = [0.0, 0.1, 0.0]
+mag_limit = 3.8
+epoch = 2030.5
+noise = false
+seed = 7
+false_stars = 5
+false_star_mag = [1.0, 2.0]
+hot_pixels = 524288
+temperature_c = -10
+[optics]
+psf_sigma_px = 1.2
+distortion = "toolbox"
+[[poses]]
+start_s = 10
+quaternion = [0, 0, 0, 2]
+"""
+
+
 def test_sky_from_a_file(tmp_path: Path) -> None:
-    view = load(
-        save(
-            tmp_path,
-            """
-            kind = "sky"
-            ra_deg = 83.8
-            dec_deg = -5
-            roll_deg = 30.0
-            rate_deg_s = [0.0, 0.1, 0.0]
-            mag_limit = 3.8
-            epoch = 2030.5
-            noise = false
-            seed = 7
-            false_stars = 5
-            false_star_mag = [1.0, 2.0]
-            hot_pixels = 524288
-            temperature_c = -10
-            [optics]
-            psf_sigma_px = 1.2
-            distortion = "toolbox"
-            [[poses]]
-            start_s = 10
-            quaternion = [0, 0, 0, 2]
-            """,
-        )
-    )
+    view = load(save(tmp_path, SCENE))
     scene, condition = view.scene, view.condition
     assert isinstance(scene, SkyScene)
     np.testing.assert_allclose(scene.quaternion, quaternion_from_pointing(83.8, -5, 30))

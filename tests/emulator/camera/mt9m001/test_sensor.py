@@ -1,15 +1,19 @@
 """Timing against the data sheet's formulas, the window and gain against an ideal picture."""
 
 from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412 import lens as other_lens
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION, double_gauss
-from cubestack.emulator.camera.mt9m001.registers import GAINS
+from cubestack.emulator.camera.mt9m001.registers import GAINS, SensorSettings, read_settings
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
@@ -18,8 +22,6 @@ from cubestack.firmware_model.interface.cameras import mt9m001 as chip
 ADDRESS = chip.REGISTERS.i2c_address
 ROW_CLOCKS = 1524
 ROW_S = ROW_CLOCKS / chip.PIXEL_CLOCK_HZ
-
-
 QUIET = replace(CONDITION, noise=False)
 
 
@@ -261,3 +263,18 @@ def test_a_turning_camera_smears_along_its_motion() -> None:
     assert round_wide == pytest.approx(round_high, rel=0.1)
     streak_px = 10 * 315 * ROW_S * np.radians(1) * 2692.34
     assert wide - high == pytest.approx(streak_px**2 / 12, rel=0.2)
+
+
+def test_a_window_s_rows_have_their_own_times() -> None:
+    turning = scene(rate_deg_s=(0.0, 5.0, 0.0), mag_limit=5.0)
+    whole = replace(read_settings(RegisterFile(chip.REGISTERS)), gains=(4.0, 4.0, 4.0, 4.0))
+    first_ps, line_ps = 2 * 10**11, Fraction(31_750_000)
+
+    def picture(readout_ps: int, settings: SensorSettings) -> np.ndarray:
+        shutter = RollingShutter(readout_ps, line_ps, 1000, 1000)
+        return Mt9m001Imager().picture(turning, QUIET, shutter, settings)
+
+    part = picture(first_ps, whole)[600:900]
+    window = replace(whole, row=600, rows=300)
+    np.testing.assert_array_equal(picture(first_ps + int(600 * line_ps), window), part)
+    assert (picture(first_ps, window) != part).any()

@@ -13,36 +13,33 @@ from ..files import check_refused, save
 
 SUN, NADIR = Target.SUN, Target.NADIR
 
+SCENE = """
+kind = "earth-sun"
+altitude_km = 600
+nadir_deg = [10.0, -20.0]
+sun = [0.0, 3.0, -4.0]
+moon = [2, 0, 0]
+rate_deg_s = [0.0, 0.1, 0.0]
+bloom_px = 6.5
+unevenness = 0.2
+glow_km = 0
+hot_pixels = 5
+hot_pairs = 2
+noise = false
+seed = 9
+[nadir_camera]
+boresight = [1.0, 0.0, 0.0]
+right = [0.0, 1.0, 0.0]
+[[reflections]]
+camera = "sun"
+at_deg = [20.0, -10.0]
+radius_px = 4
+level = 200
+"""
+
 
 def test_scene_from_a_file(tmp_path: Path) -> None:
-    view = load_earth_sun_scene(
-        save(
-            tmp_path,
-            """
-            kind = "earth-sun"
-            altitude_km = 600
-            nadir_deg = [10.0, -20.0]
-            sun = [0.0, 3.0, -4.0]
-            moon = [2, 0, 0]
-            rate_deg_s = [0.0, 0.1, 0.0]
-            bloom_px = 6.5
-            unevenness = 0.2
-            glow_km = 0
-            hot_pixels = 5
-            hot_pairs = 2
-            noise = false
-            seed = 9
-            [nadir_camera]
-            boresight = [1.0, 0.0, 0.0]
-            right = [0.0, 1.0, 0.0]
-            [[reflections]]
-            camera = "sun"
-            at_deg = [20.0, -10.0]
-            radius_px = 4
-            level = 200
-            """,
-        )
-    )
+    view = load_earth_sun_scene(save(tmp_path, SCENE))
     scene = view.scene
     truth = scene.truth(NADIR, 0)
     assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((10, -20))
