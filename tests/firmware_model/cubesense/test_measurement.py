@@ -1,5 +1,6 @@
 """Measurements: results, every result code, times, settings, and what is left whole."""
 
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -30,12 +31,14 @@ from cubestack.firmware_model.interface.cubesense.codes import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
-from cubestack.firmware_model.mcu.requests import ReadTimer, Request, Routine, SetPin, StrobeRead
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, SetPin, StrobeRead
 
 from .harness import FRAME_US, READ_OUT_US, Harness
 from .scenery import SUN_BORESIGHT, chequered, earth, edges_in, error_deg, place, sun, window
 
 TICK_US = 51.2
+#: Edges that lie on no circle.
+RECTANGLE = np.pad(np.full((140, 120), 200, np.uint8), ((200, 140), (300, 220)), constant_values=34)
 
 
 def measure(unit: Harness, camera: Camera, sram: Sram | None = None) -> dict[str, Any]:
@@ -60,13 +63,6 @@ def sun_at(alpha: float, beta: float) -> NDArray[np.uint8]:
     return sun(place(alpha, beta, SUN_BORESIGHT), 6)
 
 
-@pytest.fixture
-def lit(unit: Harness) -> Harness:
-    """A program whose cameras both see what they look for."""
-    unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(3, 4), earth(5, 6)
-    return unit
-
-
 def edges_of(unit: Harness) -> set[tuple[float, float]]:
     """Edges of the latest nadir picture, px, as telemetry hands them out."""
     values = {**unit.telemetry("NadirEdges1"), **unit.telemetry("NadirEdges2")}
@@ -87,10 +83,9 @@ def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float,
     data = window(picture)
     expected = find_sun(data, SunConfig(table), Meter(PIC18F45K20))
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)
-    assert measured["Points"] == expected.pixels
-    assert measured["FirstX"] == int(data[0]) + 256 * int(data[1])
-    assert measured["FirstY"] == int(data[2]) + 256 * int(data[3])
-    assert (measured["Sram"], measured["Radius"], measured["PixelsRead"]) == (sram, 0, 225)
+    assert (measured["FirstX"], measured["FirstY"]) == tuple(data[:4].view("<u2"))
+    assert (measured["Points"], measured["Sram"]) == (expected.pixels, sram)
+    assert (measured["Radius"], measured["PixelsRead"]) == (0, 225)
 
 
 @pytest.mark.parametrize("sram", Sram)
@@ -114,19 +109,6 @@ def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[floa
     assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in edges.points}
 
 
-def no_memory(unit: Harness, sram: Sram) -> None:
-    unit.latched.add(sram)
-    unit.run(until_us=unit.now_us + 10_000)
-    assert unit.cut() == {sram}
-
-
-def noise(rows: int) -> NDArray[np.uint8]:
-    """Edges that lie on no circle."""
-    picture = np.full((480, 640), 34, np.uint8)
-    picture[200 : 200 + rows, 300:420] = 200
-    return picture
-
-
 @pytest.mark.parametrize(
     ("picture", "detect"),
     [
@@ -134,7 +116,7 @@ def noise(rows: int) -> NDArray[np.uint8]:
         (np.full((480, 640), 255, np.uint8), DetectResult.TOO_FEW_EDGES),
         (earth(180, 0), DetectResult.TOO_FEW_EDGES),
         (chequered(), DetectResult.TOO_MANY_EDGES),
-        (noise(140), DetectResult.BAD_FIT),
+        (RECTANGLE, DetectResult.BAD_FIT),
     ],
     ids=["dark", "bright", "behind", "chequered", "rectangle"],
 )
@@ -208,16 +190,10 @@ def test_a_latch_up_under_the_search(camera: Camera, sram: Sram, search: NadirSe
 def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
     unit.scenes[Camera.NADIR] = earth(5, 6)
     seen: list[tuple[CaptureResult, DetectResult]] = []
-
-    def note(request: Request) -> None:
-        now = outcome(unit.telemetry("Result2"))
-        if now not in seen[-1:]:
-            seen.append(now)
-
     assert unit.send("CaptureAndDetect", Camera=Camera.NADIR, Sram=Sram.SRAM2) == 0
-    unit.on_request = note
+    unit.on_request = lambda _request: seen.append(outcome(unit.telemetry("Result2")))
     unit.run()
-    assert seen == [
+    assert [codes for codes, _ in groupby(seen)] == [
         (CaptureResult.PENDING, DetectResult.PENDING),
         (CaptureResult.STORED_OWN_SRAM, DetectResult.PENDING),
         (CaptureResult.STORED_OWN_SRAM, DetectResult.SUCCESS),
@@ -228,7 +204,9 @@ def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
 @pytest.mark.parametrize("other_is_dead", [False, True])
 def test_the_other_memory_serves(unit: Harness, camera: Camera, other_is_dead: bool) -> None:
     unit.scenes[Camera.SUN], unit.scenes[Camera.NADIR] = sun_at(-20, 10), earth(-20, 10)
-    no_memory(unit, Sram(camera))
+    unit.latched.add(Sram(camera))
+    unit.run(until_us=unit.now_us + 10_000)
+    assert unit.cut() == {Sram(camera)}
     if other_is_dead:
         unit.scenes[Camera(1 - camera)] = None
     measured = measure(unit, camera, Sram(1 - camera))
@@ -352,8 +330,7 @@ def answered(routine: Routine[int], now_us: int) -> int:
     assert next(routine) == ReadTimer()
     with pytest.raises(StopIteration) as end:
         routine.send(now_us)
-    value: int = end.value.value
-    return value
+    return int(end.value.value)
 
 
 @given(st.integers(0, 10**12), st.integers(0, 3_350_000))
@@ -366,6 +343,4 @@ def test_a_duration_is_right_to_a_tick_across_the_timers_overflow(start: int, us
 
 
 def test_a_tick_is_51_2_us() -> None:
-    assert microseconds(1000) == 51_200
-    assert ticks_of(51_200) == 1000
-    assert ticks_of(51_199) == 999
+    assert (microseconds(1000), ticks_of(51_200), ticks_of(51_199)) == (51_200, 1000, 999)

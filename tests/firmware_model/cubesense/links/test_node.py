@@ -65,18 +65,8 @@ def test_an_escape_in_a_frame_number_is_undone(node: Links) -> None:
         ("36" + "00" * 16, AckError.WRONG_LENGTH),
         ("36" + "00" * 200, AckError.WRONG_LENGTH),
         ("14 02 00", AckError.BAD_PARAMETER),
-        ("14 00 02", AckError.BAD_PARAMETER),
         ("15 00 00 01", AckError.BAD_PARAMETER),  # the bottom half
-        ("15 00 00 02", AckError.BAD_PARAMETER),
-        ("40 00 01 00", AckError.BAD_PARAMETER),
-        ("40 00 00 05", AckError.BAD_PARAMETER),
         ("41 00 00", AckError.BAD_PARAMETER),  # before a picture is selected
-        ("00 00", AckError.BAD_PARAMETER),
-        ("00 04", AckError.BAD_PARAMETER),
-        ("0B 03", AckError.BAD_PARAMETER),
-        ("2A 02", AckError.BAD_PARAMETER),
-        ("34 00" + "00" * 8, AckError.BAD_PARAMETER),
-        ("34 06" + "00" * 8, AckError.BAD_PARAMETER),
         ("34 01 0200 0100 0000 0000", AckError.BAD_PARAMETER),  # ends before it begins
         ("36" + "00" * 15, AckError.BAD_PARAMETER),  # no inverse
         ("64 02", AckError.BAD_PARAMETER),

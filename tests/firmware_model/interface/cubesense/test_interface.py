@@ -109,6 +109,7 @@ def test_published_telemetry_bytes() -> None:
         ("StartImageDownload", {"Size": 5}, ["Size"]),
         ("NextImageFrame", {"Frame": 8192}, ["Frame"]),
         ("Reset", {"Target": 0}, ["Target"]),
+        ("Reset", {"Target": 4}, ["Target"]),
         ("ClearOverCurrent", {"Selection": 3}, ["Selection"]),
         ("AutoAdjust1", {"Enabled": 2}, ["Enabled"]),
         ("Mask1", {"Area": 0}, ["Area"]),
