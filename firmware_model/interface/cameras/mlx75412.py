@@ -33,7 +33,8 @@ SYNC_APPLY = 0x03
 LONGEST_EXPOSURE = 0x0002
 
 
-_stored = partial(CameraRegister, modelled=False)
+_synced = partial(CameraRegister, needs_sync=True)
+_stored = partial(_synced, modelled=False)
 
 _REGISTERS = (
     CameraRegister(
@@ -52,12 +53,11 @@ _REGISTERS = (
             modelled=False,
         ),
     ),
-    CameraRegister(
+    _synced(
         0x8102,
         "HARDWARE_FEATURES",
         0x00,
         "image processing in hardware",
-        needs_sync=True,
         assumed="reset value; positions of all bits but HISTOGRAM_REMAP",
     ).of(
         BitField("SHARPENING", 0, 1, "sharpens edges", modelled=False),
@@ -78,16 +78,14 @@ _REGISTERS = (
         0,
         "barriers of the high dynamic range response; all zero is linear",
         width=0x841F - 0x840B + 1,
-        needs_sync=True,
         assumed="reset value; the model is linear whatever is written",
     ),
-    CameraRegister(
+    _synced(
         0x8444,
         "EXPOSURE_RULE",
         0x0000,
         "0x0002 is the longest exposure that the frame rate allows; else EXPOSURE counts",
         width=2,
-        needs_sync=True,
         assumed="reset value; the second address, printed as 0x8545 in one place",
     ),
     CameraRegister(
@@ -102,7 +100,6 @@ _REGISTERS = (
         "FIRMWARE_FEATURES",
         0x00,
         "image processing in the sensor's own software, which fails below 20 MHz",
-        needs_sync=True,
         assumed="reset value; which of bits 6 and 4 is which",
     ).of(
         BitField("AUTO_DYNAMIC_RANGE", 4, 1, "with BARRIER_UPDATE"),
@@ -110,36 +107,29 @@ _REGISTERS = (
         BitField("BARRIER_UPDATE", 6, 1, "with AUTO_DYNAMIC_RANGE"),
         BitField("AUTOVIEW", 7, 1, "updates the histogram remap"),
     ),
-    CameraRegister(
+    _synced(
         0x8518,
         "CLOCKS_PER_SECOND",
         27_000_000,
         "input clock in Hz that FRAMES_PER_SECOND is reckoned with",
         width=4,
-        needs_sync=True,
     ),
-    CameraRegister(
+    _synced(
         0x851C,
         "FRAMES_PER_SECOND",
         30,
         "frame rate in 1/s at an input clock of CLOCKS_PER_SECOND",
         width=2,
-        needs_sync=True,
     ),
-    CameraRegister(
+    _synced(
         0x8526,
         "EXPOSURE",
         512,
         "exposure in line times of 1322 clocks",
         width=2,
-        needs_sync=True,
         assumed="reset value",
     ),
 )
 
-REGISTERS = CameraRegisterMap(
-    camera="MLX75412",
-    i2c_address=0x2C,  # 0101_100: image sensor zero
-    address_bytes=2,
-    registers=_REGISTERS,
-)
+# The address: 0101_100: image sensor zero.
+REGISTERS = CameraRegisterMap("MLX75412", 0x2C, address_bytes=2, registers=_REGISTERS)

@@ -170,6 +170,4 @@ _REGISTERS = (
     ),
 )
 
-REGISTERS = CameraRegisterMap(
-    camera="MT9M001", i2c_address=0x5D, address_bytes=1, registers=_REGISTERS
-)
+REGISTERS = CameraRegisterMap("MT9M001", 0x5D, address_bytes=1, registers=_REGISTERS)

@@ -116,9 +116,5 @@ _REGISTERS = (
     ),
 )
 
-REGISTERS = CameraRegisterMap(
-    camera="OV7620",
-    i2c_address=0x21,  # SCCB 0x42 to write, 0x43 to read
-    address_bytes=1,
-    registers=_REGISTERS,
-)
+# The address: SCCB 0x42 to write, 0x43 to read.
+REGISTERS = CameraRegisterMap("OV7620", 0x21, address_bytes=1, registers=_REGISTERS)
