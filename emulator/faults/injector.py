@@ -64,7 +64,6 @@ class Faults:
     def inject(
         self,
         fault: Fault | str,
-        /,
         *,
         target: str | None = None,
         at_s: float | None = None,
