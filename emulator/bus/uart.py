@@ -13,8 +13,6 @@ import simpy
 from cubestack.emulator.bus.line_format import LineFormat, LineSampler
 from cubestack.emulator.sim.virtual_time import Kernel
 
-BITS_PER_BYTE = 10  # start bit, 8 data bits, stop bit
-
 
 class UartTap:
     """Listens at the device's end of a line, to what it overrides, and changes nothing."""

@@ -66,12 +66,10 @@ class PtyEndpoint(SerialPort):
     def _read(self, max_bytes: int) -> bytes:
         try:
             return os.read(self._master, max_bytes)
-        except BlockingIOError:
-            return b""
         except OSError as error:
-            if error.errno == errno.EIO:  # hung up, and nothing is left
-                return b""
-            raise
+            if error.errno not in (errno.EAGAIN, errno.EIO):  # EIO: hung up, and nothing is left
+                raise
+            return b""
 
     def _write(self, data: bytearray) -> int:
         try:

@@ -66,7 +66,8 @@ class TcpEndpoint(SerialPort):
         except OSError:  # nobody, or gone again
             return self._client
         newcomer.setblocking(False)
-        if self._client is not None and not self._leaving(self._client):
+        # Hang-ups and errors are always told.
+        if self._client is not None and not poll_now(self._client.fileno(), select.POLLRDHUP):
             with contextlib.suppress(OSError):
                 newcomer.send(REFUSAL)
             newcomer.close()
@@ -79,10 +80,6 @@ class TcpEndpoint(SerialPort):
 
     def _welcome(self) -> None:
         """A client has come."""
-
-    def _leaving(self, client: socket.socket) -> bool:
-        gone = select.POLLRDHUP | select.POLLHUP | select.POLLERR
-        return bool(poll_now(client.fileno(), select.POLLRDHUP) & gone)
 
     def _read(self, max_bytes: int) -> bytes:
         if self._client is None or self._input_ended:

@@ -54,7 +54,11 @@ class VcdTrace:
         self._lag_ps = 2 * max((uart.byte_ps for uart in uarts.values()), default=0)
         for name, value in probes().items():
             self.declare(f"firmware.{name}", None if isinstance(value, str) else 32)
-        self._pins = self._declare_pins()
+        self._pins: tuple[str, ...] = ()
+        if engine is not None:
+            self._pins = (*engine.wiring.mcu_pins, *engine.wiring.output_pins)
+            for pin in self._pins:
+                self.declare(f"fpga.{pin}", engine.wiring.widths[pin], engine.get_pin(pin))
         self._taps: list[_LineTap | _BusTap] = [
             _LineTap(self, port, uart) for port, uart in uarts.items()
         ]
@@ -88,15 +92,6 @@ class VcdTrace:
             tap.close()
         self._flush(None)
         self._writer.close(max(self._written_ns, self._kernel.now // PS_PER_NS))
-
-    def _declare_pins(self) -> tuple[str, ...]:
-        if self._engine is None:
-            return ()
-        wiring = self._engine.wiring
-        pins = (*wiring.mcu_pins, *wiring.output_pins)
-        for pin in pins:
-            self.declare(f"fpga.{pin}", wiring.widths[pin], self._engine.get_pin(pin))
-        return pins
 
     def _observed_step(self) -> None:
         self._step()

@@ -21,8 +21,6 @@ from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
 
-from amaranth.lib.wiring import Component
-
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
 from cubestack.emulator.rtl.cxxrtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
@@ -50,8 +48,7 @@ class Compiler:
 
 def find_compiler() -> Compiler | None:
     """Take ``$CXX``, else one on the PATH, else the one of the ziglang wheel, else None."""
-    candidates = [shlex.split(os.environ.get("CXX", "")), ["c++"], ["g++"], ["clang++"]]
-    for candidate in candidates:
+    for candidate in (shlex.split(os.environ.get("CXX", "")), ["c++"], ["g++"], ["clang++"]):
         program = shutil.which(candidate[0]) if candidate else None
         if program is None:
             continue
@@ -93,8 +90,7 @@ def cached_library(
     compiler = find_compiler()
     if compiler is None:
         raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
-    if folder is None:
-        folder = cache_folder()
+    folder = folder or cache_folder()
     key = _key(design, compiler)
     try:
         for candidate in folder.glob(f"{key}-*.so"):
@@ -107,10 +103,8 @@ def cached_library(
             library = folder / _library_name(key, built.read_bytes())
             built.replace(library)
     except OSError as error:
-        raise CompilerError(
-            f"can not use the cache folder {folder} ({error.strerror}); "
-            "XDG_CACHE_HOME names another one"
-        ) from error
+        text = f"can not use the cache folder {folder} ({error.strerror})"
+        raise CompilerError(f"{text}; XDG_CACHE_HOME names another one") from error
     return library
 
 
@@ -122,16 +116,8 @@ def compile_driver(
     CompilerError when the compiler fails; the message names the log.
     """
     library = scratch / "library.so"
-    command = [
-        *compiler.command,
-        *FLAGS,
-        f"-I{scratch}",
-        f"-I{cxxrtl_headers()}",
-        str(_source("driver.cpp")),
-        *options,
-        "-o",
-        str(library),
-    ]
+    sources = f"-I{scratch}", f"-I{cxxrtl_headers()}", str(_source("driver.cpp"))
+    command = [*compiler.command, *FLAGS, *sources, *options, "-o", str(library)]
     with log.open("w") as output:
         output.write(shlex.join(command) + "\n")
         output.flush()
@@ -141,10 +127,8 @@ def compile_driver(
     return library
 
 
-@lru_cache(maxsize=8)
-def _design_hash(component: Component) -> str:
-    """Kept, because a large design takes a good part of a second."""
-    return design_hash(component)
+# Kept, because a large design takes a good part of a second.
+_design_hash = lru_cache(maxsize=8)(design_hash)
 
 
 def _key(design: str, compiler: Compiler) -> str:

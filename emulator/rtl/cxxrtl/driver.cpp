@@ -1,5 +1,5 @@
 // Drives the compiled FPGA: pixel clock edges in, data clock cycles in, SRAMs beside it.
-// One of these is behind every CompiledEngine; stepping.py says what is asked of it and when.
+// One of these is behind every CompiledEngine; contract.py says what is asked of it and when.
 //
 // design.cpp is CXXRTL's output. Its eval() computes outputs and the registers' next values,
 // commit() makes those current and tells whether any changed. Outputs lag a register change by
@@ -130,14 +130,8 @@ MEMORIES
 // A segment of a camera's stream as pixel_clock.py describes it; edge k is at
 // start + floor(k * half_numerator / half_denominator).
 struct Segment {
-    int64_t start;
-    int64_t half_numerator;
-    int64_t half_denominator;
-    int64_t edges;
-    int64_t rows;
-    int64_t line_clocks;
-    int64_t active_columns;
-    int64_t vsync;
+    int64_t start, half_numerator, half_denominator, edges;
+    int64_t rows, line_clocks, active_columns, vsync;
 };
 
 // What a camera sends, and how far it is.
@@ -439,10 +433,7 @@ private:
     }
 
     bool writes() const {
-        bool any = false;
-        for (const Sram &sram : srams)
-            any |= sram.writes();
-        return any;
+        return std::any_of(srams.begin(), srams.end(), [](auto &sram) { return sram.writes(); });
     }
 
     template <class Model> static uint32_t acknowledges(const Model &top) { return ACKNOWLEDGES; }
@@ -472,15 +463,15 @@ private:
             stream.next_edge();
             if (skipping && !changed && !wrote && !stream.inside())
                 stream.skip_low_samples(until);
-        } else {
-            Camera<N>::clock(top, false);
-            if (stream.edge + 1 < stream.segment.edges) {
-                stream.next_sample();
-                put_sample<N>(top);
-            }
-            settle_fall<N>(top, time);
-            stream.next_edge();
+            return;
         }
+        Camera<N>::clock(top, false);
+        if (stream.edge + 1 < stream.segment.edges) {
+            stream.next_sample();
+            put_sample<N>(top);
+        }
+        settle_fall<N>(top, time);
+        stream.next_edge();
     }
 
     // Settling after an edge of camera N's clock. A copy makes this edge's share only, unless its

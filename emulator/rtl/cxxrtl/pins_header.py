@@ -93,16 +93,14 @@ def _bus(bus: BusPins | None) -> dict[str, str]:
 
 def _registers(design: str) -> list[str]:
     """What CXXRTL buffers are registers; it escapes what C++ does not take in a name."""
-    registers = []
-    for member, kind in (members(design) if design else {}).items():
-        if kind.startswith("wire"):
-            name = _ESCAPE.sub(_plain, member.removeprefix("p_"))
-            registers.append(f'REGISTER("{name}", {member}, {kind[len("wire<") : -1]})')
-    return registers
+    kinds = members(design).items() if design else ()
+    wires = [(member, kind) for member, kind in kinds if kind.startswith("wire")]
+    return [f'REGISTER("{_plain(member)}", {member}, {kind[5:-1]})' for member, kind in wires]
 
 
-def _plain(escape: re.Match[str]) -> str:
-    return chr(int(escape[1], 16)) if escape[1] else "_"
+def _plain(member: str) -> str:
+    name = member.removeprefix("p_")
+    return _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else "_", name)
 
 
 def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:

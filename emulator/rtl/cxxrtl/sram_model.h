@@ -7,31 +7,17 @@
 
 // Fields in the order of SramTiming, in ps.
 struct SramTiming {
-    int64_t access;
-    int64_t output_enable;
-    int64_t output_disable;
-    int64_t write_pulse;
-    int64_t data_setup;
+    int64_t access, output_enable, output_disable, write_pulse, data_setup;
 };
 
 // In the order of RULES.
 enum ViolationKind : int64_t {
-    SHORT_WRITE_PULSE,
-    ADDRESS_CHANGED_DURING_WRITE,
-    DATA_SETUP,
-    READ_ACCESS,
-    BUS_CONTENTION,
-    TURNAROUND,
-    WIRE_CONTENTION,
-    VIOLATION_KINDS,
+    SHORT_WRITE_PULSE, ADDRESS_CHANGED_DURING_WRITE, DATA_SETUP, READ_ACCESS,
+    BUS_CONTENTION, TURNAROUND, WIRE_CONTENTION, VIOLATION_KINDS,
 };
 
 struct Violation {
-    int64_t kind;
-    int64_t time;
-    int64_t address;
-    int64_t found;
-    int64_t needed;
+    int64_t kind, time, address, found, needed;
     int64_t where;  // number of the memory
 };
 
@@ -81,7 +67,7 @@ class Sram {
 public:
     // `number` is what violations in `log` call it.
     Sram(uint8_t *memory, const SramTiming &timing, ViolationLog &log, int64_t number)
-        : memory(memory), timing(timing), log(log), number(number) {}
+        : memory(memory), timing(timing), log(log), number(number) { power(true); }
 
     uint8_t bus() const { return pins.reads() ? memory[pins.address()] : pins.data(); }
 
@@ -138,14 +124,9 @@ private:
     const SramTiming timing;
     ViolationLog &log;
     const int64_t number;
-    bool powered = true;
+    bool powered;
     SramPins pins;
-    int64_t write_since = LONG_AGO;
-    int64_t data_since = LONG_AGO;
-    int64_t address_since = LONG_AGO;
-    int64_t selected_since = LONG_AGO;
-    int64_t reads_since = LONG_AGO;
-    int64_t released_at = LONG_AGO;
+    int64_t write_since, data_since, address_since, selected_since, reads_since, released_at;
 
     void end_write(int64_t time, const SramPins &old) {
         const int64_t width = time - write_since;

@@ -16,7 +16,6 @@ from cubestack.emulator.ports.realtime import IDLE_S, SLICE_S, RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
 NS_PER_MS = 1_000_000
-PS_PER_NS = 1000
 ORIGIN_NS = 123_456_789_012_345
 
 

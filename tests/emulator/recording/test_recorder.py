@@ -1,7 +1,7 @@
 """Recordings of small devices: an echo on a line, a memory on the bus."""
 
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -43,13 +43,13 @@ class Device:
         return Replay(recording, self.kernel, {"uart": self.uart}, self.bus).run(INTERFACE)
 
 
-def recorded(path: Path, device: Device, live: Callable[[Recorder], None]) -> Recording:
-    """What came on record while a device lived."""
+@contextmanager
+def recorded(path: Path, device: Device) -> Iterator[Recorder]:
+    """What happens to a device meanwhile comes on record."""
     uarts = {"uart": device.uart}
     with path.open("w") as stream, closing(Recorder(stream, "cubesense", uarts)) as recorder:
         recorder.listen(device.bus)
-        live(recorder)
-    return load_recording(path)
+        yield recorder
 
 
 def record(path: Path, writes: list[tuple[int, bytes]], transfers: int = 2) -> Recording:
@@ -61,14 +61,13 @@ def record(path: Path, writes: list[tuple[int, bytes]], transfers: int = 2) -> R
             yield device.kernel.process(device.bus.transfer(messages))
             yield device.kernel.timeout(PS_PER_MS)
 
-    def live(_recorder: Recorder) -> None:
+    with recorded(path, device):
         device.kernel.process(talk())
         for pause_ps, data in writes:
             device.kernel.advance_to(device.kernel.now + pause_ps)
             device.uart.host_writes(data)
         device.kernel.run()
-
-    return recorded(path, device, live)
+    return load_recording(path)
 
 
 WRITES = st.lists(st.tuples(st.integers(0, 10**10), st.binary(max_size=300)), max_size=4)
@@ -120,14 +119,11 @@ def test_delay_is_named(tmp_path):
 
 
 def test_failed_transfer_is_on_record(tmp_path):
-    device = Device()
-
-    def live(_recorder: Recorder) -> None:
-        transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
-        with pytest.raises(I2cError):
-            device.kernel.run(device.kernel.process(transfer))
-
-    recording = recorded(tmp_path / "a.rec", device, live)
+    device, path = Device(), tmp_path / "a.rec"
+    transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
+    with recorded(path, device), pytest.raises(I2cError):
+        device.kernel.run(device.kernel.process(transfer))
+    recording = load_recording(path)
     assert recording.transfers[0].errno == 5
     assert Device().replay(recording) == []
 
@@ -140,27 +136,23 @@ def test_recording_of_other_ports(tmp_path):
 
 
 def test_framing_errors_are_on_record_and_their_characters_dropped_again(tmp_path):
-    device = Device()
-
-    def live(_recorder: Recorder) -> None:
+    device, path = Device(), tmp_path / "a.rec"
+    with recorded(path, device):
         device.uart.host_writes(b"a")
         device.kernel.run()
         device.uart.host_form = LineFormat(57_600, parity="S")
         device.uart.host_writes(b"bc")
         device.kernel.run()
-
-    recording = recorded(tmp_path / "a.rec", device, live)
-    assert '"error":"framing"' in (tmp_path / "a.rec").read_text()
+    assert '"error":"framing"' in path.read_text()
     again = Device()
-    assert again.replay(recording) == []
+    assert again.replay(load_recording(path)) == []
     assert again.uart.framing_errors == device.uart.framing_errors == 2
 
 
 class Losing:
     """A line that loses every second byte to the device."""
 
-    def __init__(self) -> None:
-        self.count = 0
+    count = 0
 
     def to_host(self, data, first_ps, byte_ps, line) -> None:
         line(data, first_ps, byte_ps)
@@ -172,14 +164,12 @@ class Losing:
 
 
 def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
-    device = Device()
+    device, path = Device(), tmp_path / "a.rec"
     device.uart.fault_hook = Losing()
-
-    def live(_recorder: Recorder) -> None:
+    with recorded(path, device):
         device.uart.host_writes(b"abcd")
         device.kernel.run()
-
-    recording = recorded(tmp_path / "a.rec", device, live)
+    recording = load_recording(path)
     assert recording.sent("uart", "host")[0] == b"abcd"
     assert recording.sent("uart", "device")[0] == b"bd"
     again = Device()
@@ -189,13 +179,11 @@ def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
 
 
 def test_what_was_done_meanwhile_is_done_again(tmp_path):
-    device = Device()
-
-    def live(recorder: Recorder) -> None:
+    device, path = Device(), tmp_path / "a.rec"
+    with recorded(path, device) as recorder:
         device.kernel.advance_to(PS_PER_MS)
         recorder.control(device.kernel.now, ("scene", "x.toml"), "text")
-
-    recording = recorded(tmp_path / "a.rec", device, live)
+    recording = load_recording(path)
     again, done = Device(), []
 
     def act(control: Control) -> None:

@@ -12,7 +12,7 @@ from cubestack.emulator.rtl.wiring import CameraPins, Wiring
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.engines.icarus_board import IcarusBoard
 
-from .conftest import ListCamera
+from .cameras import ListCamera
 
 Command = tuple[int, str, int]
 """At a time in ps: a pin takes a level, "power MEMORY" is 1 or 0, or "strobe" reads bytes."""

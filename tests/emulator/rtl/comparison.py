@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.contract import PinEvent, RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
@@ -54,6 +54,16 @@ def assert_same(all_engines: Sequence[RtlEngine], step: Step, what: object) -> N
         found = {"answer": step(engine), **state(engine)}
         differences = {k: (found[k], expected[k]) for k in expected if found.get(k) != expected[k]}
         assert not differences, (number, what)
+
+
+def assert_same_outputs(all_engines: Sequence[RtlEngine], events: list[PinEvent]) -> np.ndarray:
+    """Every output after every event, and the state in the end; the outputs."""
+    *others, reference = all_engines
+    expected = reference.apply(events)
+    for engine in others:
+        np.testing.assert_array_equal(engine.apply(events), expected)
+        assert state(engine) == state(reference)
+    return expected
 
 
 def read(engine: RtlEngine, count: int, period: Fraction, reach: int) -> bytes:

@@ -6,8 +6,8 @@ import numpy as np
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
+from .cameras import ListCamera
 from .commanded import Command
-from .conftest import ListCamera
 
 SIDES = ("sun", "nadir")
 ENABLES = ("SUNEN", "NADEN")

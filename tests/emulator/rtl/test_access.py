@@ -25,6 +25,7 @@ from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
+from .cameras import plain_camera, random_camera
 from .comparison import Step, assert_same, engines
 
 COLUMNS, ROWS = 8, 4
@@ -89,19 +90,19 @@ def random_step(rng: np.random.Generator, wiring: Wiring) -> Step:
 
 @needs_compiler
 @pytest.mark.parametrize("design", WIRINGS)
-def test_every_engine_makes_the_same_transactions(design, make_random_camera) -> None:
+def test_every_engine_makes_the_same_transactions(design) -> None:
     """At any time: beside pixels that are stored, in standby, over the ends of segments."""
     rng = np.random.default_rng(7)
     wiring = WIRINGS[design](design(COLUMNS, ROWS))
     all_engines = engines(wiring)
-    camera = make_random_camera(rng, COLUMNS, ROWS)
+    camera = random_camera(rng, COLUMNS, ROWS)
     assert_same(all_engines, lambda engine: engine.attach(camera), "camera")
     for turn in range(120):
         assert_same(all_engines, random_step(rng, wiring), turn)
 
 
 @needs_compiler
-def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin(make_camera) -> None:
+def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin() -> None:
     """Beside a picture that is stored in the other memory, at every engine's own speed."""
     rng = np.random.default_rng(3)
     wiring = cubestar_double_wiring()
@@ -109,7 +110,7 @@ def test_a_bulk_read_of_full_size_is_the_read_pin_by_pin(make_camera) -> None:
     for bulk in (True, False):
         engine = make_engine(wiring, "compiled")
         assert isinstance(engine, CompiledEngine)
-        camera = make_camera(1024, 512, 1, period=100_000, line_clocks=1322, blank=2000)
+        camera = plain_camera(1024, 512, 1, period=100_000, line_clocks=1322, blank=2000)
         engine.attach(camera)
         rng = np.random.default_rng(3)
         engine.memories["SRAM2"][:] = rng.integers(0, 256, 1 << 19, dtype=np.uint8)

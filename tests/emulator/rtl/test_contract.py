@@ -10,6 +10,8 @@ from cubestack.emulator.rtl.contract import PinEvent, RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.cubestar.top import CubeStarTop
 
+from .cameras import plain_camera
+
 PERIOD = 100_000
 LINE = 12
 BLANK = 30
@@ -29,8 +31,8 @@ def engine(request):
 
 
 @pytest.fixture
-def camera(make_camera):
-    return make_camera()
+def camera():
+    return plain_camera()
 
 
 @pytest.fixture
@@ -66,32 +68,25 @@ def test_reset_state(engine):
     assert engine.sram.shape == (2 * ROWS * COLUMNS,)
 
 
-def test_frame_is_stored_and_acknowledged_at_the_last_pixel(storing, camera):
-    assert storing.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK
-    assert storing.now_ps == FIRST_ACK
-    assert storing.get_pin("ACK") == 1
-    assert (storing.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
-    assert not storing.violations
-
-
-def test_second_bank(engine, camera):
+@pytest.mark.parametrize(
+    ("bank", "enabled_ps", "frame"), [(0, 0, 0), (1, 0, 0), (0, (BLANK + 2 * LINE + 3) * PERIOD, 1)]
+)
+def test_next_whole_frame_is_stored_in_its_bank_and_acknowledged_at_the_last_pixel(
+    engine, camera, bank, enabled_ps, frame
+):
     engine.attach(camera)
-    engine.set_pin("BANK", 1)
+    engine.run(enabled_ps)
+    engine.set_pin("BANK", bank)
     engine.set_pin("ENABLE", 1)
-    engine.run(10 * FRAME, ("ACK", 1))
-    assert not engine.sram[: ROWS * COLUMNS].any()
-    assert (engine.sram[ROWS * COLUMNS :] == camera.images[0].ravel()).all()
+    assert engine.run(10 * FRAME, ("ACK", 1)) == engine.now_ps == FIRST_ACK + frame * FRAME
+    assert engine.get_pin("ACK") == 1
+    banks = engine.sram.reshape(2, ROWS * COLUMNS)
+    assert (banks[bank] == camera.images[frame].ravel()).all()
+    assert not banks[1 - bank].any()
     engine.set_pin("ENABLE", 0)
-    engine.set_pin("BANK", 0)
+    engine.set_pin("BANK", 1 - bank)
     assert not read(engine, ROWS * COLUMNS).any()
-
-
-def test_enabled_in_mid_frame_stores_the_next_whole_frame(engine, camera):
-    engine.attach(camera)
-    engine.run((BLANK + 2 * LINE + 3) * PERIOD)
-    engine.set_pin("ENABLE", 1)
-    assert engine.run(10 * FRAME, ("ACK", 1)) == FIRST_ACK + FRAME
-    assert (engine.sram[: ROWS * COLUMNS] == camera.images[1].ravel()).all()
+    assert not engine.violations
 
 
 @pytest.mark.parametrize(("early_ps", "frame"), [(0, 1), (1, 0)])
@@ -138,8 +133,8 @@ def test_stored_frame_is_kept_while_the_camera_goes_on(storing, camera):
     assert (storing.sram[: ROWS * COLUMNS] == camera.images[0].ravel()).all()
 
 
-def test_pixels_are_rendered_only_while_they_may_be_stored(engine, make_camera):
-    camera = make_camera(frames=5)
+def test_pixels_are_rendered_only_while_they_may_be_stored(engine):
+    camera = plain_camera(frames=5)
     engine.attach(camera)
     engine.run(FRAME + 1)
     assert camera.rendered == []
@@ -152,8 +147,8 @@ def test_pixels_are_rendered_only_while_they_may_be_stored(engine, make_camera):
     assert camera.rendered == [1]
 
 
-def test_changed_stream_is_followed_from_now_on(engine, make_camera):
-    camera, other = make_camera(seed=1), make_camera(seed=2)
+def test_changed_stream_is_followed_from_now_on(engine):
+    camera, other = plain_camera(seed=1), plain_camera(seed=2)
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
     engine.run((BLANK - 5) * PERIOD)
@@ -175,9 +170,9 @@ def test_asking_the_source_again_makes_no_clock_more_or_less(storing, camera, of
     assert not storing.violations
 
 
-def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine, make_camera):
+def test_camera_connected_in_a_high_half_makes_no_edge_of_it(engine):
     engine.run(5 * PERIOD + 10)
-    engine.attach(make_camera())
+    engine.attach(plain_camera())
     engine.run(5 * PERIOD + 20)
     assert engine.get_pin("PIXCLK") == 0
     engine.run(6 * PERIOD)
@@ -257,7 +252,7 @@ def test_apply_shows_every_output_after_every_event(engine):
     assert engine.now_ps == 30
 
 
-def test_wrong_calls_name_the_offender(engine, make_camera):
+def test_wrong_calls_name_the_offender(engine):
     engine.run(100)
     with pytest.raises(ValueError, match="run back from 100 ps to 99 ps"):
         engine.run(99)
@@ -269,7 +264,7 @@ def test_wrong_calls_name_the_offender(engine, make_camera):
         engine.run(200, ("DATA", 1))
     with pytest.raises(ValueError, match="at least 2 ps"):
         engine.strobe_read(np.zeros(1, np.uint8), Fraction(1), 200)
-    engine.attach(make_camera())
+    engine.attach(plain_camera())
     with pytest.raises(ValueError, match="not PIXCLK"):
         engine.apply([PinEvent(300, "PIXCLK", 1)])
 

@@ -1,5 +1,7 @@
 """Registers that are turned over from outside."""
 
+from collections.abc import Iterator
+
 import pytest
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
@@ -10,22 +12,29 @@ from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
-needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+@pytest.fixture
+def wiring() -> Wiring:
+    return cubestar_wiring()
 
 
-@needs_compiler
-@pytest.mark.parametrize("wiring", [cubestar_wiring(), cubesense_wiring(CubeSensePair())])
-def test_registers_have_the_names_of_the_design(wiring: Wiring) -> None:
+@pytest.fixture
+def engine(wiring: Wiring) -> Iterator[CompiledEngine]:
+    if find_compiler() is None:
+        pytest.skip("no C++ compiler")
     engine = CompiledEngine(wiring)
-    registers = engine.registers
-    assert all(bits > 0 for bits in registers.values())
-    assert {name.rsplit(".", 1)[-1] for name in registers} > {"row", "column", "store", "ack"}
+    yield engine
     engine.close()
 
 
-@needs_compiler
-def test_every_bit_of_a_running_reader_moves_the_address() -> None:
-    engine = CompiledEngine(cubestar_wiring())
+@pytest.mark.parametrize("wiring", [cubestar_wiring(), cubesense_wiring(CubeSensePair())])
+def test_registers_have_the_names_of_the_design(engine: CompiledEngine) -> None:
+    assert all(bits > 0 for bits in engine.registers.values())
+    names = {name.rsplit(".", 1)[-1] for name in engine.registers}
+    assert names > {"row", "column", "store", "ack"}
+
+
+def test_every_bit_of_a_running_reader_moves_the_address(engine: CompiledEngine) -> None:
     engine.set_pin("RNW", 1)
     engine.set_pin("ENABLE", 1)
     for _ in range(3):
@@ -38,28 +47,21 @@ def test_every_bit_of_a_running_reader_moves_the_address() -> None:
             assert engine.get_pin("SRAM_A") == before ^ 1 << bit + shift
             engine.flip(register, bit)
             assert engine.get_pin("SRAM_A") == before
-    engine.close()
 
 
-@needs_compiler
-def test_registers_in_reset_have_their_reset_value_at_once() -> None:
-    engine = CompiledEngine(cubestar_wiring())
+def test_registers_in_reset_have_their_reset_value_at_once(engine: CompiledEngine) -> None:
     before = {pin: engine.get_pin(pin) for pin in engine.wiring.output_pins}
     for register, bits in engine.registers.items():
         if register != "bank":
             for bit in range(bits):
                 engine.flip(register, bit)
                 assert {pin: engine.get_pin(pin) for pin in before} == before, register
-    engine.close()
 
 
-@needs_compiler
-def test_what_is_no_register_bit_is_refused_with_those_there_are() -> None:
-    engine = CompiledEngine(cubestar_wiring())
+def test_what_is_no_register_bit_is_refused_with_those_there_are(engine: CompiledEngine) -> None:
     for register, bit in (("writer.ack", 1), ("writer.ack", -1), ("writer.nack", 0)):
         with pytest.raises(ValueError, match=r"no register bit writer.*reader\.data \(8\)"):
             engine.flip(register, bit)
-    engine.close()
 
 
 def test_the_simulator_says_that_it_can_not() -> None:

@@ -13,8 +13,8 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
 
+from .cameras import ListCamera, plain_camera, random_camera
 from .commanded import Command, CommandedIcarus, Outcome, run_engine
-from .conftest import ListCamera
 
 pytestmark = pytest.mark.skipif(
     shutil.which("iverilog") is None, reason="Icarus Verilog (iverilog) is not installed"
@@ -66,19 +66,19 @@ def random_commands(rng: np.random.Generator, camera, count: int) -> list[Comman
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_commands(seed, tmp_path, make_random_camera):
+def test_random_commands(seed, tmp_path):
     rng = np.random.default_rng(seed)
     top = CubeStarTop(*((8, 4), (5, 3))[seed % 2])
-    camera = make_random_camera(rng, top.columns, top.rows)
+    camera = random_camera(rng, top.columns, top.rows)
     commands = random_commands(rng, camera, 25)
     star(tmp_path, top, camera).outcome(commands)
 
 
 @pytest.mark.parametrize("bank", [0, 1])
-def test_small_frames_joined_anywhere(bank, tmp_path, make_camera):
+def test_small_frames_joined_anywhere(bank, tmp_path):
     """ENABLE rises in one clock after the other of the first frame and its blanking."""
     top = CubeStarTop(5, 3)
-    camera = make_camera(5, 3, period=Fraction(10**12, 11_000_000), frames=3, blank=5)
+    camera = plain_camera(5, 3, period=Fraction(10**12, 11_000_000), frames=3, blank=5)
     capture_ps = camera.end_ps
     board = star(tmp_path, top, camera)
     for clock in range(0, 32, 3):
@@ -93,10 +93,10 @@ def test_small_frames_joined_anywhere(bank, tmp_path, make_camera):
         assert len(board.outcome(commands).acks) == 1
 
 
-def test_one_full_frame(tmp_path, make_camera):
+def test_one_full_frame(tmp_path):
     """1024 x 512 pixels of 1322 clocks a line at 10 MHz, stored and read back to the last byte."""
     top = CubeStarTop()
-    camera = make_camera(1024, 512, frames=1, line_clocks=1322, blank=40)
+    camera = plain_camera(1024, 512, frames=1, line_clocks=1322, blank=40)
     size = top.columns * top.rows
     read_ps = camera.end_ps + 50_000
     commands = [

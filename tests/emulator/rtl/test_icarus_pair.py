@@ -14,8 +14,8 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
+from .cameras import ListCamera
 from .commanded import Command, CommandedIcarus, Outcome, run_engine
-from .conftest import ListCamera
 from .pair_board import SIDES, SIZES, STROBE_PERIOD, Script, pair_camera, readings, stores
 
 pytestmark = [

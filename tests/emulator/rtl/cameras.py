@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
@@ -97,13 +96,3 @@ def random_camera(rng: np.random.Generator, columns: int, rows: int) -> ListCame
         camera.add_image(image, vsync=int(rng.random() < 0.95))
     camera.add_blank(20)
     return camera
-
-
-@pytest.fixture
-def make_camera() -> Callable[..., ListCamera]:
-    return plain_camera
-
-
-@pytest.fixture
-def make_random_camera() -> Callable[[np.random.Generator, int, int], ListCamera]:
-    return random_camera
