@@ -6,6 +6,7 @@
 import contextlib
 import socket
 import tracemalloc
+from collections.abc import Callable
 from typing import Any
 
 from cubestack.emulator.bus.i2c import I2cBus
@@ -29,23 +30,25 @@ ROLES = {"flood": 1, "unread": 2000, "stopped": 1, "polite": 1}
 """Who is at a line, and how many bytes the device answers to each byte on it."""
 
 
-class Wall:
-    """Wall time that passes when the scheduler waits, as rounded by ``wait_ready``.
+def serve(kernel: Kernel, ports, busy, waits: int, step: Callable[[int], None]) -> None:
+    """A step in each wait; wall time passes in waits, as rounded by ``wait_ready``."""
+    ns = number = 0
 
-    Something happens in each wait.
-    """
+    def clock() -> int:
+        nonlocal ns
+        ns += 1000
+        return ns
 
-    def __init__(self) -> None:
-        self.ns = 0
-        self.during_wait = lambda: None
+    def wait(_watched, timeout_s: float) -> None:
+        nonlocal ns, number
+        number += 1
+        step(number)
+        ns += max(NS_PER_MS, int(timeout_s * 1e9))
+        if number == waits:
+            scheduler.stop()
 
-    def clock(self) -> int:
-        self.ns += 1000
-        return self.ns
-
-    def wait(self, _watched, timeout_s: float) -> None:
-        self.during_wait()
-        self.ns += max(NS_PER_MS, int(timeout_s * 1e9))
+    scheduler = RealtimeScheduler(kernel, ports, busy, pace="real", clock_ns=clock, wait=wait)
+    scheduler.run()
 
 
 def call(kind: linux_i2c.Call, body: bytes) -> bytes:
@@ -94,26 +97,14 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path):
 
     The fourth exchanges a byte a wait.
     """
-    wall = Wall()
     with contextlib.ExitStack() as stack:
         desk = Desk(tmp_path, stack)
         for kind in SERIAL:
             desk.clients[kind, "stopped"].write(HALF_A_FRAME)
         desk.clients["i2c", "stopped"].write(READ_BYTES[:-1])
         got = dict.fromkeys((*SERIAL, "i2c"), 0)
-        steps = 0
-        scheduler = RealtimeScheduler(
-            desk.kernel,
-            [*desk.ports.values(), desk.server],
-            desk.busy,
-            pace="real",
-            clock_ns=wall.clock,
-            wait=wall.wait,
-        )
 
-        def step() -> None:
-            nonlocal steps
-            steps += 1
+        def step(number: int) -> None:
             for kind, count in got.items():
                 question = READ_BYTES if kind == "i2c" else b"?"
                 desk.clients[kind, "flood"].write((SET_ADDRESS + question) * 2000)
@@ -121,13 +112,10 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path):
                 desk.clients[kind, "unread"].write(question * 100)
                 got[kind] = count + len(desk.clients[kind, "polite"].read_now())
                 desk.clients[kind, "polite"].write(question)
-            if steps == 200:
+            if number == 200:
                 tracemalloc.start()
-            if steps == 600:
-                scheduler.stop()
 
-        wall.during_wait = step
-        scheduler.run()
+        serve(desk.kernel, [*desk.ports.values(), desk.server], desk.busy, 600, step)
         grown, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         assert desk.kernel.now > PS_PER_S // 2
@@ -147,32 +135,18 @@ def test_polite_clients_are_served_beside_bad_ones(tmp_path):
 
 def test_two_lines_of_a_device_at_once(tmp_path):
     """As a CubeSense has them, with rates of their own."""
-    kernel, wall = Kernel(), Wall()
+    kernel = Kernel()
     lines = [Device(kernel, 115_200, answers) for answers in (1, 3)]
     with contextlib.ExitStack() as stack:
         ports = [PtyEndpoint(tmp_path / f"tty{line.answers}", line.uart) for line in lines]
         clients = [open_client(port) for port in ports]
         for thing in (*ports, *clients):
             stack.callback(thing.close)
-        scheduler = RealtimeScheduler(
-            kernel,
-            ports,
-            lambda: any(line.uart.busy for line in lines),
-            pace="real",
-            clock_ns=wall.clock,
-            wait=wall.wait,
-        )
-        waits = 0
 
-        def step() -> None:
-            nonlocal waits
-            waits += 1
-            if waits == 2:
+        def step(number: int) -> None:
+            if number == 2:
                 clients[0].write(b"abc")
                 clients[1].write(b"q")
-            if waits == 20:
-                scheduler.stop()
 
-        wall.during_wait = step
-        scheduler.run()
+        serve(kernel, ports, lambda: any(line.uart.busy for line in lines), 20, step)
         assert (clients[0].read(3), clients[1].read(3)) == (b"abc", b"qqq")
