@@ -173,6 +173,21 @@ class Desk:
         return self
 
 
+def script(*steps: object) -> Body:
+    """A number is work, a function is called with the desk, a request's answer is noted."""
+
+    def body(desk: Desk) -> Generator[Any, Any, None]:
+        for step in steps:
+            if isinstance(step, int):
+                desk.work(step)
+            elif callable(step):
+                step(desk)
+            else:
+                desk.note((yield step))
+
+    return body
+
+
 @pytest.fixture
 def desk_of() -> type[Desk]:
     """Makes a desk of the bodies to run."""

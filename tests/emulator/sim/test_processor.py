@@ -7,21 +7,9 @@ from cubestack.emulator.sim.processor import LOOK_AHEAD_PS
 from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US
 from cubestack.firmware_model.mcu import requests as req
 
-BOOT_US, POWER_ON = 100, 1
+from ..conftest import BOOT_US, POWER_ON, script
+
 PORT_WRITE, PORT_READ, POLL = 2, 3, 7
-
-
-def script(*steps):
-    """A body: a number is work, a request is made and its answer noted."""
-
-    def body(desk):
-        for step in steps:
-            if isinstance(step, int):
-                desk.work(step)
-            else:
-                desk.note((yield step))
-
-    return body
 
 
 def awaiting(level: int = 1, timeout_us: int = 500_000) -> req.AwaitPin:

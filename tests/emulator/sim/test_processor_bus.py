@@ -3,7 +3,7 @@
 The clock is 48 MHz; the FPGA is option 3's, so that a memory can be reached beside a store.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -16,31 +16,25 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.requests import AwaitPin, BusAccess, Pay, SetPin
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 
-from ..conftest import Desk
+from ..conftest import Desk, script
 
 COLUMNS, ROWS = 8, 4
 PIXELS = COLUMNS * ROWS
 CYCLES = 8
-Body = Generator[Any, Any, None]
 
 SECOND = np.arange(PIXELS, 2 * PIXELS, dtype=np.int32)
 """Places in the second memory."""
 
 
-def desk_with(body: Callable[[Desk], Body], tick_ns: int | None = None) -> Desk:
-    """Runs one body; ``tick_ns`` puts events of others on the way."""
+def desk_with(*steps: object, tick_ns: int | None = None) -> Desk:
+    """Runs one script; ``tick_ns`` puts events of others on the way."""
     kind = "python" if find_compiler() is None else "compiled"
     engine = make_engine(cubestar_double_wiring(CubeStarDouble(COLUMNS, ROWS)), kind)
     engine.memories["SRAM2"][:] = np.arange(PIXELS) + 100
+    body = script(SetPin("RNW", 1), SetPin("ENABLE", 1), *steps)
+    desk = Desk(body, table=CORTEX_M3, engine=engine)
 
-    def enabled(desk: Desk) -> Body:
-        yield SetPin("RNW", 1)
-        yield SetPin("ENABLE", 1)
-        yield from body(desk)
-
-    desk = Desk(enabled, table=CORTEX_M3, engine=engine)
-
-    def tick() -> Body:
+    def tick() -> Generator[Any, Any, None]:
         while tick_ns is not None:
             yield desk.kernel.timeout(1000 * tick_ns)
 
@@ -58,60 +52,45 @@ def test_accesses_take_their_cycles_whoever_interrupts(tick_ns: int | None) -> N
     times: list[int] = []
     request, data = read()
 
-    def body(desk: Desk) -> Body:
-        yield Pay()
-        times.append(desk.kernel.now)
-        assert (yield request) == PIXELS
+    def note_ps(desk: Desk) -> None:
         times.append(desk.kernel.now)
 
-    desk = desk_with(body, tick_ns).run(1000)
+    desk = desk_with(Pay(), note_ps, request, note_ps, tick_ns=tick_ns).run(1000)
+    assert desk.log[-1][1] == PIXELS
     assert np.array_equal(data, np.arange(PIXELS) + 100)
-    took_ps = times[1] - times[0]
     # What is rounded off at an interruption is less than a picosecond each.
-    assert took_ps == pytest.approx(PIXELS * CYCLES * 1e12 / 48e6, abs=PIXELS)
+    assert times[1] - times[0] == pytest.approx(PIXELS * CYCLES * 1e12 / 48e6, abs=PIXELS)
     assert not desk.engine.violation_counts
 
 
 def test_a_search_stops_where_the_byte_is() -> None:
     request, data = read(above=109)
-    made: list[int] = []
-
-    def body(_desk: Desk) -> Body:
-        made.append((yield request))
-
-    desk_with(body, 130).run(1000)
-    assert made == [11]
+    assert desk_with(request, tick_ns=130).run(1000).log[-1][1] == 11
     assert data[10] == 110
     assert not data[11:].any()
 
 
 def test_writes_are_in_memory() -> None:
     values = np.arange(PIXELS, dtype=np.uint8)[::-1].copy()
+    desk = desk_with(BusAccess(SECOND.copy(), values, True, CYCLES), tick_ns=333).run(1000)
+    assert np.array_equal(desk.engine.memories["SRAM2"], values)
 
-    def body(_desk: Desk) -> Body:
-        yield BusAccess(SECOND.copy(), values, True, CYCLES)
 
-    assert np.array_equal(desk_with(body, 333).run(1000).engine.memories["SRAM2"], values)
+def load(desk: Desk, address: int, count: int) -> bytes:
+    """What an interrupt does."""
+    desk.meter.charge(ebi_read=count)
+    return desk.processor.load(0, address, count, CYCLES)
 
 
 def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
-    request, data = read()
     loaded: list[bytes] = []
     ended: list[int] = []
-
-    def body(desk: Desk) -> Body:
-        yield request
-        ended.append(desk.kernel.now)
-        yield SetPin("RNW", 0)  # would be in the FPGA's past, were the reads not paid
-
-    def interrupt(desk: Desk) -> None:
-        loaded.append(desk.processor.load(0, PIXELS + 4, 6, CYCLES))
-        desk.meter.charge(ebi_read=6)
-
-    plain = desk_with(body).run(1000)
-    disturbed = desk_with(body)
+    request, data = read()
+    # The pin would be driven in the FPGA's past, were the reads not paid.
+    steps = (request, lambda desk: ended.append(desk.kernel.now), SetPin("RNW", 0))
+    plain, disturbed = desk_with(*steps).run(1000), desk_with(*steps)
     for ns in (1100, 3000, 3001):
-        disturbed.at(ns / 1000, lambda: interrupt(disturbed))
+        disturbed.at(ns / 1000, lambda: loaded.append(load(disturbed, PIXELS + 4, 6)))
     disturbed.run(1000)
     assert loaded == [bytes(range(104, 110))] * 3
     assert np.array_equal(data, np.arange(PIXELS) + 100)
@@ -122,32 +101,15 @@ def test_an_interrupt_reads_in_between_and_pays_for_it() -> None:
 
 def test_an_interrupt_reads_while_the_program_waits_for_the_fpga() -> None:
     """The FPGA is ahead of the kernel then, and neither runs back."""
-    waited: list[bool] = []
-    loaded: list[bytes] = []
-
-    def body(_desk: Desk) -> Body:
-        yield SetPin("INTO", 0)
-        yield SetPin("RNW", 0)
-        waited.append((yield AwaitPin("ACK", 1, 100, 8)))
-
-    desk = desk_with(body, 50)
-
-    def interrupt() -> None:
-        loaded.append(desk.processor.load(0, 2 * PIXELS - 3, 3, CYCLES))
-        desk.meter.charge(ebi_read=3)
-
+    loaded: set[bytes] = set()
+    desk = desk_with(SetPin("INTO", 0), SetPin("RNW", 0), AwaitPin("ACK", 1, 100, 8), tick_ns=50)
     for ns in range(2000, 90_000, 977):
-        desk.at(ns / 1000, interrupt)
-    desk.run(1000)
-    assert waited == [False]  # no camera
-    assert set(loaded) == {bytes([129, 130, 131])}
+        desk.at(ns / 1000, lambda: loaded.add(load(desk, 2 * PIXELS - 3, 3)))
+    assert desk.run(1000).log[-1][1] is False  # no camera
+    assert loaded == {bytes([129, 130, 131])}
 
 
 def test_use_of_the_bus_is_told_once() -> None:
-    def body(_desk: Desk) -> Body:
-        for _ in range(3):
-            yield read(4)[0]
-        yield Pay()
-        yield read(4)[0]
-
-    assert desk_with(body).run(1000).accessing == [True, False, True, False]
+    request, _ = read(4)
+    desk = desk_with(request, request, request, Pay(), request).run(1000)
+    assert desk.accessing == [True, False, True, False]
