@@ -76,8 +76,8 @@ class Acquisition:
         if not self._supply.available(sram):
             return codes.CaptureResult.SRAM_OVER_CURRENT
         own = sram is codes.Sram(camera)
-        across = (fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER)
-        yield from self._enter(_actions(camera, *((fpga.Action.STORE,) if own else across)))
+        doing = [fpga.Action.STORE] if own else [fpga.Action.SEND_PICTURE, fpga.Action.STORE_OTHER]
+        yield from self._enter(_actions(camera, *doing))
         stored = yield from self._await_ack(sram)
         yield from self._standby()
         if not self._supply.available(sram):
@@ -208,10 +208,9 @@ class Acquisition:
         return stored
 
     def _enter_edge(self, camera: codes.Camera, sram: codes.Sram) -> Routine[None]:
-        if sram is codes.Sram(camera):
-            yield from self._enter(_actions(camera, fpga.Action.EDGE))
-        else:
-            yield from self._enter(_actions(camera, fpga.Action.PASS_EDGE, fpga.Action.SEND_EDGE))
+        own = sram is codes.Sram(camera)
+        doing = [fpga.Action.EDGE] if own else [fpga.Action.PASS_EDGE, fpga.Action.SEND_EDGE]
+        yield from self._enter(_actions(camera, *doing))
 
     def _enter(self, wanted: fpga.Actions) -> Routine[None]:
         """Through standby to the command that makes the FPGAs do ``wanted``."""
