@@ -8,7 +8,6 @@ from cubestack.firmware_model.aramis import telemetry as aramis
 from cubestack.firmware_model.cubesense import telemetry as cubesense
 from cubestack.firmware_model.cubestar import telemetry as cubestar
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
-from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
@@ -39,38 +38,26 @@ def thresholds(detection: int, star: int) -> str:
 
 def grid(*addresses: int) -> str:
     """What i2cdetect prints when these acknowledge."""
-    lines = ["     " + "  ".join(f"{column:x}" for column in range(16))]
+    words = [f"{column:x}" for column in range(16)]
     for row in range(0, 0x80, 0x10):
-        cells = []
-        for address in range(row, row + 0x10):
-            if not 0x08 <= address <= 0x77:
-                cells.append("  ")
-            else:
-                cells.append(f"{address:02x}" if address in addresses else "--")
-        lines.append(f"{row:02x}: " + " ".join(cells))
-    return " ".join(" ".join(lines).split())
+        shown = range(max(row, 0x08), min(row + 0x10, 0x78))
+        words += [f"{row:02x}:", *(f"{at:02x}" if at in addresses else "--" for at in shown)]
+    return " ".join(words)
 
 
 GAIN = REGISTERS["SUN_GAIN"]
 ERRNO = "import smbus2\ntry: smbus2.SMBus(12).read_byte(26)\nexcept OSError as e: print(e.errno)"
 
 
-def identity(interface: Interface, node_type: int, firmware: tuple[int, int]) -> str:
-    """What telemetry Identification reads, without its clock."""
-    message = interface.telemetry("Identification")
-    major, minor = firmware
-    known = {
-        "NodeType": node_type,
-        "InterfaceVersion": interface.version,
-        "FirmwareVersionMajor": major,
-        "FirmwareVersionMinor": minor,
-    }
-    return text(message.pack(**message.reset_values() | known)[:4])
-
-
-CUBESTAR_IDENTITY = identity(CUBESTAR, cubestar.NODE_TYPE, FIRMWARE_VERSION)
-CUBESENSE_IDENTITY = identity(CUBESENSE, cubesense.NODE_TYPE, FIRMWARE_VERSION)
-ARAMIS_IDENTITY = identity(ARAMIS, aramis.NODE_TYPE, FIRMWARE_VERSION)
+CUBESTAR_IDENTITY, CUBESENSE_IDENTITY, ARAMIS_IDENTITY = (
+    text(bytes([node_type, interface.version, *FIRMWARE_VERSION]))
+    for interface, node_type in (
+        (CUBESTAR, cubestar.NODE_TYPE),
+        (CUBESENSE, cubesense.NODE_TYPE),
+        (ARAMIS, aramis.NODE_TYPE),
+    )
+)
+"""What telemetry Identification reads first; its clock follows."""
 
 FLAGS = "i2ctransfer -y 7 w1@0x1a 0x82 r10"
 SESSION: Session = (
@@ -162,7 +149,7 @@ def test_a_session(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_session_with_several_devices(run: Run, tmp_path: Path) -> None:
-    devices = [part for name in ("cubestar", "cubesense", "aramis") for part in ("--device", name)]
+    devices = [f"--device={name}" for name in ("cubestar", "cubesense", "aramis")]
     options = ("--bus", 12, "--hz", 400_000, "--nack-errno", "EREMOTEIO")
     move = ("--i2c-addr", "cubestar=0x2b")
     check(run, tmp_path, SHARED_SESSION, *options, *devices, *move)
