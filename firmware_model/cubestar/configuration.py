@@ -8,8 +8,8 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.node.settings import Settings
 
 
-def detection_config(settings: Settings) -> DetectionConfig:
-    """Region, thresholds and limits of the search."""
+def detection_config(settings: Settings, *, plain_weights: bool = False) -> DetectionConfig:
+    """Region, thresholds and limits of the search; see ``DetectionConfig``."""
     values = settings.all(
         "setDetectionRegion", "setDetectionThresholds", "setStarPixels", "setDetectionVariables"
     )
@@ -27,6 +27,7 @@ def detection_config(settings: Settings) -> DetectionConfig:
         max_stars=values["MaxStars"],
         max_invalid=values["MaxInvalidStars"],
         max_noise=values["MaxNoise"],
+        plain_weights=plain_weights,
     )
 
 

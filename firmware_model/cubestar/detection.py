@@ -8,8 +8,8 @@ CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is
   maximum size stops growing and is invalid; the rest of a large blob is then met again by the
   search, and ends it through the limit of invalid areas.
 - Areas below the minimum size are noise. They are counted, and too many of them end the search.
-- A pixel of the centroid's grid counts when it was grown, and weighs its value above the star
-  threshold. Weighing the plain value of all pixels pulls the centroid towards the grid's middle as
+- A pixel of the centroid's grid counts when it was grown. It weighs its value, as printed, or its
+  value above the star threshold: the plain value pulls the centroid towards the grid's middle as
   soon as there is background. Among equally bright pixels (a saturated star) the grid is centred
   on their mean.
 - The dark value is the mean of the samples that were not bright enough to start an area.
@@ -64,6 +64,7 @@ class DetectionConfig:
         max_stars: the search ends with so many stars.
         max_invalid: the search ends with more invalid areas.
         max_noise: the search ends with more noise areas.
+        plain_weights: a pixel weighs its value, else its value above the star threshold.
     """
 
     step: int = 3
@@ -79,6 +80,7 @@ class DetectionConfig:
     max_stars: int = 20
     max_invalid: int = 50
     max_noise: int = 255
+    plain_weights: bool = False
 
     def __post_init__(self) -> None:
         """Refuse settings with which the search makes no sense."""
@@ -297,6 +299,7 @@ def _centroid(
     area: _Area, columns: int, config: DetectionConfig, meter: Meter
 ) -> tuple[np.float32, np.float32]:
     """Weighted mean position (x, y) in px over the grid around the brightest pixel."""
+    floor = 0 if config.plain_weights else config.star_threshold
     places = [divmod(offset, columns) for offset in area.offsets]
     peak = max(area.values)
     tied = [place for place, value in zip(places, area.values, strict=True) if value == peak]
@@ -306,7 +309,7 @@ def _centroid(
     sum_x = sum_y = weight = 0
     for (y, x), value in zip(places, area.values, strict=True):
         if abs(y - middle_y) <= half and abs(x - middle_x) <= half:
-            above = value - config.star_threshold
+            above = value - floor
             sum_x += above * (x - middle_x)
             sum_y += above * (y - middle_y)
             weight += above

@@ -24,6 +24,7 @@ from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, identify
 from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import IdMode, MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
@@ -79,6 +80,7 @@ class Processing:
     state: State
     capture: ImageCapture
     catalogue: StarCatalogue
+    switches: CubeStarSwitches = DEFAULT_SWITCHES
     results: Results = field(default_factory=Results)
     latest_ms: dict[str, float] = field(default_factory=dict)
     longest_ms: dict[str, float] = field(default_factory=dict)
@@ -130,7 +132,9 @@ class Processing:
         started_us: int = yield ReadTimer()
         with self._cycles():
             detection = yield from self.capture.pictures.search(
-                configuration.detection_config(settings)
+                configuration.detection_config(
+                    settings, plain_weights=self.switches.weights == "intensity"
+                )
             )
             camera = configuration.camera_parameters(settings)
             with self.meter.phase("correction"):
@@ -187,9 +191,17 @@ class Processing:
         meter, catalogue, attitude = self.meter, self.catalogue, self.state.attitude
         if mode is MatchMode.TRACKING and attitude is not None:
             rotation = dcm(attitude.quaternion, meter)
-            return track(vectors, catalogue, rotation, meter, margin_rad=margin)
+            verified = self.switches.tracking == "verified"
+            return track(vectors, catalogue, rotation, meter, margin_rad=margin, verified=verified)
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
-        return identify(vectors, catalogue, meter, boresight=boresight, margin_rad=margin)
+        return identify(
+            vectors,
+            catalogue,
+            meter,
+            boresight=boresight,
+            margin_rad=margin,
+            printed=self.switches.voting == "algorithm-2",
+        )
 
     def _expected_boresight(self) -> NDArray[np.float32]:
         """The hint until the first fix after it, then the boresight of the latest attitude."""

@@ -21,6 +21,7 @@ from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry import Telemetry
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine
 
@@ -47,13 +48,14 @@ class CubeStarProgram:
         meter: Meter,
         catalogue: StarCatalogue,
         layout: Layout = Layout.COPIED,
+        switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Reset: set up RAM from the retention registers and flash."""
         self.state = state = State(hardware)
         self.supply = SupplyMonitor(state)
         self._pictures = pictures_of(layout, state, meter, self.supply)
         self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)
-        self._processing = Processing(meter, state, self._capture, catalogue)
+        self._processing = Processing(meter, state, self._capture, catalogue, switches)
         self.commands = Commands(self._processing)
         telemetry = Telemetry(self.commands, lambda: bool(self.link.queue))
         self.link = CubeStarLink(meter, state, telemetry.values)

@@ -31,6 +31,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS, ROWS
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
@@ -69,6 +70,7 @@ class CubeStarBoard(Board):
         i2c_bus: I2cBus | None = None,
         layout: Layout = Layout.COPIED,
         i2c_address: int = INTERFACE.i2c_address,
+        switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Power up.
 
@@ -80,6 +82,7 @@ class CubeStarBoard(Board):
             baud: of the satellite's UART.
             layout: memory layout, with the program that belongs to it.
             i2c_address: 7-bit address on the satellite's bus.
+            switches: of the program.
         """
         self._layout = BOARDS[layout]
         super().__init__(self._layout.power, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
@@ -96,7 +99,7 @@ class CubeStarBoard(Board):
 
         def boot(cause: int) -> CubeStarProgram:
             self._hardware.reset_cause = cause
-            self.program = CubeStarProgram(self._hardware, meter, catalogue, layout)
+            self.program = CubeStarProgram(self._hardware, meter, catalogue, layout, switches)
             return self.program
 
         self.processor = Processor(

@@ -2,8 +2,8 @@
 
 CubeStar thesis, section 4.3.3 (verification round, stars within one vote of the maximum) and
 section 5.3.4 (the weights are the verification votes). The text leaves open what happens when the
-kept stars contradict each other; here they are thinned until every pair of them agrees. Two
-centroids never share an identity: they count as a contradiction, however close they are.
+kept stars contradict each other; they can be thinned until every pair of them agrees. Two centroids
+that share an identity then count as a contradiction, however close they are.
 """
 
 from dataclasses import dataclass
@@ -107,18 +107,21 @@ def verify(
     vectors: NDArray[np.float32],
     margin_rad: float,
     meter: Meter,
+    *,
+    thinned: bool = True,
 ) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
     """Let every pair of centroids vote for its identities, and keep those that all agree.
 
     ``identities`` (n,) are indices into ``vectors`` (stars, 3) or -1. Returns the votes (n,) of the
-    verification round, and the identities with -1 for what was not kept: votes below one less than
-    the maximum, or a contradiction with the other kept stars.
+    verification round, and the identities with -1 for what was not kept: no vote, votes below one
+    less than the maximum, or, if ``thinned``, a contradiction with the other kept stars.
     """
     named = (identities[pairs.first] != NONE) & (identities[pairs.second] != NONE)
     first, second = pairs.first[named], pairs.second[named]
     catalogue = angles_between(vectors[identities[first]], vectors[identities[second]], meter)
     agree = np.abs(catalogue - pairs.angle[named]) <= np.float32(margin_rad)
-    agree &= identities[first] != identities[second]
+    if thinned:
+        agree &= identities[first] != identities[second]
     agreement = np.zeros((pairs.count, pairs.count), dtype=bool)
     agreement[first[agree], second[agree]] = True
     agreement |= agreement.T
@@ -132,7 +135,9 @@ def verify(
         ram_write=3 * int(agree.sum()),
     )
     kept = (votes > 0) & (votes + 1 >= votes.max(initial=0))
-    return votes, np.where(_consistent(agreement, kept, meter), identities, NONE).astype(np.int32)
+    if thinned:
+        kept = _consistent(agreement, kept, meter)
+    return votes, np.where(kept, identities, NONE).astype(np.int32)
 
 
 def _consistent(

@@ -3,8 +3,8 @@
 CubeStar thesis, section 4.5. No voting: the stars near the last boresight are turned into camera
 axes with the last attitude, and a centroid within 0.3 deg of one takes its identity, so the camera
 may turn up to 0.3 deg in an iteration and two stars are enough. Assumed: the nearest star is taken
-when several are in reach, and the verification round drops what contradicts the other stars, as
-when a star fainter than the catalogue stands near the predicted place of another.
+when several are in reach. An extension: a verification round drops what contradicts the other
+stars, as when a star fainter than the catalogue stands near the predicted place of another.
 """
 
 from math import radians, sin
@@ -39,15 +39,17 @@ def track(
     meter: Meter,
     *,
     margin_rad: float = DEFAULT_MARGIN_RAD,
+    verified: bool = True,
 ) -> Identification:
     """Identify centroids from the attitude of the iteration before.
 
-    Phases: `reduction`, `prediction`, `distances`, `verification`.
+    Phases: `reduction`, `prediction` and, if verified, `distances`, `verification`.
 
     Args:
         directions: (n, 3) unit vectors of the centroids in camera axes.
         attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
         margin_rad: largest difference between a measured and a catalogue angle, in rad.
+        verified: whether the verification round follows; without it all stars weigh the same.
     """
     count = len(directions)
     if count < FEWEST_STARS:
@@ -55,11 +57,13 @@ def track(
     with meter.phase("reduction"):
         stars = catalogue.near(attitude[2], CUT_RADIUS_DEG, meter)
     with meter.phase("prediction"):
-        identities = _nearest(directions, catalogue.vectors, stars, attitude, meter)
-    with meter.phase("distances"):
-        pairs = CentroidPairs.measure(directions, meter)
-    with meter.phase("verification"):
-        votes, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
+        kept = _nearest(directions, catalogue.vectors, stars, attitude, meter)
+    votes = (kept != NONE).astype(np.uint8)
+    if verified:
+        with meter.phase("distances"):
+            pairs = CentroidPairs.measure(directions, meter)
+        with meter.phase("verification"):
+            votes, kept = verify(pairs, kept, catalogue.vectors, margin_rad, meter)
     if np.count_nonzero(kept != NONE) < FEWEST_STARS:
         return Identification(np.full_like(kept, NONE), votes, MatchOutcome.TOO_FEW_MATCHED)
     return Identification(kept, votes, MatchOutcome.IDENTIFIED)

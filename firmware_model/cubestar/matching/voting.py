@@ -9,7 +9,9 @@ Assisted matching (section 4.3.4) votes among the stars near a rough boresight: 
 to 35 deg, the 5 deg by which the boresight may be wrong and 30 deg of field. Pairs with a star
 outside are dropped with it; nothing else differs from lost in space.
 
-What the text leaves open, or leaves to chance, is completed here:
+Voting is done as printed, or by rounds. As printed, the first star with the most votes is taken,
+stars within one vote of the best verified are kept, and nothing is refused but fewer than three.
+What the text leaves open, or leaves to chance, is completed by rounds:
 
 - Between the first round and the identities the voting is repeated over the same entries, and a
   vote then counts only between identities that are still standing, that is, that had a fixed part
@@ -54,6 +56,7 @@ FEWEST_STARS = 3
 
 #: Tenths of the most votes that an identity needs to stand, one for each round; assumed.
 _STANDING_TENTHS = (4, 4, 5, 6, 7, 8)
+_PRINTED_TENTHS = (0,)
 
 
 def identify(
@@ -63,37 +66,52 @@ def identify(
     *,
     boresight: NDArray[np.float32] | None = None,
     margin_rad: float = DEFAULT_MARGIN_RAD,
+    printed: bool = False,
 ) -> Identification:
     """Identify centroids of unit vectors (n, 3): lost in space, or near a `boresight` (3,).
 
-    `margin_rad` is the largest difference between a measured and a catalogue angle. Phases:
+    `margin_rad` is the largest difference between a measured and a catalogue angle; `printed` is
+    Algorithm 2 as the thesis prints it. Phases:
     `reduction` (assisted only), `distances`, `votes`, `identities`, `verification`, `selection`.
     """
-    listed, stars_per_sr = catalogue.pairs, len(catalogue) / (4 * pi)
+    listed, density = catalogue.pairs, len(catalogue) / (4 * pi)
     if boresight is not None:
         with meter.phase("reduction"):
             stars, listed = catalogue.reduced(boresight, CUT_RADIUS_DEG, meter)
-        stars_per_sr = len(stars) / (2 * pi * (1 - cos(radians(CUT_RADIUS_DEG))))
+        density = len(stars) / (2 * pi * (1 - cos(radians(CUT_RADIUS_DEG))))
     count = len(directions)
     if count < FEWEST_STARS:
         return unidentified(count, MatchOutcome.TOO_FEW_CENTROIDS)
     with meter.phase("distances"):
         pairs = CentroidPairs.measure(directions, meter)
     with meter.phase("votes"):
-        votes, looked_up = _vote(pairs, listed, len(catalogue), margin_rad, meter)
+        rounds = _PRINTED_TENTHS if printed else _STANDING_TENTHS
+        votes, looked_up = _vote(pairs, listed, len(catalogue), margin_rad, rounds, meter)
     with meter.phase("identities"):
-        identities = _best(votes, meter)
+        identities = _best(votes, meter, ties=printed)
     with meter.phase("verification"):
-        confirmed, kept = verify(pairs, identities, catalogue.vectors, margin_rad, meter)
+        confirmed, kept = verify(
+            pairs, identities, catalogue.vectors, margin_rad, meter, thinned=not printed
+        )
     with meter.phase("selection"):
-        outcome = _judge(kept, directions, catalogue, looked_up, stars_per_sr, margin_rad, meter)
+        if np.count_nonzero(kept != NONE) < FEWEST_STARS:
+            outcome = MatchOutcome.TOO_FEW_MATCHED
+        elif printed:
+            outcome = MatchOutcome.IDENTIFIED
+        else:
+            outcome = _judge(kept, directions, catalogue, density, looked_up, margin_rad, meter)
     if outcome is not MatchOutcome.IDENTIFIED:
         kept = np.full_like(kept, NONE)
     return Identification(kept, confirmed, outcome)
 
 
 def _vote(
-    pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float, meter: Meter
+    pairs: CentroidPairs,
+    listed: PairList,
+    stars: int,
+    margin_rad: float,
+    rounds: tuple[int, ...],
+    meter: Meter,
 ) -> tuple[NDArray[np.intp], int]:
     """Votes (centroids, stars) of the last round, 0 for what no longer stands; entries looked up.
 
@@ -118,7 +136,7 @@ def _vote(
     right = np.concatenate([other + partner, other + star])
     size = pairs.count * stars
     votes = np.ones(size, dtype=np.intp)
-    for round_number, tenths in enumerate(_STANDING_TENTHS):
+    for round_number, tenths in enumerate(rounds):
         first_stands = votes[left] > 0
         both = first_stands & (votes[right] > 0)
         if round_number > 0:
@@ -156,27 +174,26 @@ def _search(
     return low
 
 
-def _best(votes: NDArray[np.intp], meter: Meter) -> NDArray[np.int32]:
-    """Star with the most votes for each centroid, -1 for a tie or without votes."""
+def _best(votes: NDArray[np.intp], meter: Meter, *, ties: bool) -> NDArray[np.int32]:
+    """Star with the most votes for each centroid, -1 without votes; the first of several if `ties`,
+    else -1."""
     meter.charge(table_byte=votes.size, i32_add=2 * votes.size, loop=votes.size)
     most = votes.max(axis=1)
-    unique = (votes == most[:, None]).sum(axis=1) == 1
-    return np.where((most > 0) & unique, votes.argmax(axis=1), NONE).astype(np.int32)
+    settled = ties | ((votes == most[:, None]).sum(axis=1) == 1)
+    return np.where((most > 0) & settled, votes.argmax(axis=1), NONE).astype(np.int32)
 
 
 def _judge(
     kept: NDArray[np.int32],
     directions: NDArray[np.float32],
     catalogue: StarCatalogue,
-    looked_up: int,
     stars_per_sr: float,
+    looked_up: int,
     margin_rad: float,
     meter: Meter,
 ) -> MatchOutcome:
     """Decide whether the kept identities can be believed."""
     matched = np.flatnonzero(kept != NONE)
-    if len(matched) < FEWEST_STARS:
-        return MatchOutcome.TOO_FEW_MATCHED
     if _mirrored(directions[matched], catalogue.vectors[kept[matched]], meter):
         return MatchOutcome.MIRRORED
     chance = expected_coincidences(len(kept), len(matched), looked_up, stars_per_sr, margin_rad)

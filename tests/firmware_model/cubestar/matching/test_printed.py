@@ -1,0 +1,84 @@
+"""Algorithm 2 and tracking as the thesis prints them, beside the same written out loop by loop."""
+
+from collections import Counter
+from collections.abc import Callable
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.matching.identification import MatchOutcome
+from cubestack.firmware_model.cubestar.matching.tracking import REACH_DEG, track
+from cubestack.firmware_model.cubestar.matching.voting import DEFAULT_MARGIN_RAD, identify
+
+from ..sky import meter
+
+Shoot = Callable[..., Any]
+
+
+def angle(one: NDArray[Any], other: NDArray[Any]) -> float:
+    return float(np.arccos(np.clip(np.dot(one.astype(float), other.astype(float)), -1, 1)))
+
+
+def algorithm_2(directions: NDArray[Any], catalogue: StarCatalogue) -> dict[int, int]:
+    """Star of each kept centroid, from sections 4.3.3 and 4.3.4; at least one vote is wanted."""
+    listed, count = catalogue.pairs, len(directions)
+    lists: list[Counter[int]] = [Counter() for _ in range(count)]
+    for i, j in combinations(range(count), 2):
+        near = np.abs(listed.angle - angle(directions[i], directions[j])) <= DEFAULT_MARGIN_RAD
+        for star in (*listed.first[near].tolist(), *listed.second[near].tolist()):
+            lists[i][star] += 1
+            lists[j][star] += 1
+    named = {
+        i: min(star for star in votes if votes[star] == max(votes.values()))
+        for i, votes in enumerate(lists)
+        if votes
+    }
+    confirmed = Counter[int]()
+    for i, j in combinations(named, 2):
+        apart = angle(catalogue.vectors[named[i]], catalogue.vectors[named[j]])
+        if abs(apart - angle(directions[i], directions[j])) <= DEFAULT_MARGIN_RAD:
+            confirmed.update((i, j))
+    most = max(confirmed.values(), default=0)
+    return {i: named[i] for i, votes in confirmed.items() if votes >= most - 1}
+
+
+@pytest.mark.parametrize("false_stars", [0, 3, 10])
+def test_votes_as_printed(catalogue: StarCatalogue, shoot: Shoot, false_stars: int) -> None:
+    rng = np.random.default_rng(false_stars)
+    same = 0
+    for _ in range(25):
+        directions = shoot(rng, false_stars=false_stars).directions
+        found = identify(directions, catalogue, meter(), printed=True)
+        kept = algorithm_2(directions, catalogue)
+        assert (found.outcome is MatchOutcome.IDENTIFIED) == (len(kept) >= 3)
+        same += {i: int(found.stars[i]) for i in found.matched} == (kept if len(kept) >= 3 else {})
+    assert same >= 24  # an angle at the margin may round either way
+
+
+def test_believes_what_rounds_refuse(catalogue: StarCatalogue, shoot: Shoot) -> None:
+    wrong = {True: 0, False: 0}
+    rng = np.random.default_rng(4)
+    for shot in [shoot(rng, false_stars=10) for _ in range(150)]:
+        for printed in wrong:
+            found = identify(shot.directions, catalogue, meter(), printed=printed)
+            matched = found.matched
+            wrong[printed] += bool((found.stars[matched] != shot.stars[matched]).any())
+    assert wrong[True] >= 3 > wrong[False]
+
+
+def test_tracks_what_is_nearest(catalogue: StarCatalogue, shoot: Shoot) -> None:
+    shot = shoot(np.random.default_rng(2), false_stars=0)
+    attitude = shot.attitude.astype(np.float32)
+    directions = shot.directions.copy()
+    # A centroid that stands 0.2 deg beside its star contradicts all others, and is taken for it.
+    aside = directions[0] + np.float32(np.radians(0.2)) * np.cross(directions[0], directions[1])
+    directions[0] = aside / np.linalg.norm(aside)
+    assert np.degrees(angle(directions[0], shot.directions[0])) < REACH_DEG
+    as_printed = track(directions, catalogue, attitude, meter(), verified=False)
+    assert as_printed.stars.tolist() == shot.stars.tolist()
+    assert as_printed.votes.tolist() == [1] * len(directions)
+    assert 0 not in track(directions, catalogue, attitude, meter()).matched
