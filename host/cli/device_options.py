@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from cubestack.host.cli.arguments import whole
-from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
+from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
 from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.records import create_file, start_recorder, start_trace
 from cubestack.host.devices.registry import devices
@@ -49,12 +49,16 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
     for device in devices():
         for option in device.options:
             add_option(parser, option, f"{device.name}: ")
+    for option in PROFILE_OPTIONS:
+        add_option(parser, option)
 
 
 def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str = "") -> None:
     """Declare one of them; ``prefix`` goes before its help."""
     text = prefix + option.help
-    if option.choices:
+    if option.metavar:
+        parser.add_argument(option.flag, dest=option.name, metavar=option.metavar, help=text)
+    elif option.choices:
         parser.add_argument(
             option.flag,
             dest=option.name,
@@ -70,10 +74,10 @@ def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str
 
 def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any]:
     """The board options that were given, but for defaults; ValueError for another device's."""
-    own = {option.name for option in device.options}
+    own = {option.name for option in device.all_options}
     chosen = {}
     for other in devices():
-        for option in other.options:
+        for option in other.all_options:
             value = getattr(args, option.name, None)
             if value is None or value == option.default:
                 continue
@@ -89,7 +93,7 @@ def tell_notices(
     device: AnyDevice, options: Mapping[str, Any], tell: Callable[[str], None]
 ) -> None:
     """Tell what a user must know of the chosen ``options``."""
-    for option in device.options:
+    for option in device.all_options:
         notice = option.notice(options[option.name]) if option.name in options else None
         if notice is not None:
             tell(notice)

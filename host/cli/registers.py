@@ -1,25 +1,36 @@
 """List a device's telecommands, telemetry and registers, from the tables that
-firmware and host share.
+firmware and host share; or the switches of its firmware.
 
 examples:
   cubestack registers {first}
   cubestack registers {first} --format c > {first}.h
   cubestack registers {first} --format json
+  cubestack registers {first} --switches
 """
 
 import argparse
 
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.export.interface import FORMATS, render
+from cubestack.host.export.switches import render_switches
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("device", choices=device_names(), help="device whose interface is listed")
     parser.add_argument("--format", choices=FORMATS, default="table", help="default: table")
+    parser.add_argument(
+        "--switches",
+        action="store_true",
+        help="where the firmware can do what its documents print, or better (not as C)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the listing."""
-    print(render(device(args.device).interface, args.format), end="")
+    found = device(args.device)
+    if args.switches:
+        print(render_switches(found.title, found.switches, args.format), end="")
+    else:
+        print(render(found.interface, args.format), end="")
     return 0

@@ -70,7 +70,7 @@ def _open(recording: Recording, setup: Setup, engine: Engine) -> AnyEmulated:
     """The device, made as ``setup`` says."""
     found = device(recording.device)
     options: dict[str, Any] = dict(setup.options)
-    unknown = options.keys() - {option.name for option in found.options}
+    unknown = options.keys() - {option.name for option in found.all_options}
     if unknown:
         raise ValueError(f"{recording.name}: its setup has an unknown option {min(unknown)!r}")
     with nullcontext() if setup.scene is None else written(setup.scene) as scene:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES, Switches
 from cubestack.host.clients.contract import Client, DeviceClient
 
 if TYPE_CHECKING:
@@ -37,9 +38,10 @@ class BoardOption:
         name: keyword of ``Device.open_board``, and its name in recordings; ``--name`` on the
             command line, with dashes.
         help: one phrase for a user.
-        choices: what it may be, as typed; empty for a switch.
-        default: what it is when it is not given: one of ``choices``, or False.
+        choices: what it may be, as typed; empty for a flag or any text.
+        default: what it is when it is not given: one of ``choices``, a text, or False.
         notice: what a user must know of a value, or None.
+        metavar: what stands for any text in the help; empty where it is none.
     """
 
     name: str
@@ -47,11 +49,29 @@ class BoardOption:
     choices: tuple[str, ...] = ()
     default: str | bool = False
     notice: Callable[[str], str | None] = lambda _value: None
+    metavar: str = ""
 
     @property
     def flag(self) -> str:
         """As the command line has it."""
         return "--" + self.name.replace("_", "-")
+
+
+#: Options of every device that has switches.
+PROFILE_OPTIONS = (
+    BoardOption(
+        "profile",
+        f"what the documents print, or the best that is known (default {DEFAULT_PROFILE})",
+        PROFILES,
+        DEFAULT_PROFILE,
+    ),
+    BoardOption(
+        "set",
+        "switches that differ from the profile: see `cubestack registers DEVICE --switches`",
+        default="",
+        metavar="SWITCH=VALUE,...",
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -123,13 +143,15 @@ class Device(Generic[BoardT_co, ClientT_co]):
         summary: one phrase for lists.
         interface: its messages, registers and service port.
         client: makes the device's client from a client of its node.
-        open_board: powers a board up: (scene, *, seed, engine) and, where they are chosen, baud
-            (bits a second), kernel and i2c_bus (of a board beside it) and what ``options``
-            names; so each of these needs a default. ValueError for what can not be.
+        open_board: powers a board up: (scene, *, seed, engine), ``switches`` where there are any,
+            and, where they are chosen, baud (bits a second), kernel and i2c_bus (of a board beside
+            it) and what ``options`` names; so each of these needs a default. ValueError for what
+            can not be.
         load_scene: reads a scene file; ValueError names the key that is wrong.
         default_scene: what it looks at when nothing is said.
         default_scene_title: that, for the help.
         options: of its board alone.
+        switches: where its firmware can do what its documents print, or better.
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.
         reports: further commands about it.
@@ -152,6 +174,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     default_scene: Callable[[], Any]
     default_scene_title: str
     options: tuple[BoardOption, ...] = ()
+    switches: type[Switches] = Switches
     has_fpga: bool = True
     experiment: "Callable[[], AnyExperiment] | None" = None
     reports: tuple[Report, ...] = ()
@@ -168,6 +191,11 @@ class Device(Generic[BoardT_co, ClientT_co]):
             raise ValueError(f"a device's name is an identifier of small letters, not {self.name}")
         if self.interface.name.lower() != self.name:
             raise ValueError(f"the interface of {self.name} is called {self.interface.name}")
+
+    @property
+    def all_options(self) -> tuple[BoardOption, ...]:
+        """Options of its board, and those that choose its profile."""
+        return (*self.options, *(PROFILE_OPTIONS if self.switches.declared() else ()))
 
     def scene(self, given: Any) -> Any:
         """The scene that ``given`` means: None the default, text or a path a file, else itself."""

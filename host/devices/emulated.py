@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias
 
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.clients.contract import Closable, DeviceClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
@@ -165,16 +166,16 @@ def _watch(
 
 def check_options(device: AnyDevice, options: Mapping[str, object]) -> None:
     """Refuse options, and values, that ``device`` does not have; ValueError says what it has."""
-    own = {option.name: option for option in device.options}
+    own = {option.name: option for option in device.all_options}
     for name, value in options.items():
         if name not in own:
             owners = [
-                one.name for one in devices() for option in one.options if option.name == name
+                one.name for one in devices() for option in one.all_options if option.name == name
             ]
             whose = f"an option of {', '.join(owners)}, not" if owners else "no option"
             raise ValueError(f"{name} is {whose} of {device.name}")
         choices = own[name].choices or (False, True)
-        if value not in choices:
+        if value not in choices and not own[name].metavar:
             known = ", ".join(map(str, choices))
             raise ValueError(f"{name} of {device.name} must be one of {known}, not {value!r}")
 
@@ -191,6 +192,9 @@ def power_up(
     """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board."""
     if beside is not None:
         options |= {"kernel": beside.board.kernel, "i2c_bus": beside.board.i2c_bus}
+    if device.switches.declared():
+        profile, changes = options.pop("profile", DEFAULT_PROFILE), options.pop("set", "")
+        options["switches"] = device.switches.of(profile, changes)
     board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
     return EmulatedDevice(device, board, seed)
 

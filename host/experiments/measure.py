@@ -54,7 +54,7 @@ def experiment_of(device: AnyDevice) -> AnyExperiment:
 
 def board_options(device: AnyDevice, experiment: AnyExperiment) -> Mapping[str, BoardOption]:
     """Options of the device's board that the experiment leaves to the user."""
-    options = device.options if experiment.powers_up else ()
+    options = device.all_options if experiment.powers_up else ()
     return {one.name: one for one in options if one.name not in experiment.decides}
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
@@ -29,13 +30,19 @@ def _open_board(
     *,
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
+    switches: CubeStarSwitches = DEFAULT_SWITCHES,
     **common: Any,
 ) -> "CubeStarBoard":
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
     return CubeStarBoard(
-        scene, onboard_catalogue(), baud=baud or INTERFACE.baud, layout=Layout(layout), **common
+        scene,
+        onboard_catalogue(pair_limit_deg=float(switches.pair_limit)),
+        baud=baud or INTERFACE.baud,
+        layout=Layout(layout),
+        switches=switches,
+        **common,
     )
 
 
@@ -93,6 +100,7 @@ DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
+    switches=CubeStarSwitches,
     options=(
         BoardOption(
             "layout",

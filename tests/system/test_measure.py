@@ -50,6 +50,17 @@ def test_rates_of_identification(
     assert {frame["mode"] for frame in solved} == {mode}
 
 
+def test_profiles_find_the_same_sky_in_their_own_way(measure: Measure) -> None:
+    first, *others = (
+        measure("--frames", 5, "--seed", 15, "--mag-limit", 3.8, *options)
+        for options in ((), ("--profile", "extended"), ("--profile", "published"))
+    )
+    assert all(frame["right"] for frames in (first, *others) for frame in frames)
+    errors, same, plain = ([one["error_cross_deg"] for one in rows] for rows in (first, *others))
+    assert errors == same
+    assert sum(a != b for a, b in zip(errors, plain, strict=True)) >= 4  # centroids weigh others
+
+
 def test_errors_without_noise(measure: Measure) -> None:
     frames = measure(*SAMPLE, "--seed", 14, "--no-noise")
     assert percent_right(frames) >= 95

@@ -74,3 +74,16 @@ def test_a_program_that_is_none(device: Any) -> None:
     with pytest.raises(FileNotFoundError):
         device.run("/no/such/program")
     assert device.client.client.telemetry("Identification")["NodeType"] == 5
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"profile": "best"}, "profile of cubestar must be one of published, extended, not 'best'"),
+        ({"set": "tracking=far"}, "switch tracking must be one of nearest, verified, not 'far'"),
+    ],
+)
+def test_a_profile_that_there_is_not_is_refused(options: dict[str, str], text: str) -> None:
+    with pytest.raises(ValueError, match=r"profile|switch") as refused:
+        open_device("cubestar", **options)
+    assert str(refused.value) == text

@@ -1,0 +1,39 @@
+"""Renders a sensor's switches: text table, Markdown, JSON."""
+
+import json
+import textwrap
+from dataclasses import asdict
+
+from cubestack.firmware_model.interface.codec.switches import Switches
+
+
+def render_switches(title: str, switches: type[Switches], format_name: str) -> str:
+    """The switches of the sensor that is called ``title``; ValueError for a format they lack."""
+    declared = switches.declared()
+    if format_name == "json":
+        return json.dumps({name: asdict(one) for name, one in declared.items()}, indent=2) + "\n"
+    if format_name == "c":
+        raise ValueError("switches have no C header: table, markdown or json")
+    if format_name == "table":
+        return (
+            "".join(
+                f"{name}: {one.meaning}\n"
+                f"  published  {one.published} ({one.source})\n"
+                f"  extended   {one.extended}\n"
+                + "".join(f"  or         {other}\n" for other in one.choices[2:])
+                + textwrap.fill(one.reason, 96, initial_indent="  ", subsequent_indent="  ")
+                + "\n"
+                for name, one in declared.items()
+            )
+            or f"{title} has no switches\n"
+        )
+    rows = [
+        f"| `{name}` | {one.meaning} | `{one.published}` | "
+        f"{', '.join(f'`{value}`' for value in one.choices[1:])} | {one.source} | {one.reason} |"
+        for name, one in declared.items()
+    ]
+    head = [
+        "| switch | what it decides | published | extended (others) | source | reason |",
+        "|---|---|---|---|---|---|",
+    ]
+    return "\n".join([*head, *rows]) + "\n"

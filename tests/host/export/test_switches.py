@@ -1,0 +1,42 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES, Switches
+from cubestack.host.devices.registry import device, device_names
+from cubestack.host.export.switches import render_switches
+
+from ...conftest import Run
+
+PAGE = Path(__file__).parents[3] / "docs" / "profiles.md"
+WITH_SWITCHES = [name for name in device_names() if device(name).switches.declared()]
+
+
+@pytest.mark.parametrize("name", WITH_SWITCHES)
+def test_the_page_has_the_generated_table(name: str) -> None:
+    table = render_switches(device(name).title, device(name).switches, "markdown")
+    hint = f"paste `cubestack registers {name} --switches --format markdown` into docs/profiles.md"
+    assert table in PAGE.read_text(encoding="utf-8"), hint
+
+
+@pytest.mark.parametrize("name", WITH_SWITCHES)
+def test_each_format_says_all_of_each_switch(name: str, run: Run) -> None:
+    declared = device(name).switches.declared()
+    listed = json.loads(run("registers", name, "--switches", "--format", "json").out)
+    assert list(listed) == list(declared)
+    text = " ".join(run("registers", name, "--switches").out.split())
+    for one, switch in declared.items():
+        assert [listed[one][profile] for profile in PROFILES] == list(switch.choices[:2])
+        assert listed[one]["source"] == switch.source
+        for part in (one, switch.meaning, switch.source, switch.reason, *switch.choices):
+            assert part in text
+
+
+def test_what_has_no_switches_says_so_and_c_is_refused(run: Run) -> None:
+    assert render_switches("Glow", Switches, "table") == "Glow has no switches\n"
+    outcome = run("registers", "cubestar", "--switches", "--format", "c")
+    assert outcome.code == 2
+    assert outcome.line == (
+        "cubestack registers: switches have no C header: table, markdown or json"
+    )
