@@ -184,20 +184,20 @@ def _proofs(side: Side) -> dict[str, Proof]:
             "With RESET_N low every register but the Sun's coordinates is reset; in standby every "
             "pin but SDA is",
             _fpga(side),
-            _target_wires(),
             partial(_idle, side),
             Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
+            _target_wires(),
         ),
         f"{side}-sda-i2c": Proof(
             "SDA is pulled low in transfers to this FPGA only, to acknowledge or to send a 0, and "
             "never moved while SCL is high",
             _fpga(side),
-            _target_wires(),
             partial(_pulls_sda, side),
             Fault("registers.target.reading", 1),
+            _target_wires(),
         ),
         f"{side}-ack-i2c": Proof(
-            ACKNOWLEDGES, _fpga(side), _WRITERS, _acknowledges, Fault("pix_writer.ack", 1)
+            ACKNOWLEDGES, _fpga(side), _acknowledges, Fault("pix_writer.ack", 1), _WRITERS
         ),
     }
 
@@ -208,9 +208,9 @@ PROOFS = {
         "Both FPGAs have the same command, which turns on the drivers that it should, and no wire "
         "has two",
         made(CubeSenseI2cPair),
-        _PAIR_WIRES,
         _one_driver,
         Fault("nadir.registers.target.group", 1),
+        _PAIR_WIRES,
     ),
     **_proofs("sun"),
     **_proofs("nadir"),

@@ -32,21 +32,11 @@ class BusPort(Component):
         if not 0 < address_width <= 24:
             raise ValueError(f"address_width must be in 1..24, not {address_width}")
         self._width = address_width
+        lines = {"on": In(1), "high": In(8), "low": In(8), "ale": In(1)}
+        strobes = dict.fromkeys(("cs_n", "re_n", "we_n"), In(1, init=1))
+        access = dict.fromkeys(("selected", "reading", "writing"), Out(1))
         super().__init__(
-            {
-                "on": In(1),
-                "high": In(8),
-                "low": In(8),
-                "ale": In(1),
-                "cs_n": In(1, init=1),
-                "re_n": In(1, init=1),
-                "we_n": In(1, init=1),
-                "address": Out(address_width),
-                "selected": Out(1),
-                "reading": Out(1),
-                "writing": Out(1),
-                "data": Out(8),
-            }
+            {**lines, **strobes, "address": Out(address_width), **access, "data": Out(8)}
         )
 
     def elaborate(self, platform: object) -> Module:

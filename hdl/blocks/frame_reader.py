@@ -26,13 +26,8 @@ class FrameReader(Component):
         """Make a reader for frames of ``columns`` x ``rows`` pixels."""
         self._counter = MatrixCounter(columns, rows, domain=domain)
         self._domain = domain
-        super().__init__(
-            {
-                "address": Out(MatrixCounter.address_width(columns, rows)),
-                "memory": In(8),
-                "data": Out(8),
-            }
-        )
+        width = MatrixCounter.address_width(columns, rows)
+        super().__init__({"address": Out(width), "memory": In(8), "data": Out(8)})
 
     def elaborate(self, platform: object) -> Module:
         """Build the counter and the output register."""

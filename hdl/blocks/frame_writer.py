@@ -39,17 +39,10 @@ class FrameWriter(Component):
         """Make a writer for frames of ``columns`` x ``rows`` pixels."""
         self._counter = MatrixCounter(columns, rows, domain=domain)
         self._domain = domain
-        super().__init__(
-            {
-                "pixel": In(8),
-                "hsync": In(1),
-                "vsync": In(1),
-                "address": Out(MatrixCounter.address_width(columns, rows)),
-                "data": Out(8),
-                "store": Out(1),
-                "ack": Out(1),
-            }
-        )
+        width = MatrixCounter.address_width(columns, rows)
+        camera = {"pixel": In(8), "hsync": In(1), "vsync": In(1)}
+        memory = {"address": Out(width), "data": Out(8), "store": Out(1)}
+        super().__init__({**camera, **memory, "ack": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
         """Build the row and frame tracking around the position counter."""

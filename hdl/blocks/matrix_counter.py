@@ -39,17 +39,10 @@ class MatrixCounter(Component):
         self._domain = domain
         self._loadable = loadable
         width = self.address_width(columns, rows)
-        super().__init__(
-            {
-                "next_column": In(1),
-                "next_row": In(1),
-                "clear": In(1),
-                "last_column": Out(1),
-                "last_row": Out(1),
-                "address": Out(width),
-                **({"load": In(1), "position": In(width)} if loadable else {}),
-            }
-        )
+        commands = dict.fromkeys(("next_column", "next_row", "clear"), In(1))
+        ends = dict.fromkeys(("last_column", "last_row"), Out(1))
+        preset = {"load": In(1), "position": In(width)} if loadable else {}
+        super().__init__({**commands, **ends, "address": Out(width), **preset})
 
     @staticmethod
     def address_width(columns: int, rows: int) -> int:

@@ -11,14 +11,8 @@ from typing import Literal, get_args
 from amaranth.hdl import Cat, Module, Value
 from amaranth.lib.wiring import Component, In, Out
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    ADDRESSING_COMMANDS,
-    COMMANDS,
-    Action,
-    FpgaCommand,
-    actions,
-    link_shows_enables,
-)
+from cubestack.firmware_model.interface.cubesense import fpga as table
+from cubestack.firmware_model.interface.cubesense.fpga import Action, FpgaCommand
 
 Side = Literal["sun", "nadir"]
 SIDES: tuple[Side, ...] = get_args(Side)
@@ -70,11 +64,9 @@ class DataflowControl(Component):
     def elaborate(self, platform: object) -> Module:
         """Build one condition for each row that this FPGA acts on."""
         m = Module()
-        commands: tuple[FpgaCommand, ...] = COMMANDS
         if self._mcu_addressing:
-            commands += ADDRESSING_COMMANDS
             m.d.comb += self.addressing.eq(self._addressing())
-        for command in commands:
+        for command in table.COMMANDS + table.ADDRESSING_COMMANDS * self._mcu_addressing:
             action = getattr(command.actions, self._side)
             if action is not Action.STANDBY:
                 with m.If(self._fits(command)):
@@ -96,14 +88,13 @@ class DataflowControl(Component):
             (self.edge, command.edge),
             (self.rnw, command.rnw),
             (self.en_n, own),
+            (self.other_en_n, other if self._other_matters(command) else None),
         ]
-        if self._other_matters(command):
-            levels.append((self.other_en_n, other))
         return Cat(line == level for line, level in levels if level is not None).all()
 
     def _addressing(self) -> Value:
         """The rows of address control with SHIFT left out, which makes one condition of them."""
-        rows = [replace(command, shift=None) for command in ADDRESSING_COMMANDS]
+        rows = [replace(command, shift=None) for command in table.ADDRESSING_COMMANDS]
         own = [row for row in rows if getattr(row.actions, self._side) is not Action.STANDBY]
         return Cat(self._fits(row) for row in own).any()
 
@@ -112,8 +103,6 @@ class DataflowControl(Component):
         shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
         enables = [command.sunen, command.naden]
         enables[1 if self._side == "sun" else 0] ^= 1
-        flipped = actions(shift, edge, rnw, *enables, mcu_addressing=self._mcu_addressing)
-        changed = getattr(flipped, self._side)
-        return link_shows_enables(shift, edge) and changed is not getattr(
-            command.actions, self._side
-        )
+        flipped = table.actions(shift, edge, rnw, *enables, mcu_addressing=self._mcu_addressing)
+        both = [getattr(taken, self._side) for taken in (flipped, command.actions)]
+        return table.link_shows_enables(shift, edge) and both[0] is not both[1]

@@ -6,20 +6,14 @@ resolved here, so that simulators need no tri-state lines.
 
 from amaranth.hdl import Cat, Module, Value
 
+from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
-from cubestack.firmware_model.interface.cubesense.pins import (
-    COMMON_PINS,
-    DATA_I,
-    OWN_PINS,
-    PREFIXES,
-    pair_pins,
-)
 from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
 #: Ports that each FPGA has for itself; in the pair SUN_ or NAD_ goes before their names.
-OWN_PORTS = [port.name for pin in OWN_PINS for port in pin.ports]
+OWN_PORTS = [port.name for pin in pins.OWN_PINS for port in pin.ports]
 
 
 class CubeSensePair(PinnedComponent):
@@ -42,20 +36,24 @@ class CubeSensePair(PinnedComponent):
         self.read_out = read_out
         self.mcu_addressing = mcu_addressing
         width = read_out.address_bits
-        super().__init__(resized(pair_pins(mcu_addressing), SUN_SRAM_A=width, NAD_SRAM_A=width))
+        super().__init__(
+            resized(pins.pair_pins(mcu_addressing), SUN_SRAM_A=width, NAD_SRAM_A=width)
+        )
 
     def elaborate(self, platform: object) -> Module:
         """Join the two FPGAs."""
         m = Module()
         m.submodules.sun = sun = CubeSenseFpga("sun", self.read_out, self.mcu_addressing)
         m.submodules.nadir = nadir = CubeSenseFpga("nadir", self.read_out, self.mcu_addressing)
-        common = [*COMMON_PINS, *(DATA_I,) * self.mcu_addressing]
-        for prefix, fpga in zip(PREFIXES.values(), (sun, nadir), strict=True):
+        common = [*pins.COMMON_PINS, *(pins.DATA_I,) * self.mcu_addressing]
+        for prefix, fpga in zip(pins.PREFIXES.values(), (sun, nadir), strict=True):
             own = [(name, prefix + name) for name in OWN_PORTS]
             connect_ports(m, fpga, self, own + [(name, name) for name in common])
 
         link_data = driven(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
         link_control = released(sun.LINK_C_O, sun.LINK_C_OE, nadir.LINK_C_O, nadir.LINK_C_OE)
+        enables = ("DATA_OE", "LINK_D_OE", "LINK_C_OE")
+        both_drive = Cat(getattr(sun, name) & getattr(nadir, name) for name in enables)
         m.d.comb += [
             sun.EN.eq(self.SUNEN),
             nadir.EN.eq(self.NADEN),
@@ -67,13 +65,7 @@ class CubeSensePair(PinnedComponent):
             nadir.LINK_C_I.eq(link_control),
             self.DATA.eq(driven(sun.DATA_O, sun.DATA_OE, nadir.DATA_O, nadir.DATA_OE)),
             self.DATA_OE.eq(sun.DATA_OE | nadir.DATA_OE),
-            self.CONTENTION.eq(
-                Cat(
-                    sun.DATA_OE & nadir.DATA_OE,
-                    sun.LINK_D_OE & nadir.LINK_D_OE,
-                    sun.LINK_C_OE & nadir.LINK_C_OE,
-                )
-            ),
+            self.CONTENTION.eq(both_drive),
         ]
         return m
 

@@ -40,26 +40,12 @@ class CubeSenseReader(Component):
         """Make a reader of ``read_out``."""
         self._read_out = read_out
         self._mcu_addressing = mcu_addressing
-        addressing = {
-            "addressing": In(1),
-            "take_address": In(1),
-            "read_from": In(1),
-            "address_byte": In(8),
-        }
-        super().__init__(
-            {
-                "clk": In(1),
-                "picture": In(1),
-                "scan": In(1),
-                "window": In(1),
-                "sun_x": In(read_out.column_bits),
-                "sun_y": In(read_out.row_bits),
-                "address": Out(read_out.address_bits),
-                "memory": In(8),
-                "data": Out(8),
-                **(addressing if mcu_addressing else {}),
-            }
-        )
+        requests = dict.fromkeys(("clk", "picture", "scan", "window"), In(1))
+        sun = {"sun_x": In(read_out.column_bits), "sun_y": In(read_out.row_bits)}
+        memory = {"address": Out(read_out.address_bits), "memory": In(8), "data": Out(8)}
+        option = dict.fromkeys(("addressing", "take_address", "read_from"), In(1))
+        option["address_byte"] = In(8)
+        super().__init__({**requests, **sun, **memory, **(option if mcu_addressing else {})})
 
     def elaborate(self, platform: object) -> Module:
         """Build the three orders, each with a reset of its own, and the output register."""

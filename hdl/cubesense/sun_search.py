@@ -31,16 +31,9 @@ class SunSearch(Component):
         """Make a search in pictures of ``read_out``'s size."""
         self._column_bits = read_out.column_bits
         self._domain = domain
-        super().__init__(
-            {
-                "start": In(1),
-                "store": In(1),
-                "pixel": In(8),
-                "address": In(read_out.address_bits),
-                "x": Out(read_out.column_bits),
-                "y": Out(read_out.row_bits),
-            }
-        )
+        written = {"store": In(1), "pixel": In(8), "address": In(read_out.address_bits)}
+        sun = {"x": Out(read_out.column_bits), "y": Out(read_out.row_bits)}
+        super().__init__({"start": In(1), **written, **sun})
 
     def elaborate(self, platform: object) -> Module:
         """Build the count of bright pixels and the retained coordinates."""

@@ -28,15 +28,9 @@ class SunWindow(Component):
         """Make the window that ``read_out`` describes."""
         self._read_out = read_out
         self._domain = domain
-        super().__init__(
-            {
-                "x": In(read_out.column_bits),
-                "y": In(read_out.row_bits),
-                "address": Out(read_out.address_bits),
-                "coordinate": Out(1),
-                "byte": Out(8),
-            }
-        )
+        sun = {"x": In(read_out.column_bits), "y": In(read_out.row_bits)}
+        offered = {"address": Out(read_out.address_bits), "coordinate": Out(1), "byte": Out(8)}
+        super().__init__({**sun, **offered})
 
     def elaborate(self, platform: object) -> Module:
         """Build the states, the position in the window and the window's origin."""

@@ -7,20 +7,14 @@ goes where is assumed.
 
 from amaranth.hdl import Module
 
-from cubestack.firmware_model.interface.cubestar.pins import (
-    BOARD_PREFIXES,
-    OWN_PINS,
-    SHARED,
-    TWO_BOARDS,
-)
+from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 
-_OWN = [port.name for pin in OWN_PINS for port in pin.ports]
-_COMMON = [
-    port.name for pin in SHARED if pin not in OWN_PINS for port in pin.ports if not port.output
-]
+_OWN = [port.name for pin in pins.OWN_PINS for port in pin.ports]
+_SHARED_INPUTS = (port for pin in pins.SHARED for port in pin.ports if not port.output)
+_COMMON = [port.name for port in _SHARED_INPUTS if port.name not in _OWN]
 
 
 class CubeStarTwoBoards(CubeStarBoard):
@@ -30,7 +24,7 @@ class CubeStarTwoBoards(CubeStarBoard):
     do, which takes both chip selects low.
     """
 
-    _pins = TWO_BOARDS
+    _pins = pins.TWO_BOARDS
     _banks = True
 
     def elaborate(self, platform: object) -> Module:
@@ -38,7 +32,7 @@ class CubeStarTwoBoards(CubeStarBoard):
         m = Module()
         first, second = boards = [CubeStarShared(self.columns, self.rows) for _ in range(2)]
         m.submodules.board1, m.submodules.board2 = boards
-        for prefix, board in zip(BOARD_PREFIXES, boards, strict=True):
+        for prefix, board in zip(pins.BOARD_PREFIXES, boards, strict=True):
             own = [(name, prefix + name) for name in _OWN]
             connect_ports(m, board, self, [*((name, name) for name in _COMMON), *own])
         m.d.comb += [

@@ -56,16 +56,9 @@ class TileCount(NamedTuple):
 
 def count_tiles(component: Component) -> TileCount:
     """Estimate the tiles of ``component``; UnknownCellError when it has more than logic."""
-    netlist = _netlist(component)
-    design = _Design(netlist)
+    written = built_in_yosys(_SCRIPT.format(rtlil=rtlil_text(component)))
+    design = _Design(json.loads(written)["modules"]["top"])
     return TileCount(design.network.tables(design.wanted()), design.flip_flops)
-
-
-def _netlist(component: Component) -> dict[str, Any]:
-    """Yosys' simplified and flattened module, as it writes it in JSON."""
-    script = _SCRIPT.format(rtlil=rtlil_text(component))
-    module: dict[str, Any] = json.loads(built_in_yosys(script))["modules"]["top"]
-    return module
 
 
 class _Design:

@@ -4,17 +4,8 @@ from collections.abc import Collection, Iterable
 from types import SimpleNamespace
 from typing import Any
 
-from amaranth.hdl import (
-    Assert,
-    Assume,
-    Cat,
-    ClockDomain,
-    ClockSignal,
-    Module,
-    ResetSignal,
-    Signal,
-    Value,
-)
+from amaranth import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal, Value
+from amaranth.hdl import Assert, Assume
 from amaranth.hdl._ast import Initial  # not among the public names, though documented as one
 
 from cubestack.firmware_model.interface.pins import Pin
@@ -26,15 +17,14 @@ ACKNOWLEDGES = "ACK is high exactly from when all rows of a frame are stored"
 #: Wires of a writer, by where they are below it.
 WRITER_WIRES = {
     "rst": "{domain}_rst",
-    "vsync": "vsync",
-    "store": "store",
-    "ack": "ack",
-    "column": "counter.column",
-    "row": "counter.row",
-    "line_open": "line_open",
-    "line_full": "line_full",
-    "frame_full": "frame_full",
+    **{name: f"counter.{name}" for name in ("column", "row")},
+    **{n: n for n in ("vsync", "store", "ack", "line_open", "line_full", "frame_full")},
 }
+
+
+def wires_below(part: str, *names: str) -> dict[str, str]:
+    """Wires of a part of the design, by their own names."""
+    return {name: f"{part}.{name}" for name in names}
 
 
 def writer_wires(writer: str, domain: str, below: str | None = None) -> dict[str, str]:

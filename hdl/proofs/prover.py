@@ -11,8 +11,8 @@ a counterexample from its start, which takes a small picture.
 
 import re
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -76,19 +76,19 @@ class Proof:
     Attributes:
         property: what is proved, in one sentence.
         make: the design, and what describes its size; of a small picture when asked for.
-        wires: internal wires of the design that ``harness`` looks at, by the name that it uses.
-            Submodules are named as in the design, without the numbers that make names unique.
         harness: adds assumptions and assertions to the module; the namespace has a signal for
             each port and each wire. Input ports are free. ``size`` is what ``make`` said, and
             ``registers`` are all of the design's.
         fault: a bug with which the proof must fail.
+        wires: internal wires of the design that ``harness`` looks at, by the name that it uses.
+            Submodules are named as in the design, without the numbers that make names unique.
     """
 
     property: str
     make: Callable[[bool], tuple[Component, Any]]
-    wires: dict[str, str]
     harness: Callable[[Module, SimpleNamespace], None]
     fault: Fault
+    wires: Mapping[str, str] = field(default_factory=dict)
 
 
 #: Fills a harness: its module, the ports' signals and the exposed wires' by their names.

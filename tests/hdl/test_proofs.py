@@ -70,7 +70,7 @@ def below(limit: int, wires: dict[str, str] | None = None, fault: str = "counter
     def harness(m: Module, d: SimpleNamespace) -> None:
         m.d.comb += Assert(d.address < limit)
 
-    return Proof("", lambda _: (Counter(), None), wires or {}, harness, Fault(fault, 3))
+    return Proof("", lambda _: (Counter(), None), harness, Fault(fault, 3), wires or {})
 
 
 def test_what_is_false_at_once_has_a_counterexample() -> None:

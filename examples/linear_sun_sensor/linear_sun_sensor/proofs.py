@@ -33,14 +33,12 @@ PROOFS = {
     "sunslit-idle": Proof(
         "With ENABLE low every register is reset, and every output but the array's clock rests",
         _make,
-        {},
         _idle,
         Fault("writer.osc_rst", 0),
     ),
     "sunslit-drivers": Proof(
         "FPGA and SRAM never both drive the SRAM's data bus",
         _make,
-        {},
         _one_driver,
         Fault("writer.store", 1),
     ),

@@ -8,17 +8,14 @@ from amaranth.hdl import Array, Assert, Module, Mux, Signal, Value
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.proofs.cubesense.made import column_row, fpga
-from cubestack.hdl.proofs.properties import domain, starts_in, writer_wires
+from cubestack.hdl.proofs.properties import domain, starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
 
 # The scan visits exactly the declared addresses in order.
 
 _SCAN = {
     "scan": "reader.scan",
-    "on_a_line": "reader.scan.on_a_line",
-    "vertical": "reader.scan.vertical",
-    "along": "reader.scan.along",
-    "line": "reader.scan.line",
+    **wires_below("reader.scan", "on_a_line", "vertical", "along", "line"),
 }
 
 
@@ -59,13 +56,9 @@ def _scans(m: Module, d: SimpleNamespace) -> None:
 # The Sun window is inside of the picture, around the first Sun pixel.
 
 _WINDOW = {
-    "window": "reader.window",
-    "x": "reader.sun_x",
-    "y": "reader.sun_y",
-    "in_window": "reader.window.in_window",
-    "state": "reader.window.state",
-    "right": "reader.window.position",
-    "down": "reader.window.position$4",
+    **{"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"},
+    **wires_below("reader.window", "in_window", "state"),
+    **{"right": "reader.window.position", "down": "reader.window.position$4"},
 }
 
 
@@ -108,14 +101,7 @@ def _windows(m: Module, d: SimpleNamespace) -> None:
 
 # The first Sun pixel is the first of three bright ones side by side.
 
-_SEARCH = {
-    "x": "search.x",
-    "y": "search.y",
-    "awake": "search.awake",
-    "searching": "search.searching",
-    "run": "search.run",
-    "pixel": "search.pixel",
-}
+_SEARCH = wires_below("search", "x", "y", "awake", "searching", "run", "pixel")
 
 
 def _searching(side: Side) -> dict[str, str]:
@@ -180,22 +166,22 @@ def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:
         f"{side}-scan{option}": Proof(
             "The nadir scan visits exactly the declared addresses in order",
             make,
-            _SCAN,
             _scans,
             Fault("reader.scan.line_ends", 0),
+            _SCAN,
         ),
         f"{side}-window{option}": Proof(
             "The Sun window lies inside of the picture, around the first Sun pixel",
             make,
-            _WINDOW,
             _windows,
             Fault("reader.window.clamped_y", 3),
+            _WINDOW,
         ),
         f"{side}-first-pixel{option}": Proof(
             "The first Sun pixel is the first of three bright ones side by side",
             make,
-            _searching(side),
             partial(_first_sun_pixel, side),
             Fault("search.bright", 1),
+            _searching(side),
         ),
     }

@@ -6,50 +6,35 @@ from types import SimpleNamespace
 
 from amaranth.hdl import Assert, Cat, Const, Module, Mux, Signal
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    ADDRESS_BYTES,
-    Action,
-    actions,
-    link_shows_enables,
-)
+from cubestack.firmware_model.interface.cubesense import fpga as table
+from cubestack.firmware_model.interface.cubesense.fpga import ADDRESS_BYTES, Action
 from cubestack.firmware_model.interface.cubesense.pins import FPGA, PREFIXES
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubesense.edge import edge_proofs
 from cubestack.hdl.proofs.cubesense.made import column_row, fpga, made
-from cubestack.hdl.proofs.properties import (
-    ACKNOWLEDGES,
-    acknowledges,
-    domain,
-    idle_is_reset,
-    one_sram_driver,
-    outputs_rest,
-    starts_in,
-    writer_wires,
-)
+from cubestack.hdl.proofs.properties import starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
 
 # The address never leaves the picture.
 
+_COUNTERS = {
+    "own": "pix_writer.counter",
+    "link": "link_writer.counter",
+    "picture": "reader.picture",
+}
 _POSITIONS = {
-    "own_column": "pix_writer.counter.column",
-    "own_row": "pix_writer.counter.row",
-    "link_column": "link_writer.counter.column",
-    "link_row": "link_writer.counter.row",
-    "picture_column": "reader.picture.column",
-    "picture_row": "reader.picture.row",
-    "along": "reader.scan.along",
-    "line": "reader.scan.line",
-    "vertical": "reader.scan.vertical",
-    "right": "reader.window.position",
-    "down": "reader.window.position$4",
+    **{f"{source}_{n}": f"{c}.{n}" for source, c in _COUNTERS.items() for n in ("column", "row")},
+    **wires_below("reader.scan", "along", "line", "vertical"),
+    **{"right": "reader.window.position", "down": "reader.window.position$4"},
 }
 
 
 def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
     size = d.size
     starts_in(m, d.EN)
-    for source in ("own", "link", "picture"):
+    for source in _COUNTERS:
         m.d.comb += [
             Assert(getattr(d, f"{source}_column") < size.columns),
             Assert(getattr(d, f"{source}_row") < size.rows),
@@ -71,8 +56,8 @@ def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
 
 
 def _idle(m: Module, d: SimpleNamespace) -> None:
-    outputs_rest(m, d, d.EN, FPGA)
-    idle_is_reset(m, d, d.EN, {"search.x", "search.y"})
+    properties.outputs_rest(m, d, d.EN, FPGA)
+    properties.idle_is_reset(m, d, d.EN, {"search.x", "search.y"})
 
 
 # ACK exactly when all rows are stored.
@@ -82,7 +67,7 @@ _WRITERS = writer_wires("pix_writer", "pix") | writer_wires("link_writer", "link
 
 def _acknowledges(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, d.EN)
-    acknowledges(m, d, d.ACK, pix_writer=d.PCLK, link_writer=d.LINK_C_I[0])
+    properties.acknowledges(m, d, d.ACK, pix_writer=d.PCLK, link_writer=d.LINK_C_I[0])
 
 
 # No two drivers on in any settled state.
@@ -100,15 +85,15 @@ _DRIVERS = {
 def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
     m.d.comb += Assert(d.CONTENTION == 0)
     for prefix in PREFIXES.values():
-        one_sram_driver(m, d, f"{prefix}SRAM")
+        properties.one_sram_driver(m, d, f"{prefix}SRAM")
     # Each row of the table, listed or not, where the wires can tell it from the others.
     lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
     for levels in product((0, 1), repeat=5):
         shift, edge, _, sunen, naden = levels
-        if sunen != naden and not link_shows_enables(shift, edge):
+        if sunen != naden and not table.link_shows_enables(shift, edge):
             continue
         here = lines == Cat(Const(level, 1) for level in levels)
-        for side, action in actions(*levels, mcu_addressing=mcu_addressing)._asdict().items():
+        for side, action in table.actions(*levels, mcu_addressing=mcu_addressing)._asdict().items():
             data = getattr(d, f"{side}_DATA_OE") == (action in _DRIVES_DATA)
             link = getattr(d, f"{side}_LINK_D_OE") == (action in _DRIVES_LINK)
             m.d.comb += Assert(~here | (data & link))
@@ -119,20 +104,16 @@ def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
 
 # The microcontroller's address is the one that is read.
 
-_TAKEN = {
-    "addressing": "dataflow.addressing",
-    "take": "dataflow.take_address",
-    "read_from": "dataflow.read_from",
-}
+_TAKEN = wires_below("dataflow", "addressing", "take_address", "read_from")
 
 
 def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
     """Three clocks make the address, whatever it was before; SHIFT alone never changes it."""
     starts_in(m, d.EN)
-    sync = domain(m, "monitor", d.CLK, ~d.addressing)
+    sync = properties.domain(m, "monitor", d.CLK, ~d.addressing)
     taken = Signal(8 * ADDRESS_BYTES)
     count = Signal(range(ADDRESS_BYTES + 1))  # bytes since the last read or reset, at most all
-    with m.If(d.take):
+    with m.If(d.take_address):
         sync += taken.eq(Cat(d.DATA_I, taken))
         sync += count.eq(Mux(count == ADDRESS_BYTES, count, count + 1))
     with m.Else():
@@ -144,8 +125,8 @@ def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
         same &= (count != known) | (d.SRAM_A[:width] == taken[:width])
     m.d.comb += [
         Assert(~d.addressing | same),
-        Assert(d.addressing == (d.take | d.read_from)),
-        Assert(~d.take | (d.SRAM_CE_N & ~d.DATA_OE)),
+        Assert(d.addressing == (d.take_address | d.read_from)),
+        Assert(~d.take_address | (d.SRAM_CE_N & ~d.DATA_OE)),
         Assert(count <= ADDRESS_BYTES),
     ]
 
@@ -156,17 +137,17 @@ def _proofs(side: Side) -> dict[str, Proof]:
         f"{side}-address": Proof(
             "The SRAM address never leaves the picture",
             fpga(side),
-            _POSITIONS,
             _address_stays_inside,
             Fault("reader.window.clamped_x", 7),
+            _POSITIONS,
         ),
         **{
             f"{side}-ack{'-addressing' * mcu_addressing}": Proof(
-                ACKNOWLEDGES,
+                properties.ACKNOWLEDGES,
                 fpga(side, mcu_addressing),
-                _WRITERS,
                 _acknowledges,
                 Fault("pix_writer.counter.last_row", 1),
+                _WRITERS,
             )
             for mcu_addressing in (False, True)
         },
@@ -174,7 +155,6 @@ def _proofs(side: Side) -> dict[str, Proof]:
             f"{side}-idle{'-addressing' * mcu_addressing}": Proof(
                 "With EN high every register but the Sun's coordinates is reset, and they rest",
                 fpga(side, mcu_addressing),
-                {},
                 _idle,
                 Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
             )
@@ -185,9 +165,9 @@ def _proofs(side: Side) -> dict[str, Proof]:
         f"{side}-taken-address": Proof(
             "What is read first is at the address that the microcontroller gave",
             fpga(side, mcu_addressing=True),
-            _TAKEN,
             _takes_addresses,
             Fault("dataflow.take_address", 1),
+            _TAKEN,
         ),
     }
 
@@ -198,9 +178,9 @@ PROOFS = {
         f"pair-drivers{'-addressing' * mcu_addressing}": Proof(
             "No wire of the two FPGAs has two drivers in any settled state",
             made(partial(CubeSensePair, mcu_addressing=mcu_addressing)),
-            _DRIVERS,
             partial(_drivers, mcu_addressing),
             Fault("nadir.dataflow.pass_edge", 1),
+            _DRIVERS,
         )
         for mcu_addressing in (False, True)
     },

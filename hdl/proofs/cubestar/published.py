@@ -12,16 +12,8 @@ from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
 from cubestack.firmware_model.interface.pins import Pin
 from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.top import CubeStarTop
-from cubestack.hdl.proofs.properties import (
-    ACKNOWLEDGES,
-    acknowledges,
-    domain,
-    idle_is_reset,
-    outputs_rest,
-    starts_in,
-    writer_wires,
-    written_is_driven,
-)
+from cubestack.hdl.proofs import properties
+from cubestack.hdl.proofs.properties import starts_in, wires_below
 from cubestack.hdl.proofs.prover import Fault, Proof
 
 Make = Callable[[bool], tuple[Component, SimpleNamespace]]
@@ -60,22 +52,22 @@ def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
 def bank_rests(pins: tuple[Pin, ...], m: Module, d: SimpleNamespace) -> None:
     """Standby of any board with one memory of two banks."""
     standby = ~d.ENABLE
-    outputs_rest(m, d, standby, pins, but=["SRAM_A"])
+    properties.outputs_rest(m, d, standby, pins, but=["SRAM_A"])
     m.d.comb += Assert(~standby | (d.SRAM_A[:-1] == 0))
-    idle_is_reset(m, d, standby, {"bank"})
+    properties.idle_is_reset(m, d, standby, {"bank"})
 
 
 def ack_is_right(m: Module, d: SimpleNamespace) -> None:
     """ACK of any board with one writer."""
     starts_in(m, ~d.ENABLE)
-    acknowledges(m, d, d.ACK, writer=d.PIXCLK)
+    properties.acknowledges(m, d, d.ACK, writer=d.PIXCLK)
 
 
 def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
     """Address of the n-th byte before the n-th data clock, and its byte after it."""
     starts_in(m, ~d.ENABLE)
     reading = d.ENABLE & d.RNW
-    sync = domain(m, "monitor", d.DCLK, ~reading)
+    sync = properties.domain(m, "monitor", d.DCLK, ~reading)
     column, row = Signal(range(d.size.columns)), Signal(range(d.size.rows))
     byte = Signal(8)
     last_column, last_row = column == d.size.columns - 1, row == d.size.rows - 1
@@ -91,6 +83,8 @@ def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
+#: Wires of the one writer that a board has.
+WRITER = properties.writer_wires("writer", "pix")
 LAST_ROW = Fault("writer.counter.last_row", 1)
 LAST_COLUMN = Fault("writer.counter.last_column", 0)
 
@@ -99,34 +93,29 @@ BANK_RESTS = "With ENABLE low every register but the bank is reset, and the bank
 #: By name.
 PROOFS = {
     "cubestar-ack": Proof(
-        ACKNOWLEDGES, full(CubeStarTop), writer_wires("writer", "pix"), ack_is_right, LAST_ROW
+        properties.ACKNOWLEDGES, full(CubeStarTop), ack_is_right, LAST_ROW, WRITER
     ),
     "cubestar-address": Proof(
         "The SRAM address never leaves the picture, at 1000 x 500 pixels, where it could",
         gapped(CubeStarTop),
-        {"written": "writer.address", "read": "reader.address"},
         _address_stays_inside,
         LAST_COLUMN,
+        {"written": "writer.address", "read": "reader.address"},
     ),
     "cubestar-drivers": Proof(
         "FPGA and SRAM never both drive the SRAM's data bus",
         full(CubeStarTop),
-        {},
-        written_is_driven,
+        properties.written_is_driven,
         Fault("writer.store", 1),
     ),
     "cubestar-idle": Proof(
-        BANK_RESTS,
-        full(CubeStarTop),
-        {},
-        partial(bank_rests, PUBLISHED),
-        Fault("writer.pix_rst", 0),
+        BANK_RESTS, full(CubeStarTop), partial(bank_rests, PUBLISHED), Fault("writer.pix_rst", 0)
     ),
     "cubestar-read": Proof(
         "Each data clock presents the next byte, from the first one on",
         full(CubeStarTop),
-        {"column": "reader.counter.column", "row": "reader.counter.row"},
         _reads_in_order,
         Fault("reader.counter.last_column", 0),
+        wires_below("reader.counter", "column", "row"),
     ),
 }

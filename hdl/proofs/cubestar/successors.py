@@ -9,30 +9,13 @@ from cubestack.firmware_model.interface.cubestar.pins import DOUBLE, SHARED
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
-from cubestack.hdl.proofs.cubestar.published import (
-    BANK_RESTS,
-    LAST_COLUMN,
-    LAST_ROW,
-    ack_is_right,
-    bank_rests,
-    full,
-    gapped,
-    inside,
-)
-from cubestack.hdl.proofs.properties import (
-    ACKNOWLEDGES,
-    acknowledges,
-    idle_is_reset,
-    outputs_rest,
-    starts_in,
-    writer_wires,
-    written_is_driven,
-)
+from cubestack.hdl.proofs import properties
+from cubestack.hdl.proofs.cubestar import published
+from cubestack.hdl.proofs.cubestar.published import inside
+from cubestack.hdl.proofs.properties import starts_in, writer_wires, written_is_driven
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-_SHARED = full(CubeStarShared)
-_DOUBLE = full(CubeStarDouble)
-_BOARDS = full(CubeStarTwoBoards)
+_SHARED, _DOUBLE, _BOARDS = map(published.full, (CubeStarShared, CubeStarDouble, CubeStarTwoBoards))
 
 
 def _shared_address(m: Module, d: SimpleNamespace) -> None:
@@ -57,20 +40,21 @@ def _double_address(m: Module, d: SimpleNamespace) -> None:
 
 def _boards_acknowledge(m: Module, d: SimpleNamespace) -> None:
     starts_in(m, ~d.BOARD1_ENABLE & ~d.BOARD2_ENABLE)
-    acknowledges(m, d, d.BOARD1_ACK, board1=d.PIXCLK)
-    acknowledges(m, d, d.BOARD2_ACK, board2=d.PIXCLK)
+    properties.acknowledges(m, d, d.BOARD1_ACK, board1=d.PIXCLK)
+    properties.acknowledges(m, d, d.BOARD2_ACK, board2=d.PIXCLK)
 
 
 def _boards_idle(m: Module, d: SimpleNamespace) -> None:
     """Each board by itself, whatever the other one does."""
     for board, standby in (("board1", ~d.BOARD1_ENABLE), ("board2", ~d.BOARD2_ENABLE)):
         own = [register for register in d.registers if register.name.startswith(f"{board}.")]
-        idle_is_reset(m, SimpleNamespace(registers=own), standby, {f"{board}.bank"})
+        one = SimpleNamespace(registers=own)
+        properties.idle_is_reset(m, one, standby, {f"{board}.bank"})
 
 
 def _double_idle(m: Module, d: SimpleNamespace) -> None:
     """INTO is latched by RNW in standby too, as its docstring says; nothing shows it there."""
-    outputs_rest(m, d, ~d.ENABLE, DOUBLE)
+    properties.outputs_rest(m, d, ~d.ENABLE, DOUBLE)
     for register in d.registers:
         if register.reset is not None:
             m.d.comb += Assert(d.ENABLE | (register.value == register.reset))
@@ -121,81 +105,81 @@ _STORES_INSIDE = "Storing never leaves the picture, at 1000 x 500 pixels, where 
 #: By name.
 PROOFS = {
     "cubestar-shared-ack": Proof(
-        ACKNOWLEDGES, _SHARED, writer_wires("writer", "pix"), ack_is_right, LAST_ROW
+        properties.ACKNOWLEDGES,
+        _SHARED,
+        published.ack_is_right,
+        published.LAST_ROW,
+        published.WRITER,
     ),
     "cubestar-shared-address": Proof(
         _STORES_INSIDE,
-        gapped(CubeStarShared),
-        {"written": "writer.address"},
+        published.gapped(CubeStarShared),
         _shared_address,
-        LAST_COLUMN,
+        published.LAST_COLUMN,
+        {"written": "writer.address"},
     ),
     "cubestar-shared-drivers": Proof(
         "FPGA, SRAM and processor never drive the same data lines",
         _SHARED,
-        {},
         _shared_drivers,
         Fault("bus.writing", 1),
     ),
     "cubestar-shared-idle": Proof(
-        BANK_RESTS, _SHARED, {}, partial(bank_rests, SHARED), Fault("bus.on", 1)
+        published.BANK_RESTS, _SHARED, partial(published.bank_rests, SHARED), Fault("bus.on", 1)
     ),
     "cubestar-double-ack": Proof(
-        ACKNOWLEDGES, _DOUBLE, writer_wires("writer", "pix"), ack_is_right, LAST_ROW
+        properties.ACKNOWLEDGES,
+        _DOUBLE,
+        published.ack_is_right,
+        published.LAST_ROW,
+        published.WRITER,
     ),
     "cubestar-double-address": Proof(
         _STORES_INSIDE,
-        gapped(CubeStarDouble),
-        {"written": "writer.address", "into": "into"},
+        published.gapped(CubeStarDouble),
         _double_address,
-        LAST_COLUMN,
+        published.LAST_COLUMN,
+        {"written": "writer.address", "into": "into"},
     ),
     "cubestar-double-apart": Proof(
         "The memory that is stored in is the camera's alone, the other one the bus's",
         _DOUBLE,
-        {
-            "into": "into",
-            "address": "bus.address",
-            "writer_address": "writer.address",
-            "writer_store": "writer.store",
-            "writer_data": "writer.data",
-        },
         _apart,
         Fault("reached2", 1),
+        {
+            **{"into": "into", "address": "bus.address"},
+            **{f"writer_{name}": f"writer.{name}" for name in ("address", "store", "data")},
+        },
     ),
     "cubestar-double-drivers": Proof(
         "FPGA, SRAMs and processor never drive the same data lines",
         _DOUBLE,
-        {},
         _double_drivers,
         Fault("write1", 1),
     ),
     "cubestar-double-idle": Proof(
         "With ENABLE low every register but the latched INTO is reset",
         _DOUBLE,
-        {},
         _double_idle,
         Fault("bus.on", 1),
     ),
     "cubestar-boards-ack": Proof(
-        ACKNOWLEDGES,
+        properties.ACKNOWLEDGES,
         _BOARDS,
-        writer_wires("board1", "pix", "board1.writer")
-        | writer_wires("board2", "pix", "board2.writer"),
         _boards_acknowledge,
         Fault("board2.writer.counter.last_row", 1),
+        writer_wires("board1", "pix", "board1.writer")
+        | writer_wires("board2", "pix", "board2.writer"),
     ),
     "cubestar-boards-idle": Proof(
         "With its ENABLE low every register of a board but the bank is reset, and the bank rests",
         _BOARDS,
-        {},
         _boards_idle,
         Fault("board2.writer.pix_rst", 0),
     ),
     "cubestar-boards-drivers": Proof(
         "Two boards drive the bus together only when both are selected",
         _BOARDS,
-        {},
         _one_board_drives,
         Fault("board2.bus.reading", 1),
     ),
