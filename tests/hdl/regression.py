@@ -18,7 +18,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -53,11 +53,8 @@ ARGUMENTS = {
     "verilator": ["-Wno-fatal", "-Wno-lint", "-CFLAGS", "-std=c++20"],
 }
 
-#: Wall-clock seconds after which a simulation hangs; a busy machine may be slow.
-LIMIT_S = 3600
-
-#: The same of a tier, which takes seconds.
-TIER_LIMIT_S = 600
+#: Wall-clock seconds after which a simulation hangs, and a tier, which takes seconds.
+LIMIT_S, TIER_LIMIT_S = 3600, 600
 
 # A warning in a simulation's log. Icarus has no instances to iterate over, of which GPI warns.
 WARNING = re.compile(r"WARNING +(?! |gpi +vpi_iterate returned NULL)|[Ww]arning:")
@@ -70,11 +67,11 @@ class Outcome(NamedTuple):
     ``error`` is the first failed test's.
     """
 
-    ran: tuple[str, ...]
-    failed: tuple[str, ...]
-    problem: str
-    log: str
-    seconds: float
+    ran: tuple[str, ...] = ()
+    failed: tuple[str, ...] = ()
+    problem: str = ""
+    log: str = ""
+    seconds: float = 0.0
     error: str = ""
 
     @property
@@ -84,20 +81,23 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Tier:
-    """What a top has to pass.
+    """What a top has to pass: cocotb ``modules``, those that find most first.
 
-    Attributes:
-        design: the top's class, or what else makes it of the number of columns and rows.
-        columns, rows: its size.
-        modules: cocotb modules, those that find most first.
-        environment: what they need besides the size.
+    ``design`` is its class, or what else makes it of the number of columns and rows;
+    ``further`` is what the modules read besides the size.
     """
 
     design: Callable[[int, int], Component]
     columns: int
     rows: int
     modules: tuple[str, ...]
-    environment: Mapping[str, str] = field(default_factory=dict)
+    further: Mapping[str, str]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What the modules read; what a wrong design reaches counts for nothing."""
+        size = frame_environment(self.columns, self.rows)
+        return {**size, **self.further, "HDL_COVERAGE": ""}
 
     def make(self) -> Component:
         """The top, of a small picture."""
@@ -187,22 +187,20 @@ def run_tier(
     try:
         runner = build(verilog, folder / "build", strict=False)
     except (RuntimeError, SystemExit):
-        log = folder / "build" / "build.log"
-        text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
-        return Outcome((), (), "does not compile", text, 0.0)
+        return Outcome(problem="does not compile", log=_text(folder / "build" / "build.log"))
     return simulate(
         runner,
         tier.modules,
         folder / "run",
         seed=seed,
-        environment={
-            **frame_environment(tier.columns, tier.rows),
-            **tier.environment,
-            "HDL_COVERAGE": "",  # what a wrong design reaches counts for nothing
-        },
+        environment=tier.environment,
         limit_s=limit_s,
         failures=1,
     )
+
+
+def _text(log: Path) -> str:
+    return log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
 
 
 def frame_environment(columns: int, rows: int) -> dict[str, str]:
@@ -278,9 +276,6 @@ def simulate(
     results, log = folder / "results.xml", folder / "simulation.log"
     seed += BASE_SEED
     start = time.monotonic()
-    plusargs = [f"+seed={seed}"]
-    if waveform:
-        plusargs.append(f"+dumpfile_path={waveform}")
     settings = {
         **environment,
         "PYTHONHASHSEED": "0",
@@ -294,7 +289,7 @@ def simulate(
             test_module=modules,
             hdl_toplevel=top,
             seed=seed,
-            plusargs=plusargs,
+            plusargs=[f"+seed={seed}", *[f"+dumpfile_path={waveform}"] * bool(waveform)],
             testcase=only or None,
             waves=waveform is not None,
             test_dir=folder,
@@ -322,11 +317,11 @@ def _surroundings(limit_s: int, settings: Mapping[str, str]) -> Iterator[None]:
 def _outcome(
     results: Path, log: Path, modules: Sequence[str], failures: int, seconds: float
 ) -> Outcome:
-    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    text = _text(log)
     try:
         cases = list(ElementTree.parse(results).iter("testcase"))
     except (OSError, ElementTree.ParseError):
-        return Outcome((), (), "the simulation gave no results", text, seconds)
+        return Outcome(problem="the simulation gave no results", log=text, seconds=seconds)
     failed = tuple(
         str(case.get("name"))
         for case in cases

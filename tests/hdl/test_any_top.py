@@ -18,5 +18,5 @@ CASES = [
 @pytest.mark.parametrize(("top", "module"), CASES)
 def test_top(icarus: Any, top: str, module: str) -> None:
     tier = TIERS[top]
-    settings = {"seed": 1, "environment": tier.environment}
+    settings = {"seed": 1, "environment": tier.further}
     icarus.run(tier.design, tier.columns, tier.rows, module, **settings)

@@ -53,13 +53,13 @@ def test_published_borders(icarus: Any) -> None:
 def test_bus(icarus: Any, top: str, columns: int, rows: int, seed: int) -> None:
     tier = TIERS[top]
     on_bus = [name for name in tier.modules if not name.endswith("states")]
-    icarus.run(tier.design, columns, rows, *on_bus, seed=seed, environment=tier.environment)
+    icarus.run(tier.design, columns, rows, *on_bus, seed=seed, environment=tier.further)
 
 
 @pytest.mark.parametrize("top", NEXT_VERSION)
 def test_bus_needs_no_initial_values(icarus: Any, top: str) -> None:
     tier = TIERS[top]
-    settings = {"environment": tier.environment, "initialised": False}
+    settings = {"environment": tier.further, "initialised": False}
     icarus.run(tier.design, 5, 3, *modules(STAR, "bus"), seed=1, **settings)
 
 

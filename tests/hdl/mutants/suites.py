@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
@@ -31,7 +32,7 @@ class Suite:
         environment: of the cocotb modules.
         standby: levels of inputs that make the state.
         kept: submodules whose signals the cocotb modules look at.
-        wrapper: a design around the module ``dut``, for stages with its name as top.
+        wrapper: a design around the module ``dut``, for stages with another top.
         source: file of the design's source that the mutants are of, if not of all.
     """
 
@@ -40,7 +41,7 @@ class Suite:
     environment: Mapping[str, str]
     standby: Mapping[str, int]
     kept: tuple[str, ...] = ()
-    wrapper: tuple[str, Callable[[], Component]] | None = None
+    wrapper: Callable[[], Component] | None = None
     source: str = ""
 
 
@@ -66,20 +67,8 @@ def _seeds(modules: tuple[str, ...], count: int, top: str = "dut") -> tuple[Stag
     return tuple(Stage(modules, seed, top) for seed in range(1, count + 1))
 
 
-def _suite(
-    name: str,
-    *stages: Stage,
-    standby: Mapping[str, int],
-    kept: tuple[str, ...] = (),
-    wrapper: tuple[str, Callable[[], Component]] | None = None,
-) -> Suite:
-    tier = TIERS[name]
-    environment = {
-        **frame_environment(tier.columns, tier.rows),
-        **tier.environment,
-        "HDL_COVERAGE": "",  # what a wrong design reaches counts for nothing
-    }
-    return Suite(tier.make, stages, environment, standby, kept, wrapper)
+def _suite(name: str, *stages: Stage, standby: Mapping[str, int], **options: Any) -> Suite:
+    return Suite(TIERS[name].make, stages, TIERS[name].environment, standby, **options)
 
 
 def _next(name: str, wrapped: type[AsPublished], standby: Mapping[str, int]) -> Suite:
@@ -94,7 +83,7 @@ def _next(name: str, wrapped: type[AsPublished], standby: Mapping[str, int]) -> 
         *_seeds(tier.modules, 3)[1:],
         *_seeds(published, 2, "published")[1:],
         standby=standby,
-        wrapper=("published", lambda: wrapped(tier.columns, tier.rows, "dut")),
+        wrapper=lambda: wrapped(tier.columns, tier.rows, "dut"),
     )
 
 
@@ -121,11 +110,7 @@ SUITES = {
     "cubestar-shared-bus": Suite(
         lambda: CubeStarShared(5, 33),
         _seeds(modules(STAR, "bus", "shared"), 2),
-        {
-            **frame_environment(5, 33),
-            "TESTBENCH": TIERS["cubestar-shared"].environment["TESTBENCH"],
-            "HDL_COVERAGE": "",
-        },
+        TIERS["cubestar-shared"].environment | frame_environment(5, 33),
         {"ENABLE": 0},
         source="bus_port.py",
     ),

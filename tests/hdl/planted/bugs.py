@@ -13,14 +13,9 @@ import pytest
 
 @dataclass(frozen=True)
 class Bug:
-    """One text of a module of ``cubestack.hdl`` that is replaced by another one.
+    """A text ``old``, which a module of ``cubestack.hdl`` has once, is replaced by ``new``.
 
-    Attributes:
-        kind: what sort of mistake it is.
-        title: which it is.
-        module: where it is made.
-        old, new: the text, which the module has once, and what stands in its place.
-        tops: those that have it; names of ``regression.TIERS``.
+    ``tops`` are those that have the bug; names of ``regression.TIERS``.
     """
 
     kind: str
@@ -31,237 +26,156 @@ class Bug:
     tops: tuple[str, ...]
 
 
-STAR, SHARED, DOUBLE, BOARDS, PAIR = (
-    "cubestar",
-    "cubestar-shared",
-    "cubestar-double",
-    "cubestar-boards",
-    "cubesense-pair",
-)
-ADDRESSING = "cubesense-pair-addressing"
+STAR = "cubestar"
+SHARED, DOUBLE, BOARDS = (f"cubestar-{name}" for name in ("shared", "double", "boards"))
+PAIR, ADDRESSING = "cubesense-pair", "cubesense-pair-addressing"
 WRITERS = (STAR, SHARED, DOUBLE, PAIR)
 
 #: Address of a picture's last pixel, in a top of CubeStar.
 _LAST = "((self.rows - 1) << (self.columns - 1).bit_length()) + self.columns - 1"
 
+#: By kind: title, module and tops of each; the text that it replaces, and the wrong one.
 _BY_KIND = {
-    "off by one": (
-        (
-            "a row ends a column early",
-            "blocks.matrix_counter",
+    "off by one": {
+        ("a row ends a column early", "blocks.matrix_counter", (*WRITERS, BOARDS)): (
             "column == self._columns - 1",
             "column == self._columns - 2",
-            (*WRITERS, BOARDS),
         ),
-        (
-            "a frame has a row more",
-            "blocks.matrix_counter",
+        ("a frame has a row more", "blocks.matrix_counter", WRITERS): (
             "row == self._rows - 1",
             "row == self._rows % (1 << len(row))",
-            WRITERS,
         ),
-        (
-            "a nadir scan's line ends early",
-            "cubesense.nadir_scan",
+        ("a nadir scan's line ends early", "cubesense.nadir_scan", (PAIR,)): (
             "size.rows - 1, size.columns - 1",
             "size.rows - 2, size.columns - 1",
-            (PAIR,),
         ),
-        (
-            "the Sun window starts a column too far right",
-            "cubesense.sun_window",
+        ("the Sun window starts a column too far right", "cubesense.sun_window", (PAIR,)): (
             "right, last_column = self._position(m, size.window_left, in_window)",
             "right, last_column = self._position(m, size.window_left - 1, in_window)",
-            (PAIR,),
         ),
-        (
-            "a gap is one clock shorter",
-            "blocks.frame_gap",
+        ("a gap is one clock shorter", "blocks.frame_gap", (PAIR,)): (
             "low_clocks == self._clocks",
             "low_clocks == self._clocks - 1",
-            (PAIR,),
         ),
-    ),
-    "swapped condition": (
-        (
-            "a line is taken while HSYNC is low",
-            "blocks.frame_writer",
+    },
+    "swapped condition": {
+        ("a line is taken while HSYNC is low", "blocks.frame_writer", WRITERS): (
             "                self.hsync\n                & self.vsync\n",
             "                ~self.hsync\n                & self.vsync\n",
-            WRITERS,
         ),
-        (
-            "the address multiplexer's sides",
-            "cubestar.top",
+        ("the address multiplexer's sides", "cubestar.top", (STAR,)): (
             "Mux(self.RNW, reader.address, writer.address)",
             "Mux(self.RNW, writer.address, reader.address)",
-            (STAR,),
         ),
-        (
-            "reading and writing on the bus",
-            "blocks.bus_port",
+        ("reading and writing on the bus", "blocks.bus_port", (SHARED, DOUBLE, BOARDS)): (
             "self.writing.eq(self.selected & self.re_n & ~self.we_n)",
             "self.writing.eq(self.selected & ~self.we_n)",
-            (SHARED, DOUBLE, BOARDS),
         ),
-        (
-            "the direction across the link",
-            "cubesense.dataflow",
+        ("the direction across the link", "cubesense.dataflow", (PAIR,)): (
             "(self.rnw, command.rnw),",
             "(self.rnw ^ (self.shift & ~self.edge), command.rnw),",
-            (PAIR,),
         ),
-    ),
-    "missing reset": (
-        (
-            "a store that begins inside of a line takes it",
-            "blocks.frame_writer",
+    },
+    "missing reset": {
+        ("a store that begins inside of a line takes it", "blocks.frame_writer", (STAR,)): (
             "between_lines_seen = Signal()",
             "between_lines_seen = Signal(reset_less=True)",
-            (STAR,),
         ),
-        (
-            "rows are counted on",
-            "blocks.matrix_counter",
+        ("rows are counted on", "blocks.matrix_counter", (STAR, PAIR)): (
             "row = Signal(range(self._rows))",
             "row = Signal(range(self._rows), reset_less=True)",
-            (STAR, PAIR),
         ),
-        (
-            "a short last row is not forgotten",
-            "blocks.frame_writer",
+        ("a short last row is not forgotten", "blocks.frame_writer", (STAR,)): (
             "frame_full = Signal()  # the",
             "frame_full = Signal(reset_less=True)  # the",
-            (STAR,),
         ),
-        (
-            "the reader goes on where it was",
-            "cubestar.top",
+        ("the reader goes on where it was", "cubestar.top", (STAR,)): (
             'ResetSignal("dclk").eq(~reading)',
             'ResetSignal("dclk").eq(0)',
-            (STAR,),
         ),
-        (
-            "the address latch keeps what it has",
-            "blocks.bus_port",
+        ("the address latch keeps what it has", "blocks.bus_port", ("cubestar-shared-latch",)): (
             'ResetSignal("ale").eq(~self.on)',
             'ResetSignal("ale").eq(0)',
-            ("cubestar-shared-latch",),
         ),
-        (
-            "a scan goes on where it was",
-            "cubesense.nadir_scan",
+        ("a scan goes on where it was", "cubesense.nadir_scan", (PAIR,)): (
             "vertical = Signal()",
             "vertical = Signal(reset_less=True)",
-            (PAIR,),
         ),
-        (
-            "a taken address outlives standby",
-            "cubesense.reader",
+        ("a taken address outlives standby", "cubesense.reader", (ADDRESSING,)): (
             "picture_wanted = self.picture | self.addressing",
             "picture_wanted = self.picture | self.addressing | ~(self.scan | self.window)",
-            (ADDRESSING,),
         ),
-    ),
-    "wrong bank": (
-        ("BANK is inverted", "cubestar.top", "bank.eq(self.BANK)", "bank.eq(~self.BANK)", (STAR,)),
-        (
-            "BANK is not latched",
-            "cubestar.top",
+    },
+    "wrong bank": {
+        ("BANK is inverted", "cubestar.top", (STAR,)): (
+            "bank.eq(self.BANK)",
+            "bank.eq(~self.BANK)",
+        ),
+        ("BANK is not latched", "cubestar.top", (STAR,)): (
             "m.d.enable += bank.eq(self.BANK)",
             "m.d.comb += bank.eq(self.BANK)",
-            (STAR,),
         ),
-        (
-            "BANK is not latched",
-            "cubestar.shared_top",
+        ("BANK is not latched", "cubestar.shared_top", (SHARED, BOARDS)): (
             "m.d.enable += bank.eq(self.BANK)",
             "m.d.comb += bank.eq(~self.BANK)",
-            (SHARED, BOARDS),
         ),
-        (
-            "the other memory is stored in",
-            "cubestar.double_top",
+        ("the other memory is stored in", "cubestar.double_top", (DOUBLE,)): (
             "m.d.start += into.eq(self.INTO)",
             "m.d.start += into.eq(~self.INTO)",
-            (DOUBLE,),
         ),
-        (
-            "own and other sensor's order",
-            "cubesense.top",
+        ("own and other sensor's order", "cubesense.top", (PAIR,)): (
             "own_edge, other_edge = orders if is_sun else orders[::-1]",
             "own_edge, other_edge = orders[::-1] if is_sun else orders",
-            (PAIR,),
         ),
-        (
-            "the Sun is looked for in the other camera's picture",
-            "cubesense.top",
+        ("the Sun is looked for in the other camera's picture", "cubesense.top", (PAIR,)): (
             "sun_writer = own_writer if is_sun else link_writer",
             "sun_writer = link_writer if is_sun else own_writer",
-            (PAIR,),
         ),
-    ),
-    "late ACK": (
-        (
-            "one pixel clock",
-            "blocks.frame_writer",
+    },
+    "late ACK": {
+        ("one pixel clock", "blocks.frame_writer", WRITERS): (
             "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
             "(late := Signal()).eq(storing_last_column & counter.last_row),\n"
             "            self.ack.eq(self.ack | late),",
-            WRITERS,
-        ),
-    ),
-    "early ACK": (
-        (
-            "a row",
-            "blocks.frame_writer",
+        )
+    },
+    "early ACK": {
+        ("a row", "blocks.frame_writer", WRITERS): (
             "self.ack.eq(self.ack | (storing_last_column & counter.last_row)),",
             "self.ack.eq(self.ack | (self.store & counter.last_row)),",
-            WRITERS,
         ),
-        (
-            "before the last write pulse",
-            "cubestar.top",
+        ("before the last write pulse", "cubestar.top", (STAR,)): (
             "writer = self._add_writer(m, storing)\n",
             "writer = self._add_writer(m, storing)\n        m.d.comb += "
             f"self.ACK.eq(writer.ack | (writer.store & (writer.address == {_LAST})))\n",
-            (STAR,),
         ),
-        (
-            "before the last write pulse",
-            "cubesense.top",
+        ("before the last write pulse", "cubesense.top", (PAIR,)): (
             "self.ACK.eq(own_writer.ack | link_writer.ack)",
             "self.ACK.eq(own_writer.ack | link_writer.ack | (own_writer.store & (own_writer.address"
             f" == {_LAST.replace('self.', 'self.read_out.')})))",
-            (PAIR,),
         ),
-    ),
-    "extra WE pulse": (
-        (
-            "after the last pixel",
-            "blocks.frame_writer",
+    },
+    "extra WE pulse": {
+        ("after the last pixel", "blocks.frame_writer", WRITERS): (
             "self.store.eq(accept),",
             "self.store.eq(accept | (storing_last_column & counter.last_row)),",
-            WRITERS,
         ),
-        (
-            "after a row",
-            "blocks.frame_writer",
+        ("after a row", "blocks.frame_writer", WRITERS): (
             "                & ~storing_last_column\n",
             "",
-            WRITERS,
         ),
-        (
-            "in the clock's high half",
-            "cubestar.top",
+        ("in the clock's high half", "cubestar.top", (STAR,)): (
             "self.SRAM_WE_N.eq(~writer.store | self.PIXCLK)",
             "self.SRAM_WE_N.eq(~writer.store)",
-            (STAR,),
         ),
-    ),
+    },
 }
 
-BUGS = tuple(Bug(kind, *parts) for kind, bugs in _BY_KIND.items() for parts in bugs)
+BUGS = tuple(
+    Bug(kind, title, module, *texts, tops)
+    for kind, bugs in _BY_KIND.items()
+    for (title, module, tops), texts in bugs.items()
+)
 
 
 @contextmanager
@@ -272,8 +186,8 @@ def planted(bug: Bug) -> Iterator[dict[str, object]]:
     """
     module = import_module(f"cubestack.hdl.{bug.module}")
     text = Path(str(module.__file__)).read_text(encoding="utf-8")
-    if text.count(bug.old) != 1:
-        raise ValueError(f"{bug.module} has {bug.old!r} {text.count(bug.old)} times, not once")
+    if (times := text.count(bug.old)) != 1:
+        raise ValueError(f"{bug.module} has {bug.old!r} {times} times, not once")
     copy = ModuleType(module.__name__)
     copy.__file__ = module.__file__
     exec(compile(text.replace(bug.old, bug.new), str(module.__file__), "exec"), vars(copy))

@@ -15,15 +15,7 @@ pytestmark = [
 
 #: One of each kind, on the published board, is tried in `make test` too.
 QUICK = {bug.kind: bug for bug in reversed(BUGS) if STAR in bug.tops}
-KINDS = (
-    "off by one",
-    "swapped condition",
-    "missing reset",
-    "wrong bank",
-    "late ACK",
-    "early ACK",
-    "extra WE pulse",
-)
+KINDS = dict.fromkeys(bug.kind for bug in BUGS)
 CASES = [
     pytest.param(bug, top, id=f"{bug.kind}, {bug.title}, {bug.module}-{top}")
     for bug in BUGS
@@ -55,10 +47,10 @@ def test_every_kind_is_planted_in_both_sensors() -> None:
 
 def test_document_has_every_bug() -> None:
     document = Path(__file__).parents[3] / "docs" / "gateware-tests.md"
-    text = document.read_text(encoding="utf-8")
-    for kind in KINDS:
-        titles = dict.fromkeys(bug.title for bug in BUGS if bug.kind == kind)
-        assert f"| {kind} | {'; '.join(titles)} |" in text
+    _, _, section = document.read_text(encoding="utf-8").partition("| Kind | Bugs |\n|---|---|\n")
+    titles = {kind: dict.fromkeys(b.title for b in BUGS if b.kind == kind) for kind in KINDS}
+    rows = [f"| {kind} | {'; '.join(those)} |" for kind, those in titles.items()]
+    assert section.startswith("\n".join([*rows, "\n"]))
 
 
 def test_nothing_is_left_behind() -> None:
