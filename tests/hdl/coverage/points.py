@@ -8,12 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    ADDRESSING_COMMANDS,
-    COMMANDS,
-    Action,
-    FpgaCommand,
-)
+from cubestack.firmware_model.interface.cubesense import fpga
+from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, FpgaCommand
 
 #: What a writer can be doing when it is stopped. "Reset" is the two clocks after it was started.
 STORE_STATES = (
@@ -61,13 +57,7 @@ PIXEL_MHZ = (1.0, 2.0, 5.0, 10.0, 13.5, 20.0)
 PHASES = 8
 
 #: The testbenches that ``harness.any_top`` and ``harness.rates`` run on.
-TESTBENCHES = (
-    "PublishedTestbench",
-    "SharedTestbench",
-    "DoubleTestbench",
-    "BoardsTestbench",
-    "PairTestbench",
-)
+TESTBENCHES = [f"{name}Testbench" for name in ("Published", "Shared", "Double", "Boards", "Pair")]
 
 #: CubeStar's tops by the names of their designs.
 CUBESTAR = {
@@ -84,13 +74,12 @@ Point = tuple[str, ...]
 
 def name_of(command: FpgaCommand) -> str:
     """A row of the command table as its levels: SHIFT EDGE RNW SUNEN NADEN."""
-    levels = (command.shift, command.edge, command.rnw, command.sunen, command.naden)
-    return "".join("x" if level is None else str(level) for level in levels)
+    return "".join("x" if level is None else str(level) for level in command.levels)
 
 
 def row_of(*levels: int, mcu_addressing: bool) -> str:
     """The row that fits these levels, or the levels themselves where none does."""
-    for command in COMMANDS + ADDRESSING_COMMANDS * mcu_addressing:
+    for command in COMMANDS + fpga.ADDRESSING_COMMANDS * mcu_addressing:
         if command.fits(*levels):
             return name_of(command)
     return "".join(map(str, levels))
@@ -100,11 +89,9 @@ def states_of(side: str, action: Action) -> tuple[str, ...]:
     """What an FPGA can be doing when it leaves an action."""
     of_sun = (side == "sun") == (action is Action.EDGE)
     return {
-        Action.STORE: STORE_STATES,
-        Action.STORE_OTHER: STORE_STATES,
+        **dict.fromkeys((Action.STORE, Action.STORE_OTHER), STORE_STATES),
+        **dict.fromkeys((Action.EDGE, Action.SEND_EDGE), WINDOW_STATES if of_sun else SCAN_STATES),
         Action.READ: READ_STATES,
-        Action.EDGE: WINDOW_STATES if of_sun else SCAN_STATES,
-        Action.SEND_EDGE: WINDOW_STATES if of_sun else SCAN_STATES,
         Action.SEND_PICTURE: SEND_STATES,
         Action.PASS_EDGE: ("passing",),
         Action.TAKE_ADDRESS: TAKE_STATES,
@@ -115,12 +102,10 @@ def states_of(side: str, action: Action) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Group:
-    """Points of one kind.
+    """Points of one kind; ``meaning`` is what a point is.
 
-    Attributes:
-        meaning: what a point is.
-        axes: the names of its parts, and what each can be.
-        possible: whether a combination can happen at all; arguments are the parts by name.
+    ``axes`` are the names of its parts, and what each can be; ``possible`` tells whether a
+    combination, given by these names, can happen at all.
     """
 
     meaning: str
@@ -129,11 +114,10 @@ class Group:
 
     def points(self) -> list[Point]:
         """All of them."""
-        combinations = product(*self.axes.values())
         return [
-            tuple(map(str, combination))
-            for combination in combinations
-            if self.possible(**dict(zip(self.axes, combination, strict=True)))
+            tuple(map(str, parts))
+            for parts in product(*self.axes.values())
+            if self.possible(**dict(zip(self.axes, parts, strict=True)))
         ]
 
 
@@ -143,21 +127,11 @@ def _rows(mcu_addressing: bool) -> Iterator[str]:
     )
 
 
-def _can_leave(top: str, left_in: str, left_by: str) -> bool:
-    """RNW may not hand over the address of a shared memory while a picture is stored."""
-    return left_by == "ENABLE" or top in ("published", "double")
-
-
-def _takes(side: str, action: Action, state: str) -> bool:
-    return state in states_of(side, action)
-
-
-def _acts(command: FpgaCommand) -> set[Action]:
-    return {command.actions.sun, command.actions.nadir}
-
-
-PAIR_ACTIONS = tuple(a for a in Action if any(a in _acts(c) for c in COMMANDS))
-ADDRESSING_ACTIONS = tuple(a for a in Action if any(a in _acts(c) for c in ADDRESSING_COMMANDS))
+#: In a top's own commands.
+ACTIONS = {
+    top: {action for command in commands for action in command.actions}
+    for top, commands in (("pair", COMMANDS), ("addressing", fpga.ADDRESSING_COMMANDS))
+}
 ALL_STATES = tuple(
     dict.fromkeys(s for side in SIDES for action in Action for s in states_of(side, action))
 )
@@ -178,8 +152,9 @@ GROUPS = {
     "cubestar store": Group(
         "a store, what it was at when it was left, and by which pin",
         {"top": CUBESTAR.values(), "left_in": STORE_STATES, "left_by": ("ENABLE", "RNW", "both")},
+        # RNW may not hand over the address of a shared memory while a picture is stored.
         lambda top, left_in, left_by: (
-            _can_leave(top, left_in, left_by) and (left_by != "both" or top == "published")
+            top == "published" or left_by == "ENABLE" or (top, left_by) == ("double", "RNW")
         ),
     ),
     "cubestar read": Group(
@@ -217,9 +192,9 @@ GROUPS = {
         "an action of an FPGA, and what it was at when it was left",
         {"top": PAIRS.values(), "side": SIDES, "action": tuple(Action), "state": ALL_STATES},
         lambda top, side, action, state: (
-            _takes(side, action, state)
+            state in states_of(side, action)
             and state != "before a line"  # a gap has ended, so that is a line
-            and (action in PAIR_ACTIONS if top == "pair" else action in ADDRESSING_ACTIONS)
+            and action in ACTIONS[top]
         ),
     ),
     "pair border": Group(

@@ -30,11 +30,7 @@ OTHER = {"sun": "nadir", "nadir": "sun"}
 
 #: The outputs in standby. The SRAMs' strobes are low active.
 STANDBY = {
-    "SUNACK": 0,
-    "NADACK": 0,
-    "DATA": 0,
-    "DATA_OE": 0,
-    "CONTENTION": 0,
+    **dict.fromkeys(("SUNACK", "NADACK", "DATA", "DATA_OE", "CONTENTION"), 0),
     **{
         f"{prefix}_SRAM_{name}": level
         for prefix in PREFIXES.values()
@@ -72,6 +68,18 @@ def with_sun(x: int, y: int) -> bytes:
     return bytes(content)
 
 
+def window_of(content: bytes, x: int, y: int) -> bytes:
+    """The window around a first Sun pixel, row by row."""
+    size, (left, top) = READ_OUT.window, READ_OUT.window_origin(x, y)
+    starts = (row * GEOMETRY.columns + left for row in range(top, top + size))
+    return b"".join(content[start:][:size] for start in starts)
+
+
+def coordinates(x: int, y: int) -> bytes:
+    """The bytes before the window."""
+    return x.to_bytes(2, "little") + y.to_bytes(2, "little")
+
+
 class CubeSenseMcu(Processor[Controls]):
     """Drives the control pins, and its data bus where that goes both ways.
 
@@ -100,27 +108,24 @@ class CubeSenseMcu(Processor[Controls]):
     async def command(self, shift: int, edge: int, rnw: int, sunen: int, naden: int) -> None:
         """From standby: a row of the command table, the enables last."""
         await self.set(SHIFT=shift, EDGE=edge, RNW=rnw)
-        enables = {"SUNEN": sunen, "NADEN": naden}
+        await self._enable(SUNEN=sunen, NADEN=naden)
+
+    async def standby(self) -> None:
+        """From anywhere."""
+        await self._enable(SUNEN=1, NADEN=1)
+
+    async def _enable(self, **enables: int) -> None:
+        """Both at once, or one after the other."""
         if random.getrandbits(1):
             await self.set(**enables)
         else:
             for name in random.sample(sorted(enables), 2):
                 await self.set(**{name: enables[name]})
 
-    async def standby(self) -> None:
-        """From anywhere."""
-        if random.getrandbits(1):
-            await self.set(SUNEN=1, NADEN=1)
-        else:
-            for name in random.sample(["SUNEN", "NADEN"], 2):
-                await self.set(**{name: 1})
-
     async def store(self, camera: str, memory: str) -> None:
         """From standby: a camera's picture to a memory."""
-        if camera == memory:
-            await self.command(0, 0, 0, *enables(camera))
-        else:
-            await self.command(1, 0, 0 if camera == "sun" else 1, 0, 0)
+        own = (0, 0, 0, *enables(camera))
+        await self.command(*(own if camera == memory else (1, 0, int(camera != "sun"), 0, 0)))
 
     async def read_picture(self, side: str) -> None:
         """From standby: ready to read a memory's picture."""
@@ -128,10 +133,8 @@ class CubeSenseMcu(Processor[Controls]):
 
     async def read_edge(self, sensor: str, memory: str) -> None:
         """From standby: ready to read a sensor's edge data in a memory."""
-        if sensor == memory:
-            await self.command(0, 1, 1, *enables(sensor))
-        else:
-            await self.command(1, 1, 0 if sensor == "sun" else 1, 0, 0)
+        own = (0, 1, 1, *enables(sensor))
+        await self.command(*(own if sensor == memory else (1, 1, int(sensor != "sun"), 0, 0)))
 
     async def open_address(self, side: str) -> None:
         """From standby: ready to take an address."""
@@ -284,19 +287,14 @@ class PairTestbench(Testbench[Place]):
         await self.standby()
         await Timer(1, unit="ns")
         assert levels(self.dut, STANDBY) == STANDBY
-        halves, data = behaviour(
-            self._before,
-            [self.cameras[side].clocks for side in SIDES],
-            self.mcu.controls,
-            self.mcu.data_clocks,
-            self.mcu.sent,
-        )
-        for side, half in halves.items():
-            assert self.srams[side].pulses == half.pulses, side
-            assert self.srams[side].edges == len(half.pulses), side
-            assert self.srams[side].memory == half.memory, side
-            assert self._ack[side] == half.ack, side
-        assert self.mcu.bytes == {time: data.get(time, 0) for time in self.mcu.bytes}
         clocks = {side: self.cameras[side].clocks for side in SIDES}
-        coverage.sample(halves, clocks, self.mcu.controls, self.mcu.data_clocks)
+        mcu, cameras = self.mcu, [*clocks.values()]
+        halves, data = behaviour(self._before, cameras, mcu.controls, mcu.data_clocks, mcu.sent)
+        for side, half in halves.items():
+            sram = self.srams[side]
+            assert sram.pulses == half.pulses, side
+            assert (sram.edges, sram.memory) == (len(half.pulses), half.memory), side
+            assert self._ack[side] == half.ack, side
+        assert mcu.bytes == {time: data.get(time, 0) for time in mcu.bytes}
+        coverage.sample(halves, clocks, mcu.controls, mcu.data_clocks)
         return halves

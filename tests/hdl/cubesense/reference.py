@@ -6,27 +6,19 @@ read-outs at once, not clock by clock.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby, islice, pairwise
+from itertools import chain, cycle, groupby, islice, pairwise, product
 from typing import NamedTuple
 
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    SUN_RUN,
-    SUN_THRESHOLD,
-    Action,
-    actions,
-    link_shows_enables,
-)
+from cubestack.firmware_model.interface.cubesense import fpga
+from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, Action
 from tests.hdl.cubesense.settings import MCU_ADDRESSING, READ_OUT
 from tests.hdl.harness.geometry import GEOMETRY
-from tests.hdl.harness.reference import Clock, Pulse, Tick, taken
+from tests.hdl.harness.reference import Clock, Pulse, Tick, taken, write
 
 SIDES = ("sun", "nadir")
 NEVER = 1 << 62
 ADDRESSING = (Action.TAKE_ADDRESS, Action.READ_FROM)
-NOT_FOUND = (
-    (1 << (GEOMETRY.columns - 1).bit_length()) - 1,
-    (1 << (GEOMETRY.rows - 1).bit_length()) - 1,
-)
+NOT_FOUND = tuple((1 << (size - 1).bit_length()) - 1 for size in GEOMETRY)
 
 
 class Controls(NamedTuple):
@@ -77,10 +69,10 @@ def vsync(href: Sequence[int]) -> list[int]:
 def action_of(side: str, controls: Controls) -> Action:
     """What an FPGA does that sees its own enable, and the other one only over the link."""
     _, shift, edge, rnw, sunen, naden = controls
-    if not link_shows_enables(shift, edge):
+    if not fpga.link_shows_enables(shift, edge):
         sunen, naden = (sunen, 0) if side == "sun" else (0, naden)
     levels = (shift, edge, rnw, sunen, naden)
-    return getattr(actions(*levels, mcu_addressing=MCU_ADDRESSING), side)
+    return getattr(fpga.actions(*levels, mcu_addressing=MCU_ADDRESSING), side)
 
 
 def windows(side: str, controls: Sequence[Controls]) -> list[Window]:
@@ -127,19 +119,9 @@ def store(half: Half, window: Window, clocks: Sequence[Clock], of_sun: bool) -> 
     clocks = [clock for clock in clocks if window.start < clock.rise < window.end]
     clocks = clocks[2:]  # the reset is released through two flip-flops
     levels = vsync([clock.pins.hsync for clock in clocks])
-    ticks = [
-        Tick(clock.pins.pixel, clock.pins.hsync, level)
-        for clock, level in zip(clocks, levels, strict=True)
-    ]
-    pixels, ack = taken(ticks, GEOMETRY)
-    ends = [clock.rise for clock in clocks[1:]] + [window.end]
-    for index, address in pixels:
-        if clocks[index].fall < window.end:
-            value = ticks[index].pixel
-            half.pulses.append(Pulse(clocks[index].fall, ends[index], address, value))
-            half.memory[address] = value
-    if ack is not None and ack < len(clocks):
-        half.ack += [(clocks[ack].rise, 1), (window.end, 0)]
+    ticks = [c.pins._replace(vsync=level) for c, level in zip(clocks, levels, strict=True)]
+    pixels, ack = found = taken(ticks, GEOMETRY)
+    write(half, clocks, window.end, found)
     if of_sun and len(clocks) >= 2:
         half.sun = first_sun(ticks[: ack + 1 if ack else None], pixels)
 
@@ -147,12 +129,9 @@ def store(half: Half, window: Window, clocks: Sequence[Clock], of_sun: bool) -> 
 def first_sun(ticks: Sequence[Tick], pixels: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """First of three bright ones side by side in the last frame that began."""
     began = max(index for index, tick in enumerate(ticks) if not tick.vsync)
-    columns = 1 << (GEOMETRY.columns - 1).bit_length()
-    bright = [
-        (index, address)
-        for index, address in pixels
-        if index > began and ticks[index].pixel >= SUN_THRESHOLD
-    ]
+    columns = GEOMETRY.address(0, 1)
+    later = [(index, address) for index, address in pixels if index > began]
+    bright = [(index, address) for index, address in later if ticks[index].pixel >= SUN_THRESHOLD]
     for first, third in zip(bright, bright[SUN_RUN - 1 :], strict=False):
         together = third[1] - first[1] == SUN_RUN - 1 and third[0] - first[0] == SUN_RUN - 1
         if together and third[0] + 1 < len(ticks):
@@ -161,19 +140,15 @@ def first_sun(ticks: Sequence[Tick], pixels: Sequence[tuple[int, int]]) -> tuple
 
 
 def picture(half: Half) -> Iterator[int]:
-    while True:
-        for y in range(GEOMETRY.rows):
-            for x in range(GEOMETRY.columns):
-                yield half.memory[GEOMETRY.address(x, y)]
+    for address in cycle(GEOMETRY.addresses()):
+        yield half.memory[address]
 
 
 def scan(half: Half) -> Iterator[int]:
     pixels = list(READ_OUT.scan())
     vertical = pixels[-len(READ_OUT.scan_columns) * READ_OUT.rows :]
-    while True:
-        for pixel in pixels:
-            yield half.memory[0 if pixel is None else GEOMETRY.address(*pixel)]
-        pixels = vertical
+    for pixel in chain(pixels, cycle(vertical)):
+        yield half.memory[0 if pixel is None else GEOMETRY.address(*pixel)]
 
 
 def sun_window(half: Half) -> Iterator[int]:
@@ -182,10 +157,8 @@ def sun_window(half: Half) -> Iterator[int]:
     half.suns_read.append(half.sun)
     yield from x.to_bytes(2, "little") + y.to_bytes(2, "little")
     left, top = READ_OUT.window_origin(x, y)
-    while True:
-        for row in range(READ_OUT.window):
-            for column in range(READ_OUT.window):
-                yield half.memory[GEOMETRY.address(left + column, top + row)]
+    for row, column in cycle(product(range(READ_OUT.window), repeat=2)):
+        yield half.memory[GEOMETRY.address(left + column, top + row)]
 
 
 def addressed(
@@ -208,17 +181,17 @@ def addressed(
                 data[time] = half.memory[address]
                 y, x = divmod(address, GEOMETRY.address(0, 1))
                 pixel = (y * GEOMETRY.columns + x + 1) % GEOMETRY.pixels
-                address = GEOMETRY.address(pixel % GEOMETRY.columns, pixel // GEOMETRY.columns)
+                address = GEOMETRY.addresses()[pixel]
     return data
 
 
 def read(half: Half, side: str, window: Window, data_clocks: Sequence[int]) -> dict[int, int]:
     """Byte on the microcontroller's bus after each data clock of one read-out."""
+    order = scan
     if window.action is Action.READ:
         order = picture
-    else:
-        of_sun = (side == "sun") == (window.action is Action.EDGE)
-        order = sun_window if of_sun else scan
+    elif (side == "sun") == (window.action is Action.EDGE):
+        order = sun_window
     times = [time for time in data_clocks if window.start < time < window.end]
     return dict(zip(times, islice(order(half), len(times)), strict=True))
 
@@ -231,15 +204,11 @@ def behaviour(
     sent: Mapping[int, int],
 ) -> tuple[dict[str, Half], dict[int, int]]:
     """Both halves, and the bytes read, from the memories at first and what the inputs did since."""
-    halves = {
-        side: Half(bytearray(memory), windows(side, controls))
-        for side, memory in zip(SIDES, memories, strict=True)
-    }
+    both = [Half(bytearray(m), windows(s, controls)) for s, m in zip(SIDES, memories, strict=True)]
     data: dict[int, int] = {}
-    for side, half in halves.items():
-        own, other = SIDES.index(side), 1 - SIDES.index(side)
-        sending = [w for w in halves[SIDES[other]].windows if w.action is Action.SEND_PICTURE]
-        link = link_clocks(sending, cameras[other])
+    for own, (side, half) in enumerate(zip(SIDES, both, strict=True)):
+        sending = [w for w in both[1 - own].windows if w.action is Action.SEND_PICTURE]
+        link = link_clocks(sending, cameras[1 - own])
         ended, before = -1, Action.STANDBY
         for window in half.windows:
             if window.action is Action.STORE:
@@ -253,4 +222,4 @@ def behaviour(
             ):
                 data |= addressed(half, window, data_clocks, sent)
             ended, before = window.end, window.action
-    return halves, data
+    return dict(zip(SIDES, both, strict=True)), data

@@ -1,6 +1,7 @@
 """CubeSense's blocks, each alone, on Icarus Verilog."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -53,20 +54,13 @@ def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
 @pytest.mark.parametrize("addressing", [False, True], ids=["published", "addressing"])
 @pytest.mark.parametrize("side", ["sun", "nadir"])
 def test_dataflow(simulate: Any, side: Any, addressing: bool) -> None:
-    simulate(
-        lambda _: DataflowControl(side, mcu_addressing=addressing),
-        ReadOut(),
-        "dataflow",
-        name=f"{side}_dataflow_{addressing}",
-        mcu_addressing=addressing,
-        side=side,
-        seed=1,
-    )
+    options = {"mcu_addressing": addressing, "side": side, "seed": 1}
+    options["name"] = f"{side}_dataflow_{addressing}"
+    make = partial(DataflowControl, side, mcu_addressing=addressing)
+    simulate(lambda _: make(), ReadOut(), "dataflow", **options)
 
 
 @pytest.mark.parametrize("side", ["sun", "nadir"])
 def test_fpga_alone(simulate: Any, read_out: ReadOut, side: Any) -> None:
-    name = f"{side}_fpga"
-    simulate(
-        lambda size: CubeSenseFpga(side, size), read_out, "fpga_alone", name=name, side=side, seed=1
-    )
+    options = {"name": f"{side}_fpga", "side": side, "seed": 1}
+    simulate(partial(CubeSenseFpga, side), read_out, "fpga_alone", **options)

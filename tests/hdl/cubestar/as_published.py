@@ -3,9 +3,12 @@
 The bus rests, so nothing is read.
 """
 
-from amaranth.hdl import Cat, Const, Fragment, Instance, Module, Mux, Signal
-from amaranth.lib.wiring import Component, In, SignatureMembers
+from collections.abc import Mapping
 
+from amaranth.hdl import Cat, Const, Fragment, Instance, Module, Mux, Signal, Value
+from amaranth.lib.wiring import In, SignatureMembers
+
+from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.top import CubeStarTop
@@ -17,17 +20,23 @@ _BUS_RESTS = {
 }
 
 
-def _ports(board: Component) -> SignatureMembers:
-    Fragment.get(board, None)  # Amaranth warns of a component that is never elaborated
-    return board.signature.members
-
-
 class AsPublished(CubeStarTop):
     """Around a board that is a module named ``board``."""
 
     def __init__(self, columns: int, rows: int, board: str = "board") -> None:
         super().__init__(columns, rows)
         self._board = board
+
+    def _members(self, design: type[CubeStarBoard]) -> SignatureMembers:
+        board = design(self.columns, self.rows)
+        Fragment.get(board, None)  # Amaranth warns of a component that is never elaborated
+        return board.signature.members
+
+    def _instance(self, members: SignatureMembers, levels: Mapping[str, Value]) -> Instance:
+        """The board, with ``levels`` at its ports."""
+        ways = {name: "i" if member.flow is In else "o" for name, member in members.items()}
+        known = {f"{way}_{name}": levels[name] for name, way in ways.items() if name in levels}
+        return Instance(self._board, **known)
 
 
 class SharedAsPublished(AsPublished):
@@ -36,15 +45,7 @@ class SharedAsPublished(AsPublished):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         levels = {name: getattr(self, name) for name in self.signature.members} | _BUS_RESTS
-        members = _ports(CubeStarShared(self.columns, self.rows))
-        m.submodules.board = Instance(
-            self._board,
-            **{
-                f"{'i' if member.flow is In else 'o'}_{name}": levels[name]
-                for name, member in members.items()
-                if name in levels
-            },
-        )
+        m.submodules.board = self._instance(self._members(CubeStarShared), levels)
         return m
 
 
@@ -53,14 +54,11 @@ class DoubleAsPublished(AsPublished):
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        members = _ports(CubeStarDouble(self.columns, self.rows))
-        ports = {
-            name: Signal(member.shape, name=f"board_{name}") for name, member in members.items()
-        }
-        for name, level in _BUS_RESTS.items():
+        members = self._members(CubeStarDouble)
+        ports = {n: Signal(member.shape, name=f"board_{n}") for n, member in members.items()}
+        same = ("PIXCLK", "PIXDATA", "HSYNC", "VSYNC", "ENABLE")
+        for name, level in {**_BUS_RESTS, **{n: getattr(self, n) for n in same}}.items():
             m.d.comb += ports[name].eq(level)
-        for name in ("PIXCLK", "PIXDATA", "HSYNC", "VSYNC", "ENABLE"):
-            m.d.comb += ports[name].eq(getattr(self, name))
         storing = self.ENABLE & ~self.RNW
         first, second = (
             {name: ports[f"SRAM{n}_{name}"] for name in ("A", "D_O", "D_OE", "CE_N", "WE_N")}
@@ -80,11 +78,5 @@ class DoubleAsPublished(AsPublished):
             self.SRAM_OE_N.eq(1),
             self.SRAM_WE_N.eq(first["WE_N"] & second["WE_N"]),
         ]
-        m.submodules.board = Instance(
-            self._board,
-            **{
-                f"{'i' if member.flow is In else 'o'}_{name}": ports[name]
-                for name, member in members.items()
-            },
-        )
+        m.submodules.board = self._instance(members, ports)
         return m

@@ -38,13 +38,13 @@ module full_frame;
         end
     endfunction
 
-    // Camera: free-running, joined in the middle of frame 0. One clock in 256 is stretched.
+    // Camera: free-running, joined in the last rows of frame 0. One clock in 256 is stretched.
     integer seed, half, frame, row, column, blank, stretch;
     initial begin
         if (!$value$plusargs("seed=%d", seed)) seed = 1;
         half = 30000 + $unsigned($random(seed)) % 40000;
         frame = 0;
-        row = $unsigned($random(seed)) % (ROWS - 32);
+        row = ROWS - 96 + $unsigned($random(seed)) % 64;
         column = $unsigned($random(seed)) % COLUMNS;
         blank = 0;
         forever begin

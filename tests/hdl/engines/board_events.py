@@ -5,45 +5,37 @@ Every event is an instant of its own, so that what each engine settles on is def
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-from cubestack.emulator.boards.cubestar.wiring import (
-    cubestar_double_wiring,
-    cubestar_shared_wiring,
-    cubestar_two_boards_wiring,
-    cubestar_wiring,
-)
+from cubestack.emulator.boards.cubestar import wiring as cubestar
 from cubestack.emulator.rtl.contract import PinEvent
 from cubestack.emulator.rtl.wiring import CameraPins, Wiring
-from cubestack.firmware_model.interface.cubesense.fpga import (
-    ADDRESSING_COMMANDS,
-    COMMANDS,
-    Action,
-    ReadOut,
-)
+from cubestack.firmware_model.interface.cubesense import fpga
+from cubestack.firmware_model.interface.cubesense.fpga import Action
 from cubestack.hdl.cubesense.pair import CubeSensePair
+from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
+from tests.hdl.regression import SMALLEST
 
+#: Between two events at least; a bench in Verilog needs some of it to settle.
 SPACING_PS = 10
-"""Between two events at least; a bench in Verilog needs some of it to settle."""
 
+#: Of CubeStar's tops: so wide that the bus' address latch has bits; no power of two.
 COLUMNS, ROWS = 18, 5
-"""Of CubeStar's tops: so wide that the bus' address latch has bits; no power of two."""
 
+#: One more than the memories on the bus have.
 ADDRESS_BITS = 10
-"""One more than the memories on the bus have."""
 
-SIZE = ReadOut(11, 5, 9, scan_step=2, first_row=1, first_column=1, window=5, window_left=1)
-
+#: Wait so many ps, then drive a pin.
 Step = tuple[int, str, int]
-"""Wait so many ps, then drive a pin."""
-
 Rng = np.random.Generator
+Script = Callable[[Rng], Iterator[Step]]
 
 
 @dataclass(frozen=True)
@@ -61,31 +53,27 @@ class Board:
     columns: int
     rows: int
     gap: int
-    script: Callable[[Rng], Iterator[Step]]
+    script: Script
 
 
 def random_events(board: Board, wiring: Wiring, rng: Rng, end_ps: int) -> list[PinEvent]:
     """Cameras with clocks of their own, and the microcontroller, up to ``end_ps``."""
-    merged: list[tuple[int, str, int]] = []
-    for camera in wiring.cameras:
-        merged += _until(_camera(board, camera, rng), end_ps)
-    merged += _until(board.script(rng), end_ps)
-    merged.sort(key=lambda event: event[0])
+    sources = [_camera(board, camera, rng) for camera in wiring.cameras] + [board.script(rng)]
+    merged = [event for source in sources for event in _until(source, end_ps)]
     events, time_ps = [], 0
-    for at, pin, level in merged:
+    for at, pin, level in sorted(merged, key=lambda event: event[0]):
         time_ps = max(at, time_ps + SPACING_PS)
         events.append(PinEvent(time_ps, pin, level))
     return events
 
 
-def _until(steps: Iterator[Step], end_ps: int) -> list[tuple[int, str, int]]:
-    time_ps, events = 0, []
+def _until(steps: Iterator[Step], end_ps: int) -> Iterator[tuple[int, str, int]]:
+    time_ps = 0
     for wait, pin, level in steps:
         time_ps += wait
         if time_ps > end_ps:
-            break
-        events.append((time_ps, pin, level))
-    return events
+            return
+        yield time_ps, pin, level
 
 
 def _camera(board: Board, pins: CameraPins, rng: Rng) -> Iterator[Step]:
@@ -159,9 +147,7 @@ def _access(rng: Rng, select: str) -> Iterator[Step]:
         yield wait, select, 1
 
 
-def _on_bus(
-    boards: tuple[str, ...] = ("",), choice: str = "BANK"
-) -> Callable[[Rng], Iterator[Step]]:
+def _on_bus(boards: tuple[str, ...] = ("",), choice: str = "BANK") -> Script:
     """Stores, accesses at any time, standby; ``choice`` is the pin that says where to store."""
 
     def script(rng: Rng) -> Iterator[Step]:
@@ -188,9 +174,9 @@ def _on_bus(
     return script
 
 
-def _cubesense(mcu_addressing: bool) -> Callable[[Rng], Iterator[Step]]:
+def _cubesense(mcu_addressing: bool) -> Script:
     enables = ("SUNEN", "NADEN")
-    commands = (*COMMANDS, *ADDRESSING_COMMANDS * mcu_addressing)
+    commands = fpga.COMMANDS + fpga.ADDRESSING_COMMANDS * mcu_addressing
     storing = [row for row in commands if {Action.STORE, Action.STORE_OTHER} & {*row.actions}]
     reading = [row for row in commands if row not in storing]
 
@@ -211,7 +197,7 @@ def _cubesense(mcu_addressing: bool) -> Callable[[Rng], Iterator[Step]]:
             if stores:
                 yield int(rng.integers(5_000_000, 25_000_000)), "CLK", 0
                 continue
-            taking = row in ADDRESSING_COMMANDS and not row.shift
+            taking = row in fpga.ADDRESSING_COMMANDS and not row.shift
             for _ in range(int(rng.integers(1, 5 if taking else 60))):
                 if mcu_addressing and (taking or rng.random() < 0.02):
                     yield 1_000, "DATA_I", int(rng.integers(256))
@@ -229,28 +215,26 @@ def _cubesense(mcu_addressing: bool) -> Callable[[Rng], Iterator[Step]]:
 
 def _pair(mcu_addressing: bool) -> Board:
     def wiring(narrow: bool) -> Wiring:
-        size = replace(SIZE, columns=SIZE.columns - narrow)
-        return cubesense_wiring(CubeSensePair(size, mcu_addressing))
+        columns = SMALLEST.columns - narrow
+        return cubesense_wiring(CubeSensePair(replace(SMALLEST, columns=columns), mcu_addressing))
 
-    return Board(wiring, SIZE.columns, SIZE.rows, SIZE.frame_gap, _cubesense(mcu_addressing))
+    size = (SMALLEST.columns, SMALLEST.rows, SMALLEST.frame_gap)
+    return Board(wiring, *size, _cubesense(mcu_addressing))
 
 
-def _star(make: Callable[[int, int], Wiring], script: Callable[[Rng], Iterator[Step]]) -> Board:
-    return Board(lambda narrow: make(COLUMNS - narrow, ROWS), COLUMNS, ROWS, 9, script)
+def _star(make: Callable[[Any], Wiring], top: type[CubeStarBoard], script: Script) -> Board:
+    return Board(lambda narrow: make(top(COLUMNS - narrow, ROWS)), COLUMNS, ROWS, 9, script)
 
 
 #: By the top's name, as the command line has it.
 BOARDS = {
-    "cubestar": _star(lambda *size: cubestar_wiring(CubeStarTop(*size)), _cubestar),
-    "cubestar-shared": _star(
-        lambda *size: cubestar_shared_wiring(CubeStarShared(*size)), _on_bus()
-    ),
+    "cubestar": _star(cubestar.cubestar_wiring, CubeStarTop, _cubestar),
+    "cubestar-shared": _star(cubestar.cubestar_shared_wiring, CubeStarShared, _on_bus()),
     "cubestar-double": _star(
-        lambda *size: cubestar_double_wiring(CubeStarDouble(*size)), _on_bus(choice="INTO")
+        cubestar.cubestar_double_wiring, CubeStarDouble, _on_bus(choice="INTO")
     ),
     "cubestar-boards": _star(
-        lambda *size: cubestar_two_boards_wiring(CubeStarTwoBoards(*size)),
-        _on_bus(("BOARD1_", "BOARD2_")),
+        cubestar.cubestar_two_boards_wiring, CubeStarTwoBoards, _on_bus(("BOARD1_", "BOARD2_"))
     ),
     "cubesense-pair": _pair(mcu_addressing=False),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),

@@ -5,9 +5,8 @@ settled pins a picosecond after each event, and what they then offer has another
 """
 
 import re
-import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -82,13 +81,9 @@ class Played(NamedTuple):
 
 
 class IcarusBoard:
-    """A top's Verilog between its memories, compiled once.
+    """A top's Verilog between its memories, compiled once; its files are in ``folder``.
 
-    Args:
-        folder: for the files that it makes.
-        wiring: of the top.
-        verilog: of the top.
-        watched: outputs that :meth:`play` tells; all of them when not given.
+    :meth:`play` tells the ``watched`` outputs; all of them when not given.
     """
 
     def __init__(
@@ -107,8 +102,7 @@ class IcarusBoard:
         codes = {name: code for code, name in enumerate(_driven(self._wiring))}
         with (self._folder / "events.txt").open("w") as file:
             file.writelines(f"{time_ps} {codes[pin]} {level:d}\n" for time_ps, pin, level in events)
-        program = str(shutil.which("vvp"))
-        command = [program, "-n", "bench.vvp"]
+        command = ["vvp", "-n", "bench.vvp"]
         subprocess.run(command, cwd=self._folder, check=True, capture_output=True, timeout=LIMIT_S)
         levels = np.fromfile(self._folder / "outputs.txt", np.int64, sep=" ")
         memories = {
@@ -127,29 +121,27 @@ def _driven(wiring: Wiring) -> dict[str, str]:
 def _bench(wiring: Wiring, watched: Sequence[str]) -> str:
     pins = wiring.widths
     kinds = {name: "reg" if name in wiring.initial else "wire" for name in pins}
-    memories = [_memory(n, memory, wiring) for n, memory in enumerate(wiring.memories)]
-    numbers = range(len(memories))
-    depth = wiring.widths[wiring.memories[0]["A"]]
+    numbers = range(len(wiring.memories))
     return _BENCH.format(
         declarations="".join(f"  {kinds[name]} [{w - 1}:0] {name};\n" for name, w in pins.items()),
         ports=", ".join(f".{name}({name})" for name in pins),
-        memories="\n".join(memories),
+        memories="\n".join(_memory(n, memory, pins) for n, memory in enumerate(wiring.memories)),
         initial="\n".join(f"    {name} = {level};" for name, level in wiring.initial.items()),
-        depth=depth,
+        depth=pins[wiring.memories[0]["A"]],
         cleared="\n".join(f"      bytes_{n}[n] = 0;" for n in numbers),
         follow="\n".join(f"    follow_{n};" for n in numbers),
         cases="\n".join(
             f"        {code}: {name} = level;" for code, name in enumerate(_driven(wiring).values())
         ),
-        format=" ".join("%0d" for _ in watched),
+        format=" ".join(["%0d"] * len(watched)),
         watched=", ".join(watched),
         dumps="\n".join(f'    $writememh("memory_{n}.hex", bytes_{n});' for n in numbers),
     )
 
 
-def _memory(number: int, memory: MemoryPins, wiring: Wiring) -> str:
+def _memory(number: int, memory: MemoryPins, widths: Mapping[str, int]) -> str:
     pins = {pin: memory[pin] for pin in MEMORY_PINS}
-    return _MEMORY.format(n=number, width=wiring.widths[memory["A"]], **pins)
+    return _MEMORY.format(n=number, width=widths[memory["A"]], **pins)
 
 
 def _read_hex(path: Path) -> bytes:

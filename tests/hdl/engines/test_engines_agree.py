@@ -4,23 +4,23 @@ Whole small frames and a microcontroller's work, pin by pin: after every event e
 settled on the same level in all of them, and in the end the memories hold the same.
 """
 
-import os
 import shutil
 from collections.abc import Callable
+from contextlib import closing
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from cubestack.emulator.rtl.contract import PinEvent, RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.hdl.flow.generate import rtlil_text, verilog_text
+from cubestack.hdl.flow.generate import verilog_text
 from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
+from tests.hdl.regression import FULL
 
 from .board_events import BOARDS, random_events
 from .icarus_board import IcarusBoard, Played
@@ -30,7 +30,6 @@ pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
 ]
 
-FULL = os.environ.get("HDL_TIER") == "full"
 SEEDS = range(12 if FULL else 2)
 END_PS = 120_000_000
 
@@ -59,11 +58,9 @@ def case(request, tmp_path_factory) -> Case:
 
 
 def play(engine: RtlEngine, events: list[PinEvent]) -> Played:
-    try:
+    with closing(engine):
         outputs = engine.apply(events)
         return Played(outputs, {name: m.tobytes() for name, m in engine.memories.items()})
-    finally:
-        engine.close()
 
 
 def difference(wiring: Wiring, events: list[PinEvent], found: Played, expected: Played) -> str:
@@ -106,26 +103,14 @@ def test_the_events_are_worth_it(case):
     assert still <= {case.wiring.contention}
 
 
-def off_by_one(case: Case) -> Wiring:
+def test_a_fault_in_the_simulated_engine_and_in_icarus_is_found(case, tmp_path):
     """The same pins, and a picture one column less wide."""
-    wiring = BOARDS[case.name].wiring(True)
-    rtlil_text(wiring.component)
+    wiring, events = BOARDS[case.name].wiring(True), case.some_events()
     assert wiring.widths == case.wiring.widths
-    return wiring
-
-
-def test_a_fault_in_the_simulated_engine_is_found(case):
-    events = case.some_events()
     expected = play(CompiledEngine(case.wiring), events)
-    found = play(SimulatedEngine(off_by_one(case)), events)
-    assert difference(case.wiring, events, found, expected)
-
-
-def test_a_fault_in_icarus_is_found(case, tmp_path):
-    events = case.some_events()
-    expected = play(CompiledEngine(case.wiring), events)
-    faulty = IcarusBoard(tmp_path, case.wiring, verilog_text(off_by_one(case).component))
-    assert difference(case.wiring, events, faulty.play(events), expected)
+    icarus = IcarusBoard(tmp_path, case.wiring, verilog_text(wiring.component))
+    for found in (play(SimulatedEngine(wiring), events), icarus.play(events)):
+        assert difference(case.wiring, events, found, expected)
 
 
 def test_a_fault_in_the_compiled_engine_is_found(case):
@@ -137,7 +122,7 @@ def test_a_fault_in_the_compiled_engine_is_found(case):
     engine = CompiledEngine(case.wiring)
     counters = [name for name in engine.registers if name.endswith("writer.counter.column")]
     assert counters
-    outputs: list[NDArray[np.int64]] = []
+    outputs = []
     for start, end in pairwise([0, *(pulses + 1).tolist(), len(events)]):
         outputs.append(engine.apply(events[start:end]))
         for counter in counters:

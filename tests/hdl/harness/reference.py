@@ -5,8 +5,8 @@ whole frames at once, not clock by clock, so that it shares no structure with th
 """
 
 from collections.abc import Sequence
-from itertools import groupby
-from typing import NamedTuple
+from itertools import cycle, groupby, pairwise
+from typing import Any, NamedTuple
 
 from tests.hdl.harness.geometry import Geometry
 
@@ -63,8 +63,11 @@ class Behaviour(NamedTuple):
     memory: bytearray
 
 
-def taken(ticks: Sequence[Tick], geometry: Geometry) -> tuple[list[tuple[int, int]], int | None]:
-    """Pixels to store, as (index into ``ticks``, address in the bank), and the tick of ACK."""
+#: Pixels to store, as (index into the ticks, address in the bank), and the tick of ACK.
+Taken = tuple[list[tuple[int, int]], int | None]
+
+
+def taken(ticks: Sequence[Tick], geometry: Geometry) -> Taken:
     pixels: list[tuple[int, int]] = []
     for vsync, frame in groupby(enumerate(ticks), key=lambda item: item[1].vsync):
         if not vsync:
@@ -85,16 +88,14 @@ def taken(ticks: Sequence[Tick], geometry: Geometry) -> tuple[list[tuple[int, in
 def windows(controls: Sequence[Controls]) -> list[Window]:
     """Storing and reading times; ``controls`` begins and ends in standby."""
     found = []
-    before = controls[0]
     start = bank = 0
-    for now in controls[1:]:
+    for before, now in pairwise(controls):
         if (now.enable, now.rnw) != (before.enable, before.rnw):
             if before.enable:
                 found.append(Window(start, now.time, before.rnw, bank))
             elif now.enable:
                 bank = now.bank
             start = now.time
-        before = now
     return found
 
 
@@ -108,34 +109,35 @@ def behaviour(
     """Work out everything from the initial ``memory`` and what the inputs did since."""
     done = Behaviour([], [(0, 0)], [(0, 0)], bytearray(memory))
     for window in windows(controls):
-        if window.rnw:
-            _read(done, geometry, window, [t for t in data_clocks if window.start < t < window.end])
+        start, end, rnw, _ = window
+        if rnw:
+            _read(done, geometry, window, [t for t in data_clocks if start < t < end])
         else:
-            _store(
-                done, geometry, window, [c for c in camera if window.start < c.rise < window.end]
-            )
+            _store(done, geometry, window, [c for c in camera if start < c.rise < end])
     return done
 
 
 def _store(done: Behaviour, geometry: Geometry, window: Window, clocks: list[Clock]) -> None:
     clocks = clocks[2:]  # the reset is released through two flip-flops
-    pixels, ack = taken([clock.pins for clock in clocks], geometry)
-    ends = [clock.rise for clock in clocks[1:]] + [window.end]
+    found = taken([clock.pins for clock in clocks], geometry)
+    write(done, clocks, window.end, found, window.bank * geometry.bank_size)
+
+
+def write(done: Any, clocks: Sequence[Clock], end: int, found: Taken, base: int = 0) -> None:
+    """The pulses, memory and ACK of what was taken at ``clocks``, cut off at ``end``."""
+    pixels, ack = found
+    ends = [clock.rise for clock in clocks[1:]] + [end]
     for index, position in pixels:
-        address = window.bank * geometry.bank_size + position
-        if clocks[index].fall < window.end:
-            value = clocks[index].pins.pixel
-            done.pulses.append(Pulse(clocks[index].fall, ends[index], address, value))
-            done.memory[address] = value
+        _, fall, pins = clocks[index]
+        if fall < end:
+            done.pulses.append(Pulse(fall, ends[index], base + position, pins.pixel))
+            done.memory[base + position] = pins.pixel
     if ack is not None and ack < len(clocks):
-        done.ack.extend([(clocks[ack].rise, 1), (window.end, 0)])
+        done.ack.extend([(clocks[ack].rise, 1), (end, 0)])
 
 
 def _read(done: Behaviour, geometry: Geometry, window: Window, data_clocks: list[int]) -> None:
-    values = []
-    for step, time in enumerate(data_clocks):
-        row, column = divmod(step % geometry.pixels, geometry.columns)
-        values.append((time, done.memory[geometry.address(column, row, window.bank)]))
-    for time, value in [*values, (window.end, 0)]:
+    content = cycle([done.memory[address] for address in geometry.addresses(window.bank)])
+    for time, value in [*zip(data_clocks, content, strict=False), (window.end, 0)]:
         if value != done.data[-1][1]:
             done.data.append((time, value))

@@ -75,6 +75,13 @@ def steps(ticks: Sequence[Tick], gaps: bool = False) -> Iterator[Step]:
         yield Step(state, writes, frozenset(borders))
 
 
+def read_state(count: int) -> str:
+    """How far so many data clocks of a picture's read-out come."""
+    if count >= GEOMETRY.pixels:
+        return "last pixel" if count == GEOMETRY.pixels else "wrapped"
+    return "no clock" if not count else "first row" if count < GEOMETRY.columns else "further rows"
+
+
 def left_in(clocks: Sequence[Clock], stepped: Sequence[Step], end: int) -> str:
     """What a writer was at at a time in ps, from the clocks since it was started."""
     before = [index for index, clock in enumerate(clocks) if clock.rise < end]

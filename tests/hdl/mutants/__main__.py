@@ -53,10 +53,8 @@ def arguments() -> argparse.Namespace:
 
 
 def score(name: str, args: argparse.Namespace) -> list[Result]:
-    count = None if args.all else args.count
-    scoring = Scoring(
-        name, SUITES[name], args.out, count=count, seed=args.seed, proofs=not args.no_proofs
-    )
+    options = {"count": None if args.all else args.count, "proofs": not args.no_proofs}
+    scoring = Scoring(name, SUITES[name], args.out, seed=args.seed, **options)
     results = []
     columns = [SpinnerColumn(), *Progress.get_default_columns()]
     with Progress(*columns, console=errors, disable=not errors.is_terminal, transient=True) as bar:
@@ -69,31 +67,28 @@ def score(name: str, args: argparse.Namespace) -> list[Result]:
     return results
 
 
-def counted(results: list[Result]) -> Score:
-    outcomes = [result.outcome for result in results]
-    return Score(*(outcomes.count(kind) for kind in ("killed", "equivalent", "survived")))
-
-
 def table(scores: dict[str, Score]) -> Table:
     made = Table("top", "mutants", "killed", "equivalent", "survived", "score")
     for name, found in scores.items():
-        numbers = (found.killed, found.equivalent, found.survived)
-        made.add_row(name, str(sum(numbers)), *map(str, numbers), f"{found.share:.1%}")
+        made.add_row(name, str(sum(found)), *map(str, found), f"{found.share:.1%}")
     return made
 
 
 def main() -> int:
     args = arguments()
     results = {name: score(name, args) for name in args.names or TOPS}
-    scores = {name: counted(found) for name, found in results.items()}
+    scores = {
+        name: Score(*(sum(r.outcome == kind for r in found) for kind in Score._fields))
+        for name, found in results.items()
+    }
     if args.json:
         report = {
             name: {
-                **asdict(scores[name]),
-                "share": round(scores[name].share, 4),
-                "results": [asdict(result) for result in found],
+                **found._asdict(),
+                "share": round(found.share, 4),
+                "results": [asdict(result) for result in results[name]],
             }
-            for name, found in results.items()
+            for name, found in scores.items()
         }
         print(json.dumps(report, indent=1))
     else:

@@ -69,6 +69,9 @@ _RESET = ("$adff", "$adffe")
 _MODEL = re.compile(r"^ +(\d+) \\(guess\d+) .* ([01]+) *$", re.MULTILINE)
 
 
+Texts = Sequence[str]
+
+
 class Verdict(NamedTuple):
     """What is known of a mutant: ``equivalent``, or else the steps to a difference if one is known.
 
@@ -105,18 +108,11 @@ class Equivalence:
             if "dff" in cell["type"]
             for bit in cell["connections"]["Q"]
         }
-        retained = [
-            self._same(name, n)
-            for name, bits in outputs.items()
-            for n, bit in enumerate(bits)
-            if registers.get(bit)
-        ]
+        places = [(bit, name, n) for name, bits in outputs.items() for n, bit in enumerate(bits)]
+        retained = [self._same(name, n) for bit, name, n in places if registers.get(bit)]
         self._retained = " & ".join(retained) or "1"
-        self._narrow = [
-            name
-            for name, bits in outputs.items()
-            if len(bits) <= _NARROW_BITS and all(bit in registers for bit in bits)
-        ]
+        narrow = {name: bits for name, bits in outputs.items() if len(bits) <= _NARROW_BITS}
+        self._narrow = [name for name, bits in narrow.items() if registers.keys() >= {*bits}]
         self._invariants: dict[str, list[str]] = {}  # by the block that they are of
 
     def compare(self, mutant: Mutant) -> Verdict:
@@ -143,35 +139,26 @@ class Equivalence:
         if pin.enable is None:
             return f"(gold{level} == gate{level})"
         enable = self._index[pin.enable]
-        mask = f"gold{enable}"
-        if pin.enables == 1:
-            mask = f"{{{pin.width}{{gold{enable}}}}}"
+        mask = f"{{{pin.width}{{gold{enable}}}}}" if pin.enables == 1 else f"gold{enable}"
         equal = f"(((gold{level} ^ gate{level}) & {mask}) == 0)"
         return f"((gold{enable} == gate{enable}) & {equal})"
 
     def _guesses(self, block: str) -> list[str]:
         """That narrow registers below ``block`` never have some value, or two values together."""
+        below = {n: self._index[n] for n in self._narrow if n.startswith(block)}
         levels = {
-            name: [
-                f"(gold{self._index[name]} == {value})" for value in range(1 << self._wires[name])
-            ]
-            for name in self._narrow
-            if name.startswith(block)
+            name: [f"(gold{number} == {value})" for value in range(1 << self._wires[name])]
+            for name, number in below.items()
         }
         several = [values for values in levels.values() if len(values) > 2]
         single = [f"~{level}" for values in several for level in values]
         pairs = [
             f"~({a} & {b})"
             for one, other in combinations(sorted(levels), 2)
-            if self._block(one) == self._block(other)
+            if _block(one) == _block(other)
             for a, b in product(levels[one], levels[other])
         ]
         return single + pairs
-
-    @staticmethod
-    def _block(name: str) -> str:
-        """Where a signal belongs, a counter being a part of what it counts for."""
-        return name.rpartition(".")[0].removesuffix("counter").removesuffix(".")
 
     def _kept(self, mutant: Mutant | None, guesses: list[str], known: Sequence[str]) -> list[str]:
         """The largest inductive set of ``guesses``, while ``known`` holds at any time."""
@@ -185,12 +172,7 @@ class Equivalence:
         return guesses
 
     def _refuted(
-        self,
-        mutant: Mutant | None,
-        guesses: Sequence[str],
-        known: Sequence[str],
-        steps: int,
-        options: str,
+        self, mutant: Mutant | None, guesses: Texts, known: Texts, steps: int, options: str
     ) -> set[int]:
         """Indices of guesses that can be wrong in the last step: some, if there are any."""
         size = -(-len(guesses) // _GROUPS)
@@ -220,21 +202,14 @@ class Equivalence:
         return len(re.findall(r"^\[base case \d+\]", report, re.MULTILINE))
 
     def _run(
-        self,
-        mutant: Mutant | None,
-        groups: Sequence[Sequence[str]],
-        known: Sequence[str],
-        calls: Sequence[str],
+        self, mutant: Mutant | None, groups: Sequence[Texts], known: Texts, calls: Texts
     ) -> str:
         script = _JOIN.format(mutation=mutant.command() if mutant else "")
-        files = {
-            "netlist.il": self._netlist.text,
-            "gold.il": self._gold,
-            "harness.v": self._harness(groups, known),
-        }
+        files = {"netlist.il": self._netlist.text, "gold.il": self._gold}
+        files["harness.v"] = self._harness(groups, known)
         return yosys_files(script + "\n".join(calls), files)[0]
 
-    def _harness(self, groups: Sequence[Sequence[str]], known: Sequence[str]) -> str:
+    def _harness(self, groups: Sequence[Texts], known: Texts) -> str:
         """Verilog of both side by side; group n of guesses is ``guess<n>``, and ``all<n>``."""
         outputs = [("standby", self._standby), ("retained", self._retained)]
         vectors = {f"guess{n}": group for n, group in enumerate(groups)}
@@ -266,6 +241,11 @@ def _pins(design: Component) -> tuple[Pin, ...]:
         Pin(name, "input" if member.flow is In else "output", "", len(getattr(design, name)))
         for name, member in design.signature.members.items()
     )
+
+
+def _block(name: str) -> str:
+    """Where a signal belongs, a counter being a part of what it counts for."""
+    return name.rpartition(".")[0].removesuffix("counter").removesuffix(".")
 
 
 def _block_of(mutant: Mutant) -> str:

@@ -6,19 +6,17 @@ the same netlist counts; a survivor is tried again.
 """
 
 import json
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.mutants.equivalence import Equivalence
 from tests.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
 from tests.hdl.mutants.suites import Stage, Suite
-from tests.hdl.regression import build, simulate
+from tests.hdl.regression import Outcome, build, simulate
 
 #: A simulation hangs after so many times its duration without a mutant, and at least so many s.
 PATIENCE, SHORTEST = 20, 120
@@ -44,8 +42,7 @@ class Result:
     steps: int | None = None
 
 
-@dataclass(frozen=True)
-class Score:
+class Score(NamedTuple):
     """Counts of one suite."""
 
     killed: int
@@ -86,21 +83,18 @@ class Scoring:
             for number, mutant in enumerate(chunk, 1):
                 found = done.get(mutant.command())
                 if found is None:
-                    bench = bench or self._bench(chunk)
+                    bench = bench or _Bench(self._suite, self._netlist, chunk, self._folder)
                     found = bench.simulated(number, mutant)
                     if self._proofs and found.outcome == "survived":
                         found = self._judged(mutant, found)
                     self._keep(mutant, found)
                 yield found
 
-    def _bench(self, chunk: Sequence[Mutant]) -> "_Bench":
-        return _Bench(self._suite, selectable(self._netlist, chunk), self._folder)
-
     def _judged(self, mutant: Mutant, result: Result) -> Result:
         verdict = self._equivalence.compare(mutant)
         outcome = "equivalent" if verdict.equivalent else "survived"
-        seconds = result.seconds + verdict.seconds
-        return Result(result.mutant, outcome, seconds=round(seconds, 1), steps=verdict.steps)
+        seconds = round(result.seconds + verdict.seconds, 1)
+        return replace(result, outcome=outcome, seconds=seconds, steps=verdict.steps)
 
     @cached_property
     def _equivalence(self) -> Equivalence:
@@ -109,9 +103,8 @@ class Scoring:
     def _done(self) -> dict[str, Result]:
         if not self._file.exists():
             return {}
-        entries: list[dict[str, Any]] = [
-            json.loads(line) for line in self._file.read_text(encoding="utf-8").splitlines()
-        ]
+        lines = self._file.read_text(encoding="utf-8").splitlines()
+        entries: list[dict[str, Any]] = [json.loads(line) for line in lines]
         return {
             entry["command"]: Result(**entry["result"])
             for entry in entries
@@ -119,38 +112,29 @@ class Scoring:
         }
 
     def _keep(self, mutant: Mutant, result: Result) -> None:
-        entry = {
-            "netlist": self._netlist.digest,
-            "command": mutant.command(),
-            "result": asdict(result),
-        }
+        entry = {"netlist": self._netlist.digest, "command": mutant.command()}
         with self._file.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(entry) + "\n")
+            file.write(json.dumps({**entry, "result": asdict(result)}) + "\n")
 
 
 class _Bench:
     """Mutants in one Verilog file, compiled once for each top of the stages."""
 
-    def __init__(self, suite: Suite, verilog: str, folder: Path) -> None:
+    def __init__(
+        self, suite: Suite, design: Netlist, chunk: Sequence[Mutant], folder: Path
+    ) -> None:
         self._suite = suite
         self._folder = folder
         source = folder / "dut.v"
-        source.write_text(verilog, encoding="utf-8")
-        further = []
-        if suite.wrapper:
-            name, make = suite.wrapper
-            further.append(folder / f"{name}.v")
-            further[0].write_text(verilog_text(make(), name), encoding="utf-8")
-        self._runners = {
-            top: build(
-                source,
-                folder / f"build-{top}",
-                top=top,
-                further=further if top != "dut" else [],
-                strict=False,
-            )
-            for top in {stage.top for stage in suite.stages}
-        }
+        source.write_text(selectable(design, chunk), encoding="utf-8")
+        self._runners = {}
+        for top in {stage.top for stage in suite.stages}:
+            further = []
+            if suite.wrapper and top != "dut":
+                further.append(folder / f"{top}.v")
+                further[0].write_text(verilog_text(suite.wrapper(), top), encoding="utf-8")
+            into = folder / f"build-{top}"
+            self._runners[top] = build(source, into, top=top, further=further, strict=False)
         self._limits: dict[Stage, int] = {}
 
     def simulated(self, number: int, mutant: Mutant) -> Result:
@@ -168,25 +152,14 @@ class _Bench:
                 return Result(str(mutant), "killed", by, stage.seed, round(seconds, 1))
         return Result(str(mutant), "survived", seconds=round(seconds, 1))
 
-    def _simulate(self, stage: Stage, number: int, limit_s: int) -> Any:
-        with _argument(f"+mutant={number}"):
-            return simulate(
-                self._runners[stage.top],
-                stage.modules,
-                self._folder / "run",
-                seed=stage.seed,
-                top=stage.top,
-                environment=self._suite.environment,
-                limit_s=limit_s,
-                failures=1,
-            )
-
-
-@contextmanager
-def _argument(text: str) -> Iterator[None]:
-    """One more argument of the simulator."""
-    os.environ["SIM_CMD_SUFFIX"] = text
-    try:
-        yield
-    finally:
-        del os.environ["SIM_CMD_SUFFIX"]
+    def _simulate(self, stage: Stage, number: int, limit_s: int) -> Outcome:
+        return simulate(
+            self._runners[stage.top],
+            stage.modules,
+            self._folder / "run",
+            seed=stage.seed,
+            top=stage.top,
+            environment={**self._suite.environment, "SIM_CMD_SUFFIX": f"+mutant={number}"},
+            limit_s=limit_s,
+            failures=1,
+        )

@@ -27,8 +27,7 @@ async def clock(dut: Any, memory: bytes, reset: int = 0) -> int:
 async def presents_the_picture_without_end(dut: Any) -> None:
     for length in (GEOMETRY.pixels // 2, 3 * GEOMETRY.pixels):
         memory = random.randbytes(GEOMETRY.bank_size)
-        rows, columns = range(GEOMETRY.rows), range(GEOMETRY.columns)
-        picture = [memory[GEOMETRY.address(x, y)] for y in rows for x in columns]
+        picture = [memory[address] for address in GEOMETRY.addresses()]
         assert await clock(dut, memory, reset=1) == 0
         for step in range(length):
             assert await clock(dut, memory) == picture[step % GEOMETRY.pixels]

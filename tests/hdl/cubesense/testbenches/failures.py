@@ -6,7 +6,7 @@ from typing import Any
 import cocotb
 
 from tests.hdl.coverage.hits import hit
-from tests.hdl.cubesense.pair import OTHER, SIDES, PairTestbench, with_sun
+from tests.hdl.cubesense.pair import OTHER, SIDES, PairTestbench, coordinates, window_of, with_sun
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.testbench import timed_test
 
@@ -20,16 +20,11 @@ async def measures(bench: PairTestbench, sensor: str, memory: str) -> None:
     assert await bench.fetch((sensor, memory)) == content
     await bench.mcu.read_edge(sensor, memory)
     if sensor == "sun":
-        data = await bench.mcu.read(4)
-        assert data == x.to_bytes(2, "little") + y.to_bytes(2, "little")
-        left, top = READ_OUT.window_origin(x, y)
-        for row in range(top, top + READ_OUT.window):
-            expected = content[row * COLUMNS + left :][: READ_OUT.window]
-            assert await bench.mcu.read(READ_OUT.window) == expected
+        assert await bench.mcu.read(4) == coordinates(x, y)
+        assert await bench.mcu.read(READ_OUT.window**2) == window_of(content, x, y)
     else:
-        pixels = list(READ_OUT.scan())
-        data = await bench.mcu.read(len(pixels))
-        for value, pixel in zip(data, pixels, strict=True):
+        for pixel in READ_OUT.scan():
+            value = await bench.mcu.clock()
             assert pixel is None or value == content[pixel[1] * COLUMNS + pixel[0]]
     await bench.mcu.standby()
     parts = {"dead": bench.dead_camera, "failed": bench.failed_sram}
@@ -42,16 +37,15 @@ async def what_works_still_measures(dut: Any, side: str, broken: str) -> None:
     """With a side's memory failed, each sensor in the other one; with a camera dead, the other
     sensor in either memory, or in the dead camera's when its own failed.
     """
-    other = OTHER[side]
-    if broken == "memory":
-        bench = await PairTestbench.start(dut, failed_sram=side)
-        for sensor in random.sample(SIDES, 2):
-            await measures(bench, sensor, other)
-        return
-    failed = other if broken == "both" else ""
-    bench = await PairTestbench.start(dut, dead_camera=side, failed_sram=failed)
-    for memory in (side, side) if failed else random.sample(SIDES, 2):
-        await measures(bench, other, memory)
+    other, some = OTHER[side], random.sample(SIDES, 2)
+    dead, failed, cases = {
+        "memory": ("", side, [(sensor, other) for sensor in some]),
+        "camera": (side, "", [(other, memory) for memory in some]),
+        "both": (side, other, [(other, side)] * 2),
+    }[broken]
+    bench = await PairTestbench.start(dut, dead_camera=dead, failed_sram=failed)
+    for sensor, memory in cases:
+        await measures(bench, sensor, memory)
     if not failed:
         await bench.check()
 
@@ -63,8 +57,7 @@ async def dead_camera_is_waited_for_in_standby(dut: Any) -> None:
     for memory in SIDES:
         await bench.mcu.store("nadir", memory)
         assert not await bench.mcu.acknowledged(memory, 10**6)
-        assert int(dut.NAD_SRAM_CE_N.value)
-        assert int(dut.SUN_SRAM_CE_N.value)
+        assert int(dut.NAD_SRAM_CE_N.value) & int(dut.SUN_SRAM_CE_N.value)
         await bench.mcu.standby()
     await measures(bench, "sun", "nadir")
     await bench.check()

@@ -10,10 +10,8 @@ from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.testbench import timed_test
 from tests.hdl.harness.watching import disturb_in_standby, levels
 
-INPUTS = (
-    *("Y", "HREF", "PCLK", "RNW", "CLK", "EDGE", "SHIFT"),
-    *("LINK_D_I", "LINK_C_I", "SRAM_D_I"),
-)
+CONTROLS = ("RNW", "CLK", "EDGE", "SHIFT")
+INPUTS = ("Y", "HREF", "PCLK", *CONTROLS, "LINK_D_I", "LINK_C_I", "SRAM_D_I")
 STANDBY = {
     **dict.fromkeys(("ACK", "DATA_O", "DATA_OE", "SRAM_A", "SRAM_D_O", "SRAM_D_OE"), 0),
     **dict.fromkeys(("LINK_D_O", "LINK_D_OE", "LINK_C_O", "LINK_C_OE"), 0),
@@ -33,7 +31,6 @@ async def standby(dut: Any) -> None:
 @timed_test
 async def idle_is_reset(dut: Any) -> None:
     """With EN high nothing on any other pin moves any output, not even for a glitch."""
-
     await standby(dut)
     await disturb_in_standby(dut, STANDBY, INPUTS, (1_000,), 2000)
 
@@ -46,17 +43,16 @@ async def reads_its_memory(dut: Any) -> None:
     dut.LINK_C_I.value = OTHER_LINE
     dut.RNW.value = 1
     dut.EN.value = 0
-    for y in range(GEOMETRY.rows):
-        for x in range(GEOMETRY.columns):
-            dut.LINK_D_I.value = random.randrange(256)
-            await Timer(1, unit="ns")
-            assert int(dut.SRAM_A.value) == GEOMETRY.address(x, y)
-            dut.SRAM_D_I.value = memory[GEOMETRY.address(x, y)]
-            await Timer(1, unit="ns")
-            dut.CLK.value = 1
-            await Timer(1, unit="ns")
-            dut.CLK.value = 0
-            assert int(dut.DATA_O.value) == memory[GEOMETRY.address(x, y)]
+    for address in GEOMETRY.addresses():
+        dut.LINK_D_I.value = random.randrange(256)
+        await Timer(1, unit="ns")
+        assert int(dut.SRAM_A.value) == address
+        dut.SRAM_D_I.value = memory[address]
+        await Timer(1, unit="ns")
+        dut.CLK.value = 1
+        await Timer(1, unit="ns")
+        dut.CLK.value = 0
+        assert int(dut.DATA_O.value) == memory[address]
     dut.LINK_C_I.value = 0
     await Timer(1, unit="ns")
     assert not int(dut.DATA_OE.value), "both enabled is no row to read in"

@@ -4,10 +4,9 @@ import random
 from typing import Any
 
 import cocotb
-from cocotb.triggers import Timer
 
 from tests.hdl.cubesense.reference import vsync
-from tests.hdl.cubesense.settings import READ_OUT, clock
+from tests.hdl.cubesense.settings import READ_OUT, clock, some_time
 
 GAP = READ_OUT.frame_gap
 
@@ -15,13 +14,12 @@ GAP = READ_OUT.frame_gap
 async def compare(dut: Any, href: list[int]) -> None:
     await clock(dut, "pix", reset=1, href=random.getrandbits(1))
     for level, expected in zip(href, vsync(href), strict=True):
-        dut.pix_clk.value = 0
-        dut.pix_rst.value = 0
+        dut.pix_clk.value = dut.pix_rst.value = 0
         dut.href.value = level
-        await Timer(random.randint(1, 50), unit="ns")
+        await some_time()
         assert int(dut.vsync.value) == expected
         dut.pix_clk.value = 1
-        await Timer(random.randint(1, 50), unit="ns")
+        await some_time()
 
 
 @cocotb.test()

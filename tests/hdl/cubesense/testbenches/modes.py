@@ -8,7 +8,6 @@ from cocotb.triggers import Timer
 
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions, link_shows_enables
 from tests.hdl.cubesense.pair import PREFIXES, STANDBY, PairTestbench, frame
-from tests.hdl.cubesense.reference import SIDES
 from tests.hdl.cubesense.settings import MCU_ADDRESSING
 from tests.hdl.harness.camera import picture
 from tests.hdl.harness.instants import ODD, wait
@@ -22,11 +21,9 @@ MOMENTS = (1, 100, 3_000, 20_000, 100_000, 1_000_000)
 #: own enable.
 DRIVES = {
     Action.STANDBY: (0, 0, 0, 0, 0),
-    Action.STORE: (1, 0, 0, 0, 0),
-    Action.READ: (1, 1, 1, 0, 0),
-    Action.EDGE: (1, 1, 1, 0, 0),
+    **dict.fromkeys((Action.STORE, Action.STORE_OTHER), (1, 0, 0, 0, 0)),
+    **dict.fromkeys((Action.READ, Action.EDGE), (1, 1, 1, 0, 0)),
     Action.SEND_PICTURE: (0, 0, 0, 1, 1),
-    Action.STORE_OTHER: (1, 0, 0, 0, 0),
     Action.SEND_EDGE: (1, 1, 0, 1, 0),
     Action.PASS_EDGE: (0, 0, 1, 0, 0),
 }
@@ -53,34 +50,29 @@ async def every_row_and_every_unlisted_row(bench: PairTestbench) -> None:
         for camera in bench.cameras.values():
             await camera.reach(len(camera.clocks) + 4)
         wanted = actions(shift, edge, rnw, sunen, naden, mcu_addressing=MCU_ADDRESSING)
-        alone = sunen != naden and not link_shows_enables(shift, edge)
-        if alone:
+        if sunen != naden and not link_shows_enables(shift, edge):
             # Unlisted, and the link is taken: a sender can not know that nobody listens. A
             # receiver gets no clock and stays in reset.
-            seen = actions(shift, edge, rnw, 0, 0)
-            sends = {s: getattr(seen, s) is Action.SEND_PICTURE for s in SIDES}
             enabled = "sun" if not sunen else "nadir"
-            wanted = wanted._replace(
-                **{enabled: Action.SEND_PICTURE if sends[enabled] else Action.STANDBY}
-            )
-        for index, side in enumerate(SIDES):
+            sends = getattr(actions(shift, edge, rnw, 0, 0), enabled) is Action.SEND_PICTURE
+            wanted = wanted._replace(**{enabled: Action.SEND_PICTURE if sends else Action.STANDBY})
+        for index, (side, prefix) in enumerate(PREFIXES.items()):
             action = getattr(wanted, side)
-            prefix = PREFIXES[side]
             chip, output, bus, link, copies = DRIVES[action]
-            fpga = getattr(bench.dut, side)
-            assert int(getattr(bench.dut, f"{prefix}_SRAM_CE_N").value) == 1 - chip
-            assert int(getattr(bench.dut, f"{prefix}_SRAM_OE_N").value) == 1 - output
-            assert int(fpga.DATA_OE.value) == bus
-            assert int(fpga.LINK_D_OE.value) == link
             shows = link_shows_enables(shift, edge) and not (sunen, naden)[index]
-            assert int(fpga.LINK_C_OE.value) == (3 if copies else shows << index)
+            expected = {
+                f"{prefix}_SRAM_CE_N": 1 - chip,
+                f"{prefix}_SRAM_OE_N": 1 - output,
+                f"{side}.DATA_OE": bus,
+                f"{side}.LINK_D_OE": link,
+                f"{side}.LINK_C_OE": 3 if copies else shows << index,
+            }
+            assert levels(bench.dut, expected) == expected
             done.add(action)
         assert not int(bench.dut.CONTENTION.value)
         if wanted == (Action.STANDBY, Action.STANDBY):
-            quiet = {
-                n: v for n, v in levels(bench.dut, STANDBY).items() if not n.endswith("LINK_C_OE")
-            }
-            assert quiet == {n: v for n, v in STANDBY.items() if n in quiet}
+            quiet = {n: level for n, level in STANDBY.items() if not n.endswith("LINK_C_OE")}
+            assert levels(bench.dut, quiet) == quiet
         await bench.mcu.standby()
         await Timer(1, unit="step")
         assert levels(bench.dut, STANDBY) == STANDBY

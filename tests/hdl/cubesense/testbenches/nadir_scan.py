@@ -13,17 +13,10 @@ COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 
 def pixels_by_hand() -> list[tuple[int, int] | None]:
     """The scan in the words of its source, once through."""
-    found: list[tuple[int, int] | None] = [None]
-    y = READ_OUT.first_row
-    while y < ROWS:
-        found += [(x, y) for x in range(COLUMNS)]
-        y += READ_OUT.scan_step
-    found.append(None)
-    x = READ_OUT.first_column
-    while x < COLUMNS:
-        found += [(x, y) for y in range(ROWS)]
-        x += READ_OUT.scan_step
-    return found
+    rows = range(READ_OUT.first_row, ROWS, READ_OUT.scan_step)
+    columns = range(READ_OUT.first_column, COLUMNS, READ_OUT.scan_step)
+    along_rows = [(x, y) for y in rows for x in range(COLUMNS)]
+    return [None, *along_rows, None, *((x, y) for x in columns for y in range(ROWS))]
 
 
 def addresses(count: int) -> list[int]:

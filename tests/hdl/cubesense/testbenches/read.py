@@ -4,7 +4,7 @@ import os
 import random
 from itertools import product
 
-from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, with_sun
+from tests.hdl.cubesense.pair import OTHER, PairTestbench, frame, window_of, with_sun
 from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import picture
@@ -46,11 +46,7 @@ async def sun_window(bench: PairTestbench) -> None:
     for (x, y), memory in cases if everything else random.sample(cases, 5):
         content = with_sun(x, y)
         await bench.shoot(("sun", memory), content)
-        left, top = READ_OUT.window_origin(x, y)
-        window = b"".join(
-            content[row * COLUMNS + left :][: READ_OUT.window]
-            for row in range(top, top + READ_OUT.window)
-        )
+        window = window_of(content, x, y)
         expected = bytes([x & 255, x >> 8, y & 255, y >> 8]) + window + window[:2]
         assert await bench.read_edge("sun", memory, len(expected)) == expected
         assert await bench.read_edge("sun", memory, 5) == expected[:5]

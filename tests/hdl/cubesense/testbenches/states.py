@@ -48,9 +48,8 @@ def ticks_to(state: str) -> tuple[list[Tick], list[Tick]]:
 
 def row_with(side: str, action: Action) -> Sequence[int]:
     """Levels of a row of the table in which an FPGA does that; the other may do anything."""
-    rows = [row for row in ROWS_OF_TABLE if getattr(row.actions, side) is action]
-    row = random.choice(rows)
-    return tuple(level or 0 for level in (row.shift, row.edge, row.rnw, row.sunen, row.naden))
+    row = random.choice([row for row in ROWS_OF_TABLE if getattr(row.actions, side) is action])
+    return tuple(level or 0 for level in row.levels)
 
 
 async def leave_store(bench: PairTestbench, side: str, action: Action, state: str) -> None:
@@ -75,36 +74,27 @@ async def leave_sending(bench: PairTestbench, side: str, state: str) -> None:
 
 def clocks_to(state: str, window: bool) -> int:
     """Data clocks after which a read-out is there."""
-    rows = 1 + len(READ_OUT.scan_rows) * COLUMNS
-    scan = {
-        "default": 0,
-        "A": random.randrange(1, rows),
-        "B": rows,
-        "C": random.randrange(rows + 1, READ_OUT.scan_clocks),
-        "C again": READ_OUT.scan_clocks + random.randrange(9),
+    rows, clocks = 1 + len(READ_OUT.scan_rows) * COLUMNS, READ_OUT.scan_clocks
+    after, pixels = 4 + READ_OUT.window**2, GEOMETRY.pixels
+    scan = {"A": range(1, rows), "B": range(rows, rows + 1), "C": range(rows + 1, clocks)}
+    ranges = {
+        **({name: range(n, n + 1) for n, name in enumerate("ABCD")} if window else scan),
+        "default": range(1),
+        "C again": range(clocks, clocks + 9),
+        "E": range(4, after),
+        "E again": range(after, after + 9),
+        "first row": range(1, COLUMNS),
+        "further rows": range(COLUMNS, pixels),
+        "last pixel": range(pixels, pixels + 1),
+        "wrapped": range(pixels + 1, pixels + 9),
+        "next bytes": range(2, 9),
+        "passing": range(9),
+        "more bytes": range(4, 9),
+        **dict.fromkeys(("no clock", "no byte"), range(1)),
+        **dict.fromkeys(("addressed byte", "one byte"), range(1, 2)),
+        **{"two bytes": range(2, 3), "address": range(3, 4)},
     }
-    size = READ_OUT.window**2
-    around = {
-        **{name: count for count, name in enumerate("ABCD")},
-        "E": 4 + random.randrange(size),
-        "E again": 4 + size + random.randrange(9),
-    }
-    picture_ = {
-        "no clock": 0,
-        "first row": random.randrange(1, COLUMNS),
-        "further rows": random.randrange(COLUMNS, GEOMETRY.pixels),
-        "last pixel": GEOMETRY.pixels,
-        "wrapped": GEOMETRY.pixels + random.randrange(1, 9),
-        "addressed byte": 1,
-        "next bytes": random.randrange(2, 9),
-        "passing": random.randrange(9),
-        "no byte": 0,
-        "one byte": 1,
-        "two bytes": 2,
-        "address": 3,
-        "more bytes": random.randrange(4, 9),
-    }
-    return ((around if window else scan) | picture_)[state]
+    return random.choice(ranges[state])
 
 
 async def leave_reading(bench: PairTestbench, side: str, action: Action, state: str) -> None:

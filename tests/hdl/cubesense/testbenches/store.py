@@ -4,7 +4,7 @@ import random
 from itertools import product
 from typing import Any
 
-from tests.hdl.cubesense.pair import OTHER, PREFIXES, PairTestbench, frame, with_sun
+from tests.hdl.cubesense.pair import OTHER, PREFIXES, PairTestbench, coordinates, frame, with_sun
 from tests.hdl.cubesense.reference import NOT_FOUND, SIDES
 from tests.hdl.cubesense.settings import READ_OUT
 from tests.hdl.harness.camera import flat, line, lines, picture
@@ -14,16 +14,9 @@ from tests.hdl.harness.testbench import checked_test, timed_test
 COLUMNS, ROWS, GAP = READ_OUT.columns, READ_OUT.rows, READ_OUT.frame_gap
 
 
-def any_path() -> tuple[str, str]:
-    """A camera and a memory."""
-    return random.choice(SIDES), random.choice(SIDES)
-
-
 @checked_test(PairTestbench)
 async def every_camera_to_every_memory(bench: PairTestbench) -> None:
-    paths = [(camera, memory) for camera in SIDES for memory in SIDES] * 2
-    random.shuffle(paths)
-    for camera, memory in paths:
+    for camera, memory in random.sample(PairTestbench.PLACES * 2, 8):
         other = bench.content(OTHER[memory])
         before = len(bench.srams[memory].pulses)
         await bench.shoot((camera, memory), picture())
@@ -60,13 +53,13 @@ async def both_at_once(bench: PairTestbench) -> None:
 async def joined_anywhere(bench: PairTestbench) -> None:
     """A frame that is joined after its gap has begun is dropped, and the next one stored."""
     for _ in range(8):
-        camera, memory = any_path()
-        first, second = frame(picture()), picture()
-        start = await bench.cameras[camera].begin(first)
-        await bench.cameras[camera].reach(start + random.randrange(len(first) - 3))
-        await bench.store((camera, memory))
-        bench.cameras[camera].send(frame(second))
-        assert await bench.mcu.acknowledged(memory)
+        place = random.choice(bench.PLACES)
+        camera, first = bench.camera_of(place), frame(picture())
+        start = await camera.begin(first)
+        await camera.reach(start + random.randrange(len(first) - 3))
+        await bench.store(place)
+        camera.send(frame(picture()))
+        assert await bench.mcu.acknowledged(place[1])
         await bench.mcu.standby()
 
 
@@ -91,15 +84,13 @@ async def ack_stays_and_nothing_more_is_stored(bench: PairTestbench) -> None:
 @checked_test(PairTestbench)
 async def lines_too_long_and_too_short(bench: PairTestbench) -> None:
     """Surplus pixels and rows are ignored; what is missing stays as it was."""
+    sizes = [COLUMNS, COLUMNS - 1, 1, COLUMNS + 1, 2 * COLUMNS]
     for _ in range(6):
-        camera, memory = any_path()
-        await bench.store((camera, memory))
-        source = bench.cameras[camera]
-        sizes = [COLUMNS, COLUMNS - 1, 1, COLUMNS + 1, 2 * COLUMNS]
-        rows = [random.randbytes(random.choice(sizes)) for _ in range(ROWS - 1)]
-        rows.append(random.randbytes(COLUMNS))
-        source.send(frame(b"")[:-1])
-        source.send(flat(line(row) for row in rows))
+        place = random.choice(bench.PLACES)
+        await bench.store(place)
+        source = bench.camera_of(place)
+        rows = [random.randbytes(size) for size in (*random.choices(sizes, k=ROWS - 1), COLUMNS)]
+        source.send([*frame(b"")[:-1], *flat(line(row) for row in rows)])
         source.send([*flat(lines(picture())), *frame(b"")])
         await source.sent()
         await bench.mcu.standby()
@@ -116,8 +107,7 @@ async def sun_is_found_while_storing(bench: PairTestbench) -> None:
         await bench.shoot(("sun", memory), with_sun(x, y))
         if random.getrandbits(1):
             await bench.shoot(("nadir", random.choice(SIDES)))
-        expected = x.to_bytes(2, "little") + y.to_bytes(2, "little")
-        assert await bench.read_edge("sun", memory, 4) == expected
+        assert await bench.read_edge("sun", memory, 4) == coordinates(x, y)
 
 
 @timed_test
@@ -131,10 +121,9 @@ async def any_waveform(dut: Any) -> None:
                 source.send(line(row))
                 if random.random() < 1 / ROWS:
                     source.send(frame(b"")[: random.choice([GAP - 2, GAP, GAP + 9])])
-        camera, memory = any_path()
-        await bench.store((camera, memory))
-        patience = 2 * GEOMETRY.pixels * bench.cameras[camera].period
-        await bench.mcu.acknowledged(memory, patience)
+        place = random.choice(bench.PLACES)
+        await bench.store(place)
+        await bench.acknowledged(place, 2 * GEOMETRY.pixels * bench.camera_of(place).period)
         await bench.mcu.standby()
     halves = await bench.check()
     assert any(half.pulses for half in halves.values())
@@ -143,13 +132,10 @@ async def any_waveform(dut: Any) -> None:
 @checked_test(PairTestbench)
 async def lines_a_gap_apart(bench: PairTestbench) -> None:
     """As many low clocks as a gap may not have make no frame's end; one more does."""
-    for camera, memory in product(SIDES, SIDES):
-        source = bench.cameras[camera]
-        content = picture()
-        for pause in (GAP, GAP + 1):
-            await bench.store((camera, memory))
-            source.send([*frame(b""), *flat(lines(content, pause))])
-            await source.sent()
-            acknowledged = await bench.mcu.acknowledged(memory, 4 * source.period)
-            assert acknowledged == (pause == GAP)
-            await bench.mcu.standby()
+    for place, pause in product(bench.PLACES, (GAP, GAP + 1)):
+        source = bench.camera_of(place)
+        await bench.store(place)
+        source.send([*frame(b""), *flat(lines(picture(), pause))])
+        await source.sent()
+        assert await bench.acknowledged(place, 4 * source.period) == (pause == GAP)
+        await bench.mcu.standby()

@@ -17,7 +17,7 @@ COLUMNS, ROWS = GEOMETRY
 
 def rows_of(sizes: Iterable[int]) -> list[Tick]:
     """Lines of so many random pixels."""
-    return flat(list(line(random.randbytes(size))) for size in sizes)
+    return flat(line(random.randbytes(size)) for size in sizes)
 
 
 @checked_test(PublishedTestbench)

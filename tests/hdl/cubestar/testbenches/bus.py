@@ -14,6 +14,7 @@ from tests.hdl.harness.camera import picture
 from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.sram import SLOWEST_ACCESS
 from tests.hdl.harness.testbench import checked_test
+from tests.hdl.harness.watching import levels
 
 
 async def works_on(bench: BusTestbench, accesses: int, *memories: int) -> None:
@@ -55,9 +56,9 @@ async def picture_is_worked_on_where_it_was_stored(bench: TESTBENCH) -> None:
         assert await bench.fetch(place) == content
         await bench.open(place)
         window, (_, bank) = bench.window(place), bench.memory_of(place)
-        first = window.base + bank * MEMORY
-        await bench.bus.write(first, content[0] ^ 0xFF, window.select)
-        assert await bench.bus.read(first, window.select) == content[0] ^ 0xFF
+        spot = {"address": window.base + bank * MEMORY, "select": window.select}
+        await bench.bus.write(value=content[0] ^ 0xFF, **spot)
+        assert await bench.bus.read(**spot) == content[0] ^ 0xFF
         await bench.standby()
 
 
@@ -125,10 +126,9 @@ async def nothing_happens_without_the_chip_select(bench: TESTBENCH) -> None:
         bench.dut.AD_LOW_I.value = random.getrandbits(8)
         getattr(bench.dut, strobe).value = 0
         await wait(SLOWEST_ACCESS, ODD)
-        assert not int(bench.dut.AD_LOW_OE.value)
-        for memory in bench.MEMORIES:
-            for name in ("CE_N", "OE_N", "WE_N"):
-                assert int(getattr(bench.dut, f"{memory}{name}").value)
+        high = [m + name for m in bench.MEMORIES for name in ("CE_N", "OE_N", "WE_N")]
+        rest = {"AD_LOW_OE": 0, **dict.fromkeys(high, 1)}
+        assert levels(bench.dut, rest) == rest
         getattr(bench.dut, strobe).value = 1
         await Timer(1, unit="ns")
     assert [sram.memory for sram in bench.srams] == before

@@ -1,14 +1,13 @@
 """Two SRAMs in turn: the camera fills one while the bus has the other."""
 
 import random
-from typing import Any
 
 from cocotb.triggers import Timer
 
 from tests.hdl.cubestar.next_version import DoubleTestbench
 from tests.hdl.cubestar.testbenches.bus import works_on
 from tests.hdl.harness.camera import picture
-from tests.hdl.harness.testbench import checked_test, timed_test
+from tests.hdl.harness.testbench import checked_test
 
 
 async def fills(bench: DoubleTestbench, memory: int) -> None:
@@ -33,12 +32,10 @@ async def one_memory_serves_both_in_turn(bench: DoubleTestbench) -> None:
         assert int(failed.value)
 
 
-@timed_test
-async def standby_turns_all_off(dut: Any) -> None:
-    bench = await DoubleTestbench.start(dut)
+@checked_test(DoubleTestbench)
+async def standby_turns_all_off(bench: DoubleTestbench) -> None:
     await bench.begin(random.getrandbits(1), picture())
     await bench.camera.reach(len(bench.camera.clocks) + random.randrange(20))
     await bench.check()
     await bench.open()
     await fills(bench, 1)
-    await bench.check()

@@ -15,32 +15,6 @@ from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.testbench import checked_test, timed_test
 
 
-def wrapped(content: bytes, count: int) -> bytes:
-    """The first ``count`` bytes of ``content`` without end."""
-    return (content * (count // len(content) + 1))[:count]
-
-
-@checked_test(PublishedTestbench)
-async def starts_at_the_first_pixel(bench: PublishedTestbench) -> None:
-    """However far the last reading came, and whichever pin ended it."""
-    for end in ({"ENABLE": 0}, {"RNW": 0}, {"ENABLE": 0, "RNW": 0}, {"ENABLE": 0}):
-        await bench.mcu.open()
-        count = random.choice([1, GEOMETRY.columns, random.randrange(GEOMETRY.pixels)])
-        assert await bench.mcu.read(count) == bench.stored()[:count]
-        await bench.mcu.set(**end)
-        if end == {"RNW": 0}:
-            await bench.mcu.set(RNW=1)
-            assert await bench.mcu.read(3) == bench.stored()[:3]
-            await bench.mcu.standby()
-
-
-@checked_test(PublishedTestbench)
-async def wraps_past_the_last_pixel(bench: PublishedTestbench) -> None:
-    await bench.mcu.open()
-    count = 2 * GEOMETRY.pixels + random.randrange(GEOMETRY.pixels)
-    assert await bench.mcu.read(count) == wrapped(bench.stored(), count)
-
-
 @timed_test
 async def without_a_camera(dut: Any) -> None:
     """No pixel clock since power-up; storing waits, reading works."""
@@ -67,9 +41,8 @@ async def camera_dies_while_storing(bench: PublishedTestbench) -> None:
             await bench.mcu.open()
         else:
             await bench.mcu.set(RNW=1)
-        count = random.randrange(1, 10)
-        read = await bench.mcu.read(count)
-        assert read == bench.stored()[:count]
+        read = await bench.mcu.read(random.randrange(1, 10))
+        assert bench.stored().startswith(read)
         await bench.mcu.set(ENABLE=0, RNW=0)
         bench.camera.go()
         await bench.camera.sent()
@@ -98,26 +71,20 @@ async def both_banks(bench: PublishedTestbench) -> None:
 
 
 @checked_test(PublishedTestbench)
-async def byte_stands_until_the_next_clock(bench: PublishedTestbench) -> None:
-    """DATA keeps still between rising edges, whatever the memory offers meanwhile."""
-    await bench.mcu.open()
-    for expected in bench.stored():
-        assert await bench.mcu.clock() == expected
-        await bench.mcu.set(after=random.randrange(200_000))
-        assert int(bench.dut.DATA.value) == expected
-
-
-@checked_test(PublishedTestbench)
 async def left_after_any_count_by_any_pin(bench: PublishedTestbench) -> None:
-    """The next reading starts at the first pixel all the same."""
+    """The next reading starts at the first pixel all the same, also without standby between."""
     pixels, columns = GEOMETRY.pixels, GEOMETRY.columns
-    further = random.randrange(columns, pixels)
-    counts = (0, random.randrange(1, columns), further, pixels, pixels + random.randrange(1, 9))
+    further, beyond = random.randrange(columns, pixels), 2 * pixels + random.randrange(pixels)
+    counts = (0, random.randrange(1, columns), further, pixels, beyond)
     for count, end in product(counts, ({"ENABLE": 0}, {"RNW": 0}, {"ENABLE": 0, "RNW": 0})):
         bank = random.getrandbits(1)
+        content = bench.stored(bank)
         await bench.mcu.open(bank)
-        assert await bench.mcu.read(count) == wrapped(bench.stored(bank), count)
+        assert await bench.mcu.read(count) == (3 * content)[:count]
         await bench.mcu.set(**end)
+        if end == {"RNW": 0}:
+            await bench.mcu.set(RNW=1)
+            assert await bench.mcu.read(3) == content[:3]
         await bench.mcu.set(ENABLE=0)
 
 
