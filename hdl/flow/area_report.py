@@ -45,8 +45,7 @@ def count_ice40(component: Component) -> Ice40Count:
     """Cells that Yosys' ``synth_ice40`` maps ``component`` to; needs the extra ``hdl``."""
     script = "read_rtlil design.il\nsynth_ice40 -top top\nwrite_json design.json\n"
     _, text = yosys_files(script, {"design.il": rtlil_text(component)}, "design.json")
-    netlist = json.loads(text)
-    cells = Counter(cell["type"] for cell in netlist["modules"]["top"]["cells"].values())
+    cells = Counter(cell["type"] for cell in json.loads(text)["modules"]["top"]["cells"].values())
     return Ice40Count(
         cells["SB_LUT4"],
         sum(count for name, count in cells.items() if name.startswith("SB_DFF")),

@@ -128,8 +128,7 @@ def _bits(pin: Pin) -> list[str]:
 def _wrapper(module: str, pins: Sequence[Pin]) -> Iterator[str]:
     """The module that has the bidirectional pins."""
     yield f"module {module} ("
-    declarations = [f"  {_KINDS[pin.direction]} wire {_range(pin.width)}{pin}" for pin in pins]
-    yield ",\n".join(declarations)
+    yield ",\n".join(f"  {_KINDS[pin.direction]} wire {_range(pin.width)}{pin}" for pin in pins)
     yield ");"
     connections: list[tuple[str, str]] = []
     drivers = []

@@ -147,8 +147,7 @@ def prove(proof: Proof, planted: bool = False) -> ProofResult:
         steps=FAULT_STEPS if planted else STEPS,
         limit=LIMIT,
     )
-    files = {"flat.il": flat, "harness.il": text}
-    _, report = yosys_files(script, files, "sat.txt")
+    _, report = yosys_files(script, {"flat.il": flat, "harness.il": text}, "sat.txt")
     return ProofResult(
         "Induction step proven: SUCCESS!" in report,
         "model found for base case: FAIL!" in report,
@@ -205,8 +204,7 @@ class _Harness(Component):
 
     def __init__(self, design: Component, exposed: dict[str, int], assertions: _Assertions) -> None:
         self._design, self._exposed, self._assertions = design, exposed, assertions
-        members = design.signature.members
-        super().__init__({name: m for name, m in members.items() if m.flow is In})
+        super().__init__({name: m for name, m in design.signature.members.items() if m.flow is In})
 
     def elaborate(self, platform: object) -> Module:
         m = Module()

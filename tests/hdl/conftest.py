@@ -1,5 +1,6 @@
 """Builds designs and runs cocotb modules on them; keeps the waveform of a test that fails."""
 
+import json
 import os
 import re
 import shutil
@@ -13,17 +14,9 @@ from amaranth.lib.wiring import Component
 from cocotb_tools.runner import Runner
 
 from cubestack.hdl.flow.generate import verilog_text
-from tests.hdl import waves
+from tests.hdl import regression
 from tests.hdl.coverage import hits
-from tests.hdl.regression import (
-    BASE_SEED,
-    PAIR,
-    SIMULATOR,
-    build,
-    frame_environment,
-    modules,
-    simulate,
-)
+from tests.hdl.regression import BASE_SEED, HERE, PAIR, SIMULATOR, Outcome
 
 # Registers start at X instead of the value that Verilog's initialisers give them: the real part
 # has no such thing. Yosys' own helper signals keep theirs.
@@ -44,7 +37,6 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what simulates."""
     for item in items:
         if "icarus" in getattr(item, "fixturenames", ()):
             item.add_marker("cocotb")
@@ -68,7 +60,32 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 
 #: Modules with tests that drive unknown levels, which Verilator does not have.
-X_MODULES = {*modules(PAIR, "dataflow", "addressing")}
+X_MODULES = {*regression.modules(PAIR, "dataflow", "addressing")}
+
+#: Waveforms of failing tests: a VCD file and a JSON file beside it for each, until it is run again.
+#: `cubestack hdl wave` reads them.
+WAVES = HERE.parents[1] / "out" / "hdl" / "waves"
+
+
+def plain_name(node: str) -> str:
+    """What the files are called: ``x.y-8-4`` for ``test_x.py::test_y[8-4]``."""
+    file, _, test = node.partition("::")
+    parts = Path(file).stem.removeprefix("test_"), test.removeprefix("test_")
+    return ".".join(re.sub(r"\W+", "-", part).strip("-") for part in parts)
+
+
+def describe(path: Path, node: str, seed: int, failed: Outcome, again: Outcome) -> str:
+    """Write what the waveform shows beside it; a line for the reader.
+
+    ``failed`` is the run of all tests, ``again`` the first failed one alone.
+    """
+    if not path.exists():
+        return "no waveform was written"
+    about = {"test": node, "cocotb": failed.failed[0], "seed": seed + BASE_SEED}
+    about |= {"simulator": SIMULATOR, "error": failed.error}
+    path.with_suffix(".json").write_text(json.dumps(about, indent=1), encoding="utf-8")
+    alone = "" if again.failed else ", in which it passed alone"
+    return f"waveform{alone}: {path}; look at it with: cubestack hdl wave {path.stem}"
 
 
 class Icarus:
@@ -77,7 +94,7 @@ class Icarus:
     With ``HDL_SIMULATOR`` another simulator does, except for runs that need unknown levels.
     """
 
-    def __init__(self, folder: Path, kept: Path = waves.FOLDER) -> None:
+    def __init__(self, folder: Path, kept: Path = WAVES) -> None:
         self._folder = folder
         self._kept = kept
         self._built: dict[str, Runner] = {}
@@ -85,7 +102,7 @@ class Icarus:
 
     def run(
         self,
-        design: Callable[[int, int], Component],
+        design: regression.Design,
         columns: int,
         rows: int,
         *modules: str,
@@ -109,7 +126,7 @@ class Icarus:
         name = f"{design.__name__}-{columns}x{rows}-{top}-{initialised}-{text.__name__}"
         folder = self._folder / name
         make = partial(
-            build,
+            regression.build,
             folder / "dut.v",
             top=top,
             further=[harness] if harness else [],
@@ -123,25 +140,25 @@ class Icarus:
                 assert changed
             (folder / "dut.v").write_text(verilog, encoding="utf-8")
             self._built[name] = make(folder)
-        settings = {
-            **frame_environment(columns, rows),
-            "DESIGN": design.__name__,
-            **(environment or {}),
-        }
-        run = partial(simulate, seed=seed, top=top, environment=settings)
+        settings = {**regression.frame_environment(columns, rows), "DESIGN": design.__name__}
+        settings |= environment or {}
+        run = partial(regression.simulate, seed=seed, top=top, environment=settings)
         self._runs += 1
         place = self._folder / f"{self._runs}"
         outcome = run(self._built[name], modules, place)
         node = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]
-        waves.forget(self._kept, node)
+        for path in self._kept.glob(f"{plain_name(node)}.*"):
+            path.unlink(missing_ok=True)
         if outcome.failed:
             # The seed makes it the same run again.
             first = outcome.failed[0]
             failed = [*outcome.failed[:20], *(["…"] if len(outcome.failed) > 20 else [])]
-            path = waves.path_of(self._kept, node, first)
+            self._kept.mkdir(parents=True, exist_ok=True)
+            case = re.sub(r"[^\w.]+", "-", first)
+            path = self._kept / f"{plain_name(node)}.{case}.vcd"
             traced = make(self._folder / f"{name}-traced", traced=True)
             again = run(traced, modules, place / "traced", only=first, waveform=path)
-            kept = waves.describe(path, node, seed, outcome, again)
+            kept = describe(path, node, seed, outcome, again)
             raise AssertionError(f"cocotb tests failed: {failed}\n{kept}\n{outcome.log[-6000:]}")
         assert not outcome.problem, f"{outcome.problem}\n{outcome.log[-4000:]}"
 

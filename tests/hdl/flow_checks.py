@@ -24,39 +24,33 @@ def written(name: str, top: Top, folder: Path) -> Path:
     return path
 
 
-def quiet(*command: object) -> None:
-    done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
-    )
-    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+def said(*command: object) -> str:
+    """What a program prints that does not fail."""
+    words = [str(word) for word in command]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=TIMEOUT_S)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 def icarus_takes_it_without_a_warning(file: Path) -> None:
-    quiet("iverilog", "-g2005", "-Wall", "-s", file.stem, "-o", file.with_suffix(".vvp"), file)
+    program = file.with_suffix(".vvp")
+    assert not said("iverilog", "-g2005", "-Wall", "-s", file.stem, "-o", program, file)
 
 
 def yosys_takes_it_without_a_warning(file: Path) -> None:
-    out = run_yosys(
-        f"read_verilog {file.name}\nhierarchy -check -top {file.stem}\nproc\ncheck -assert\n",
-        file.parent,
-    )
-    assert "Warning" not in out
+    script = f"read_verilog {file.name}\nhierarchy -check -top {file.stem}\nproc\ncheck -assert\n"
+    assert "Warning" not in run_yosys(script, file.parent)
 
 
 def verilator_takes_it_without_a_warning(file: Path) -> None:
-    command = [VERILATOR, "--lint-only", "-Wall", "--top-module", file.stem, file]
-    done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "%Warning" not in done.stdout + done.stderr
+    command = (VERILATOR, "--lint-only", "-Wall", "--top-module", file.stem, file)
+    assert "%Warning" not in said(*command)
 
 
 def bidirectional_pins_are_in_the_wrapper_only(file: Path) -> None:
     wrapper, core = file.read_text(encoding="utf-8").split(f"module {file.stem}_core")
     assert "inout" in wrapper
-    assert "inout" not in core
-    assert "initial" not in core
+    assert not re.search("inout|initial", core)
 
 
 def every_pin_and_every_bit_is_listed(file: Path, top: Top, pins: int | None) -> None:
@@ -81,13 +75,8 @@ def every_clock_pin_is_constrained(top: Top, folder: Path) -> None:
         if entry["direction"] == "input"
         for n, bit in enumerate(entry["bits"])
     }
-    clocks = {
-        pins[bit]
-        for cell in module["cells"].values()
-        for bit in cell["connections"].get("CLK", [])
-        if bit in pins
-    }
-    assert clocks == {clock.port for clock in top.clocks}
+    used = {bit for c in module["cells"].values() for bit in c["connections"].get("CLK", [])}
+    assert {pins[bit] for bit in used & set(pins)} == {clock.port for clock in top.clocks}
 
 
 def area_is_as_recorded(name: str, design: Top | Block, file: Path, ice40: bool = False) -> None:

@@ -79,6 +79,9 @@ class Outcome(NamedTuple):
         return not self.failed and not self.problem
 
 
+Design = Callable[[int, int], Component]
+
+
 @dataclass(frozen=True)
 class Tier:
     """What a top has to pass: cocotb ``modules``, those that find most first.
@@ -87,7 +90,7 @@ class Tier:
     ``further`` is what the modules read besides the size.
     """
 
-    design: Callable[[int, int], Component]
+    design: Design
     columns: int
     rows: int
     modules: tuple[str, ...]
@@ -96,8 +99,7 @@ class Tier:
     @property
     def environment(self) -> dict[str, str]:
         """What the modules read; what a wrong design reaches counts for nothing."""
-        size = frame_environment(self.columns, self.rows)
-        return {**size, **self.further, "HDL_COVERAGE": ""}
+        return {**frame_environment(self.columns, self.rows), **self.further, "HDL_COVERAGE": ""}
 
     def make(self) -> Component:
         """The top, of a small picture."""
@@ -146,12 +148,7 @@ def _pair(mcu_addressing: bool) -> Tier:
     return Tier(design, SMALLEST.columns, SMALLEST.rows, PAIR_MODULES + further, environment)
 
 
-def _star(
-    design: Callable[[int, int], Component],
-    testbench: str,
-    *names: str,
-    size: tuple[int, int] = (5, 3),
-) -> Tier:
+def _star(design: Design, testbench: str, *names: str, size: tuple[int, int] = (5, 3)) -> Tier:
     return Tier(design, *size, modules(STAR, *names), {"TESTBENCH": f"{STAR}.{testbench}"})
 
 

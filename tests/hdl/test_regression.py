@@ -1,10 +1,16 @@
-"""The regression itself: the same seed gives the same run, and wrong designs do not get through."""
+"""The regression itself: the same seed gives the same run, and wrong designs do not get through.
 
+A failing simulation fails pytest, whatever else may break, and leaves a waveform.
+"""
+
+import json
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
+from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.regression import STAR, TIERS, build, frame_environment, modules, run_tier, simulate
 
@@ -74,3 +80,27 @@ def test_what_hangs_is_ended(verilog: Path, tmp_path: Path) -> None:
     outcome = run_tier("cubestar", verilog, tmp_path / "tier", limit_s=3)
     # Told to end, a simulation may still write that its test failed.
     assert outcome.failed or outcome.problem == "the simulation gave no results"
+
+
+@pytest.fixture
+def failing(icarus: Any, tmp_path: Path) -> Any:
+    """Keeps its waveforms apart from those that somebody looks at."""
+    return type(icarus)(tmp_path, tmp_path / "waves")
+
+
+def test_failing_cocotb_tests_are_named_until_they_pass(failing: Any, tmp_path: Path) -> None:
+    with pytest.raises(AssertionError, match=r"failed: \['fails', 'fails_in_the_background'\]"):
+        failing.run(MatrixCounter, 2, 2, "tests.hdl.harness.failing", seed=1)
+    (waveform,) = (tmp_path / "waves").glob("*.vcd")
+    assert waveform.stem == "regression.failing_cocotb_tests_are_named_until_they_pass.fails"
+    assert "$enddefinitions" in waveform.read_text(encoding="utf-8")
+    about = json.loads(waveform.with_suffix(".json").read_text(encoding="utf-8"))
+    assert about["cocotb"] == "fails"
+    assert "as it should" in about["error"]
+    failing.run(MatrixCounter, 2, 2, "tests.hdl.blocks.testbenches.matrix_counter", seed=1)
+    assert not list((tmp_path / "waves").iterdir())
+
+
+def test_module_that_cannot_be_loaded_fails(failing: Any) -> None:
+    with pytest.raises((AssertionError, RuntimeError)):
+        failing.run(MatrixCounter, 2, 2, "tests.hdl.harness.missing", seed=1)

@@ -48,8 +48,7 @@ def _boards_idle(m: Module, d: SimpleNamespace) -> None:
     """Each board by itself, whatever the other one does."""
     for board, standby in (("board1", ~d.BOARD1_ENABLE), ("board2", ~d.BOARD2_ENABLE)):
         own = [register for register in d.registers if register.name.startswith(f"{board}.")]
-        one = SimpleNamespace(registers=own)
-        properties.idle_is_reset(m, one, standby, {f"{board}.bank"})
+        properties.idle_is_reset(m, SimpleNamespace(registers=own), standby, {f"{board}.bank"})
 
 
 def _double_idle(m: Module, d: SimpleNamespace) -> None:

@@ -65,21 +65,12 @@ def _by_top(found: list[Speed]) -> dict[str, dict[str, float]]:
 
 def _report(found: list[Speed], missing: dict[str, str]) -> dict[str, object]:
     """Clocks a second, and how many times as many the compiled engine makes as each other one."""
-    return {
-        "clocks_per_s": {
-            top: {name: round(rate) for name, rate in rates.items()}
-            for top, rates in _by_top(found).items()
-        },
-        "ratio": {
-            top: {
-                name: round(rates["compiled"] / rate, 1)
-                for name, rate in rates.items()
-                if name != "compiled" and "compiled" in rates
-            }
-            for top, rates in _by_top(found).items()
-        },
-        "absent": missing,
-    }
+    clocks, ratio = {}, {}
+    for top, rates in _by_top(found).items():
+        clocks[top] = {name: round(rate) for name, rate in rates.items()}
+        best = rates.pop("compiled", None)
+        ratio[top] = {name: round(best / rate, 1) for name, rate in rates.items() if best}
+    return {"clocks_per_s": clocks, "ratio": ratio, "absent": missing}
 
 
 def _table(found: list[Speed], engines: list[str]) -> Table:

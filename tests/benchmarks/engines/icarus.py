@@ -75,8 +75,7 @@ def run_cocotb(workload: Workload, lines: int) -> float:
             log = (done.stdout + done.stderr).strip() or "no word"
             raise CocotbError(f"cocotb on Icarus Verilog failed: {log.splitlines()[-1]}")
         result = np.load(folder / "result.npz")
-        memories = {memory.name: result[memory.name] for memory in wiring.memories}
-        workload.check(lines, memories)
+        workload.check(lines, {memory.name: result[memory.name] for memory in wiring.memories})
         return float(result["seconds"])
 
 

@@ -12,6 +12,7 @@ Time is the processor's, so that a busy machine tells the same; on an idle one i
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from typing import NamedTuple
 
 from cubestack.emulator.rtl.contract import RtlEngine
@@ -34,17 +35,11 @@ class Speed(NamedTuple):
 
 
 class _Engine(NamedTuple):
-    """An engine to be measured.
+    """An engine to be measured."""
 
-    Attributes:
-        make: starts it; None for the one that runs elsewhere.
-        lines: of a sample, None being a whole frame.
-        rounds: the best one counts: the others were disturbed.
-    """
-
-    make: Callable[[Workload], RtlEngine] | None
-    lines: int | None
-    rounds: int
+    make: Callable[[Workload], RtlEngine] | None  # starts it; None for the one that runs elsewhere
+    lines: int | None  # of a sample, None being a whole frame
+    rounds: int  # the best one counts: the others were disturbed
 
 
 #: By name; ratios are to the first one.
@@ -93,16 +88,10 @@ def measure(top: str) -> Iterator[Speed]:
 def _seconds(kind: _Engine, workload: Workload, lines: int) -> float:
     if kind.make is None:
         return run_cocotb(workload, lines)
-    engine = kind.make(workload)
-    try:
-        for camera, source in workload.cameras().items():
-            engine.attach(source, camera)
-        for pin, level in workload.levels:
-            engine.set_pin(pin, level)
+    with closing(kind.make(workload)) as engine:
+        workload.begin(engine)
         start = time.process_time()
         engine.run(workload.end_ps(lines))
         seconds = time.process_time() - start
         workload.check(lines, engine.memories)
         return seconds
-    finally:
-        engine.close()

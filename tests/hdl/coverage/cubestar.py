@@ -55,8 +55,7 @@ def _store(window: Window, clocks: Sequence[Clock], period: int, left_by: str) -
     acknowledged = "yes" if any(step.state == "ACK" for step in stepped) else "no"
     for case in stepped[-1].borders:
         hit("cubestar border", case=case, acknowledged=acknowledged)
-    ends = [clock.rise for clock in own[1:]] + [window.end]
-    for clock, end in zip(own, ends, strict=True):
+    for clock, end in zip(own, [clock.rise for clock in own[1:]] + [window.end], strict=True):
         if end - clock.rise > STOPPED * period:
             level = "high" if min(clock.fall, end) - clock.rise > STOPPED * period else "low"
             hit("cubestar border", case=f"clock stops {level}", acknowledged=acknowledged)

@@ -13,31 +13,15 @@ from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS, Action, 
 
 #: What a writer can be doing when it is stopped. "Reset" is the two clocks after it was started.
 STORE_STATES = (
-    "reset",
-    "before a line",
-    "in a line",
-    "write pulse",
-    "surplus pixels",
-    "between lines",
-    "between frames",
-    "short last row",
-    "ACK",
+    *("reset", "before a line", "in a line", "write pulse", "surplus pixels", "between lines"),
+    *("between frames", "short last row", "ACK"),
 )
 
 #: Irregular things that a camera does, or is found at.
 BORDERS = (
-    "joined in a line",
-    "joined in a frame",
-    "no VSYNC before a frame",
-    "VSYNC in a line",
-    "line too long",
-    "line too short",
-    "last row too short",
-    "frame too short",
-    "lines after ACK",
-    "VSYNC after ACK",
-    "clock stops low",
-    "clock stops high",
+    *("joined in a line", "joined in a frame", "no VSYNC before a frame", "VSYNC in a line"),
+    *("line too long", "line too short", "last row too short", "frame too short"),
+    *("lines after ACK", "VSYNC after ACK", "clock stops low", "clock stops high"),
 )
 
 #: Border cases of pictures that were acknowledged.
@@ -113,7 +97,6 @@ class Group:
     possible: Callable[..., bool] = lambda **_: True
 
     def points(self) -> list[Point]:
-        """All of them."""
         return [
             tuple(map(str, parts))
             for parts in product(*self.axes.values())
@@ -241,11 +224,8 @@ GROUPS = {
         {
             "testbench": TESTBENCHES,
             "pressure": (
-                "steady",
-                "stalling camera",
-                "lopsided clock",
-                "hurried processor",
-                "slow processor",
+                *("steady", "stalling camera", "lopsided clock"),
+                *("hurried processor", "slow processor"),
             ),
         },
     ),

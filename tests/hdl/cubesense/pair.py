@@ -45,7 +45,6 @@ STANDBY = {
 
 
 def gap() -> list[Tick]:
-    """Between two frames."""
     return list(vsync(READ_OUT.frame_gap + random.randint(1, 9)))
 
 
@@ -54,14 +53,9 @@ def frame(content: bytes) -> list[Tick]:
     return [*gap(), *flat(lines(content))]
 
 
-def dark() -> bytearray:
-    """A picture without a Sun."""
-    return bytearray(random.choices(range(200), k=GEOMETRY.pixels))
-
-
 def with_sun(x: int, y: int) -> bytes:
     """A picture whose first Sun pixel is there; a dark one for ``NOT_FOUND``."""
-    content = dark()
+    content = bytearray(random.choices(range(200), k=GEOMETRY.pixels))
     if (x, y) != NOT_FOUND:
         start = y * GEOMETRY.columns + x
         content[start : start + 3] = bytes([200, 255, 231])
@@ -83,10 +77,8 @@ def coordinates(x: int, y: int) -> bytes:
 class CubeSenseMcu(Processor[Controls]):
     """Drives the control pins, and its data bus where that goes both ways.
 
-    Attributes:
-        bytes: what came, by the time of its data clock.
-        sent: what was on the data bus then.
-        drives: whether it drives that bus; at first it floats at some level.
+    By the time of their data clocks it has the ``bytes`` that came, and what was ``sent`` on the
+    bus then. At first it does not drive that: it floats at some level.
     """
 
     CLOCK = "CLK"
@@ -157,7 +149,6 @@ class CubeSenseMcu(Processor[Controls]):
         self._dut.DATA_I.value = UNKNOWN if byte is None else byte
 
     async def acknowledged(self, side: str, patience: int = 10**9) -> bool:
-        """Poll an FPGA's ACK for at most ``patience`` ps."""
         return await self.sees(f"{PREFIXES[side]}ACK", patience)
 
     async def clock(self) -> int:
@@ -177,9 +168,7 @@ def enables(side: str) -> tuple[int, int]:
 class PairTestbench(Testbench[Place]):
     """A place is a camera and a memory.
 
-    Attributes:
-        dead_camera: whose clock stands still, if any.
-        failed_sram: that keeps nothing and offers unknown bytes, if any.
+    A ``dead_camera``'s clock stands still; a ``failed_sram`` keeps nothing, offers unknown bytes.
     """
 
     PLACES: ClassVar[tuple[Place, ...]] = tuple(product(SIDES, SIDES))
@@ -190,17 +179,13 @@ class PairTestbench(Testbench[Place]):
         self.cameras: dict[str, Camera] = {}
         self.srams: dict[str, Sram] = {}
         for side, prefix in PREFIXES.items():
-            for name in ("Y", "HREF", "PCLK"):
-                getattr(dut, f"{prefix}_{name}").value = 0
-            pins = SimpleNamespace(
-                PIXCLK=getattr(dut, f"{prefix}_PCLK"),
-                PIXDATA=getattr(dut, f"{prefix}_Y"),
-                HSYNC=getattr(dut, f"{prefix}_HREF"),
-                VSYNC=SimpleNamespace(),  # not wired
-            )
-            self.cameras[side] = Camera(pins, timing)
-            clock = partial(self._storing_clock, side)
-            self.srams[side] = Sram(dut, f"{prefix}_SRAM_", clock)
+            wired = {"PIXCLK": "PCLK", "PIXDATA": "Y", "HSYNC": "HREF"}
+            pins = {name: getattr(dut, f"{prefix}_{own}") for name, own in wired.items()}
+            for pin in pins.values():
+                pin.value = 0
+            pins["VSYNC"] = SimpleNamespace()  # not wired
+            self.cameras[side] = Camera(SimpleNamespace(**pins), timing)
+            self.srams[side] = Sram(dut, f"{prefix}_SRAM_", partial(self._storing_clock, side))
         self.dead_camera = self.failed_sram = ""
         self._before = [bytes(self.srams[side].memory) for side in SIDES]
         self._ack: dict[str, Levels] = {side: [(0, 0)] for side in SIDES}
@@ -274,11 +259,9 @@ class PairTestbench(Testbench[Place]):
         return data
 
     def content(self, side: str) -> bytes:
-        """A memory's picture, row by row."""
         return self.srams[side].picture()
 
     async def cameras_are_done(self) -> None:
-        """All that was sent is over."""
         for camera in self.cameras.values():
             await camera.sent()
 

@@ -42,8 +42,6 @@ class Window(NamedTuple):
 
 @dataclass
 class Half:
-    """One FPGA and its memory: what is expected of it."""
-
     memory: bytearray
     windows: list[Window]
     pulses: list[Pulse] = field(default_factory=list)
@@ -180,8 +178,7 @@ def addressed(
             elif window.start < time < end:
                 data[time] = half.memory[address]
                 y, x = divmod(address, GEOMETRY.address(0, 1))
-                pixel = (y * GEOMETRY.columns + x + 1) % GEOMETRY.pixels
-                address = GEOMETRY.addresses()[pixel]
+                address = GEOMETRY.addresses()[(y * GEOMETRY.columns + x + 1) % GEOMETRY.pixels]
     return data
 
 

@@ -11,6 +11,7 @@ from amaranth.lib.wiring import Component, In
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 from cubestack.hdl.blocks.frame_gap import FrameGap
 from cubestack.hdl.blocks.gray_counter import GrayCounter
+from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubesense.dataflow import DataflowControl
 from cubestack.hdl.cubesense.nadir_scan import NadirScan
 from cubestack.hdl.cubesense.sun_search import SunSearch
@@ -30,9 +31,7 @@ class AsynchronousReset(Component):
         m.submodules.block = self._block
         m.domains.pix = ClockDomain(async_reset=True)
         m.d.comb += [ClockSignal("pix").eq(self.pix_clk), ResetSignal("pix").eq(self.pix_rst)]
-        for name, member in self._block.signature.members.items():
-            inside, outside = getattr(self._block, name), getattr(self, name)
-            m.d.comb += inside.eq(outside) if member.flow is In else outside.eq(inside)
+        connect_ports(m, self._block, self, ((n, n) for n in self._block.signature.members))
         return m
 
 

@@ -17,8 +17,7 @@ def test_published_pins() -> None:
     for fpga in (CubeSenseFpga("sun"), CubeSenseFpga("nadir", mcu_addressing=True)):
         rtlil_text(fpga)  # a design must be used, Amaranth says
         assert [(pin, pin.width) for pin in fpga.pins] == [(pin, pin.width) for pin in FPGA]
-        ports = {port.name for pin in fpga.pins for port in pin.ports}
-        assert ports == set(fpga.signature.members)
+        assert {port.name for pin in fpga.pins for port in pin.ports} == set(fpga.signature.members)
 
 
 def test_address_control_takes_no_further_pin() -> None:

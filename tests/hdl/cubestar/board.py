@@ -36,12 +36,9 @@ class Mcu(Processor[Controls]):
         await self.set(BANK=bank)
         if random.random() < 0.5:
             await self.set(RNW=0)
-            await self.set(ENABLE=1)
-        else:
-            await self.set(RNW=0, ENABLE=1)
+        await self.set(RNW=0, ENABLE=1)
 
     async def acknowledged(self, patience: int = 10**9) -> bool:
-        """Poll ACK for at most ``patience`` ps."""
         return await self.sees("ACK", patience)
 
     async def open(self, bank: int = 0) -> None:
@@ -54,23 +51,15 @@ class Mcu(Processor[Controls]):
 
 
 class CubeStarTestbench(Testbench[int]):
-    """A place is a bank, a memory or a board, by its number.
+    """A place is a bank, a memory or a board, by its number; ``mcus`` drive the control pins.
 
-    Attributes:
-        camera: the one camera.
-        mcus: who drives the control pins, of each board.
-        srams: all memories.
+    ``TOP`` is the name in the declared coverage, ``MEMORIES`` what the names of each memory's pins
+    begin with, ``LOW`` the inputs besides the camera's that are low at first.
     """
 
     PLACES: ClassVar[tuple[int, ...]] = (0, 1)
-
-    #: Name in the declared coverage.
     TOP: ClassVar[str]
-
-    #: What the names of each memory's pins begin with.
     MEMORIES: ClassVar[tuple[str, ...]] = ("SRAM_",)
-
-    #: Inputs besides the camera's that are low at first.
     LOW: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, dut: Any, mcus: Sequence[Any], timing: Timing = ANY) -> None:
@@ -125,7 +114,6 @@ class CubeStarTestbench(Testbench[int]):
 
     @property
     def mcu(self) -> Mcu:
-        """The only one."""
         (mcu,) = self.mcus
         return mcu
 
@@ -134,7 +122,6 @@ class CubeStarTestbench(Testbench[int]):
         return self.mcus[place % len(self.mcus)]
 
     def storing(self) -> set[int]:
-        """Places that are stored at."""
         return {place for place in self.PLACES if self.control(place).storing}
 
     def pixel_clock(self, memory: int) -> int:
@@ -172,16 +159,15 @@ class CubeStarTestbench(Testbench[int]):
     async def check(self) -> object:
         """ACK and the write pulses of all stores, to the ps, wherever in memory they went."""
         await self.settle_in_standby()
+        clocks, memory = self.camera.clocks, bytes(2 * GEOMETRY.bank_size)
         for n, (mcu, (_, ack)) in enumerate(zip(self.mcus, self._acks, strict=True)):
             srams = self.srams if len(self.mcus) == 1 else [self.srams[n]]
-            pulses = sorted(pulse for sram in srams for pulse in sram.pulses)
-            memory = bytes(2 * GEOMETRY.bank_size)
-            expected = behaviour(GEOMETRY, memory, self.camera.clocks, mcu.controls, ())
-            assert ack == expected.ack
             # Those that the camera's clock began are at even ps.
-            own = [pulse for pulse in pulses if pulse.start % 2 == EVEN]
+            own = sorted(p for sram in srams for p in sram.pulses if p.start % 2 == EVEN)
+            expected = behaviour(GEOMETRY, memory, clocks, mcu.controls, ())
+            assert ack == expected.ack
             assert _positions(own) == _positions(expected.pulses)
-            coverage.sample(self.camera.clocks, self.camera.period, mcu.controls)
+            coverage.sample(clocks, self.camera.period, mcu.controls)
         return None
 
 

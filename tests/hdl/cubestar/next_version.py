@@ -26,11 +26,7 @@ class Window(NamedTuple):
 
 
 class BusTestbench(CubeStarTestbench):
-    """Adds the bus.
-
-    Attributes:
-        bus: its master.
-    """
+    """Adds the bus."""
 
     WINDOWS: ClassVar[tuple[Window, ...]]
     SELECTS: ClassVar[tuple[str, ...]] = ("CS_N",)

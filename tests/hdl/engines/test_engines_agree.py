@@ -46,7 +46,6 @@ class Case(NamedTuple):
         return random_events(BOARDS[self.name], self.wiring, rng, end_ps)
 
     def some_events(self) -> list[PinEvent]:
-        """Enough to notice a fault."""
         return self.events(0, END_PS // 3)
 
 
@@ -85,8 +84,7 @@ def test_settled_pin_by_settled_pin(case, seed):
     if FULL and verilator_root() is not None:
         engines["verilator"] = lambda: VerilatedEngine(case.wiring)
     for name, make in engines.items():
-        found = play(make(), events)
-        assert not difference(case.wiring, events, found, expected), name
+        assert not difference(case.wiring, events, play(make(), events), expected), name
 
 
 def test_the_events_are_worth_it(case):
@@ -129,5 +127,4 @@ def test_a_fault_in_the_compiled_engine_is_found(case):
             engine.flip(counter, 0)
     memories = {name: memory.tobytes() for name, memory in engine.memories.items()}
     engine.close()
-    found = Played(np.concatenate(outputs), memories)
-    assert difference(case.wiring, events, found, expected)
+    assert difference(case.wiring, events, Played(np.concatenate(outputs), memories), expected)

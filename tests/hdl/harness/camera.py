@@ -12,7 +12,7 @@ from cocotb.triggers import Event, FallingEdge, RisingEdge
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.instants import EVEN, now, wait
 from tests.hdl.harness.reference import Clock, Tick
-from tests.hdl.harness.timing import ANY, Timing
+from tests.hdl.harness.timing import ANY, Timing, between
 
 T = TypeVar("T")
 
@@ -34,20 +34,17 @@ def line(pixels: Iterable[int], blanking: int | None = None) -> Iterator[Tick]:
 
 
 def vsync(clocks: int | None = None) -> Iterator[Tick]:
-    """VSYNC low between two frames."""
     for _ in range(clocks or random.randint(1, 9)):
         yield Tick(random.randrange(256), 0, 0)
 
 
 def lines(content: bytes, blanking: int | None = None) -> list[list[Tick]]:
-    """The lines of a frame of ``GEOMETRY``."""
     size = GEOMETRY.columns
     starts = range(0, len(content), size)
     return [list(line(content[start : start + size], blanking)) for start in starts]
 
 
 def flat(parts: Iterable[Iterable[T]]) -> list[T]:
-    """The parts one after the other."""
     return list(chain.from_iterable(parts))
 
 
@@ -71,15 +68,14 @@ class Camera:
         self._pins = Tick(0, 0, 1)
         self._running = Event()
         self._running.set()
-        self.period = timing.pixel_period()
-        self.stalls = timing.stalls()
-        self._phase = timing.phase(self.period)
-        self._duty = timing.duty()
+        self.period = between(timing.pixel_periods) // 2 * 2
+        self.stalls = random.choice(timing.stall_rates)
+        self._phase = int(random.uniform(*timing.phases) * self.period)
+        self._duty = random.uniform(*timing.duties)
         self.clocks: list[Clock] = []
 
     @property
     def busy(self) -> bool:
-        """Whether something sent was not clocked yet."""
         return bool(self._queue) or self._shown
 
     def send(self, ticks: Iterable[Tick]) -> None:
@@ -102,19 +98,15 @@ class Camera:
         await self.reach(len(self.clocks) + 3)
 
     async def reach(self, clocks: int) -> None:
-        """Wait until so many rising edges are over."""
         while len(self.clocks) < clocks:
             await RisingEdge(self._dut.PIXCLK)
 
     async def hold(
         self, there: Sequence[Tick], stay: Sequence[Tick], *, exactly: bool, low: bool
     ) -> None:
-        """Send what leads ``there``, and wait for a clock of what keeps it there.
+        """Send what leads ``there`` and lets it ``stay``, and wait for a clock of the latter.
 
-        Args:
-            there, stay: what is sent.
-            exactly: whether that is the first clock; else one of the first half.
-            low: whether to wait until that clock has fallen.
+        That is ``exactly`` the first one, or one of the first half; ``low``: until it has fallen.
         """
         first = await self.begin([*there, *stay]) + len(there) + 1
         await self.reach(first if exactly else first + random.randrange(len(stay) // 2))
@@ -122,7 +114,7 @@ class Camera:
             await FallingEdge(self._dut.PIXCLK)
 
     def stop(self) -> None:
-        """Stop the clock at whatever level it has."""
+        """At whatever level the clock has."""
         self._running.clear()
 
     def go(self) -> None:
@@ -138,9 +130,8 @@ class Camera:
             high, low = self._half(self._duty), self._half(1 - self._duty)
             change = random.randrange(HOLD, high + low - SETUP, 2)
             elapsed = 0
-            for moment, act in sorted(
-                [(high, self._fall), (change, self._show)], key=itemgetter(0)
-            ):
+            steps = [(high, self._fall), (change, self._show)]
+            for moment, act in sorted(steps, key=itemgetter(0)):
                 await self._pass(moment - elapsed)
                 elapsed = moment
                 act()

@@ -12,7 +12,7 @@ from tests.hdl.coverage.hits import hit
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.sram import SLOWEST_ACCESS, UNKNOWN
-from tests.hdl.harness.timing import ANY, Timing
+from tests.hdl.harness.timing import ANY, Timing, between
 
 #: Address bits that some memory uses: memory or bank, row, column.
 USED_BITS = GEOMETRY.position_bits + 1
@@ -81,12 +81,11 @@ class Ebi:
         """
         await self.address(address)
         self.drives = False
-        chip = select or self._selects[0]
-        pins = [getattr(self._dut, name) for name in ("RE_N", "WE_N", chip)]
+        pins = [getattr(self._dut, name) for name in ("RE_N", "WE_N", select or self._selects[0])]
         for pin in pins:
             pin.value = 0
             await wait(1_000, ODD)
-        await wait(SLOWEST_ACCESS + self._timing.pause(), ODD)
+        await wait(SLOWEST_ACCESS + between(self._timing.pauses), ODD)
         byte = int(self._dut.AD_LOW_O.value)
         for pin in reversed(pins):
             pin.value = 1
@@ -105,7 +104,7 @@ class Ebi:
         chip.value = 0
         await self._pause()
         getattr(self._dut, strobe).value = 0
-        await wait(SLOWEST_ACCESS + self._timing.pause(), ODD)
+        await wait(SLOWEST_ACCESS + between(self._timing.pauses), ODD)
         driven = int(self._dut.AD_LOW_OE.value)
         byte = int(self._dut.AD_LOW_O.value) if driven else None
         getattr(self._dut, strobe).value = 1
@@ -115,4 +114,4 @@ class Ebi:
         return byte
 
     async def _pause(self) -> None:
-        await wait(self._timing.pause(), ODD)
+        await wait(between(self._timing.pauses), ODD)

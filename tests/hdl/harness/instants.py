@@ -17,5 +17,4 @@ def now() -> int:
 
 async def wait(ps: int, parity: int) -> None:
     """Wait for ``ps``, or one more, until a picosecond of that ``parity``; never for nothing."""
-    time = now()
-    await Timer(max(ps, 1) + (time + max(ps, 1) + parity) % 2, unit="step")
+    await Timer(max(ps, 1) + (now() + max(ps, 1) + parity) % 2, unit="step")

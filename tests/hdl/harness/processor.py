@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from tests.hdl.harness.instants import ODD, now, wait
 from tests.hdl.harness.sram import SLOWEST_ACCESS
-from tests.hdl.harness.timing import ANY, Timing
+from tests.hdl.harness.timing import ANY, Timing, between
 
 C = TypeVar("C")
 
@@ -36,7 +36,7 @@ class Processor(Generic[C]):
 
     async def set(self, after: int | None = None, **levels: int) -> None:
         """Drive pins together, ``after`` ps or after a random idle time."""
-        await wait(self._timing.idle() if after is None else after, ODD)
+        await wait(between(self._timing.idles) if after is None else after, ODD)
         for name, level in levels.items():
             getattr(self._dut, name).value = level
         self._moved = now()
@@ -54,15 +54,16 @@ class Processor(Generic[C]):
 
     async def clock(self) -> int:
         """One data clock, after the SRAM's access time; the byte it presents."""
-        await wait(max(self._timing.data_half(), self._moved + SLOWEST_ACCESS + 2 - now()), ODD)
+        await wait(
+            max(between(self._timing.data_halves), self._moved + SLOWEST_ACCESS + 2 - now()), ODD
+        )
         pin = getattr(self._dut, self.CLOCK)
         pin.value = 1
         self._moved = now()
         self.data_clocks.append(now())
-        await wait(self._timing.data_half(), ODD)
+        await wait(between(self._timing.data_halves), ODD)
         pin.value = 0
         return int(self._dut.DATA.value)
 
     async def read(self, count: int) -> bytes:
-        """So many data clocks."""
         return bytes([await self.clock() for _ in range(count)])

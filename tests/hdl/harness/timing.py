@@ -21,7 +21,7 @@ DATA_HALVES = {
 
 @dataclass(frozen=True)
 class Timing:
-    """Each pair is the least and the most; each call draws one.
+    """Each pair is the least and the most, for :func:`between`.
 
     Attributes:
         pixel_periods: of the camera's clock; drawn once for a bench.
@@ -40,27 +40,6 @@ class Timing:
     data_halves: tuple[int, int] = (4_000, 100_000)
     idles: tuple[int, int] = (0, 500_000)
     pauses: tuple[int, int] = (1_000, 20_000)
-
-    def pixel_period(self) -> int:
-        return _between(*self.pixel_periods) // 2 * 2
-
-    def phase(self, period: int) -> int:
-        return int(random.uniform(*self.phases) * period)
-
-    def duty(self) -> float:
-        return random.uniform(*self.duties)
-
-    def stalls(self) -> float:
-        return random.choice(self.stall_rates)
-
-    def data_half(self) -> int:
-        return _between(*self.data_halves)
-
-    def idle(self) -> int:
-        return _between(*self.idles)
-
-    def pause(self) -> int:
-        return _between(*self.pauses)
 
 
 #: Rates at random, unless a test says more.
@@ -90,5 +69,5 @@ def fixed(pixel_mhz: float, data_half: int, phase: float) -> Timing:
     )
 
 
-def _between(least: int, most: int) -> int:
-    return random.randint(least, most)
+def between(limits: tuple[int, int]) -> int:
+    return random.randint(*limits)

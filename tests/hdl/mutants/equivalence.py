@@ -84,8 +84,6 @@ class Verdict(NamedTuple):
 
 
 class Equivalence:
-    """Compares mutants of one design."""
-
     def __init__(self, netlist: Netlist, design: Component, standby: Mapping[str, int]) -> None:
         """Take a design as a ``netlist`` too, and the levels of its inputs in ``standby``.
 
@@ -125,8 +123,7 @@ class Equivalence:
             block = _block_of(mutant)
             if block not in self._invariants:
                 self._invariants[block] = self._kept(None, self._guesses(block), [])
-            known = self._invariants[block]
-            equal = self._pins in self._kept(mutant, [self._pins, *common], known)
+            equal = self._pins in self._kept(mutant, [self._pins, *common], self._invariants[block])
             steps = None if equal else self._counterexample(mutant, STEPS)
         return Verdict(equal, steps, time.monotonic() - start)
 

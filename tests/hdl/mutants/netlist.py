@@ -86,7 +86,6 @@ class Mutant(NamedTuple):
     source: tuple[str, ...] = ()
 
     def command(self) -> str:
-        """Yosys' command that makes it."""
         text = (
             f"mutate -mode {self.mode} -module {self.module} -cell {self.cell} "
             f"-port {self.port} -portbit {self.bit}"
@@ -94,7 +93,6 @@ class Mutant(NamedTuple):
         return text if self.control_bit is None else f"{text} -ctrlbit {self.control_bit}"
 
     def __str__(self) -> str:
-        """One line for a reader."""
         where = f"{self.module}/" if self.module != "dut" else ""
         name = f" ({self.wire})" if self.wire else ""
         under = "" if self.control_bit is None else f" under bit {self.control_bit}"
@@ -110,8 +108,7 @@ def netlist(component: Component, kept: Sequence[str] = ()) -> Netlist:
     text = str(rtlil.convert(component, name="dut", emit_src=True))
     text = _SOURCE.sub(lambda found: f'{found[1]}{_basenames(found[2])}"', text)
     keep = "".join(f"setattr -mod -set keep_hierarchy 1 dut.{name}\n" for name in kept)
-    script = _SIMPLIFY.format(keep=keep)
-    _, simplified = yosys_files(script, {"design.il": text}, "netlist.il")
+    _, simplified = yosys_files(_SIMPLIFY.format(keep=keep), {"design.il": text}, "netlist.il")
     return Netlist(re.sub(r"^# Generated.*\n", "", simplified))
 
 
@@ -150,23 +147,14 @@ def selectable(design: Netlist, chosen: Sequence[Mutant]) -> str:
 
 
 def _parsed(line: str) -> Mutant:
-    options: dict[str, list[str]] = {}
-    for name, value in _OPTION.findall(line):
-        options.setdefault(name, []).append(value)
-
-    def one(name: str) -> str:
-        return options.get(name, [""])[0]
-
-    wire = one("wire")
+    options = _OPTION.findall(line)
+    one = dict(options)
     return Mutant(
-        one("mode"),
-        one("module"),
-        one("cell"),
-        one("port"),
-        int(one("portbit")),
-        int(one("ctrlbit")) if "ctrlbit" in options else None,
-        f"{wire}[{one('wirebit')}]" if wire else "",
-        tuple(options.get("src", [])),
+        *(one[name] for name in ("mode", "module", "cell", "port")),
+        int(one["portbit"]),
+        int(one["ctrlbit"]) if "ctrlbit" in one else None,
+        f"{one['wire']}[{one['wirebit']}]" if "wire" in one else "",
+        tuple(value for name, value in options if name == "src"),
     )
 
 

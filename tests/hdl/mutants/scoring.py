@@ -43,8 +43,6 @@ class Result:
 
 
 class Score(NamedTuple):
-    """Counts of one suite."""
-
     killed: int
     equivalent: int
     survived: int

@@ -8,6 +8,7 @@ from amaranth.hdl import ClockDomain, ClockSignal, Module, ResetSignal
 from amaranth.lib.wiring import Component, In
 
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
+from cubestack.hdl.blocks.pinned import connect_ports
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
 from tests.hdl.regression import ANY_TOP, PAIR, STAR, TIERS, frame_environment, modules
@@ -57,9 +58,7 @@ class CounterAlone(Component):
         m.submodules.counter = self._counter
         m.domains.sync = ClockDomain(async_reset=True)
         m.d.comb += [ClockSignal().eq(self.clk), ResetSignal().eq(self.rst)]
-        for name, member in self._counter.signature.members.items():
-            inside, outside = getattr(self._counter, name), getattr(self, name)
-            m.d.comb += inside.eq(outside) if member.flow is In else outside.eq(inside)
+        connect_ports(m, self._counter, self, ((n, n) for n in self._counter.signature.members))
         return m
 
 

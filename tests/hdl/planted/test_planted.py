@@ -25,7 +25,6 @@ CASES = [
 
 
 def wrong_verilog(bug: Bug, top: str) -> str:
-    """The top with the bug."""
     tier = TIERS[top]
     with planted(bug) as names:
         design = names.get(tier.design.__name__, tier.design)

@@ -42,7 +42,6 @@ def byte_at(bench: PairTestbench, side: str, x: int, y: int) -> int:
 
 @checked_test(PairTestbench)
 async def pixels_in_any_order(bench: PairTestbench) -> None:
-    """The first clock presents the addressed byte, in either memory."""
     async for side in each_side(bench):
         for x, y in [*CORNERS, *(any_pixel() for _ in range(30))]:
             await take(bench, x, y)
@@ -70,8 +69,7 @@ async def addresses_outside_of_the_picture(bench: PairTestbench) -> None:
     for _ in range(20):
         address = random.getrandbits(8 * ADDRESS_BYTES)
         await bench.mcu.take(address.to_bytes(ADDRESS_BYTES, "big"))
-        wanted = bench.srams[side].memory[address % GEOMETRY.bank_size]
-        assert await bench.mcu.clock() == wanted
+        assert await bench.mcu.clock() == bench.srams[side].memory[address % GEOMETRY.bank_size]
 
 
 @checked_test(PairTestbench)

@@ -30,7 +30,6 @@ async def standby(dut: Any) -> None:
 
 @timed_test
 async def idle_is_reset(dut: Any) -> None:
-    """With EN high nothing on any other pin moves any output, not even for a glitch."""
     await standby(dut)
     await disturb_in_standby(dut, STANDBY, INPUTS, (1_000,), 2000)
 

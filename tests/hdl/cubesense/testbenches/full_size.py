@@ -16,17 +16,15 @@ async def standby(dut: Any) -> None:
     await Timer(1, unit="us")
 
 
-async def command(dut: Any, **levels: int) -> None:
-    """The control lines, then the enables."""
-    for name in ("SHIFT", "EDGE", "RNW"):
-        getattr(dut, name).value = levels[name]
+async def command(dut: Any, SUNEN: int, NADEN: int, **lines: int) -> None:
+    for name, level in lines.items():
+        getattr(dut, name).value = level
     await Timer(1, unit="us")
-    dut.SUNEN.value, dut.NADEN.value = levels["SUNEN"], levels["NADEN"]
+    dut.SUNEN.value, dut.NADEN.value = SUNEN, NADEN
     await Timer(1, unit="us")
 
 
 async def stored(dut: Any, memory: int, camera: int, frame: int) -> None:
-    """Compare a memory with a camera's frame."""
     dut.memory.value, dut.camera.value, dut.expected.value = memory, camera, frame
     dut.look.value = 1
     await Timer(1, unit="ns")

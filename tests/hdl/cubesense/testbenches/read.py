@@ -40,8 +40,7 @@ async def nadir_scan(bench: PairTestbench) -> None:
 async def sun_window(bench: PairTestbench) -> None:
     """Around Suns in the middle, at the borders and in the corners, and around none."""
     columns, rows = (0, COLUMNS // 2, COLUMNS - 3), (0, ROWS // 2, ROWS - 1)
-    places = [*product(columns, rows), NOT_FOUND]
-    cases = list(product(places, SIDES))
+    cases = list(product([*product(columns, rows), NOT_FOUND], SIDES))
     everything = os.environ.get("HDL_TIER") == "full"
     for (x, y), memory in cases if everything else random.sample(cases, 5):
         content = with_sun(x, y)

@@ -54,8 +54,7 @@ def row_with(side: str, action: Action) -> Sequence[int]:
 
 async def leave_store(bench: PairTestbench, side: str, action: Action, state: str) -> None:
     """From standby there, and out."""
-    source = side if action is Action.STORE else OTHER[side]
-    camera = bench.cameras[source]
+    camera = bench.cameras[side if action is Action.STORE else OTHER[side]]
     await bench.mcu.command(*row_with(side, action))
     if state != "reset":
         await camera.started()
@@ -133,8 +132,7 @@ async def every_action_is_left_in_every_state(bench: PairTestbench) -> None:
 async def every_row_in_every_order_of_the_enables(bench: PairTestbench) -> None:
     for shift, edge, rnw, *levels in random.sample(list(product((0, 1), repeat=5)), 32):
         names = [name for name, level in zip(STAND, levels, strict=True) if not level]
-        orders = [[name] for name in names], [names], [[name] for name in names[::-1]]
-        for order in orders:
+        for order in [[name] for name in names], [names], [[name] for name in names[::-1]]:
             await bench.mcu.set(SHIFT=shift, EDGE=edge, RNW=rnw)
             for group in order:
                 await bench.mcu.set(**dict.fromkeys(group, 0))

@@ -117,8 +117,7 @@ async def any_waveform(dut: Any) -> None:
     for _ in range(12):
         for source in bench.cameras.values():
             for _ in range(3 * ROWS):
-                row = random.randbytes(random.choice([COLUMNS] * 8 + [1, COLUMNS + 1]))
-                source.send(line(row))
+                source.send(line(random.randbytes(random.choice([COLUMNS] * 8 + [1, COLUMNS + 1]))))
                 if random.random() < 1 / ROWS:
                     source.send(frame(b"")[: random.choice([GAP - 2, GAP, GAP + 9])])
         place = random.choice(bench.PLACES)

@@ -70,8 +70,7 @@ async def memory_that_is_filled_is_out_of_reach(bench: TESTBENCH) -> None:
         other = sram.picture(1 - bank)
         content = picture()
         await bench.begin(place, content)
-        memory = bench.srams.index(sram)
-        meddling = cocotb.start_soon(is_cut_off(bench, 1 << 30, memory))
+        meddling = cocotb.start_soon(is_cut_off(bench, 1 << 30, bench.srams.index(sram)))
         assert await bench.acknowledged(place)
         meddling.cancel()
         for name in (*bench.SELECTS, "RE_N", "WE_N"):
