@@ -1,10 +1,6 @@
 """Runs cocotb modules on a Verilog file: what pytest's fixtures and the mutants share.
 
-:func:`simulate` runs any modules. :func:`run_tier` runs the tier of a top on a GIVEN file, which
-need not be what the top's source gives::
-
-    outcome = run_tier("cubestar", Path("mutant.v"), Path("scratch"))
-    outcome.passed, outcome.failed
+:func:`simulate` runs any modules, :func:`run_tier` the tier of a top on a given file.
 
 From the environment: ``HDL_SEED`` is added to every seed, ``HDL_SIMULATOR`` is ``icarus`` (default)
 or ``verilator``, ``HDL_TIER=full`` is what `make test-hdl` runs besides what `make test` does.

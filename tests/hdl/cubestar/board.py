@@ -54,13 +54,15 @@ class CubeStarTestbench(Testbench[int]):
     """A place is a bank, a memory or a board, by its number; ``mcus`` drive the control pins.
 
     ``TOP`` is the name in the declared coverage, ``MEMORIES`` what the names of each memory's pins
-    begin with, ``LOW`` the inputs besides the camera's that are low at first.
+    begin with, ``LOW`` the inputs besides the camera's that are low at first, and ``QUIET`` the
+    outputs that are 0 in standby besides the memories'.
     """
 
     PLACES: ClassVar[tuple[int, ...]] = (0, 1)
     TOP: ClassVar[str]
     MEMORIES: ClassVar[tuple[str, ...]] = ("SRAM_",)
     LOW: ClassVar[tuple[str, ...]] = ()
+    QUIET: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, dut: Any, mcus: Sequence[Any], timing: Timing = ANY) -> None:
         """``mcus``: the pins of each processor."""
@@ -110,7 +112,8 @@ class CubeStarTestbench(Testbench[int]):
     def standby_levels(cls) -> dict[str, int]:
         """The outputs in standby, without the addresses. The SRAMs' strobes are low active."""
         strobes = {"D_OE": 0, "CE_N": 1, "OE_N": 1, "WE_N": 1}
-        return {f"{sram}{name}": strobes[name] for sram in cls.MEMORIES for name in strobes}
+        pins = {f"{sram}{name}": strobes[name] for sram in cls.MEMORIES for name in strobes}
+        return pins | dict.fromkeys(cls.QUIET, 0)
 
     @property
     def mcu(self) -> Mcu:

@@ -30,6 +30,7 @@ class BusTestbench(CubeStarTestbench):
 
     WINDOWS: ClassVar[tuple[Window, ...]]
     SELECTS: ClassVar[tuple[str, ...]] = ("CS_N",)
+    QUIET = ("AD_LOW_OE",)
 
     def __init__(self, dut: Any, mcus: list[Any], timing: Timing = ANY) -> None:
         super().__init__(dut, mcus, timing)
@@ -38,10 +39,6 @@ class BusTestbench(CubeStarTestbench):
 
     def watch(self) -> None:
         self.bus.start()
-
-    @classmethod
-    def standby_levels(cls) -> dict[str, int]:
-        return super().standby_levels() | {"AD_LOW_OE": 0}
 
     def place_of(self, address: int, select: str) -> int:
         """Of an access on the bus."""
@@ -81,10 +78,9 @@ class BusTestbench(CubeStarTestbench):
 
     async def fetch(self, place: int) -> bytes:
         await self.open(place)
-        window = self.window(place)
-        bank = self.memory_of(place)[1]
-        addresses = [window.base + address for address in GEOMETRY.addresses(bank)]
-        content = [await self.bus.read(address, window.select) for address in addresses]
+        _, base, _, select = self.window(place)
+        addresses = GEOMETRY.addresses(self.memory_of(place)[1])
+        content = [await self.bus.read(base + address, select) for address in addresses]
         await self.control(place).standby()
         return bytes(byte for byte in content if byte is not None)
 
@@ -94,15 +90,12 @@ class SharedTestbench(BusTestbench):
 
     TOP = "shared"
     LOW = ("ENABLE", "RNW", "BANK")
+    QUIET = ("AD_LOW_OE", "ACK", "AD_LOW_O", "SRAM_D_O")
     WINDOWS = (Window(0, 0, 2 * MEMORY, ""),)
 
     def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         super().__init__(dut, [dut], timing)
         (self.sram,) = self.srams
-
-    @classmethod
-    def standby_levels(cls) -> dict[str, int]:
-        return super().standby_levels() | {"ACK": 0, "AD_LOW_O": 0, "SRAM_D_O": 0}
 
     def storing(self) -> set[int]:
         return {self.mcu.controls[-1].bank} if self.mcu.storing else set()
@@ -113,6 +106,7 @@ class DoubleTestbench(BusTestbench):
 
     TOP = "double"
     LOW = ("ENABLE", "RNW", "INTO")
+    QUIET = ("AD_LOW_OE", "ACK", "AD_LOW_O")
     MEMORIES = ("SRAM1_", "SRAM2_")
     WINDOWS = (Window(0, 0, MEMORY, ""), Window(1, MEMORY, MEMORY, ""))
 
@@ -121,10 +115,6 @@ class DoubleTestbench(BusTestbench):
         pins = SimpleNamespace(**{name: getattr(dut, name) for name in names}, BANK=dut.INTO)
         super().__init__(dut, [pins], timing)
         self._into = 0  # from when RNW fell last
-
-    @classmethod
-    def standby_levels(cls) -> dict[str, int]:
-        return super().standby_levels() | {"ACK": 0, "AD_LOW_O": 0}
 
     def storing(self) -> set[int]:
         return {self._into} if self.mcu.storing else set()

@@ -17,6 +17,7 @@ class PublishedTestbench(CubeStarTestbench):
 
     TOP = "published"
     LOW = ("ENABLE", "RNW", "BANK", "DCLK")
+    QUIET = ("ACK", "DATA", "SRAM_D_O")
 
     def __init__(self, dut: Any, timing: Timing = ANY) -> None:
         super().__init__(dut, [dut], timing)
@@ -26,10 +27,6 @@ class PublishedTestbench(CubeStarTestbench):
 
     def watch(self) -> None:
         cocotb.start_soon(watch(self.dut.DATA, self._data))
-
-    @classmethod
-    def standby_levels(cls) -> dict[str, int]:
-        return super().standby_levels() | {"ACK": 0, "DATA": 0, "SRAM_D_O": 0}
 
     def stored(self, place: int = 0) -> bytes:
         return super().stored(place)

@@ -40,20 +40,13 @@ Script = Callable[[Rng], Iterator[Step]]
 
 @dataclass(frozen=True)
 class Board:
-    """A small top with what its surroundings do.
+    """A small top with what its surroundings do."""
 
-    Attributes:
-        wiring: of the top, one column less wide when asked for.
-        columns, rows: of its picture.
-        gap: clocks between two frames at least.
-        script: what the microcontroller does next, for ever.
-    """
-
-    wiring: Callable[[bool], Wiring]
+    wiring: Callable[[bool], Wiring]  # of the top, one column less wide when asked for
     columns: int
     rows: int
-    gap: int
-    script: Script
+    gap: int  # clocks between two frames at least
+    script: Script  # what the microcontroller does next, for ever
 
 
 def random_events(board: Board, wiring: Wiring, rng: Rng, end_ps: int) -> list[PinEvent]:

@@ -1,7 +1,4 @@
-"""Cameras attached, so that the compiled engine runs in bursts on copies of the design.
-
-Beside Amaranth's simulator, which makes one edge after the other, on every top.
-"""
+"""The compiled engine's bursts on copies of a design, and Amaranth's simulator, edge by edge."""
 
 from fractions import Fraction
 from itertools import islice

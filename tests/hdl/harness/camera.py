@@ -56,9 +56,8 @@ def frame(content: bytes) -> list[Tick]:
 class Camera:
     """Free-running source: its rate, phase, duty cycle and stretched clocks are ``timing``'s.
 
-    Its pins change at random between hold and set-up time.
-
-    With nothing to send it is between two lines. ``clocks`` is the record of what it did.
+    Its pins change at random between hold and set-up time. With nothing to send it is between two
+    lines. ``clocks`` is the record of what it did.
     """
 
     def __init__(self, dut: Any, timing: Timing = ANY) -> None:

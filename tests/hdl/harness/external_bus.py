@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any
 
 import cocotb
-from cocotb.triggers import ReadOnly
 
 from tests.hdl.coverage import cubestar as cover_cubestar
 from tests.hdl.coverage.hits import hit
@@ -13,6 +12,7 @@ from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.instants import ODD, wait
 from tests.hdl.harness.sram import SLOWEST_ACCESS, UNKNOWN
 from tests.hdl.harness.timing import ANY, Timing, between
+from tests.hdl.harness.watching import never_high
 
 #: Address bits that some memory uses: memory or bank, row, column.
 USED_BITS = GEOMETRY.position_bits + 1
@@ -34,14 +34,8 @@ class Ebi:
             getattr(dut, name).value = 0
 
     def start(self) -> None:
-        cocotb.start_soon(self._watch())
-
-    async def _watch(self) -> None:
-        """One driver at most on the data lines, whenever a point in time has settled."""
-        while True:
-            await self._dut.AD_LOW_OE.value_change
-            await ReadOnly()
-            assert not (self.drives and int(self._dut.AD_LOW_OE.value)), "two drivers on AD_LOW"
+        both = "two drivers on AD_LOW"
+        cocotb.start_soon(never_high(self._dut.AD_LOW_OE, both, unless=lambda: not self.drives))
 
     async def address(self, address: int) -> None:
         """The first half of an access."""

@@ -12,14 +12,12 @@ C = TypeVar("C")
 
 
 class Processor(Generic[C]):
-    """Drives the control pins at random moments of its own.
+    """Drives the control pins at random moments of its own; ``CLOCK`` is the data clock's pin.
 
-    Attributes:
-        controls: the pins' levels, each with the time (ps) from which on it has them.
-        data_clocks: times of the data clock's rising edges.
+    ``controls`` are the pins' levels, each with the time (ps) from which on it has them,
+    ``data_clocks`` the times of the data clock's rising edges.
     """
 
-    #: The data clock's pin.
     CLOCK: ClassVar[str]
 
     def __init__(

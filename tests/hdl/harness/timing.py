@@ -21,25 +21,15 @@ DATA_HALVES = {
 
 @dataclass(frozen=True)
 class Timing:
-    """Each pair is the least and the most, for :func:`between`.
+    """Each pair is the least and the most, for :func:`between`."""
 
-    Attributes:
-        pixel_periods: of the camera's clock; drawn once for a bench.
-        phases: of its first edge, in parts of its period.
-        duties: high part of its period.
-        stall_rates: chosen from; so often a half of its clock takes 2 to 20 times as long.
-        data_halves: of the data clock, which waits for the SRAM's access time besides.
-        idles: between two actions of the processor.
-        pauses: between two changes of the external bus's pins.
-    """
-
-    pixel_periods: tuple[int, int] = (50_000, 200_000)
-    phases: tuple[float, float] = (0.0, 1.0)
-    duties: tuple[float, float] = (0.3, 0.7)
-    stall_rates: tuple[float, ...] = (0.0, 0.02, 0.1)
-    data_halves: tuple[int, int] = (4_000, 100_000)
-    idles: tuple[int, int] = (0, 500_000)
-    pauses: tuple[int, int] = (1_000, 20_000)
+    pixel_periods: tuple[int, int] = (50_000, 200_000)  # of the camera's clock, once for a bench
+    phases: tuple[float, float] = (0.0, 1.0)  # of its first edge, in parts of its period
+    duties: tuple[float, float] = (0.3, 0.7)  # high part of its period
+    stall_rates: tuple[float, ...] = (0.0, 0.02, 0.1)  # so often a half of it is 2 to 20 as long
+    data_halves: tuple[int, int] = (4_000, 100_000)  # of the data clock, which waits for the SRAM
+    idles: tuple[int, int] = (0, 500_000)  # between two actions of the processor
+    pauses: tuple[int, int] = (1_000, 20_000)  # between two changes of the external bus's pins
 
 
 #: Rates at random, unless a test says more.

@@ -55,6 +55,8 @@ clk2fflogic
 opt -full
 """
 
+_START = "-set-at 1 standby 1 -set-at 1 retained 1"
+
 #: Registers wider than this are not guessed about.
 _NARROW_BITS = 4
 
@@ -93,9 +95,9 @@ class Equivalence:
         files = {"netlist.il": netlist.text}
         _, self._gold, flat = yosys_files(_GOLD, files, "gold.il", "flat.json")
         module = json.loads(flat)["modules"]["dut"]
-        ports = {name: (p["direction"], p["bits"]) for name, p in module["ports"].items()}
-        self._inputs = {n: len(bits) for n, (way, bits) in ports.items() if way == "input"}
-        outputs = {n: bits for n, (way, bits) in ports.items() if way == "output"}
+        ports = module["ports"].items()
+        self._inputs = {n: len(p["bits"]) for n, p in ports if p["direction"] == "input"}
+        outputs = {n: p["bits"] for n, p in ports if p["direction"] == "output"}
         self._wires = {name: len(bits) for name, bits in outputs.items()}
         self._index = {name: number for number, name in enumerate(self._wires)}
         self._standby = " & ".join(f"\\{n} == {level}" for n, level in standby.items())
@@ -159,12 +161,8 @@ class Equivalence:
 
     def _kept(self, mutant: Mutant | None, guesses: list[str], known: Sequence[str]) -> list[str]:
         """The largest inductive set of ``guesses``, while ``known`` holds at any time."""
-        first = "-seq 1 -set-at 1 standby 1 -set-at 1 retained 1"
-        for steps, options in ((1, first), (2, "-seq 2 -set-at 1 all 1")):
-            while guesses:
-                wrong = self._refuted(mutant, guesses, known, steps, options)
-                if not wrong:
-                    break
+        for steps, options in ((1, f"-seq 1 {_START}"), (2, "-seq 2 -set-at 1 all 1")):
+            while guesses and (wrong := self._refuted(mutant, guesses, known, steps, options)):
                 guesses = [guess for n, guess in enumerate(guesses) if n not in wrong]
         return guesses
 
@@ -175,10 +173,8 @@ class Equivalence:
         size = -(-len(guesses) // _GROUPS)
         groups = [guesses[at : at + size] for at in range(0, len(guesses), size)]
         show = " ".join(f"-show guess{n}" for n in range(len(groups)))
-        calls = [
-            f"sat {options} -set known 1 -set-at {steps} all{n} 0 {show}"
-            for n in range(len(groups))
-        ]
+        call = f"sat {options} -set known 1 -set-at {steps}"
+        calls = [f"{call} all{n} 0 {show}" for n in range(len(groups))]
         report = self._run(mutant, groups, known, calls)
         wrong = set()
         for step, name, bits in _MODEL.findall(report):
@@ -189,10 +185,7 @@ class Equivalence:
 
     def _counterexample(self, mutant: Mutant, most: int) -> int | None:
         """Steps from standby to a difference at the pins; None when there is none in ``most``."""
-        call = (
-            f"sat -tempinduct-baseonly -maxsteps {most} "
-            "-set-at 1 standby 1 -set-at 1 retained 1 -prove all 1 -show all"
-        )
+        call = f"sat -tempinduct-baseonly -maxsteps {most} {_START} -prove all 1 -show all"
         report = self._run(mutant, [[self._pins]], [], [call])
         if "model found for base case: FAIL!" not in report:
             return None

@@ -69,21 +69,16 @@ class Netlist:
 
 
 class Mutant(NamedTuple):
-    """One change.
+    """One change."""
 
-    ``mode`` is "inv", "const0", "const1", "cnot0" or "cnot1"; the last two invert while bit
-    ``control_bit`` of the same port is 0 or 1. ``wire`` is the bit's name in the design, empty when
-    it has none; ``source`` are lines of the design's source that the cell comes from.
-    """
-
-    mode: str
+    mode: str  # "inv", "const0" or "const1"; "cnot0" or "cnot1" inverts while a bit is 0 or 1
     module: str
     cell: str
     port: str
     bit: int
-    control_bit: int | None = None
-    wire: str = ""
-    source: tuple[str, ...] = ()
+    control_bit: int | None = None  # that bit, of the same port
+    wire: str = ""  # the bit's name in the design, if it has one
+    source: tuple[str, ...] = ()  # lines of the design's source that the cell comes from
 
     def command(self) -> str:
         text = (

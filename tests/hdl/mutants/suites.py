@@ -25,25 +25,15 @@ class Stage:
 
 @dataclass(frozen=True)
 class Suite:
-    """A design and its simulations.
-
-    Attributes:
-        make: the design, of a small picture.
-        stages: what a mutant has to pass, what finds most first.
-        environment: of the cocotb modules.
-        standby: levels of inputs that make the state.
-        kept: submodules whose signals the cocotb modules look at.
-        wrapper: a design around the module ``dut``, for stages with another top.
-        source: file of the design's source that the mutants are of, if not of all.
-    """
+    """A design, of a small picture, and what a mutant of it has to pass."""
 
     make: Callable[[], Component]
-    stages: tuple[Stage, ...]
-    environment: Mapping[str, str]
-    standby: Mapping[str, int]
-    kept: tuple[str, ...] = ()
-    wrapper: Callable[[], Component] | None = None
-    source: str = ""
+    stages: tuple[Stage, ...]  # what finds most first
+    environment: Mapping[str, str]  # of the cocotb modules
+    standby: Mapping[str, int]  # levels of inputs that make the state
+    kept: tuple[str, ...] = ()  # submodules whose signals the cocotb modules look at
+    wrapper: Callable[[], Component] | None = None  # around ``dut``, for stages with another top
+    source: str = ""  # file of the design's source that the mutants are of, if not of all
 
 
 class CounterAlone(Component):

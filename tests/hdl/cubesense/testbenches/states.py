@@ -1,7 +1,4 @@
-"""Each action of each FPGA is left in everything that it can be at; irregular cameras, each path.
-
-What there is to reach is what ``cover_points`` declares.
-"""
+"""Each FPGA's actions are left in everything that they can be at; irregular cameras, each path."""
 
 import random
 from collections.abc import Sequence
@@ -142,7 +139,7 @@ async def every_row_in_every_order_of_the_enables(bench: PairTestbench) -> None:
 
 def irregular(case: str) -> list[Tick]:
     """A whole picture, irregular but for a gap before it."""
-    rows = [list(row) for row in lines(picture())]
+    rows = lines(picture())
     number = random.randrange(ROWS - 2)
     match case:
         case "line too long":

@@ -1,7 +1,4 @@
-"""Boards on the processor's external bus: who has each memory, and that neither disturbs the other.
-
-``TESTBENCH`` in the environment names the testbench.
-"""
+"""Boards on the processor's external bus: who has each memory, and neither disturbs the other."""
 
 import random
 

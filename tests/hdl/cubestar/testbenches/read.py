@@ -41,7 +41,8 @@ async def camera_dies_while_storing(bench: PublishedTestbench) -> None:
             await bench.mcu.open()
         else:
             await bench.mcu.set(RNW=1)
-        assert bench.stored().startswith(await bench.mcu.read(random.randrange(1, 10)))
+        read = await bench.mcu.read(random.randrange(1, 10))
+        assert bench.stored().startswith(read)
         await bench.mcu.set(ENABLE=0, RNW=0)
         bench.camera.go()
         await bench.camera.sent()

@@ -1,7 +1,4 @@
-"""Each store is left in everything that it can be at, by each pin that may end it.
-
-``TESTBENCH`` in the environment names the testbench, one of CubeStar's.
-"""
+"""Each store of CubeStar's is left in everything that it can be at, by each pin that may end it."""
 
 import random
 
