@@ -1,11 +1,13 @@
-"""CubeStar's tops on their pins, on Icarus Verilog."""
+"""CubeStar's tops on their pins, on Icarus Verilog; and the published pins in their documents."""
 
 import random
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.firmware_model.interface.cubestar.pins import HEADER, PUBLISHED
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
@@ -67,3 +69,24 @@ def test_next_version_stores_as_the_published_board(
     icarus: Any, wrapper: type[AsPublished], columns: int, rows: int, seed: int
 ) -> None:
     icarus.run(wrapper, columns, rows, *STORING, seed=seed, text=with_board)
+
+
+def test_header_has_every_pin_once() -> None:
+    widths = {pin: pin.width for pin in PUBLISHED if not pin.startswith("SRAM_")}
+    assert set(HEADER) == set(widths)
+    positions = []
+    for pin, position in HEADER.items():
+        first, _, last = position.partition("-")
+        own = range(int(first), int(last or first) + 1)
+        assert len(own) == widths[pin]
+        positions += own
+    assert positions == sorted(set(positions))
+
+
+def test_document_has_the_same_pins() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "gateware.md").read_text()
+    rows = re.findall(r"^\| ([\d-]+) \| `(\w+)` \| (in|out) \| (.+) \|$", text, re.M)
+    assert rows == [
+        (position, pin, pin.direction.removesuffix("put"), pin.meaning)
+        for pin, position in HEADER.items()
+    ]

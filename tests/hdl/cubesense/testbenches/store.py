@@ -69,10 +69,9 @@ async def ack_stays_and_nothing_more_is_stored(bench: PairTestbench) -> None:
     for memory in SIDES:
         content = bytearray(GEOMETRY.pixels)
         content[2 * COLUMNS + 3 : 2 * COLUMNS + 6] = bytes([255] * 3)
-        await bench.store(("sun", memory))
-        sun = bench.cameras["sun"]
-        sun.send(frame(bytes(content)))
+        await bench.begin(("sun", memory), bytes(content))
         assert await bench.mcu.acknowledged(memory)
+        sun = bench.cameras["sun"]
         sun.send([*frame(picture()), *frame(bytes([255]) * GEOMETRY.pixels), *frame(picture())])
         await sun.sent()
         assert int(getattr(bench.dut, f"{PREFIXES[memory]}ACK").value)

@@ -62,8 +62,7 @@ async def write_pulse_cut_off(bench: PublishedTestbench) -> None:
     """
     for change in ({"ENABLE": 0}, {"RNW": 1}, {"ENABLE": 0, "RNW": 1}) * 3:
         bank = random.getrandbits(1)
-        await bench.store(bank)
-        bench.camera.send(frame(picture()))
+        await bench.begin(bank, picture())
         for _ in range(random.randint(1, GEOMETRY.pixels)):
             await FallingEdge(bench.dut.SRAM_WE_N)
         await bench.mcu.set(random.randrange(1, bench.camera.period // 4), **change)

@@ -55,8 +55,7 @@ async def both_banks(bench: PublishedTestbench) -> None:
     for _ in range(6):
         bank = random.getrandbits(1)
         content[bank] = picture()
-        await bench.store(bank)
-        bench.camera.send(frame(content[bank]))
+        await bench.begin(bank, content[bank])
         while bench.camera.busy:
             await bench.mcu.set(BANK=random.getrandbits(1))
         assert await bench.mcu.acknowledged(4 * bench.camera.period)

@@ -85,9 +85,8 @@ async def ack_stays(dut: Any) -> None:
     """Over VSYNC and whole frames, with nothing stored, until ENABLE falls or RNW rises."""
     bench = await PublishedTestbench.start(dut)
     for release in ({"ENABLE": 0}, {"RNW": 1}) * 2:
-        await bench.store()
         content = picture()
-        bench.camera.send(frame(content))
+        await bench.begin(0, content)
         assert await bench.mcu.acknowledged()
         pulses = len(bench.sram.pulses)
         bench.camera.send([*frame(picture()), *frame(picture()), *vsync()])
@@ -107,9 +106,9 @@ async def ack_stays(dut: Any) -> None:
 async def vsync_starts_again(bench: PublishedTestbench) -> None:
     for _ in range(2 * TIMES):
         await bench.store()
-        cut = random.randrange(1, ROWS * COLUMNS)
         content = picture()
-        bench.camera.send([*frame(picture()[:cut]), *frame(content)])
+        bench.camera.send(frame(picture()[: random.randrange(1, ROWS * COLUMNS)]))
+        bench.camera.send(frame(content))
         await is_stored(bench, content)
 
 
