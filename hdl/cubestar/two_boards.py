@@ -13,8 +13,8 @@ from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.shared_top import CubeStarShared
 
 _OWN = [port.name for pin in pins.OWN_PINS for port in pin.ports]
-_SHARED_INPUTS = (port for pin in pins.SHARED for port in pin.ports if not port.output)
-_COMMON = [port.name for port in _SHARED_INPUTS if port.name not in _OWN]
+_INPUTS = [port.name for pin in pins.SHARED for port in pin.ports if not port.output]
+_COMMON = [name for name in _INPUTS if name not in _OWN]
 
 
 class CubeStarTwoBoards(CubeStarBoard):

@@ -52,8 +52,8 @@ def _sun(side: str, place: tuple[int, int]) -> None:
         return
     (x, y), size = place, READ_OUT.window
     left, top = x - READ_OUT.window_left, y - READ_OUT.window_above  # of the window that is wanted
-    column = "left" if left < 0 else "right" if left > READ_OUT.columns - size else "inside"
-    row = "top" if top < 0 else "bottom" if top > READ_OUT.rows - size else "inside"
+    column = ("left", "inside", "right")[(left >= 0) + (left > READ_OUT.columns - size)]
+    row = ("top", "inside", "bottom")[(top >= 0) + (top > READ_OUT.rows - size)]
     hit("sun window", memory=side, column=column, row=row)
 
 

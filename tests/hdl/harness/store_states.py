@@ -79,7 +79,9 @@ def read_state(count: int) -> str:
     """How far so many data clocks of a picture's read-out come."""
     if count >= GEOMETRY.pixels:
         return "last pixel" if count == GEOMETRY.pixels else "wrapped"
-    return "no clock" if not count else "first row" if count < GEOMETRY.columns else "further rows"
+    if not count:
+        return "no clock"
+    return "first row" if count < GEOMETRY.columns else "further rows"
 
 
 def left_in(clocks: Sequence[Clock], stepped: Sequence[Step], end: int) -> str:

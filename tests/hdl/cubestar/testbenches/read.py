@@ -92,6 +92,7 @@ async def every_command_without_a_clock(dut: Any) -> None:
     """The camera's never ran, or stopped long ago at either level."""
     bench = await PublishedTestbench.without_camera(dut)
     await every_command(bench)
+    await wait(2 * STOPPED * bench.camera.period, ODD)  # its first clock is no late one
     cocotb.start_soon(bench.camera.run())
     await bench.camera.reach(3)
     for edge in (RisingEdge, FallingEdge):
