@@ -14,8 +14,8 @@ import pytest
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
+from cubestack.emulator.i2cdev.scheduler import open_scheduler
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.emulator.i2cdev.serving import open_scheduler
 from cubestack.host.devices.emulated import open_device
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
