@@ -195,6 +195,7 @@ NEXT_VERSION = {
         ("cubesense", r"^\| `(.+)` \|()", DOCUMENTED),
         ("cubestar-next", r"^\| `(\w+)` \|.*\| (\d+) \|", NEXT_VERSION),
     ],
+    ids=["cubesense", "cubestar-next"],
 )
 def test_documented_counts(document, row, names):
     text = (DOCS / f"gateware-{document}.md").read_text(encoding="utf-8")

@@ -47,10 +47,8 @@ module cubesense_full_frame;
                          input integer column);
         reg [31:0] mixed;
         begin
-            mixed = (frame * 32'h85EBCA6B) ^ (row * 32'hC2B2AE35) ^ (column * 32'h9E3779B1)
-                    ^ (camera * 32'h27D4EB2F);
-            mixed = (mixed ^ (mixed >> 15)) * 32'h2C1B3C6D;
-            pixel = mixed[31:24];
+            mixed = {camera[0], frame[6:0], row[9:0], column[13:0]} * 32'h9E3779B1;
+            pixel = mixed[31:24] ^ mixed[23:16];
             if (camera == 0) begin
                 pixel = pixel >> 1;
                 if (frame == 1 && row == SUN_Y && (column >= SUN_X || column == SUN_X - 2))

@@ -32,9 +32,8 @@ module full_frame;
     function [7:0] pixel(input integer frame, input integer row, input integer column);
         reg [31:0] mixed;
         begin
-            mixed = (frame * 32'h85EBCA6B) ^ (row * 32'hC2B2AE35) ^ (column * 32'h9E3779B1);
-            mixed = (mixed ^ (mixed >> 15)) * 32'h2C1B3C6D;
-            pixel = mixed[31:24];
+            mixed = {frame[7:0], row[9:0], column[13:0]} * 32'h9E3779B1;
+            pixel = mixed[31:24] ^ mixed[23:16];
         end
     endfunction
 

@@ -20,8 +20,13 @@ COLUMNS, ROWS = 3, 2
 
 
 @pytest.fixture(scope="module")
-def counter() -> Netlist:
-    return netlist(CounterAlone(COLUMNS, ROWS))
+def design() -> CounterAlone:
+    return CounterAlone(COLUMNS, ROWS)
+
+
+@pytest.fixture(scope="module")
+def counter(design: CounterAlone) -> Netlist:
+    return netlist(design)
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +35,8 @@ def every(counter: Netlist) -> list[Mutant]:
 
 
 @pytest.fixture(scope="module")
-def equivalence(counter: Netlist) -> Equivalence:
-    return Equivalence(counter, CounterAlone(COLUMNS, ROWS), {"rst": 1})
+def equivalence(design: CounterAlone, counter: Netlist) -> Equivalence:
+    return Equivalence(counter, design, {"rst": 1})
 
 
 def test_same_seed_gives_the_same_mutants(counter: Netlist, every: list[Mutant]) -> None:
