@@ -46,6 +46,7 @@ class Commands(CommandExecutor):
             "ClearWDGResetCounter": self._clear_watchdog_count,
             "ClearErrorFlags": lambda _: self.state.flags.clear(),
             "ImageBlockSet": self._select_block,
+            "setIDMode": self._set_mode,
             "setTrackingMode": self._set_hint,
             "ReadConfig": lambda _: self.state.load_config(),
             "SaveConfig": lambda _: self.state.save_config(),
@@ -148,6 +149,11 @@ class Commands(CommandExecutor):
             self._meter.charge(loop=UPLOAD_BLOCK_BYTES)
 
     # --- stars --------------------------------------------------------------------------------
+
+    def _set_mode(self, command: QueuedCommand) -> None:
+        automatic = self.processing.switches.transitions == "automatic"
+        if automatic and command.values["IdMode"] == codes.IdMode.LOST_IN_SPACE:
+            self.state.mode = codes.MatchMode.LOST_IN_SPACE
 
     def _set_hint(self, _command: QueuedCommand) -> None:
         self.state.retained.hint_present = 1

@@ -1,9 +1,11 @@
 """From picture to attitude: detection, matching and QUEST, with the time of each step.
 
-CubeStar thesis, sections 5.3.3 to 5.3.5. What the mode flag selects is published; how it changes
-is not, so it is assumed: an attitude leads to tracking, a failure leads one step back (tracking,
-assisted, lost in space). Without an attitude and a hint (telecommand setTrackingMode) the node is
-lost in space, whatever the flag says.
+CubeStar thesis, sections 5.3.3 to 5.3.5. What the mode flag selects is published, and that an
+attitude leads to tracking (section 6.1). The rest is assumed: a failure leads one step back
+(tracking, assisted, lost in space), and the flag counts once setIDMode wants tracking; or, with
+switch `transitions`, it always counts, a failure leads to lost in space, and so does setIDMode when
+it wants that. Without an attitude and a hint (telecommand setTrackingMode) the node is lost in
+space, whatever the flag says.
 """
 
 from collections.abc import Iterator
@@ -179,7 +181,11 @@ class Processing:
         return True
 
     def _choose_mode(self) -> MatchMode:
-        if self.state.settings.get("setIDMode", "IdMode") == IdMode.LOST_IN_SPACE:
+        if self.switches.transitions == "automatic":
+            lost = self.state.mode is MatchMode.LOST_IN_SPACE
+        else:
+            lost = self.state.settings.get("setIDMode", "IdMode") == IdMode.LOST_IN_SPACE
+        if lost:
             return MatchMode.LOST_IN_SPACE
         if self.state.attitude is None and not self.state.retained.hint_present:
             self.state.raise_flag("IDModeError")
@@ -190,9 +196,15 @@ class Processing:
         margin = float(self.state.settings.get("setIDMargin", "Margin"))
         meter, catalogue, attitude = self.meter, self.catalogue, self.state.attitude
         if mode is MatchMode.TRACKING and attitude is not None:
-            rotation = dcm(attitude.quaternion, meter)
-            verified = self.switches.tracking == "verified"
-            return track(vectors, catalogue, rotation, meter, margin_rad=margin, verified=verified)
+            return track(
+                vectors,
+                catalogue,
+                self._rotation(attitude),
+                meter,
+                margin_rad=margin,
+                verified=self.switches.tracking == "verified",
+                radius_deg=self._radius_deg(mode),
+            )
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
         return identify(
             vectors,
@@ -209,7 +221,18 @@ class Processing:
         if attitude is None or self.state.retained.hint_present:
             hint = self.state.settings.all("setTrackingMode")
             return direction_of(hint["RightAscension"], hint["Declination"], self.meter)
-        return np.asarray(dcm(attitude.quaternion, self.meter)[2])
+        return np.asarray(self._rotation(attitude)[2])
+
+    def _rotation(self, attitude: Attitude) -> NDArray[np.float32]:
+        """Direction cosine matrix of the latest attitude, from flash if it is there."""
+        if attitude.rotation is None:
+            return dcm(attitude.quaternion, self.meter)
+        self.meter.charge(flash_read=9)
+        return attitude.rotation
+
+    def _radius_deg(self, mode: MatchMode) -> float:
+        tracking = mode is MatchMode.TRACKING
+        return float(self.switches.reduction) if tracking else CUT_RADIUS_DEG
 
     def _explain_failure(self, identification: Identification) -> None:
         """Raise the flags that say more about a failure than its outcome."""
@@ -228,11 +251,13 @@ class Processing:
         in_field = self.catalogue.near(boresight, radius_deg, self.meter)
         if len(in_field) < FEWEST_STARS:
             self.state.raise_flag("LessThanThreeStarsInFoV")
-        if not len(self.catalogue.near(boresight, CUT_RADIUS_DEG, self.meter)):
+        if not len(self.catalogue.near(boresight, self._radius_deg(mode), self.meter)):
             self.state.raise_flag("ReducedIDListSizeError")
 
     def _step_back(self) -> None:
-        self.state.mode = MatchMode(min(self.results.mode + 1, MatchMode.LOST_IN_SPACE))
+        lost = MatchMode.LOST_IN_SPACE
+        automatic = self.switches.transitions == "automatic"
+        self.state.mode = lost if automatic else MatchMode(min(self.results.mode + 1, lost))
 
     # --- attitude -----------------------------------------------------------------------------
 
@@ -268,9 +293,10 @@ class Processing:
         except AttitudeError:
             self._step_back()
             return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
+        stored = dcm(quaternion, self.meter) if self.switches.flash_store == "page" else None
         self._record("attitude", (yield from phases.end(self.state, "attitude_us", started_us)))
         self.state.attitude = Attitude(
-            quaternion, results.frame, results.image_ms, len(kept), results.mode
+            quaternion, results.frame, results.image_ms, len(kept), results.mode, stored
         )
         self.state.mode = MatchMode.TRACKING
         self.state.retained.hint_present = 0

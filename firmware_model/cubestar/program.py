@@ -51,7 +51,7 @@ class CubeStarProgram:
         switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Reset: set up RAM from the retention registers and flash."""
-        self.state = state = State(hardware)
+        self.state = state = State(hardware, meter if switches.flash_store == "page" else None)
         self.supply = SupplyMonitor(state)
         self._pictures = pictures_of(layout, state, meter, self.supply)
         self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)

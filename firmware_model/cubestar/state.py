@@ -6,8 +6,9 @@ flash. Settings, flags and counters are kept as well (an extension); they live i
 registers (appendix E: "retention registers in backup power domain").
 
 A page of this part's flash stands 20 000 erasures. The published firmware writes the attitude each
-second, which erases a page of 4 kB that often if each write takes a whole page: 5.6 hours. The
-model counts the writes (``FlashStore.writes``) and does not wear out.
+second, which erases a page of 4 kB that often if each write takes a whole page: 5.6 hours. With
+switch `flash_store` that is paid: each write takes its time, and a worn page keeps its zeros
+(assumed; the data sheet promises no more than the number). ``FlashStore.writes`` counts them.
 """
 
 import struct
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskStatus
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
 
@@ -51,6 +53,9 @@ CONFIG_PAGE = "config"
 ATTITUDE_PAGE = "attitude"
 MODE_PAGE = "mode"
 
+FLASH_ENDURANCE = 20_000
+"""Erasures that a page stands: data sheet of the EFM32GG280."""
+
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF
@@ -66,6 +71,7 @@ class Attitude:
         image_ms: uptime at the picture's mid-exposure, in ms, modulo 2^32.
         matched: stars used.
         mode: MatchMode by which they were identified.
+        rotation: float32 (3, 3), the direction cosine matrix, if that is stored as well.
     """
 
     quaternion: NDArray[np.float32]
@@ -73,20 +79,24 @@ class Attitude:
     image_ms: int
     matched: int
     mode: int
+    rotation: NDArray[np.float32] | None = None
 
     LAYOUT = struct.Struct("<4fIIBB")
 
     def pack(self) -> bytes:
         """Contents of the flash page."""
-        return self.LAYOUT.pack(
+        matrix = b"" if self.rotation is None else self.rotation.astype("<f4").tobytes()
+        return matrix + self.LAYOUT.pack(
             *self.quaternion, self.frame & _U32, self.image_ms & _U32, self.matched, self.mode
         )
 
     @classmethod
     def unpack(cls, page: bytes) -> "Attitude":
         """The attitude in a flash page."""
-        *quaternion, frame, image_ms, matched, mode = cls.LAYOUT.unpack(page)
-        return cls(np.array(quaternion, np.float32), frame, image_ms, matched, mode)
+        matrix, rest = page[: -cls.LAYOUT.size], page[-cls.LAYOUT.size :]
+        *quaternion, frame, image_ms, matched, mode = cls.LAYOUT.unpack(rest)
+        rotation = np.frombuffer(matrix, "<f4").reshape(3, 3) if matrix else None
+        return cls(np.array(quaternion, np.float32), frame, image_ms, matched, mode, rotation)
 
 
 @dataclass
@@ -149,9 +159,12 @@ class State(NodeState):
     #: Retention registers in use, in bytes.
     RETENTION_SIZE = len(_MAGIC) + _SETTINGS_BYTES + _FLAGS.length + _COUNTERS.size
 
-    def __init__(self, hardware: CubeStarHardware) -> None:
-        """Restore from ``hardware``: retention registers, else the configuration in flash."""
-        self.hardware = hardware
+    def __init__(self, hardware: CubeStarHardware, flash_meter: Meter | None = None) -> None:
+        """Restore from ``hardware``: retention registers, else the configuration in flash.
+
+        ``flash_meter`` is charged for erasing and writing; without it flash is free and lasts.
+        """
+        self.hardware, self._flash_meter = hardware, flash_meter
         super().__init__(field.name for field in _FLAGS.fields)
         self.settings = Settings(INTERFACE, SETTING_COMMANDS)
         self.retained = Retained()
@@ -192,7 +205,7 @@ class State(NodeState):
     @mode.setter
     def mode(self, mode: MatchMode) -> None:
         if mode != self.mode:
-            self.hardware.flash.write(MODE_PAGE, bytes([mode]))
+            self._write(MODE_PAGE, bytes([mode]))
 
     @property
     def attitude(self) -> Attitude | None:
@@ -202,11 +215,18 @@ class State(NodeState):
 
     @attitude.setter
     def attitude(self, attitude: Attitude) -> None:
-        self.hardware.flash.write(ATTITUDE_PAGE, attitude.pack())
+        self._write(ATTITUDE_PAGE, attitude.pack())
+
+    def _write(self, page: str, data: bytes) -> None:
+        if self._flash_meter is None:
+            self.hardware.flash.write(page, data)
+        else:
+            self._flash_meter.charge(flash_erase=1, flash_program=-(-len(data) // 4))
+            self.hardware.flash.write(page, data, FLASH_ENDURANCE)
 
     def save_config(self) -> None:
         """Write the settings to flash."""
-        self.hardware.flash.write(CONFIG_PAGE, self.settings.pack())
+        self._write(CONFIG_PAGE, self.settings.pack())
 
     def load_config(self) -> None:
         """Read the settings from flash; without any, the declared reset values."""

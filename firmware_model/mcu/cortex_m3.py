@@ -23,6 +23,7 @@ def cortex_m3(
     """
     survey = "soft-float and integer routines on a Cortex-M3, flash at zero wait states"
     core = "Cortex-M3 Technical Reference Manual, instruction timing: load or store, 2 cycles"
+    flash = " as the part's family takes; the program waits, interrupts are served"
 
     def measured(cycles: int) -> Cost:
         return Cost(cycles, "measured", survey)
@@ -51,6 +52,8 @@ def cortex_m3(
             "ram_read": Cost(2, "published", core),
             "ram_write": Cost(2, "published", core),
             "flash_read": Cost(2 + flash_waits, "published", f"{core}, + {flash_waits} waits"),
+            "flash_erase": Cost(clock_hz // 50, "assumed", f"page, 20 ms{flash}"),
+            "flash_program": Cost(clock_hz // 50_000, "assumed", f"word, 20 us{flash}"),
             "ebi_read": ebi,
             "ebi_write": ebi,
             "port_read": measured(3 + gpio_waits),

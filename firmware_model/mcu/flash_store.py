@@ -1,6 +1,7 @@
 """Non-volatile memory of a processor."""
 
 from dataclasses import dataclass, field
+from itertools import zip_longest
 
 
 @dataclass(eq=False)
@@ -10,8 +11,11 @@ class FlashStore:
     pages: dict[str, bytes] = field(default_factory=dict)
     writes: dict[str, int] = field(default_factory=dict)
 
-    def write(self, page: str, data: bytes) -> None:
-        """Erase and program ``page``."""
+    def write(self, page: str, data: bytes, endurance: int | None = None) -> None:
+        """Erase and program ``page``; one that was written ``endurance`` times keeps its zeros."""
+        if endurance is not None and self.writes.get(page, 0) >= endurance:
+            worn = self.pages.get(page, b"")
+            data = bytes(old & new for old, new in zip_longest(worn, data, fillvalue=0xFF))
         self.pages[page] = bytes(data)
         self.writes[page] = self.writes.get(page, 0) + 1
 

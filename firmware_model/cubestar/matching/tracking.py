@@ -40,6 +40,7 @@ def track(
     *,
     margin_rad: float = DEFAULT_MARGIN_RAD,
     verified: bool = True,
+    radius_deg: float = CUT_RADIUS_DEG,
 ) -> Identification:
     """Identify centroids from the attitude of the iteration before.
 
@@ -50,12 +51,13 @@ def track(
         attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
         margin_rad: largest difference between a measured and a catalogue angle, in rad.
         verified: whether the verification round follows; without it all stars weigh the same.
+        radius_deg: of the reduced catalogue, about the boresight.
     """
     count = len(directions)
     if count < FEWEST_STARS:
         return unidentified(count, MatchOutcome.TOO_FEW_CENTROIDS)
     with meter.phase("reduction"):
-        stars = catalogue.near(attitude[2], CUT_RADIUS_DEG, meter)
+        stars = catalogue.near(attitude[2], radius_deg, meter)
     with meter.phase("prediction"):
         kept = _nearest(directions, catalogue.vectors, stars, attitude, meter)
     votes = (kept != NONE).astype(np.uint8)

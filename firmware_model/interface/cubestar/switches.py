@@ -41,6 +41,30 @@ class CubeStarSwitches(Switches):
         reason="57.3 is the diagonal of the calibrated camera, so that every pair in a picture is "
         "listed",
     )
+    reduction: str = switch(
+        "radius of the reduced catalogue that a star is tracked in, in degrees",
+        "30.3",
+        "35",
+        source="section 5.3.4: just wider than the field when the attitude is known well; 4.3.4 "
+        "takes 30 for the field, and tracking moves by 0.3 at most",
+        reason="the calibrated camera's farthest corner is 31.3 from the boresight",
+    )
+    flash_store: str = switch(
+        "what it costs to store attitude and mode flag",
+        "page",
+        "nothing",
+        source="section 5.3.5: quaternion and DCM go to flash at every turn",
+        reason="a page takes 20 ms to erase and stands 20 000 times, 5.6 hours of the loop",
+    )
+    transitions: str = switch(
+        "how the mode flag changes",
+        "automatic",
+        "commanded",
+        source="sections 5.3.4 and 6.1: the flag follows the attitude determination, and is soon "
+        "tracking; after a failure (not printed): lost in space",
+        reason="lost in space is the sure choice until setIDMode, and a failure costs one step: "
+        "tracking, assisted, lost in space",
+    )
 
 
 #: Those of the default profile.

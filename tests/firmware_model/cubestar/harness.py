@@ -16,6 +16,7 @@ from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTI
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ResetCause, TaskStatus
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.mcu.requests import (
@@ -39,6 +40,7 @@ class Harness(Runner, HostSide):
 
     Attributes:
         picture: what the FPGA delivers.
+        algorithms: switches of the program.
         camera_refuses: whether the camera leaves a message with these bytes unanswered.
         frame_us: from the FPGA's ENABLE to ACK; None: the frame never comes.
         pins: output pins.
@@ -52,10 +54,12 @@ class Harness(Runner, HostSide):
     boot_us = 3_000
     # no telecommand takes longer than hang_us: a whole picture on the UART takes 91 s
 
-    def __init__(self, catalogue: StarCatalogue) -> None:
+    def __init__(
+        self, catalogue: StarCatalogue, switches: CubeStarSwitches = DEFAULT_SWITCHES
+    ) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, CORTEX_M3)
-        self.catalogue = catalogue
+        self.catalogue, self.algorithms = catalogue, switches
         self.flash = FlashStore()
         self.picture: NDArray[np.uint8] = np.zeros((512, 1024), np.uint8)
         self.camera_refuses: Callable[[bytes], bool] = lambda _data: False
@@ -79,7 +83,7 @@ class Harness(Runner, HostSide):
         self.run()
 
     def start(self) -> Routine[None]:
-        self.program = CubeStarProgram(self, self.meter, self.catalogue)
+        self.program = CubeStarProgram(self, self.meter, self.catalogue, switches=self.algorithms)
         return self.program.main()
 
     @property

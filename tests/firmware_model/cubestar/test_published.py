@@ -1,0 +1,123 @@
+"""The mode flag, flash and the reduced catalogue as the thesis has them, by switches."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.matching.tracking import track
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+
+from .harness import Harness
+from .sky import Sky, attitude_of, error_deg, meter, take
+
+Make = Callable[[str], Harness]
+
+
+@pytest.fixture
+def make(catalogue: StarCatalogue) -> Make:
+    """The program with some switches as published."""
+
+    def published(*names: str) -> Harness:
+        changes = ",".join(f"{one}={CubeStarSwitches.declared()[one].published}" for one in names)
+        return Harness(catalogue, CubeStarSwitches.of("extended", changes))
+
+    return published
+
+
+def modes(unit: Harness, picture: np.ndarray) -> tuple[int, MatchMode]:
+    """Mode that a picture was matched in, and the flag after it."""
+    unit.picture = picture
+    unit.command("CaptureAndProcess")
+    flag = MatchMode(unit.telemetry("LoopStatus")["ModeFlag"])
+    return unit.telemetry("AttitudeQuaternion")["Mode"], flag
+
+
+def test_the_flag_goes_from_lost_to_tracking_and_back_by_itself(
+    make: Make, catalogue: StarCatalogue, sky: Sky, pose: Rotation
+) -> None:
+    unit, tracking, lost = make("transitions"), MatchMode.TRACKING, MatchMode.LOST_IN_SPACE
+    elsewhere = take(catalogue, Rotation.from_euler("x", 60, degrees=True) * pose).picture
+    assert modes(unit, sky.picture) == (lost, tracking)
+    assert modes(unit, sky.picture) == (tracking, tracking)
+    assert modes(unit, elsewhere) == (tracking, lost)  # the attitude is still the one before
+    assert not unit.telemetry("AttitudeQuaternion")["Valid"]
+    assert modes(unit, elsewhere) == (lost, tracking)
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    assert modes(unit, elsewhere) == (tracking, tracking)
+    unit.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
+    assert modes(unit, elsewhere) == (lost, tracking)
+    unit.power_on()
+    assert modes(unit, elsewhere) == (tracking, tracking)
+
+
+def test_each_turn_pays_for_a_page_with_quaternion_and_matrix(make: Make, sky: Sky) -> None:
+    spent = []
+    for unit in (make("flash_store"), make()):
+        unit.picture = sky.picture
+        unit.command("CaptureImage", "DetectStars", "IDStars")
+        for _ in range(2):
+            before_us = unit.now_us
+            unit.command("EstimateAttitude")
+            spent.append(unit.now_us - before_us)
+        page = unit.flash.pages["attitude"]
+        assert (unit.flash.writes["attitude"], len(page)) == (2, 62 if len(spent) == 2 else 26)
+    # 16 words the page, and once one for the flag; the matrix is worked out in well under a ms
+    assert spent[0] - spent[2] == pytest.approx(2 * 20_000 + 17 * 20, abs=100)
+    assert spent[1] - spent[3] == pytest.approx(20_000 + 16 * 20, abs=100)
+    published = make("flash_store", "transitions")
+    published.picture = sky.picture
+    published.command("CaptureAndProcess", "CaptureAndProcess")
+    stored = np.frombuffer(published.flash.pages["attitude"][:36], "<f4").reshape(3, 3)
+    values = published.telemetry("AttitudeQuaternion")
+    assert values["Mode"] == MatchMode.TRACKING
+    assert stored == pytest.approx(attitude_of(values).as_matrix(), abs=1e-6)
+    assert error_deg(Rotation.from_matrix(stored), sky.attitude) < 0.005
+
+
+@pytest.mark.parametrize(("name", "wears"), [("flash_store", True), ("voting", False)])
+def test_a_worn_page_keeps_its_zeros(make: Make, sky: Sky, name: str, wears: bool) -> None:
+    unit = make(name)
+    modes(unit, sky.picture)
+    unit.flash.writes["attitude"] = 20_000 - 1
+    for worn in (False, wears):
+        unit.flash.pages["attitude"] = bytes(len(unit.flash.pages["attitude"]))
+        modes(unit, sky.picture)
+        assert any(unit.flash.pages["attitude"]) is not worn
+
+
+def test_a_star_in_the_corner_is_outside_of_the_narrow_catalogue(catalogue: StarCatalogue) -> None:
+    star = 100
+    for off_deg, found in ((30.2, True), (30.4, False)):
+        turn = Rotation.align_vectors(
+            [[0, np.sin(np.radians(off_deg)), np.cos(np.radians(off_deg))]],
+            [catalogue.vectors[star].astype(float)],
+        )[0]
+        attitude = turn.as_matrix().astype(np.float32)
+        near = np.argsort(catalogue.vectors @ attitude[2])[-3:]
+        directions = turn.apply(catalogue.vectors[[*near, star]]).astype(np.float32)
+        for radius_deg, expected in ((30.3, found), (35.0, True)):
+            result = track(
+                directions, catalogue, attitude, meter(), verified=False, radius_deg=radius_deg
+            )
+            assert (int(result.stars[3]) == star) is expected
+
+
+def test_tracking_takes_the_narrow_catalogue_and_assisted_the_wide_one(
+    make: Make, catalogue: StarCatalogue, sky: Sky
+) -> None:
+    reads = []
+    for unit in (make("reduction"), make()):
+        unit.command("setIDMode", IdMode=IdMode.TRACKING)
+        modes(unit, sky.picture)
+        before = unit.meter.phases.get("prediction", 0)
+        modes(unit, sky.picture)
+        reads.append(unit.meter.phases["prediction"] - before)
+    boresight = sky.attitude.inv().as_matrix()[:, 2]
+    inside = [
+        int((catalogue.vectors @ boresight > np.cos(np.radians(r))).sum()) for r in (30.3, 35)
+    ]
+    assert reads[0] / reads[1] == pytest.approx(inside[0] / inside[1], rel=0.02)
