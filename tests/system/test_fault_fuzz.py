@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.bus.i2c import I2cError, I2cMessage
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.scene.earth_sun import EarthSunScene
@@ -60,7 +61,7 @@ class Fuzzer:
     """
 
     def __init__(self, opened: AnyEmulated, seed: int, turns: dict[str, float] = TURNS) -> None:
-        self.board: Any = opened.board
+        self.board: Board = opened.board
         self.interface = interface = opened.device.interface
         self.kernel = self.board.kernel
         self._step, self._then_ps, self._still = self.kernel.step, 0, 0

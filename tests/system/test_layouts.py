@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.layouts import fpga_of
 from cubestack.emulator.recording.trace import VcdTrace
 from cubestack.emulator.scene.sky import SkyScene
@@ -38,7 +39,7 @@ class Node:
 
     def __init__(self, opened: AnyEmulated, layout: Layout) -> None:
         self.layout = layout
-        self.board: Any = opened.board
+        self.board: CubeStarBoard = opened.board
         self.cubestar: Any = opened.client
         self.client = self.cubestar.client
 

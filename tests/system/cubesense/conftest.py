@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.boards.cubesense.board import HALVES
+from cubestack.emulator.boards.cubesense.board import HALVES, CubeSenseBoard
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
 from cubestack.host.clients.cubesense.client import Measurement
@@ -52,7 +52,7 @@ def sent(opened: AnyEmulated, camera: Camera) -> np.ndarray:
     return found
 
 
-def held(board: Any, half: Camera) -> np.ndarray:
+def held(board: CubeSenseBoard, half: Camera) -> np.ndarray:
     """The picture (480, 640) in the memory of a camera's half; an address is row : column."""
     rows: np.ndarray = board.engine.memories[HALVES[half]].reshape(-1, 1024)
     return rows[:ROWS, :COLUMNS].copy()

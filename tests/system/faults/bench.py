@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 from smbus2 import i2c_msg
 
+from cubestack.emulator.boards.aramis.board import AramisBoard
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
+from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.faults.injection import Injection
@@ -99,7 +103,7 @@ class Bench:
 
     def __init__(self, opened: AnyEmulated) -> None:
         self.name = opened.device.name
-        self.board: Any = opened.board
+        self.board: Board = opened.board
         self.faults = opened.faults
         self.interface = opened.device.interface
         self.byte_s = 10 / self.interface.baud
@@ -178,6 +182,8 @@ FAILED = ("CAPTURE_FAILED", {"ImageCaptureError"})
 class Star(Bench):
     """A CubeStar."""
 
+    board: CubeStarBoard
+
     @property
     def stored(self) -> np.ndarray:
         """What the FPGA wrote into its memory, (512, 1024)."""
@@ -226,6 +232,7 @@ TIMED_OUT = (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
 class Sense(Bench):
     """A CubeSense; of its halves it is the nadir camera's if nothing else is said."""
 
+    board: CubeSenseBoard
     scene = FACING
     flags_in = "CommunicationStatus"
 
@@ -284,6 +291,7 @@ def line_s(frame: RollingShutter, line: float) -> float:
 class Tracker(Bench):
     """An AraMiS star tracker."""
 
+    board: AramisBoard
     scene = SkyScene.pointing(*ORION_DEG, 20.0)
 
     def measure(self) -> Attitude:

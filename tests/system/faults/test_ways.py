@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.plan import parse_plan
 from cubestack.emulator.faults.table import FAULTS
@@ -20,7 +21,7 @@ from tests.system.conftest import Ear
 from .bench import BENCHES, Bench, Star, Tracker, powered
 
 
-def given(kind: str, board: Any) -> dict[str, Any]:
+def given(kind: str, board: Board) -> dict[str, Any]:
     """A value for each parameter of a fault; the rates are those that no run takes notice of."""
     fault = FAULTS[kind]
     values = {name: getattr(fault(), name) for name in fault.parameters()}
@@ -44,7 +45,7 @@ def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
 
 
 def test_the_shell_completes_and_takes_every_kind(shell: Shell) -> None:
-    board: Any = shell.target.controls._board  # type: ignore[union-attr]
+    board: Board = shell.target.controls._board  # type: ignore[union-attr]
     kinds = board.faults.kinds()
     completed = set(shell.complete("fault "))
     assert {*kinds, "clear"} <= completed
