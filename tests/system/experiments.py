@@ -1,8 +1,9 @@
-"""Experiments behind docs/fidelity.md that `cubestack measure` has no options for.
+"""Experiments behind docs/fidelity.md and profiles.md that `cubestack measure` has no options for.
 
 Each runs the whole stack, reads the serial line and prints what it found::
 
     .venv/bin/python tests/system/experiments.py field          tables 4.4 and 4.5
+    .venv/bin/python tests/system/experiments.py profiles       the same, in both profiles
     .venv/bin/python tests/system/experiments.py pairs          two pair limits beside each other
     .venv/bin/python tests/system/experiments.py thresholds     the uncut sky
     .venv/bin/python tests/system/experiments.py times          figure 5.7
@@ -12,6 +13,7 @@ Each runs the whole stack, reads the serial line and prints what it found::
 """
 
 import argparse
+import itertools
 import math
 from collections import defaultdict
 from contextlib import closing
@@ -33,11 +35,13 @@ from cubestack.emulator.scene.attitude import (
 )
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.experiments.attitude import errors, is_right, rough_boresight
-from cubestack.host.experiments.cubestar.measure import give_hint
+from cubestack.host.experiments.cubestar.measure import count_wrong, give_hint
 
 PUBLISHED_PAIR_LIMIT_DEG = 42.1
 SIDEREAL_DEG_S = 360 / 86164.1
@@ -71,9 +75,14 @@ class Shot:
 class Stack:
     """A board with a client on its serial line."""
 
-    def __init__(self, pair_limit_deg: float = PAIR_LIMIT_DEG, optics: Optics = LENS) -> None:
+    def __init__(
+        self,
+        pair_limit_deg: float = PAIR_LIMIT_DEG,
+        optics: Optics = LENS,
+        switches: CubeStarSwitches = DEFAULT_SWITCHES,
+    ) -> None:
         catalogue = onboard_catalogue(pair_limit_deg=pair_limit_deg)
-        self.board = CubeStarBoard(SkyScene.pointing(0, 0), catalogue)
+        self.board = CubeStarBoard(SkyScene.pointing(0, 0), catalogue, switches=switches)
         self.cubestar = CubeStar(NodeClient(self.board.serial(), INTERFACE))
         self.optics = optics
         if optics is not LENS:
@@ -141,6 +150,29 @@ def field(frames: int) -> None:
             for false in (1, 5, 10):
                 title = f"pairs {limit} deg, {false} false stars"
                 stack.print_rates(frames, title, LOST, ROUGH, mag_limit=3.8, false_stars=false)
+
+
+def profiles(frames: int) -> None:
+    """Tables 4.4 and 4.5 in both profiles, as rows of a Markdown table."""
+    skies: list[dict[str, Any]] = [{"mag_limit": magnitude} for magnitude in (3.6, 3.7, 3.8)]
+    skies += [{"mag_limit": 3.8, "false_stars": false} for false in (1, 5, 10)]
+    for mode, sky in itertools.product((LOST, ROUGH), skies):
+        cells = []
+        for profile in PROFILES:
+            switches = CubeStarSwitches.of(profile)
+            rng, tally = np.random.default_rng(1), np.zeros(3)
+            with closing(Stack(float(switches.pair_limit), PLAIN, switches)) as stack:
+                for number in range(frames):
+                    hint = (5.0, rng) if mode is ROUGH else None
+                    pose = random_quaternion(rng)
+                    shot = stack.shoot(hint, quaternion=pose, seed=number, **sky)
+                    wrong = count_wrong(stack.cubestar, stack.board.truth()) if shot.valid else 0
+                    assert wrong is not None
+                    three, off = shot.matched - wrong >= 3, shot.valid and not shot.right
+                    tally += three, wrong > 0, off
+            cells += [f"{share:.1f}" for share in 100 * tally / frames]
+        title = ", ".join(f"{name} {value}" for name, value in sky.items())
+        print(f"| {title}, {mode} |", " | ".join(cells), "|", flush=True)
 
 
 def pairs(frames: int) -> None:
@@ -253,7 +285,7 @@ def loop(frames: int) -> None:
 
 EXPERIMENTS = {
     experiment.__name__: experiment
-    for experiment in (field, pairs, thresholds, times, repeatability, slew, loop)
+    for experiment in (field, profiles, pairs, thresholds, times, repeatability, slew, loop)
 }
 
 

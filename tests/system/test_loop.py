@@ -4,7 +4,7 @@ CubeStar thesis, sections 5.3.6, 6.2 and 6.3.
 """
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 from cubestack.host.clients.cubestar.client import Attitude
+from cubestack.host.errors import BadAnswerError
 from tests.system.conftest import Open
 
 ITERATIONS = 6
@@ -95,6 +96,24 @@ def test_tracks_at_the_published_rate(looping: Any, axis: int) -> None:
     assert max(turn.cross for turn in turns) < 0.02
     moved = attitude_error_deg(turns[0].attitude.quaternion, turns[-1].attitude.quaternion)
     assert np.hypot(*moved) == pytest.approx(0.1333 * (ITERATIONS - 1), abs=0.02)
+
+
+@pytest.mark.parametrize("profile", ["published", "extended"])
+def test_as_published_it_tracks_by_itself_until_its_flash_is_worn(
+    session: Open, profile: str
+) -> None:
+    scene = replace(ORION, rate_deg_s=(0.1333, 0.0, 0.0), mag_limit=3.8)
+    with session(scene, seed=1, profile=profile) as opened:
+        opened.client.client.command("Trigger")
+        opened.client.client.pause(1.9)
+        published = profile == "published"
+        lost, then = MatchMode.LOST_IN_SPACE, MatchMode(0 if published else 2)
+        modes = [turn.attitude.mode for turn in run_loop(opened, scene, 3)]
+        assert modes == [lost, then, then]
+        opened.board.flash.writes["attitude"] = 20_000
+        refused = pytest.raises(BadAnswerError, match="length") if published else nullcontext()
+        with refused:
+            assert max(turn.cross for turn in run_loop(opened, scene, 6)) < 0.01
 
 
 def matched_share(opened: Any, rate_deg_s: float, rng: np.random.Generator) -> float:

@@ -164,7 +164,7 @@ def _measure(
     if picture_truth is None:
         known = emulated.board.truth()
     centroids = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
-    wrong = _count_wrong(cubestar, known) if solved else 0
+    wrong = count_wrong(cubestar, known) if solved else 0
     phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
     # The flags say why a task ended as its status tells.
     flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]
@@ -205,7 +205,7 @@ def _prime_tracking(emulated: _Emulated, offset_deg: float, rng: np.random.Gener
     emulated.client.client.command("ClearErrorFlags")
 
 
-def _count_wrong(cubestar: CubeStar, truth: NDArray[np.float64] | None) -> int | None:
+def count_wrong(cubestar: CubeStar, truth: NDArray[np.float64] | None) -> int | None:
     """Identified stars that the truth puts elsewhere; None without a truth."""
     if truth is None:
         return None

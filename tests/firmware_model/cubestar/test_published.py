@@ -7,12 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 
 from .harness import Harness
-from .sky import Sky, attitude_of, error_deg, meter, take
+from .sky import Sky, attitude_of, error_deg, take
 
 Make = Callable[[str], Harness]
 
@@ -65,9 +64,9 @@ def test_each_turn_pays_for_a_page_with_quaternion_and_matrix(make: Make, sky: S
             spent.append(unit.now_us - before_us)
         page = unit.flash.pages["attitude"]
         assert (unit.flash.writes["attitude"], len(page)) == (2, 62 if len(spent) == 2 else 26)
-    # 16 words the page, and once one for the flag; the matrix is worked out in well under a ms
-    assert spent[0] - spent[2] == pytest.approx(2 * 20_000 + 17 * 20, abs=100)
-    assert spent[1] - spent[3] == pytest.approx(20_000 + 16 * 20, abs=100)
+    # 16 words the page, and once one for the flag; working out the matrix takes 1606 cycles
+    assert spent[0] - spent[2] == pytest.approx(2 * 20_000 + 17 * 20 + 1606 / 48, abs=3)
+    assert spent[1] - spent[3] == pytest.approx(20_000 + 16 * 20 + 1606 / 48, abs=3)
     published = make("flash_store", "transitions")
     published.picture = sky.picture
     published.command("CaptureAndProcess", "CaptureAndProcess")
@@ -89,35 +88,18 @@ def test_a_worn_page_keeps_its_zeros(make: Make, sky: Sky, name: str, wears: boo
         assert any(unit.flash.pages["attitude"]) is not worn
 
 
-def test_a_star_in_the_corner_is_outside_of_the_narrow_catalogue(catalogue: StarCatalogue) -> None:
-    star = 100
-    for off_deg, found in ((30.2, True), (30.4, False)):
-        turn = Rotation.align_vectors(
-            [[0, np.sin(np.radians(off_deg)), np.cos(np.radians(off_deg))]],
-            [catalogue.vectors[star].astype(float)],
-        )[0]
-        attitude = turn.as_matrix().astype(np.float32)
-        near = np.argsort(catalogue.vectors @ attitude[2])[-3:]
-        directions = turn.apply(catalogue.vectors[[*near, star]]).astype(np.float32)
-        for radius_deg, expected in ((30.3, found), (35.0, True)):
-            result = track(
-                directions, catalogue, attitude, meter(), verified=False, radius_deg=radius_deg
-            )
-            assert (int(result.stars[3]) == star) is expected
-
-
-def test_tracking_takes_the_narrow_catalogue_and_assisted_the_wide_one(
+def test_tracking_looks_at_the_stars_of_a_narrower_catalogue(
     make: Make, catalogue: StarCatalogue, sky: Sky
 ) -> None:
-    reads = []
+    spent = []
     for unit in (make("reduction"), make()):
         unit.command("setIDMode", IdMode=IdMode.TRACKING)
         modes(unit, sky.picture)
         before = unit.meter.phases.get("prediction", 0)
         modes(unit, sky.picture)
-        reads.append(unit.meter.phases["prediction"] - before)
+        spent.append(unit.meter.phases["prediction"] - before)
     boresight = sky.attitude.inv().as_matrix()[:, 2]
     inside = [
         int((catalogue.vectors @ boresight > np.cos(np.radians(r))).sum()) for r in (30.3, 35)
     ]
-    assert reads[0] / reads[1] == pytest.approx(inside[0] / inside[1], rel=0.02)
+    assert spent[0] / spent[1] == pytest.approx(inside[0] / inside[1], rel=0.02)
