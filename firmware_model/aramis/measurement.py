@@ -15,13 +15,20 @@ from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
-from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.pipeline import VERIFIED, Configuration, Detection, solve
+from cubestack.firmware_model.aramis.field import FOV_DEG, Field
+from cubestack.firmware_model.aramis.pipeline import (
+    PUBLISHED,
+    VERIFIED,
+    Configuration,
+    Detection,
+    solve,
+)
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.state import Measurement, State
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface import aramis
 from cubestack.firmware_model.interface.aramis import MeasurementMode, Reason, SensorState
+from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 
@@ -34,8 +41,10 @@ def _lens(fov_deg: float, only_round: bool) -> Field:
     return Field(fov_deg=fov_deg, round=only_round)
 
 
-def configuration(settings: StoredSettings) -> Configuration:
-    """Settings of the processing."""
+def configuration(
+    settings: StoredSettings, switches: AramisSwitches = DEFAULT_SWITCHES
+) -> Configuration:
+    """Settings of the processing; what a switch has as printed, no setting changes."""
     search, matching = settings.all("SetDetection"), settings.all("SetIdentification")
     field = settings.all("SetField")
     lens = _lens(float(field["FieldOfView"]), bool(field["Round"]))
@@ -46,13 +55,19 @@ def configuration(settings: StoredSettings) -> Configuration:
         min_pixels=int(search["MinPixels"]),
         max_pixels=int(search["MaxPixels"]),
         max_stars=int(search["MaxStars"]),
-        subtract=bool(search["Subtract"]),
+        subtract=bool(search["Subtract"]) and switches.weights == "above-mean",
     )
+    sigma_rad = float(matching["Noise"]) * lens.scale[1]
+    if switches.noise == "appendix-e":
+        sigma_rad = PUBLISHED.profile.sigma_rad * lens.fov_deg / FOV_DEG
     profile = replace(
         VERIFIED.profile,
-        sigma_rad=float(matching["Noise"]) * lens.scale[1],
+        sigma_rad=sigma_rad,
         pivots=int(matching["Pivots"]),
-        verify=bool(matching["Verify"]),
+        always_pivot=switches.pivots == "always",
+        filtered=switches.aided == "filtered",
+        identities=switches.identities,
+        verify=bool(matching["Verify"]) and switches.belief == "confirmed",
         hint_tolerance_deg=float(matching["HintTolerance"]),
     )
     return Configuration(lens, detection, profile)
@@ -66,6 +81,7 @@ class Measuring:
     _state: State
     _camera: Camera
     _catalogue: CatalogueStore
+    _switches: AramisSwitches
 
     def __post_init__(self) -> None:
         """Begin without pictures."""
@@ -147,7 +163,7 @@ class Measuring:
         assert database is not None
         assert place is not None
         with self._phases(result):
-            settings = configuration(self._state.settings)
+            settings = configuration(self._state.settings, self._switches)
             exposure = int(self._state.settings.get("SetExposure", "Rows"))
             picture, past = self._camera.picture(place), self._background
             solution = solve(picture, past, settings, database, self._meter, hint, exposure)

@@ -14,6 +14,7 @@ from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.aramis.telemetry import Telemetry
 from cubestack.firmware_model.interface.aramis import MeasurementMode
+from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine, Sleep
 
@@ -34,12 +35,14 @@ class AramisProgram:
         state: what the program remembers; traces read it.
     """
 
-    def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
+    def __init__(
+        self, hardware: AramisHardware, meter: Meter, switches: AramisSwitches = DEFAULT_SWITCHES
+    ) -> None:
         """Reset: settings from flash, everything else anew."""
         self.state = state = State(hardware.flash)
         self._camera = Camera(hardware, state, meter)
         self._catalogue = CatalogueStore(hardware, meter)
-        self._measuring = Measuring(meter, state, self._camera, self._catalogue)
+        self._measuring = Measuring(meter, state, self._camera, self._catalogue, switches)
         self.commands = Commands(
             hardware, meter, state, self._camera, self._catalogue, self._measuring
         )

@@ -4,6 +4,7 @@ AraMiS thesis, sections 5.7 (the three outcomes), 5.9 (rough direction) and appe
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,11 @@ class Profile:
         sigma_rad: noise of a measured direction per axis, in rad. The thesis' appendix E settles on
             0.26 px of its simulator, 0.3759 rad / 582.
         pivots: pivot triangles at most, 0 to 3.
+        always_pivot: whether one is measured even when one candidate is left, as appendix E does.
+        filtered: whether a unique triangle near a rough direction must also have the right sides
+            and a boresight near it (an extension).
+        identities: how stars are told apart: by section 5.8 or appendix E, or either criterion of
+            section 5.8 where the sides are checked.
         hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (an
             extension).
         side_tolerance_rad: largest difference of a side, with verification or a rough direction;
@@ -44,6 +50,9 @@ class Profile:
 
     sigma_rad: float = 0.26 * 0.3759 / 582
     pivots: int = 3
+    always_pivot: bool = False
+    filtered: bool = True
+    identities: Literal["section-5.8", "appendix-e", "either"] = "either"
     verify: bool = False
     tolerance_rad: float = 1.2e-3
     side_tolerance_rad: float = 7e-4

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report
@@ -61,6 +62,7 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
+    switches=AramisSwitches,
     has_fpga=False,
     prepare=lambda shown: call(f"{BOARD}.catalogue:onboard_database", progress=shown)(),
     conformance=ConformanceNotes(

@@ -34,6 +34,7 @@ from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
 from cubestack.firmware_model.aramis.program import AramisProgram
 from cubestack.firmware_model.interface.aramis import INTERFACE, ResetCause
 from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, SensorState
+from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS, ROWS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
@@ -74,6 +75,7 @@ class AramisBoard(Board):
         i2c_bus: I2cBus | None = None,
         noise: NoiseTerms | None = None,
         i2c_address: int = INTERFACE.i2c_address,
+        switches: AramisSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Power up.
 
@@ -85,6 +87,7 @@ class AramisBoard(Board):
             baud: of the satellite's UART.
             noise: which terms of noise the sensor has, all unless given.
             i2c_address: 7-bit address on the satellite's bus.
+            switches: of the program.
         """
         if engine != "auto":
             raise ValueError(f"AraMiS has no FPGA: its engine must be 'auto', not {engine!r}")
@@ -107,7 +110,7 @@ class AramisBoard(Board):
             self._hardware.reset_cause = cause
             self._frames.clear()
             self._frame = 0
-            self.program = AramisProgram(self._hardware, meter)
+            self.program = AramisProgram(self._hardware, meter, switches)
             return self.program
 
         self.processor = Processor(

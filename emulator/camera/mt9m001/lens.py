@@ -10,6 +10,10 @@ Neither focal length, aperture nor transmission are published. The focal length 
 and height. The aperture and the effective width (bandwidth times transmission times quantum
 efficiency and fill factor) are assumed: f/1.2, and 3200 Angstrom at 0.55 and 0.85. The spot is
 assumed to be set as wide as removing spikes wants it, which asks for 13 of 25 pixels (section 3.5).
+
+The thesis' equation 3.2, the electrons of a star, is replaced by that of `Optics`. It takes no
+photons but a response in A/W, has a flux of 10^11.2 without a unit, and its gain is electrons for a
+count, by which electrons must not be multiplied. Exposure, magnitude and area count alike in both.
 """
 
 import math

@@ -5,8 +5,9 @@ Method 1 steps a 5 x 5 window by one pixel and judges the pixel in its middle; m
 five and judges the bright pixels in it. Half of the window's pixels, 13 of 25, decide. A window
 cut by the border is judged by the same part of the pixels that it has.
 
-The text picks method 2 as the quicker one; the flight code of appendix E calls method 1. Method 2
-loses stars that fall on the border of windows, so its mask is the poorer one.
+The text finds no significant difference between what the two remove, and picks method 2 as the
+quicker one; the flight code of appendix E calls method 1. Here they do differ: method 2 loses stars
+that fall on the border of windows, none of which has half of its pixels lit.
 """
 
 from enum import IntEnum

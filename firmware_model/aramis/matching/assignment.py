@@ -4,7 +4,7 @@ AraMiS thesis, section 5.8 (tables 5.1 to 5.3). Two criteria put a score into a 
 measured against catalogue stars: the order of brightness, and the order of the sides. Each scores
 its coefficient of variation (standard deviation over mean of the three measured values), so the
 criterion whose values differ more decides where both disagree. A side stands for the star opposite
-to it. The thesis' appendix scores brightness star by star in another way; this follows the text.
+to it. `assign_plainly` follows the listing of appendix E, which differs.
 """
 
 from dataclasses import dataclass
@@ -59,6 +59,32 @@ def assign(
     if weights[0] > weights[1]:
         return Assignment(scores, by_brightness, by_sides)
     return Assignment(scores, by_sides, by_brightness)
+
+
+def assign_plainly(brightness: Floats, sides: Floats, catalogue: Floats, meter: Meter) -> Indices:
+    """Star (3,) of the catalogue's triangle for each measured one, as appendix E prints it.
+
+    The listing sorts the catalogue's stars by magnitude, but drops the result, so they stay in the
+    order of their numbers. Each measured star, the brightest first, scores for the one of its place
+    by how far its brightness is from the others'. A side scores for the catalogue's nearest one,
+    unless two have the same. Each star takes its own highest score, even if two take the same star.
+    """
+    order = [0, 2, 1]  # of sides: a, c, b stand opposite to stars 3, 2, 1
+    corners, half = catalogue.astype(np.float32), np.float32(0.5)
+    edges = corners[[0, 0, 1]] - corners[[1, 2, 2]]
+    expected = _TWO * np.arcsin(half * np.sqrt((edges * edges).sum(axis=1)))
+    measured = _TWO * np.arcsin(half * sides[order])
+    nearest = np.abs(expected[:, None] - measured).argmin(axis=1)
+    mean = brightness.sum() / _THREE
+    apart = np.abs(brightness[:, None] - brightness) + np.diag(np.full(3, np.inf, np.float32))
+    scores = np.diag(apart.min(axis=1) / mean)
+    if len(set(nearest.tolist())) == 3:
+        scores[2 - nearest, 2 - np.arange(3)] += variation(expected, meter)
+    meter.charge(f32_add=15 + 2 + 9 + 6 + 3, f32_mul=9 + 12, f32_div=4, f32_sqrt=3, f32_acos=6)
+    meter.charge(f32_compare=9 + 6 + 9, ram_read=18, ram_write=12, loop=18)
+    # The listing keeps the last of equal scores.
+    found: Indices = 2 - scores[:, ::-1].argmax(axis=1)
+    return found
 
 
 def variation(values: Floats, meter: Meter) -> np.float32:

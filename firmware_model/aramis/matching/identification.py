@@ -3,7 +3,9 @@
 AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
 the main triangle, the next three the pivots, and a unique triangle is believed. A rough direction
 leaves the triangles around it; an extension is that it also must be close to the boresight found,
-and that the sides must agree with the identities, of which the second choice will do.
+and that the sides must agree with the identities, of which the second choice will do. Appendix E
+differs from the text: it measures a pivot even for a unique triangle, so it needs a fourth star,
+and it tells stars apart in its own way.
 
 With verification (an extension), an attitude must be confirmed by further stars. Then every
 candidate is tried, with both ways of telling its stars apart; pivots, which a false star would
@@ -20,7 +22,7 @@ import numpy as np
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.matching.assignment import assign
+from cubestack.firmware_model.aramis.matching.assignment import assign, assign_plainly
 from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.matching.triples import Match, match_triple
@@ -48,7 +50,7 @@ def identify(
     smeared = profile.verify and measured.smear_px > profile.smear_px
     if smeared and measured.skew_px > profile.skew_px:
         return unsolved(Reason.SMEAR, measured)
-    if len(measured) < 3:
+    if len(measured) < 3 + profile.always_pivot:
         return unsolved(Reason.SMEAR if smeared else Reason.TOO_FEW_STARS, measured)
     vectors = field.directions(measured.centroids, meter)
     faces = None
@@ -85,7 +87,7 @@ class _Search:
             outcome = MeasurementOutcome.AMBIGUOUS if several else MeasurementOutcome.NONE
             return replace(unsolved(match.end, self.measured, **counts), outcome=outcome)
         choices = self._identities(main, match, int(match.candidates[0]))
-        if self.hint is not None:
+        if self.hint is not None and self.profile.filtered:
             choices = [choice for choice in choices if self._sides_agree(main, choice)]
             if not choices:
                 return unsolved(Reason.UNCONFIRMED, self.measured, **counts)
@@ -93,7 +95,7 @@ class _Search:
         quaternion = self._attitude(np.array(main), identities)
         if quaternion is None:
             return unsolved(Reason.DEGENERATE, self.measured, **counts)
-        if self._far_from_hint(quaternion):
+        if self.profile.filtered and self._far_from_hint(quaternion):
             return unsolved(Reason.FAR_FROM_HINT, self.measured, **counts)
         return self._solution(match.end, quaternion, np.array(main), identities, **counts)
 
@@ -134,9 +136,16 @@ class _Search:
     def _match(self, main: tuple[int, int, int]) -> Match:
         profile, count = self.profile, len(self.measured)
         pivots = [star for star in range(count) if star not in main][: profile.pivots]
-        enough, sigma_rad = profile.candidates if profile.verify else 1, profile.sigma_rad
+        enough = profile.candidates if profile.verify else 1
         return match_triple(
-            self.vectors, main, pivots, sigma_rad, self.database, self.faces, self.meter, enough
+            self.vectors,
+            main,
+            pivots,
+            profile.sigma_rad,
+            self.database,
+            self.faces,
+            self.meter,
+            None if profile.always_pivot else enough,
         )
 
     def _identities(self, main: tuple[int, int, int], match: Match, triangle: int) -> list[Indices]:
@@ -145,8 +154,11 @@ class _Search:
         database, stars = self.database, self.database.stars[triangle].astype(np.intp)
         brightness, known = self.measured.brightness[list(main)], database.vectors[stars]
         with self.meter.phase("identities"):
-            found = assign(brightness, match.main.sides, database.v_mag[stars], known, self.meter)
-        differ = (found.order != found.other).any()
+            sides, v_mag = match.main.sides, database.v_mag[stars]
+            if self.profile.identities == "appendix-e":
+                return [stars[assign_plainly(brightness, sides, known, self.meter)]]
+            found = assign(brightness, sides, v_mag, known, self.meter)
+        differ = self.profile.identities == "either" and (found.order != found.other).any()
         return [stars[order] for order in (found.order, found.other)[: 1 + differ]]
 
     def _sides_agree(self, main: tuple[int, int, int], identities: Indices) -> bool:

@@ -88,7 +88,7 @@ def match_triple(
     database: Database,
     faces: Mask | None,
     meter: Meter,
-    enough: int = 1,
+    enough: int | None = 1,
 ) -> Match:
     """Match the triangle of three stars, with pivots as long as too many candidates are left.
 
@@ -99,7 +99,8 @@ def match_triple(
         main: the three stars of the main triangle, the brightest first.
         pivots: further stars, at most three are used.
         faces: (f,) which faces count; None: all.
-        enough: no pivot is needed when so few candidates are left; 1 as published.
+        enough: no pivot is needed when so few candidates are left, 1 in section 5.7; None: as in
+            appendix E, one at least, and further ones until one candidate is left, not none.
     """
     with meter.phase("triangles"):
         triangle = measure_triangle(vectors[list(main)], sigma_rad, meter)
@@ -107,11 +108,10 @@ def match_triple(
         return Match(Reason.DEGENERATE, None, _NOTHING, 0)
     with meter.phase("search"):
         left = find_triangles(triangle, database, faces, meter)
-    if len(left) == 0:
-        return Match(Reason.NO_TRIANGLE, triangle, left, 0)
+    nothing = Reason.NO_SHARED_PAIR if len(left) else Reason.NO_TRIANGLE
     used = 0
     for (first, second), star in zip(PIVOT_PAIRS, pivots, strict=False):
-        if len(left) <= enough:
+        if (used and len(left) == 1) if enough is None else len(left) <= enough:
             break
         used += 1
         with meter.phase("triangles"):
@@ -122,10 +122,8 @@ def match_triple(
             others = find_triangles(pivot, database, faces, meter)
         with meter.phase("pivoting"):
             left = left[_share_pair(database.stars[left], database.stars[others], meter)]
-        if len(left) == 0:
-            return Match(Reason.NO_SHARED_PAIR, triangle, left, used)
-    end = Reason.UNIQUE if len(left) == 1 else Reason.SEVERAL
-    return Match(end, triangle, left, used)
+    ends = {0: nothing, 1: Reason.UNIQUE}
+    return Match(ends.get(len(left), Reason.SEVERAL), triangle, left, used)
 
 
 def _share_pair(triangles: NDArray[np.uint16], others: NDArray[np.uint16], meter: Meter) -> Mask:

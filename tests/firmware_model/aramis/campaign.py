@@ -13,9 +13,13 @@ import numpy as np
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
+from cubestack.firmware_model.aramis.measurement import configuration
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
+from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.solution import Profile
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
+from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 from .sky import FIELD, Light, database, in_published_sense, is_right, meter, misnamed, picture
 
@@ -26,6 +30,7 @@ def rates(
     light: Light | None = None,
     hint_error_deg: float | None = None,
     field: Field = FIELD,
+    stars_per_field: int = 6,
     seed: int = 0,
 ) -> dict[str, float]:
     """Parts of so many poses: right, wrong, ambiguous, none; `far` are wrong in the thesis' sense.
@@ -33,7 +38,7 @@ def rates(
     `misnamed` counts stars a pose, `ms` is the mean time on the processor.
     """
     rng = np.random.default_rng(seed)
-    onboard = database(CatalogueParameters(fov_deg=field.fov_deg))
+    onboard = database(CatalogueParameters(fov_deg=field.fov_deg, stars_per_field=stars_per_field))
     counts, spent = Counter[str](), meter()
     for _ in range(poses):
         made = picture(rng, field, light)
@@ -55,6 +60,17 @@ COARSE = Light(noise_px=0.26 * 1024 / 582, mag_noise=0.3)
 NOTHING = Light(mag_limit=-2.0, false_stars=20, false_mags=(2.0, 6.0))
 PLAIN, CHECKED = PUBLISHED.profile, VERIFIED.profile
 
+
+def switched(changes: str = "", profile: str = "published") -> Profile:
+    """As the switches make it, with all settings at their reset values."""
+    switches = AramisSwitches.of(profile, changes)
+    return configuration(StoredSettings(FlashStore()), switches).profile
+
+
+PRINTED = switched()
+LISTED = switched("identities=appendix-e")
+NOISES = (Light(), replace(COARSE, noise_px=0.26), COARSE, replace(COARSE, noise_px=1.0))
+
 CASES: dict[str, tuple[Any, ...]] = {
     "published": (PLAIN,),
     "published, 2 deg hint": (PLAIN, Light(), 2.0),
@@ -64,6 +80,17 @@ CASES: dict[str, tuple[Any, ...]] = {
     "published, 1 px, 2 deg hint": (PLAIN, replace(COARSE, noise_px=1.0), 2.0),
     "published, 5 false stars": (PLAIN, Light(false_stars=5)),
     "published, 18 deg": (PLAIN, Light(), None, Field(fov_deg=18)),
+    **{
+        f"profile published, {light.noise_px:.2g} px{', 2 deg hint' * (hint is not None)}": (
+            PRINTED,
+            light,
+            hint,
+        )
+        for hint in (None, 2.0)
+        for light in NOISES
+    },
+    "the same, 0.26 px, five stars a field": (PRINTED, NOISES[1], None, FIELD, 5),
+    "the same, 0.26 px, stars as in appendix E": (LISTED, NOISES[1]),
     "verified": (CHECKED,),
     "verified, 5 false": (CHECKED, Light(false_stars=5)),
     "verified, 5 false, 2 deg hint": (CHECKED, Light(false_stars=5), 2.0),

@@ -14,6 +14,7 @@ from cubestack.firmware_model.aramis.pipeline import VERIFIED, Detection
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.telemetry import body_quaternion
 from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 
@@ -37,6 +38,21 @@ def test_every_setting_arrives() -> None:
     profile = found.profile
     assert profile.sigma_rad == pytest.approx(0.5 / 3232.64, rel=1e-4)
     assert (profile.pivots, profile.verify, profile.hint_tolerance_deg) == (1, False, 9)
+
+
+def test_what_a_switch_has_as_printed_no_setting_changes() -> None:
+    settings, printed = StoredSettings(FlashStore()), AramisSwitches.of("published")
+    before = configuration(settings, printed)
+    assert (before.detection.subtract, before.detection.spikes) == (False, SpikeRemoval.CENTRE)
+    profile = before.profile
+    assert profile.sigma_rad == pytest.approx(0.26 * 0.3759 / 582, rel=1e-6)
+    assert (profile.verify, profile.always_pivot, profile.filtered) == (False, True, False)
+    matching = {"Noise": 0.5, "Pivots": 3, "Verify": 1, "HintTolerance": 6}
+    settings.put("SetIdentification", matching)
+    assert configuration(settings, printed) == before
+    settings.put("SetField", {"FieldOfView": 18.0, "Round": 1})
+    likely = configuration(settings, printed).profile
+    assert likely.sigma_rad == pytest.approx(0.26 * np.radians(18) / 582, rel=1e-3)
 
 
 @given(st.data())
