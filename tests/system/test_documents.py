@@ -143,8 +143,9 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
         assert (ROOT / file).is_file(), file
 
 
-def test_experiments_of_the_fidelity_page_are_those_there_are() -> None:
-    named = re.findall(r"`experiments\.py (\w+)", text_of("docs/fidelity.md"))
+def test_experiments_of_the_pages_are_those_there_are() -> None:
+    pages = text_of("docs/fidelity.md") + text_of("docs/profiles.md")
+    named = re.findall(r"experiments\.py (\w+)", pages)
     there = re.findall(r"experiments\.py (\w+) ", text_of("tests/system/experiments.py"))
     assert {*named} == {*there}
 
