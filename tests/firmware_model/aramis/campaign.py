@@ -59,16 +59,8 @@ def rates(
 COARSE = Light(noise_px=0.26 * 1024 / 582, mag_noise=0.3)
 NOTHING = Light(mag_limit=-2.0, false_stars=20, false_mags=(2.0, 6.0))
 PLAIN, CHECKED = PUBLISHED.profile, VERIFIED.profile
-
-
-def switched(changes: str = "", profile: str = "published") -> Profile:
-    """As the switches make it, with all settings at their reset values."""
-    switches = AramisSwitches.of(profile, changes)
-    return configuration(StoredSettings(FlashStore()), switches).profile
-
-
-PRINTED = switched()
-LISTED = switched("identities=appendix-e")
+PRINTED = configuration(StoredSettings(FlashStore()), AramisSwitches.of("published")).profile
+LISTED = replace(PRINTED, identities="appendix-e")
 NOISES = (Light(), replace(COARSE, noise_px=0.26), COARSE, replace(COARSE, noise_px=1.0))
 
 CASES: dict[str, tuple[Any, ...]] = {
@@ -81,11 +73,7 @@ CASES: dict[str, tuple[Any, ...]] = {
     "published, 5 false stars": (PLAIN, Light(false_stars=5)),
     "published, 18 deg": (PLAIN, Light(), None, Field(fov_deg=18)),
     **{
-        f"profile published, {light.noise_px:.2g} px{', 2 deg hint' * (hint is not None)}": (
-            PRINTED,
-            light,
-            hint,
-        )
+        f"profile published, {light.noise_px:.2g} px, hint {hint}": (PRINTED, light, hint)
         for hint in (None, 2.0)
         for light in NOISES
     },

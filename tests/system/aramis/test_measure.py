@@ -33,12 +33,9 @@ def test_near_a_rough_direction_as_published_nothing_is_wrong(measure: Measure) 
 
 
 def test_the_published_profile_believes_a_unique_triangle_after_a_pivot(measure: Measure) -> None:
-    few = ("--frames", 3, "--seed", 21, "--mode", "assisted", "--profile", "published")
-    for options, least in ((few, 1), ((*few, "--set", "pivots=when-needed"), 0)):
-        solved = [frame for frame in measure(*options) if frame["solved"]]
-        found = {(one["reason"], one["candidates"], one["matched"]) for one in solved}
-        assert found == {("unique", 1, 3)}
-        assert min(frame["pivots"] for frame in solved) == least
+    near = ("--frames", 4, "--seed", 21, "--mode", "assisted", "--profile", "published")
+    found = {(frame["reason"], frame["pivots"], frame["matched"]) for frame in measure(*near)}
+    assert found == {("unique", 1, 3)}
 
 
 def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Measure) -> None:
