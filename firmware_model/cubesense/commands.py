@@ -13,10 +13,10 @@ from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.download import Download, PictureReader
 from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, TelecommandJob
-from cubestack.firmware_model.cubesense.measurement import Measurement
+from cubestack.firmware_model.cubesense.measurement import Measurement, make_table
 from cubestack.firmware_model.cubesense.state import CameraSettings, State, distortion_of
 from cubestack.firmware_model.cubesense.supply import Supply
-from cubestack.firmware_model.cubesense.vision import distortion
+from cubestack.firmware_model.cubesense.vision.distortion import DistortionError
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import codes
@@ -152,9 +152,9 @@ class Commands:
         Making one is charged to the measurement that needs it first.
         """
         try:
-            for projection in distortion.Projection:
-                distortion.fine_table(Meter(self.meter.table), projection, factors)
-        except distortion.DistortionError:
+            for camera in codes.Camera:
+                make_table(camera, self.measurement.switches, factors, Meter(self.meter.table))
+        except DistortionError:
             self.state.last_error = AckError.BAD_PARAMETER
         else:
             settings.distortion = factors

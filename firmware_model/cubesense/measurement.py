@@ -20,6 +20,10 @@ from cubestack.firmware_model.cubesense.vision.sample_search import Between, aro
 from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ, PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
@@ -59,11 +63,6 @@ BETWEEN = {
     codes.NadirSearch.AROUND_SAMPLES_STEPPING: Between.SEQUENTIAL,
 }
 
-PROJECTIONS = {
-    codes.Camera.SUN: distortion.Projection.EQUIDISTANT,
-    codes.Camera.NADIR: distortion.Projection.STEREOGRAPHIC,
-}
-
 SCANNED_PIXELS = FULL_SIZE.scan_clocks - 2
 """Two clocks present no pixel."""
 
@@ -71,26 +70,48 @@ FLASH_ERASE_BYTES, FLASH_WRITE_BYTES, FLASH_STEP_US = 64, 32, 2_000
 """The part erases and writes its flash in such blocks, and stops for each: 2 ms, assumed."""
 
 
+def projection_of(camera: codes.Camera, switches: CubeSenseSwitches) -> distortion.Projection:
+    """Where the table of ``camera`` leads to."""
+    if camera is codes.Camera.NADIR and switches.distortion == "stereographic":
+        return distortion.Projection.STEREOGRAPHIC
+    return distortion.Projection.EQUIDISTANT
+
+
+def make_table(
+    camera: codes.Camera, switches: CubeSenseSwitches, factors: tuple[float, ...], meter: Meter
+) -> distortion.RadiusTable:
+    """The distortion table of ``camera`` for ``factors``; DistortionError when there is none."""
+    if switches.distortion == "byte-table":
+        return distortion.byte_table(meter, factors)
+    return distortion.fine_table(meter, projection_of(camera, switches), factors)
+
+
 @cache
-def _constant_table(camera: codes.Camera) -> distortion.RadiusTable:
+def _constant_table(camera: codes.Camera, switches: CubeSenseSwitches) -> distortion.RadiusTable:
     """Made of the reset values, by the compiler."""
     factors = CameraSettings.at_reset(camera).distortion
-    return distortion.fine_table(Meter(PIC18F45K20), PROJECTIONS[camera], factors)
+    return make_table(camera, switches, factors, Meter(PIC18F45K20))
 
 
 class Measurement:
     """Measures with either camera, into ``State.results``."""
 
     def __init__(
-        self, meter: Meter, state: State, cameras: CameraControl, acquisition: Acquisition
+        self,
+        meter: Meter,
+        state: State,
+        cameras: CameraControl,
+        acquisition: Acquisition,
+        switches: CubeSenseSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Measure as the settings in ``state`` say."""
         self._meter = meter
         self._state = state
         self._cameras = cameras
         self._acquisition = acquisition
+        self.switches = switches
         self._tables = {
-            camera: (CameraSettings.at_reset(camera).distortion, _constant_table(camera))
+            camera: (CameraSettings.at_reset(camera).distortion, _constant_table(camera, switches))
             for camera in codes.Camera
         }
 
@@ -122,16 +143,28 @@ class Measurement:
 
     def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
         """The Earth; False when the memory was cut off."""
-        settings = self._state.cameras[codes.Camera.NADIR]
-        config = EdgeConfig(settings.threshold, settings.boresight, masks=tuple(settings.masks))
+        settings, switches = self._state.cameras[codes.Camera.NADIR], self.switches
+        config = EdgeConfig(
+            settings.threshold,
+            settings.boresight,
+            masks=tuple(settings.masks),
+            sub_pixel=switches.edges == "sub-pixel",
+            listing=switches.edges == "listing",
+        )
         stored = yield from read_ticks()
         edges = yield from self._find_edges(result, config)
         if edges is None:
             return False
         searched = yield from read_ticks()
         result.search_us = microseconds((yield from ticks_since(stored)))
-        found = find_nadir(edges, NadirConfig(self._tables[codes.Camera.NADIR][1]), self._meter)
-        self._meter.charge(f32_mul=1, f32_convert=1)
+        judged = NadirConfig(
+            self._tables[codes.Camera.NADIR][1],
+            projection_of(codes.Camera.NADIR, switches),
+            checked=switches.limb == "checked",
+        )
+        found = find_nadir(edges, judged, self._meter)
+        if judged.checked:
+            self._meter.charge(f32_mul=1, f32_convert=1)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
         result.total_us = microseconds((yield from ticks_since(started)))
         result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
@@ -168,7 +201,11 @@ class Measurement:
         result.search_us = microseconds((yield from ticks_since(stored)))
         _, table = self._tables[codes.Camera.SUN]
         config = sun_centroid.SunConfig(
-            table, settings.threshold, settings.boresight, masks=tuple(settings.masks)
+            table,
+            settings.threshold,
+            settings.boresight,
+            masks=tuple(settings.masks),
+            printed=self.switches.sun == "all-pixels",
         )
         found = sun_centroid.find_sun(data, config, self._meter)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
@@ -188,9 +225,9 @@ class Measurement:
             return
         reset = CameraSettings.at_reset(camera).distortion
         if factors == reset:
-            table = _constant_table(camera)
+            table = _constant_table(camera, self.switches)
         else:
-            table = distortion.fine_table(self._meter, PROJECTIONS[camera], factors)
+            table = make_table(camera, self.switches, factors, self._meter)
             yield Pay()
             blocks = -(-table.size // FLASH_ERASE_BYTES) + -(-table.size // FLASH_WRITE_BYTES)
             yield from pause(blocks * FLASH_STEP_US)

@@ -1,12 +1,11 @@
 """Where everything lies, and whether it fits: the memories of the PIC18F45K20 on CubeSense.
 
 CubeSense thesis, appendix A.7 (1536 bytes of RAM, 32 kB of flash) and section 6.2 (pages of 256
-bytes, constant tables in flash). Sizes are derived from the constants that the program uses.
+bytes). Sizes are derived from the constants that the program uses. Distortion tables lie in flash;
+the text leaves that open, but beside the node's messages RAM has no room even for its 227 bytes.
 Program code is not modelled, so flash must leave room for it. The Earth and the Sun are never
 looked for at the same time, so their buffers share their places.
 """
-
-import numpy as np
 
 from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
@@ -16,6 +15,10 @@ from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import FRAME_BYTES, MASK_AREAS, Camera
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS, TELECOMMANDS
 from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory, used
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH
@@ -35,16 +38,26 @@ TASK_BYTES = 32
 CAPACITY = {Memory.RAM: 1536, Memory.FLASH: 32 * 1024}
 
 
-_WINDOW, _SUMS = "Sun window", "sums of the window's columns and of a row"
+_WINDOW = "Sun window"
 
 
-def budget() -> tuple[Buffer, ...]:
+def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]:
     """Every buffer of the program."""
+    checked, cone = switches.limb == "checked", switches.distortion == "stereographic"
+    places = {
+        "normal equations, their inverse, right side": (9 + (9 if checked or cone else 6) + 3)
+        * FLOAT
+    }
+    if switches.sun == "all-pixels":
+        places["sums of the window"] = 2 * FLOAT + INT
+    else:
+        places["sums of the window's columns and of a row"] = (FULL_SIZE.window + 1) * (FLOAT + INT)
+    inside, place = sorted(places, key=places.__getitem__)
     longest = 1 + max(message.length for message in TELECOMMANDS)
     answers = (message.length for message in INTERFACE.telemetries if message.name != "ImageFrame")
     ram = {
         _WINDOW: window_bytes(),
-        _SUMS: (FULL_SIZE.window + 1) * (FLOAT + INT),
+        place: places[place],
         "samples of the row above": len(FULL_SIZE.scan_columns),
         "edges": MAX_EDGES * 2 * INT,
         "telecommands, waiting and being received": (QUEUE_DEPTH + 1) * longest,
@@ -59,13 +72,13 @@ def budget() -> tuple[Buffer, ...]:
     }
     shared = {
         "scanned pixels": (FULL_SIZE.scan_step, _WINDOW),
-        "edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW),
-        "normal equations, their inverse, right side": ((9 + 9 + 3) * FLOAT, _SUMS),
+        **({"edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW)} if checked else {}),
+        inside: (places[inside], place),
     }
-    tables = len(Camera) * TABLE_ENTRIES * np.dtype(np.int16).itemsize
+    table = TABLE_ENTRIES * (1 if switches.distortion == "byte-table" else INT)
     flash = {
-        "distortion tables of the reset values": tables,
-        "distortion tables of other coefficients": tables,
+        "distortion tables of the reset values": table * (len(Camera) if cone else 1),
+        "distortion tables of other coefficients": table * len(Camera),
         "distortion coefficients": len(Camera) * DISTORTION_TERMS * FLOAT,
     }
     return (
@@ -85,9 +98,8 @@ def _state_bytes() -> int:
     return sum(INTERFACE.telemetry(name).length for name in shown) + settings + boresights
 
 
-def report() -> str:
-    """The budget as a Markdown table, one row for a buffer, with sums."""
-    buffers = budget()
+def report(buffers: tuple[Buffer, ...]) -> str:
+    """A budget as a Markdown table, one row for a buffer, with sums."""
     rows = ["| Memory | Buffer | Bytes |", "|---|---|---:|"]
     for memory, total in used(buffers).items():
         rows += [

@@ -16,6 +16,10 @@ from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Reset, Routine
 
@@ -36,7 +40,12 @@ class CubeSenseProgram:
         state: what the program remembers; traces read it.
     """
 
-    def __init__(self, hardware: CubeSenseHardware, meter: Meter) -> None:
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        switches: CubeSenseSwitches = DEFAULT_SWITCHES,
+    ) -> None:
         """Reset: RAM starts with the declared reset values."""
         self.idle = False
         self._hardware = hardware
@@ -44,7 +53,7 @@ class CubeSenseProgram:
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
         self.acquisition = acquisition = Acquisition(hardware, meter, self._supply)
-        measurement = Measurement(meter, state, self.cameras, acquisition)
+        measurement = Measurement(meter, state, self.cameras, acquisition, switches)
         self._jobs = jobs = JobQueue()
         self.commands = Commands(meter, state, self._supply, self.cameras, acquisition, measurement)
         reader, download = self.commands.reader, self.commands.download

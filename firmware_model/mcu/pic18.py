@@ -20,7 +20,7 @@ FITTED_SUN_PIXELS = 109
 The thesis does not say how many, and they decide the factor. This is a Sun 7 px in radius at the
 30 % level, between the published 8 and 6 px (table 5.3), whose spot of light reaches the threshold
 of 225 within 5.9 px. Fewer are possible: the window's place around the first Sun pixel suits a
-Sun 4.5 px in radius (69 px), and the published nadir time follows from a fit to about 51.
+Sun 4.5 px in radius (69 px), and the published nadir time follows from a fit to about 43.
 """
 
 LIBRARY_FACTOR = 0.1852

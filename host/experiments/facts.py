@@ -15,9 +15,10 @@ OptionsT = TypeVar("OptionsT", bound=Options)
 
 @dataclass(frozen=True)
 class Facts(Result):
-    """Facts by name, in their order."""
+    """Facts by name, in their order; ``lines`` tell them to a reader, if not each on a line."""
 
     facts: dict[str, Any]
+    lines: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -45,5 +46,5 @@ class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
         yield Facts(self.look_up(options, opened.shown))
 
     def summarise(self, results: Sequence[Facts], wall_s: float) -> Iterable[str]:
-        """Each fact on a line."""
-        return fact_lines(results[0].facts)
+        """Their own lines, or each fact on one."""
+        return results[0].lines or fact_lines(results[0].facts)

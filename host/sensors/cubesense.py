@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
 
@@ -47,6 +48,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
+    switches=CubeSenseSwitches,
     options=(
         BoardOption(
             "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"

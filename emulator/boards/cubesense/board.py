@@ -30,6 +30,10 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action,
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS, ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
@@ -71,6 +75,7 @@ class CubeSenseBoard(Board):
         bench_baud: int = SERVICE_PORT.baud,
         i2c_address: int = INTERFACE.i2c_address,
         register_address: int = REGISTERS.i2c_address,
+        switches: CubeSenseSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Power up.
 
@@ -81,6 +86,7 @@ class CubeSenseBoard(Board):
             baud, bench_baud: of the serial lines with the node and the bench protocol.
             mcu_addressing: FPGAs with the option that lets the processor choose addresses.
             i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
+            switches: of the program.
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(_wiring(mcu_addressing=mcu_addressing), engine)
@@ -103,7 +109,7 @@ class CubeSenseBoard(Board):
         def boot(_cause: int) -> CubeSenseProgram:
             self.hardware.reset()
             self._release_pins()
-            self.program = CubeSenseProgram(self.hardware, meter)
+            self.program = CubeSenseProgram(self.hardware, meter, switches)
             return self.program
 
         self.processor = Processor(

@@ -1,8 +1,8 @@
 """Circles through edges, in the part's single precision.
 
 CubeSense thesis, sections 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by the
-inverse's first rows). Extensions are the radius, which needs the third row too, and leaving one
-point out of the sums again.
+inverse's first rows). Extensions are the radius, which needs the third row too, leaving one point
+out of the sums again, and refusing what is no circle.
 """
 
 from dataclasses import dataclass
@@ -67,6 +67,29 @@ class LeastSquaresCircle:
         """The circle; None when there are too few points, or they lie on a line."""
         if self._count < FEWEST:
             return None
+        determinant, products = self._solution()
+        xx, _, yy, *_ = self._sums
+        self._meter.charge(f32_mul=18 + 3 + 9, f32_add=9 + 2 + 6, f32_compare=1)
+        # A determinant this small by its largest product is rounding alone.
+        if abs(determinant) <= np.float32(1e-5) * abs(xx * yy * np.float32(self._count)):
+            return None
+        x, y, c = products / determinant
+        square = x * x + y * y + c
+        self._meter.charge(f32_div=3, f32_mul=2, f32_add=2, f32_compare=1, f32_sqrt=1)
+        if not square > 0:
+            return None
+        return Circle(x, y, np.sqrt(square))
+
+    def centre(self) -> Values | None:
+        """The centre (2,) as listing C.5 calculates it, out of any points; None where it divides by
+        0, which the listing does not prevent.
+        """
+        determinant, products = self._solution()
+        self._meter.charge(f32_mul=9 + 12 + 6, f32_add=5 + 6 + 4, f32_div=2)
+        return products[:2] / determinant if determinant else None
+
+    def _solution(self) -> tuple[np.float32, Values]:
+        """Determinant, and the determinant times centre (x, y) and squared radius less theirs."""
         xx, xy, yy, sx, sy, zx, zy, z = self._sums
         n = np.float32(self._count)
         matrix = np.array([[xx, xy, sx], [xy, yy, sy], [2 * sx, 2 * sy, n]])
@@ -76,15 +99,6 @@ class LeastSquaresCircle:
 
         # The inverse, transposed, times the determinant; cyclic indices give the sign.
         cofactors = turned(1, 1) * turned(2, 2) - turned(1, 2) * turned(2, 1)
-        determinant = sequential_sum(matrix[0] * cofactors[0])
-        self._meter.charge(f32_mul=18 + 3 + 9, f32_add=9 + 2 + 6, f32_compare=1)
-        # A determinant this small by its largest product is rounding alone.
-        if abs(determinant) <= np.float32(1e-5) * abs(xx * yy * n):
-            return None
+        determinant = np.float32(sequential_sum(matrix[0] * cofactors[0]))
         # The thesis' unknowns are the negative centre, and its right side is negative too.
-        x, y, c = sequential_sum(cofactors * np.array([[zx], [zy], [z]])) / determinant
-        square = x * x + y * y + c
-        self._meter.charge(f32_div=3, f32_mul=2, f32_add=2, f32_compare=1, f32_sqrt=1)
-        if not square > 0:
-            return None
-        return Circle(x, y, np.sqrt(square))
+        return determinant, sequential_sum(cofactors * np.array([[zx], [zy], [z]]))

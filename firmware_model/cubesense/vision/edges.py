@@ -1,16 +1,20 @@
 """Edges of the Earth in the lines that the nadir FPGA scans, as their pixels come over the pins.
 
-CubeSense thesis, sections 4.2.2, 6.5.1, 6.5.2 and appendix C.3. Every 64th pixel of a line is a
-sample. Between two samples on different sides of the threshold, a binary search in the buffer finds
-the first bright pixel. An edge at or beyond the rim of the field of view is false.
+CubeSense thesis, sections 4.2.2, 6.5.1, 6.5.2 and appendices C.3 and C.4. Every 64th pixel of a
+line is a sample. Between two samples on different sides of the threshold, a binary search in the
+buffer finds the first bright pixel. An edge at or beyond the rim of the field of view is false. The
+pixel before a line is dark; the text leaves that open. Boresight: table 5.1.
 
-What we settle: the pixel before a line is dark, and the previous sample is a bound of the search,
-so that it has 64 positions and exactly 6 steps (in the listing the first buffered pixel is a bound,
-and an edge there is found one pixel late). Boresight: table 5.1.
+As printed, the buffer's first pixel is a bound of the search and the steps are 6, or 5, whatever
+they find: a bright line that ends with a sample is found to end one pixel late. The edge is the
+centre of the bright pixel, up to a pixel inside, which also lets parts of the lens' rim pass.
 
-An extension, with ``sub_pixel``: the edge lies between the two pixels that the search ends with,
-where a straight line through their values meets the threshold. The published edge is the centre of
-the bright one, up to a pixel inside, which also lets parts of the lens' rim pass for edges.
+An extension, with ``sub_pixel``: the previous sample is a bound, and the edge lies between the two
+pixels that the search ends with, where a straight line through their values meets the threshold.
+
+Appendix C.3 to the letter has two slips that its text has not, with ``listing``: edges of the last
+32 rows come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to
+positions belongs to start addresses of the published gateware, which ours does not have.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -26,6 +30,11 @@ from cubestack.firmware_model.cubesense.vision.masks import Mask, masked
 from cubestack.firmware_model.interface.cubesense.codes import EDGE_UNIT, EDGES_PER_FRAME
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
+
+LISTED_RIM_CENTRE = (367.0, 237.0)
+
+LISTED_REST = 32
+"""Pixels at a column's end; the listing halves where they start."""
 
 MAX_EDGES = 2 * EDGES_PER_FRAME
 """Edges that the part keeps: assumed. The widest Earth has 28, the rest is for false ones."""
@@ -44,6 +53,7 @@ class EdgeConfig:
         rim_px: an edge so far from the boresight is false.
         masks: areas whose edges are dropped.
         sub_pixel: interpolate between the pixels of an edge.
+        listing: with the slips of appendix C.3.
     """
 
     threshold: int = 70
@@ -51,6 +61,7 @@ class EdgeConfig:
     rim_px: float = RIM_PX
     masks: Sequence[Mask] = ()
     sub_pixel: bool = True
+    listing: bool = False
 
 
 class EdgeList:
@@ -81,10 +92,12 @@ class EdgeList:
     def offsets(self) -> NDArray[np.float32]:
         """Coordinates (n, 2) from the boresight in px; charges the conversion."""
         count = len(self)
-        self._meter.charge(f32_convert=2 * count, f32_add=2 * count)
+        self._meter.charge(f32_convert=2 * count)
         if self._config.sub_pixel:
-            self._meter.charge(f32_mul=2 * count)
-        return self._from_boresight(self.points)
+            self._meter.charge(f32_mul=2 * count, f32_add=2 * count)
+        else:
+            self._meter.charge(i16_add=2 * count)
+        return self._from(self._config.boresight, self.points)
 
     def add(self, line: int, vertical: bool, crossing: "Crossing") -> None:
         """Judge and keep an edge on scanned row, or column, ``line``."""
@@ -102,14 +115,16 @@ class EdgeList:
         else:
             self._points.append(point)
 
-    def _from_boresight(self, points: NDArray[np.int16]) -> NDArray[np.float32]:
-        """1/32 px (..., 2) to px from the boresight."""
+    @staticmethod
+    def _from(centre: tuple[float, float], points: NDArray[np.int16]) -> NDArray[np.float32]:
+        """1/32 px (..., 2) to px from ``centre``."""
         unit = np.float32(1 / EDGE_UNIT)
-        return points.astype(np.float32) * unit - np.array(self._config.boresight, np.float32)
+        return points.astype(np.float32) * unit - np.array(centre, np.float32)
 
     def _outside(self, point: tuple[int, int]) -> bool:
         """Equation 6.5.1 against the rim; the listing converts each factor anew."""
-        x, y = self._from_boresight(np.array(point, np.int16))
+        centre = LISTED_RIM_CENTRE if self._config.listing else self._config.boresight
+        x, y = self._from(centre, np.array(point, np.int16))
         self._meter.charge(
             i16_add=8, f32_convert=4, f32_mul=2, f32_add=1, f32_sqrt=1, f32_compare=1
         )
@@ -196,7 +211,7 @@ class NadirLines:
     ) -> None:
         """Wait for a scan's first clock; ``buffer`` (scan_step,) takes pixels, None makes one."""
         self.edges = EdgeList(config, meter)
-        self._threshold = config.threshold
+        self._config = config
         self._meter = meter
         self._pieces = _pieces(read_out)
         self._piece: _Piece | None = next(self._pieces)
@@ -226,12 +241,31 @@ class NadirLines:
         sample = int(self._buffer[piece.size - 1])
         self._previous = sample
         self._meter.charge(array_byte=2, i8=3, loop16=1)
-        start = piece.start
-        wide = crossing((start - 1, before), (start + piece.size - 1, sample), self._threshold)
-        if wide is not None:
-            steps = bisect(wide, self._threshold, self._meter)
+        start, threshold = piece.start, self._config.threshold
+        wide = crossing((start - 1, before), (start + piece.size - 1, sample), threshold)
+        if wide is None:
+            return
+        if self._config.sub_pixel:
+            steps = bisect(wide, threshold, self._meter)
             found = answered(steps, lambda position: int(self._buffer[position - start]))
-            self.edges.add(line, piece.vertical, found)
+        else:
+            first = start // 2 if self._config.listing and piece.size == LISTED_REST else start
+            bright = first + self._listed_search(piece.size, sample >= threshold)
+            found = Crossing(bright, bright, sample, sample)
+        self.edges.add(line, piece.vertical, found)
+
+    def _listed_search(self, size: int, rises: bool) -> int:
+        """Appendix C.4: the bright pixel's place in the buffer, between its first and its last."""
+        light, dark = (size - 1, 0) if rises else (0, size - 1)
+        steps = size.bit_length() - 1
+        self._meter.charge(call=1, i8=6 * steps, array_byte=steps, loop=steps)
+        for _ in range(steps):
+            middle = (light + dark) >> 1
+            if self._buffer[middle] >= self._config.threshold:
+                light = middle
+            else:
+                dark = middle
+        return light
 
 
 def _pieces(size: ReadOut) -> Iterator[_Piece]:

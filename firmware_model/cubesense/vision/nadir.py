@@ -6,6 +6,10 @@ hand out its centre as int of 1/100 px. Angles are the centre's coordinates at 2
 The result codes are public, what leads to them is not; assumed:
 
 - too many edges: more than the part keeps.
+
+As printed there are no checks: every edge counts, the radius is not calculated, and only a division
+by 0 or a centre that the interface does not have is a bad fit. With them:
+
 - too few edges: fewer than `NadirConfig.min_edges`, here 6, twice the unknowns.
 - bad fit: no circle, an angular radius that no altitude of interest has, a centre more than 100 deg
   away along an axis, which the interface does not have, or edges off the circle.
@@ -53,12 +57,14 @@ class NadirConfig:
         projection: that the table leads to.
         min_edges: fewer are too few.
         radius_deg: angular radii that the Earth may have: 96 to 6378 km of altitude.
+        checked: whether these and the distances from the circle are looked at.
     """
 
     table: RadiusTable
     projection: Projection = Projection.STEREOGRAPHIC
     min_edges: int = 6
     radius_deg: tuple[float, float] = (30.0, 80.0)
+    checked: bool = True
 
 
 @dataclass(frozen=True)
@@ -85,7 +91,7 @@ class NadirResult(Direction):
     Attributes:
         edges: that the fit used; without a fit, that were found.
         dropped: edges left out of it.
-        radius_deg: angular radius of the circle; 0 when there is none.
+        radius_deg: angular radius of the circle; 0 when there is none, or it was not calculated.
     """
 
     edges: int = 0
@@ -105,20 +111,24 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
     meter.charge(i8=3)
     if edges.full:
         return NadirResult(codes.DetectResult.TOO_MANY_EDGES, edges=len(edges))
-    if len(edges) < config.min_edges:
+    if config.checked and len(edges) < config.min_edges:
         return NadirResult(codes.DetectResult.TOO_FEW_EDGES, edges=len(edges))
     with meter.phase("undistort"):
         corrected = config.table.correct(edges.offsets(), meter)
         points = corrected.astype(np.float32) / arithmetic.HUNDREDTHS
         meter.charge(f32_convert=2 * len(points), f32_div=2 * len(points))
     with meter.phase("fit"):
-        circle, used = _fit(points, config, meter)
+        if config.checked:
+            circle, used = _fit(points, config, meter)
+        else:
+            circle, used = _as_printed(points, config, meter), len(points)
         dropped = len(edges) - used
         if circle is None:
             return NadirResult(codes.DetectResult.BAD_FIT, edges=used, dropped=dropped)
         centre, radius_deg = _on_the_sky(circle, config.projection, meter)
-        low, high = config.radius_deg
-        meter.charge(f32_compare=4)
+        low, high = config.radius_deg if config.checked else (0.0, 180.0)
+        if config.checked:
+            meter.charge(f32_compare=4)
         in_range = bool(np.all(np.abs(centre) <= LARGEST_PX))
         if not (in_range and low <= radius_deg <= high):
             bad = codes.DetectResult.BAD_FIT
@@ -150,9 +160,20 @@ def _fit(points: Values, config: NadirConfig, meter: Meter) -> tuple[Circle | No
         points = np.delete(points, worst, axis=0)
 
 
+def _as_printed(points: Values, config: NadirConfig, meter: Meter) -> Circle | None:
+    """Circle through all points, without a radius where only its centre is wanted."""
+    equations = LeastSquaresCircle(points, meter)
+    if config.projection is not Projection.EQUIDISTANT:
+        return equations.solve()
+    centre = equations.centre()
+    return None if centre is None else Circle(centre[0], centre[1], np.float32(0))
+
+
 def _on_the_sky(circle: Circle, projection: Projection, meter: Meter) -> tuple[Values, float]:
     """Centre (2,) in equidistant px from the boresight, and the angular radius in degrees."""
     centre = np.array([circle.x, circle.y], np.float32)
+    if circle.radius == 0:
+        return centre, 0.0
     if projection is Projection.EQUIDISTANT:
         meter.charge(f32_div=1)
         return centre, float(circle.radius / np.float32(codes.PIXELS_PER_DEGREE))

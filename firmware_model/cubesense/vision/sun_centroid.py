@@ -4,12 +4,14 @@ CubeSense thesis, sections 4.4.2, 6.6.2, 6.6.3, appendix C.6 and table 5.1: mean
 of all pixels that reach the threshold, weighted by value, plus the window's origin, less the
 boresight; then undistorted.
 
-An extension, with ``whole_chords``: a Sun that overflows the window is cut, mostly at the bottom,
-and its mean moves. A row that reaches the window's left or right border is then left out of the
-mean of x, a column that reaches the upper or lower one out of the mean of y. When nothing would
-remain, all count.
+As printed that is all; only a division by 0 is no Sun. The window is where our FPGA has it: inside
+of the picture.
 
-The Sun is not found when the FPGA saw no run of bright pixels, when fewer pixels reach the
+An extension: a Sun that overflows the window is cut, mostly at the bottom, and its mean moves. A
+row that reaches the window's left or right border is then left out of the mean of x, a column that
+reaches the upper or lower one out of the mean of y. When nothing would remain, all count.
+
+Another: the Sun is not found when the FPGA saw no run of bright pixels, when fewer pixels reach the
 threshold than `SunConfig.min_pixels`, or when their centre lies outside of the field of view, where
 the lens shows nothing and an int of 1/100 px may overflow; the criteria are assumed. Four pixels
 are one more than the FPGA's run, so that one row of stuck pixels is no Sun.
@@ -45,7 +47,7 @@ class SunConfig:
         boresight: (x, y) in px.
         masks: areas whose pixels do not count.
         min_pixels: fewer are no Sun.
-        whole_chords: leave cut rows and columns out.
+        printed: without the extensions.
     """
 
     table: RadiusTable
@@ -53,7 +55,7 @@ class SunConfig:
     boresight: tuple[float, float] = (369.0, 250.0)
     masks: Sequence[Mask] = ()
     min_pixels: int = fpga.SUN_RUN + 1
-    whole_chords: bool = True
+    printed: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,27 +89,29 @@ def find_sun(
     window = data[COORDINATE_BYTES:].reshape(read_out.window, read_out.window)
     with meter.phase("centroid"):
         meter.charge(i16_add=8)
-        if first == fpga.SUN_NOT_FOUND:
+        if first == fpga.SUN_NOT_FOUND and not config.printed:
             return SunResult(codes.DetectResult.SUN_NOT_FOUND)
         meter.charge(i8=window.size, loop16=read_out.window)
         rows, columns = np.nonzero(window >= config.threshold)
         kept = ~masked(columns + origin[0], rows + origin[1], config.masks, meter)
         rows, columns = rows[kept], columns[kept]
         pixels = len(rows)
-        meter.charge(i8=1)
-        if pixels < config.min_pixels:
+        if not config.printed:
+            meter.charge(i8=1)
+        if pixels < (1 if config.printed else config.min_pixels):
             return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
         # What the listing does for each Sun pixel, every factor converted anew.
         meter.charge(f32_convert=4 * pixels, f32_mul=2 * pixels, f32_add=2 * pixels, i16_add=pixels)
         values = window[rows, columns]
         side, axes = read_out.window, ((columns, rows), (rows, columns))
         mean = np.array([_mean(*axis, values, side, config, meter) for axis in axes])
-        offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
+        if config.printed:
+            whole = np.subtract(first, config.boresight).astype(np.float32)
+            offset = whole + mean - np.subtract(first, origin).astype(np.float32)
+        else:
+            offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
         meter.charge(f32_add=4, f32_div=2, f32_convert=4)
-        # In whole pixels, because the processor multiplies bytes by itself.
-        meter.charge(f32_convert=2, i16_add=6)
-        across, down = (int(value) for value in offset)
-        if across * across + down * down > RIM_PX * RIM_PX:
+        if not config.printed and _out_of_field(offset, meter):
             return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
     with meter.phase("undistort"):
         centre = config.table.correct(offset[None], meter)[0]
@@ -119,6 +123,13 @@ def find_sun(
     return SunResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, pixels)
 
 
+def _out_of_field(offset: NDArray[np.float32], meter: Meter) -> bool:
+    """In whole pixels, because the processor multiplies bytes by itself."""
+    meter.charge(f32_convert=2, i16_add=6)
+    across, down = (int(value) for value in offset)
+    return across * across + down * down > RIM_PX * RIM_PX
+
+
 def _mean(
     along: NDArray[np.int64],
     chord: NDArray[np.int64],
@@ -128,7 +139,7 @@ def _mean(
     meter: Meter,
 ) -> np.float32:
     """Weighted mean of the coordinate ``along``, chords (rows of x, columns of y) cut left out."""
-    if config.whole_chords:
+    if not config.printed:
         # Each chord's sums are kept, and added up at its end unless it was cut.
         meter.charge(i8=2 * len(values), f32_add=side, i16_add=side)
         cut = np.unique(chord[(along == 0) | (along == side - 1)])

@@ -3,25 +3,51 @@
 
 example:
   cubestack memory cubesense --json
+  cubestack memory cubesense --profile published
 """
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Facts, Lookup
-from cubestack.host.options import Options
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import Kind, Options, option
+
+if TYPE_CHECKING:
+    from cubestack.firmware_model.mcu.memory_budget import Buffer
 
 
-class _Memory(Lookup[Options]):
-    options = Options
+@dataclass(frozen=True, kw_only=True)
+class MemoryOptions(Options):
+    """Options of `cubestack memory cubesense`."""
+
+    profile: str = option(DEFAULT_PROFILE, f"default: {DEFAULT_PROFILE}", choices=PROFILES)
+    set: str = option("", "switches that differ", Kind("text", str), metavar="SWITCH=VALUE,...")
+
+    def check(self) -> None:
+        """The switches must exist."""
+        CubeSenseSwitches.of(self.profile, self.set)
+
+    def budget(self) -> "tuple[Buffer, ...]":
+        """Buffers of the program that these describe."""
+        from cubestack.firmware_model.cubesense.memory import budget
+
+        return budget(CubeSenseSwitches.of(self.profile, self.set))
+
+
+class _Memory(Lookup[MemoryOptions]):
+    options = MemoryOptions
     description = __doc__
 
-    def look_up(self, options: Options, shown: Shown) -> dict[str, Any]:
+    def look_up(self, options: MemoryOptions, shown: Shown) -> dict[str, Any]:
         """Size in bytes, sum and buffers of each memory by its name."""
-        from cubestack.firmware_model.cubesense.memory import CAPACITY, budget, used
+        from cubestack.firmware_model.cubesense.memory import CAPACITY, used
 
-        buffers = budget()
+        buffers = options.budget()
         return {
             memory.value: {
                 "bytes": CAPACITY[memory],
@@ -31,10 +57,10 @@ class _Memory(Lookup[Options]):
             for memory, total in used(buffers).items()
         }
 
-    def summarise(self, results: Sequence[Facts], wall_s: float) -> Iterable[str]:
+    def run(self, opened: Opener[Any, Any], options: MemoryOptions) -> Iterator[Facts]:
         from cubestack.firmware_model.cubesense.memory import report
 
-        return [report()]
+        yield Facts(self.look_up(options, opened.shown), (report(options.budget()),))
 
     def succeeded(self, results: Sequence[Facts]) -> bool:
         """No memory is too small."""

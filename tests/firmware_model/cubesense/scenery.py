@@ -133,6 +133,13 @@ def chequered() -> NDArray[np.uint8]:
     return np.where((rows // 64 + columns // 64) % 2, 200, 0).astype(np.uint8)
 
 
+def rough(rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Squares of 40 pixels, dark and bright, with so much noise that their values overlap."""
+    picture = rng.integers(0, 90, (ROWS, COLUMNS)).astype(np.uint8)
+    picture[rng.integers(0, 2, (ROWS // 40, COLUMNS // 40)).repeat(40, 0).repeat(40, 1) > 0] += 60
+    return picture
+
+
 def _digital(light: NDArray[np.float64], rng: np.random.Generator | None) -> NDArray[np.uint8]:
     if rng is not None:
         light = light + rng.normal(0, 1, light.shape)

@@ -1,8 +1,11 @@
 import numpy as np
+import pytest
 
 from cubestack.firmware_model.cubesense.memory import CAPACITY, Memory, budget, report, used
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig, NadirLines
+from cubestack.firmware_model.interface.codec.switches import PROFILES, Profile
 from cubestack.firmware_model.interface.cubesense.codes import Sram
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 
 from .harness import Harness
 from .scenery import chequered
@@ -12,8 +15,9 @@ def sizes() -> dict[str, int]:
     return {buffer.name: buffer.size for buffer in budget()}
 
 
-def test_everything_fits_and_flash_has_room_for_a_program() -> None:
-    total = used(budget())
+@pytest.mark.parametrize("profile", PROFILES)
+def test_everything_fits_and_flash_has_room_for_a_program(profile: Profile) -> None:
+    total = used(budget(CubeSenseSwitches.of(profile)))
     assert total[Memory.RAM] <= CAPACITY[Memory.RAM] == 1536
     assert total[Memory.FLASH] < CAPACITY[Memory.FLASH] / 8
 
@@ -27,10 +31,20 @@ def test_sizes_follow_from_what_is_kept() -> None:
     assert len(size) == len(budget())
 
 
-def test_what_shares_a_place_fits_into_it() -> None:
-    size = sizes()
-    for name in {buffer.inside for buffer in budget()} - {""}:
-        assert sum(buffer.size for buffer in budget() if buffer.inside == name) <= size[name]
+def test_the_published_program_takes_less_and_its_table_needs_flash() -> None:
+    ours, printed = (used(budget(CubeSenseSwitches.of(profile))) for profile in PROFILES[::-1])
+    assert ours[Memory.FLASH] - printed[Memory.FLASH] == 4 * 2 * 227 - 3 * 227
+    # The 3 x 3 matrix, two rows of its inverse and its right side, in place of the sums of chords.
+    assert ours[Memory.RAM] - printed[Memory.RAM] == 16 * (4 + 2) - 18 * 4
+    assert 0 < CAPACITY[Memory.RAM] - printed[Memory.RAM] < 227
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_what_shares_a_place_fits_into_it(profile: Profile) -> None:
+    buffers = budget(CubeSenseSwitches.of(profile))
+    size = {buffer.name: buffer.size for buffer in buffers}
+    for name in {buffer.inside for buffer in buffers} - {""}:
+        assert sum(buffer.size for buffer in buffers if buffer.inside == name) <= size[name]
 
 
 def test_the_programs_buffers_are_as_large_as_the_budget_says(unit: Harness) -> None:
@@ -50,6 +64,6 @@ def test_the_programs_buffers_are_as_large_as_the_budget_says(unit: Harness) -> 
 
 
 def test_the_report_lists_every_buffer_and_the_sums() -> None:
-    text = report()
+    text = report(budget())
     assert all(buffer.name in text for buffer in budget())
     assert f"**{used(budget())[Memory.RAM]}**" in text

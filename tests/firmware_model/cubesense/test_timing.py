@@ -41,12 +41,12 @@ def nadir_seconds(table: CostTable, config: NadirConfig, edges: EdgeConfig) -> f
 
 @pytest.fixture
 def published_sun(meter: Meter) -> SunConfig:
-    return SunConfig(byte_table(meter), whole_chords=False)
+    return SunConfig(byte_table(meter), printed=True)
 
 
 @pytest.fixture
 def published_nadir(meter: Meter) -> NadirConfig:
-    return NadirConfig(byte_table(meter), Projection.EQUIDISTANT)
+    return NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
 
 
 def test_the_factor_is_the_fit_to_the_published_sun_program(published_sun: SunConfig) -> None:
@@ -85,16 +85,16 @@ def fitted(pixels: int, config: SunConfig) -> CostTable:
 def test_the_nadir_time(published_sun: SunConfig, published_nadir: NadirConfig) -> None:
     whole_pixels = EdgeConfig(sub_pixel=False)
     predicted = IMAGING_S + nadir_seconds(pic18.PIC18F45K20, published_nadir, whole_pixels)
-    # A quarter below the published 245 ms: the Sun pixels of the fit are a guess.
-    assert predicted == pytest.approx(0.180, abs=0.005)
-    # The published time is that of a fit to half of them.
-    slower = fitted(51, published_sun)
+    # 30 % below the published 245 ms: the Sun pixels of the fit are a guess.
+    assert predicted == pytest.approx(0.172, abs=0.003)
+    # The published time is that of a fit to four in ten of them.
+    slower = fitted(43, published_sun)
     assert IMAGING_S + nadir_seconds(slower, published_nadir, whole_pixels) == pytest.approx(
         0.245, rel=0.03
     )
 
 
-def test_ours_takes_little_longer(
+def test_ours_takes_longer(
     published_sun: SunConfig,
     published_nadir: NadirConfig,
     equidistant: RadiusTable,
@@ -103,7 +103,7 @@ def test_ours_takes_little_longer(
     extra = nadir_seconds(
         pic18.PIC18F45K20, NadirConfig(stereographic), EdgeConfig()
     ) - nadir_seconds(pic18.PIC18F45K20, published_nadir, EdgeConfig(sub_pixel=False))
-    assert 0 < extra < 0.012
+    assert 0 < extra < 0.020
     extra = sun_seconds(pic18.PIC18F45K20, 109, SunConfig(equidistant)) - sun_seconds(
         pic18.PIC18F45K20, 109, published_sun
     )

@@ -72,6 +72,19 @@ def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
     assert all(frame["phase_ms"]["store"] == pytest.approx(30.5, abs=0.1) for frame in nadir)
 
 
+@pytest.mark.parametrize("which", [NADIR, SUN], ids=lambda which: which[1])
+def test_the_published_profile_is_quicker_and_worse(
+    measure: Measure, nadir: Frames, sun: Frames, which: tuple[str, str]
+) -> None:
+    printed = measure(*which, "--frames", 20, "--seed", 3, "--profile", "published")
+    ours = (nadir if which == NADIR else sun)[:20]
+    assert all(frame["detected"] for frame in printed)
+    errors, better = ([one["error_deg"] for one in found] for found in (printed, ours))
+    assert 2 * np.mean(better) < np.mean(errors) < max(errors) < 0.5
+    for one, other in zip(printed, ours, strict=True):
+        assert one["phase_ms"]["centroid"] < other["phase_ms"]["centroid"]
+
+
 def test_the_same_seed_gives_the_same_results(measure: Measure) -> None:
     first, second = (measure("--frames", 1, "--seed", 8) for _ in range(2))
     for frame in (*first, *second):

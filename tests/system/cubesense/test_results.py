@@ -63,3 +63,11 @@ def test_result_of_a_scene(ready: Open, name: str) -> None:
     camera = Camera.SUN if expected in ("SUN_NOT_FOUND", "SUCCESS") else Camera.NADIR
     with ready(scene) as opened:
         assert opened.client.capture_and_detect(camera).detect.name == expected
+
+
+def test_a_terminator_makes_a_wrong_direction_as_printed(ready: Open) -> None:
+    with ready(RESULTS["terminator"][0], profile="published") as opened:
+        found = opened.client.capture_and_detect(Camera.NADIR)
+        truth = opened.board.truth(Camera.NADIR)
+        assert found.detected
+        assert abs(found.alpha_deg - truth.alpha_deg) > 5

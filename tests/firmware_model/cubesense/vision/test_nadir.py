@@ -26,7 +26,7 @@ def ours(stereographic: RadiusTable) -> NadirConfig:
 
 @pytest.fixture
 def published(meter: Meter) -> NadirConfig:
-    return NadirConfig(byte_table(meter), Projection.EQUIDISTANT)
+    return NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
 
 
 def errors(
@@ -49,14 +49,6 @@ def test_the_goal_for_a_full_earth(ours: NadirConfig) -> None:
     mean, sigma = np.abs(error).mean(axis=0), error.std(axis=0)
     assert mean.max() < 0.03  # the goal is 0.12
     assert sigma.max() < 0.03  # the goal is 0.18
-
-
-def test_the_published_way_meets_its_published_figures(published: NadirConfig) -> None:
-    error = errors(published, EdgeConfig(sub_pixel=False), 0, 30, 40)
-    assert np.abs(error).mean() < 0.16
-    assert error.std(axis=0).max() < 0.18
-    # and the stereographic fit is far from it
-    assert np.abs(error).mean() > 0.03
 
 
 def test_a_partial_earth(ours: NadirConfig) -> None:

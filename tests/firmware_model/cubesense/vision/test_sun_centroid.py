@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.vision.distortion import (
-    Projection,
-    RadiusTable,
-    byte_table,
-    fine_table,
-)
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun, window_bytes
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
@@ -42,14 +37,8 @@ def test_the_goal(ours: SunConfig, bloom_px: float, flat: bool) -> None:
     assert p95(ours, bloom_px, 45, 90, flat) < 0.13  # the goal is 2
 
 
-def test_the_published_way_misses_it(meter: Meter) -> None:
-    published = SunConfig(byte_table(meter), whole_chords=False)
-    assert p95(published, 7, 0, 45, False) > 0.2
-    assert p95(published, 7, 45, 90, False) < 2
-
-
 def test_whole_chords_hold_an_overflowing_sun(ours: SunConfig, equidistant: RadiusTable) -> None:
-    all_pixels = SunConfig(equidistant, whole_chords=False)
+    all_pixels = SunConfig(equidistant, printed=True)
     assert p95(ours, 7, 0, 90, True) < 0.13 < 0.2 < p95(all_pixels, 7, 0, 90, True)
     # At 8 px some Suns leave no whole column.
     assert p95(ours, 8, 0, 90, True) < 0.8 * p95(all_pixels, 8, 0, 90, True)
@@ -72,7 +61,7 @@ def test_the_mean_is_weighted_from_the_boresight(equidistant: RadiusTable, meter
 def test_an_uncut_sun_has_the_published_mean(equidistant: RadiusTable, meter: Meter) -> None:
     data = window(sun(np.array([200.3, 300.6]), 5))
     both = [
-        find_sun(data, SunConfig(equidistant, whole_chords=whole), meter) for whole in (True, False)
+        find_sun(data, SunConfig(equidistant, printed=printed), meter) for printed in (False, True)
     ]
     assert both[0] == both[1]
 

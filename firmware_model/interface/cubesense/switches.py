@@ -1,0 +1,50 @@
+"""Where CubeSense's firmware can do what its thesis prints, or better."""
+
+from dataclasses import dataclass
+
+from cubestack.firmware_model.interface.codec.switches import Switches, switch
+
+
+@dataclass(frozen=True)
+class CubeSenseSwitches(Switches):
+    """Switches of the vision; all sections are those of the CubeSense thesis."""
+
+    distortion: str = switch(
+        "table that undoes the lens, and the projection that the Earth's edges are fitted in",
+        "byte-table",
+        "stereographic",
+        "equidistant",
+        source="sections 6.2 and 6.3, appendix C.2",
+        reason="bytes hold whole pixels of 0.34 deg, 16-bit entries 1/100 px; the limb is a circle "
+        "in stereographic pixels only (the Sun's are equidistant in any case)",
+    )
+    edges: str = switch(
+        "where an edge of the Earth lies",
+        "whole-pixel",
+        "sub-pixel",
+        "listing",
+        source="section 6.5.2, appendix C.4; appendix C.3 to the letter is listing",
+        reason="a straight line through the two pixels of an edge tells where it meets the "
+        "threshold; the listing places edges of the last 32 rows 224 rows too high, and has the "
+        "rim of the field around (367, 237)",
+    )
+    limb: str = switch(
+        "what becomes of edges that are on no common circle",
+        "unchecked",
+        "checked",
+        source="section 6.5.3.1, appendix C.5",
+        reason="false edges and the terminator pull the circle away; checks drop a few edges, and "
+        "refuse too few of them, a bad fit, or a radius that no altitude has",
+    )
+    sun: str = switch(
+        "which pixels of the Sun's window count",
+        "all-pixels",
+        "whole-chords",
+        source="sections 4.4.2 and 6.6.3, appendix C.6",
+        reason="a Sun that overflows the window is cut, and its mean moves; stuck pixels and light "
+        "outside of the field are no Sun",
+    )
+
+
+#: Those of the default profile.
+DEFAULT_SWITCHES = CubeSenseSwitches()

@@ -1,0 +1,191 @@
+"""The listings of appendices C.2 to C.6, written out line by line, beside the model of each."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.cubesense.vision import nadir, sun_centroid
+from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
+from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig
+from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.mcu.costs import Meter
+
+from ..scenery import chequered, earth, edges_in, rough, scan, sun, window
+
+F = np.float32
+THRESHOLD = 70
+
+
+def binary_search(search: list[int], light: int, dark: int, runtime: int) -> int:
+    for _ in range(runtime):
+        temp = (light + dark) >> 1
+        if search[temp] >= THRESHOLD:
+            light = temp
+        else:
+            dark = temp
+    return light
+
+
+def edge_detect(clocks: Iterator[int], rim: tuple[int, int], last: int) -> list[list[int]]:
+    """Edges of the bytes of a scan; ``last`` row is the one before the last 32 of a column.
+
+    Positions are 1 less than in the listing, whose FPGA starts elsewhere.
+    """
+    found: list[list[int]] = []
+
+    def examine(size: int, prev: int, place: Callable[[int], list[int]]) -> int:
+        search = [next(clocks) for _ in range(size)]
+        now, runtime = search[size - 1], {64: 6, 32: 5}[size]
+        if (now >= THRESHOLD) == (prev >= THRESHOLD):
+            return now
+        bounds = (size - 1, 0) if now >= THRESHOLD else (0, size - 1)
+        edge = place(binary_search(search, *bounds, runtime))
+        if (edge[0] - rim[0]) ** 2 + (edge[1] - rim[1]) ** 2 < 226**2:
+            found.append(edge)
+        return now
+
+    next(clocks)
+    for y in range(1, 9):
+        prev = 0
+        for x in range(1, 11):
+            prev = examine(64, prev, lambda at: [(x << 6) - 64 + at, (y << 6) + 15 - 64])  # noqa: B023
+    next(clocks)
+    for x in range(1, 11):
+        prev = 0
+        for y in range(1, 8):
+            prev = examine(64, prev, lambda at: [(x << 6) - 1, (y << 6) - 64 + at])  # noqa: B023
+        examine(32, prev, lambda at: [(x << 6) - 1, last + at])  # noqa: B023
+    assert next(clocks, None) is None
+    return found
+
+
+def interpolation(xd: np.float32, yd: np.float32, lookup: list[int]) -> list[int]:
+    rd = np.sqrt(xd * xd + yd * yd)
+    rd0 = int(rd)
+    ru = F(rd0) + F(lookup[rd0]) + (F(lookup[rd0 + 1]) - F(lookup[rd0])) * (rd - F(rd0))
+    return [int(ru * xd / rd * F(100)), int(ru * yd / rd * F(100))]
+
+
+def calc_nadir(edges: list[list[int]], lookup: list[int]) -> list[int]:
+    matrix, right, two = np.zeros((3, 3), F), np.zeros(3, F), F(2)
+    for edge_x, edge_y in edges:
+        ru = interpolation(F(edge_x - 371), F(edge_y - 236), lookup)
+        x, y = F(ru[0]) / F(100), F(ru[1]) / F(100)
+        term = x * x + y * y
+        rows = [[two * x * x, two * x * y, x], [two * y * x, two * y * y, y], [two * x, two * y, 1]]
+        matrix += np.array(rows, F)
+        right -= np.array([term * x, term * y, term])
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    inverse = [
+        [e * i - f * h, -(b * i - c * h), b * f - c * e],
+        [-(d * i - f * g), a * i - c * g, -(a * f - c * d)],
+    ]
+    return [
+        int(-(j * right[0] + k * right[1] + m * right[2]) / det * F(100)) for j, k, m in inverse
+    ]
+
+
+def calc_sun(data: list[int], lookup: list[int]) -> list[int]:
+    xd = yd = F(0)
+    total = 0
+    for at, pixel in enumerate(data[4:]):
+        if pixel >= 225:
+            xd, yd = xd + F(at % 15) * F(pixel), yd + F(at // 15) * F(pixel)
+            total += pixel
+    x = F(data[0] + 256 * data[1] - 369) + xd / F(total) - F(5)
+    y = F(data[2] + 256 * data[3] - 250) + yd / F(total) - F(3)
+    return interpolation(x, y, lookup)
+
+
+@pytest.fixture
+def lookup(meter: Meter) -> list[int]:
+    return list(map(int, byte_table(meter).differences))
+
+
+@pytest.fixture
+def printed(meter: Meter) -> nadir.NadirConfig:
+    return nadir.NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
+
+
+@pytest.mark.parametrize(
+    ("listing", "rim", "last"), [(False, (371, 236), 448), (True, (367, 237), 224)]
+)
+@pytest.mark.parametrize("seed", range(2))
+def test_edges(meter: Meter, seed: int, listing: bool, rim: tuple[int, int], last: int) -> None:
+    rng = np.random.default_rng(seed)
+    tilted = earth(*rng.uniform(-25, 25, 2), rng=rng)
+    for picture in (rough(rng), tilted, earth(0, 29), chequered()):
+        config = EdgeConfig(sub_pixel=False, listing=listing)
+        edges = edges_in(picture, meter, config)
+        expected = edge_detect(map(int, scan(picture)), rim, last)
+        assert len(expected) >= 8
+        assert (edges.points // 32).tolist() == expected[:MAX_EDGES]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_nadir(meter: Meter, printed: nadir.NadirConfig, lookup: list[int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    alpha, beta = rng.uniform(-35, 35, 2)
+    edges = edges_in(earth(alpha, beta, rng=rng), meter, EdgeConfig(sub_pixel=False))
+    found = nadir.find_nadir(edges, printed, meter)
+    assert [found.x, found.y] == calc_nadir((edges.points // 32).tolist(), lookup)
+    assert (found.detect, found.dropped, found.radius_deg) == (DetectResult.SUCCESS, 0, 0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_sun(meter: Meter, lookup: list[int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centre, bloom = rng.uniform((229, 110), (509, 390)), float(rng.uniform(3, 9))
+    data = window(sun(centre, bloom, rng, flat=bool(seed % 2)))
+    config = sun_centroid.SunConfig(byte_table(meter), printed=True)
+    found = sun_centroid.find_sun(data, config, meter)
+    assert [found.x, found.y] == calc_sun([int(byte) for byte in data], lookup)
+
+
+def test_costs_are_those_of_the_listing_s_operations(
+    meter: Meter, printed: nadir.NadirConfig
+) -> None:
+    edges = edges_in(earth(3, -8), meter, EdgeConfig(sub_pixel=False))
+    n, before = len(edges), Counter(meter.counts)
+    nadir.find_nadir(edges, printed, meter)
+    spent = Counter(meter.counts) - before
+    assert {name: count for name, count in spent.items() if name.startswith("f32")} == {
+        "f32_sqrt": n,
+        "f32_compare": n,  # ours: the radius may be 0
+        "f32_mul": n * (7 + 14) + 27 + 2,
+        "f32_add": n * (5 + 13) + 15,
+        "f32_div": n * (2 + 2) + 2 + 2,  # the last two are the angles'
+        "f32_convert": n * (2 + 8 + 2) + 2 + 4,
+    }
+
+
+@pytest.mark.parametrize("first", [(100, 1, 200, 0), (139, 0, 247, 0)], ids=["stuck", "outside"])
+@pytest.mark.parametrize(("printed", "detect"), [(False, "SUN_NOT_FOUND"), (True, "SUCCESS")])
+def test_any_pixel_is_a_sun(
+    meter: Meter, printed: bool, detect: str, first: tuple[int, ...]
+) -> None:
+    config = sun_centroid.SunConfig(byte_table(meter), printed=printed)
+    data = np.zeros(sun_centroid.window_bytes(), np.uint8)
+    data[:4], data[100] = first, 230
+    assert sun_centroid.find_sun(data, config, meter).detect.name == detect
+    data[100] = 224
+    assert sun_centroid.find_sun(data, config, meter).detect is DetectResult.SUN_NOT_FOUND
+
+
+@pytest.mark.parametrize(("checked", "detect"), [(True, "BAD_FIT"), (False, "SUCCESS")])
+def test_any_circle_is_an_earth(
+    meter: Meter, printed: nadir.NadirConfig, stereographic: RadiusTable, checked: bool, detect: str
+) -> None:
+    picture = earth(10, 5)
+    picture[:, :371] = 34  # lit from the right: the terminator is a straight line
+    for config in (nadir.NadirConfig(stereographic, checked=checked), printed):
+        found = nadir.find_nadir(edges_in(picture, meter), config, meter)
+        assert found.detect.name == ("SUCCESS" if config is printed else detect)
+        few = nadir.find_nadir(edges_in(earth(4, -10, 30_000), meter), config, meter)
+        assert (few.detect is DetectResult.SUCCESS) is not config.checked
+        assert few.edges == 4
+        nothing = nadir.find_nadir(edges_in(picture * 0, meter), config, meter)
+        assert nothing.detect is not DetectResult.SUCCESS
