@@ -46,18 +46,18 @@ class Opener(Generic[BoardT_co, ClientT_co]):
     shown: Shown = _silent
 
     def __call__(
-        self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **board: Any
+        self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **options: Any
     ) -> EmulatedDevice[BoardT_co, ClientT_co]:
         """The device, looking at ``scene``, with a plan of faults, or that in a file, injected.
 
-        ``board`` are keywords of its board that the experiment decides. Raises ValueError for a
+        ``options`` are keywords of its board that the experiment decides. Raises ValueError for a
         scene or a plan that makes no sense.
         """
         from cubestack.emulator.faults.plan import load_plan
 
         plan = load_plan(faults) if isinstance(faults, Path) else faults
         emulated = power_up(
-            self.device, scene, seed=seed, engine=self.engine, **{**self.board, **board}
+            self.device, scene, seed=seed, engine=self.engine, **{**self.board, **options}
         )
         if plan is not None:
             try:
