@@ -23,7 +23,7 @@ class CubeSenseSwitches(Switches):
         "whole-pixel",
         "sub-pixel",
         "listing",
-        source="section 6.5.2, appendix C.4; appendix C.3 to the letter is listing",
+        source="section 6.5.2, appendix C.4; listing has the two slips of appendix C.3",
         reason="a straight line through the two pixels of an edge tells where it meets the "
         "threshold; the listing places edges of the last 32 rows 224 rows too high, and has the "
         "rim of the field around (367, 237)",
