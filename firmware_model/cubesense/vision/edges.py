@@ -12,9 +12,9 @@ centre of the bright pixel, up to a pixel inside, which also lets parts of the l
 An extension, with ``sub_pixel``: the previous sample is a bound, and the edge lies between the two
 pixels that the search ends with, where a straight line through their values meets the threshold.
 
-Appendix C.3 has two slips that its text has not, with ``listing``: edges of the last
-32 rows come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to
-positions belongs to start addresses of the published gateware, which ours does not have.
+Appendix C.3 has two slips that the text has not, here with ``listing``: edges of the last 32 rows
+come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions
+belongs to start addresses of the published gateware, which ours does not have.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
