@@ -20,6 +20,7 @@ from cubestack.firmware_model.cubesense.memory import Memory, budget, used
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.host.cli.main import COMMANDS, make_parser
 from cubestack.host.cli.reports import reports
+from tests.conftest import Run
 from tests.system.conftest import ROOT
 
 EARTH = 'kind = "earth-sun"'
@@ -153,6 +154,12 @@ def test_experiments_of_the_pages_are_those_there_are() -> None:
 def test_reasons_of_aramis_page_are_those_of_the_interface() -> None:
     named = re.findall(r"`([A-Z_]{5,})`", text_of("docs/fidelity-aramis.md"))
     assert {*named} <= Reason.__members__.keys()
+
+
+def test_cubesense_s_memory_is_that_of_its_profiles_page(run: Run) -> None:
+    table = run("memory", "cubesense", "--profile", "published").out
+    ram, flash = re.findall(r"\*\*all, of \d+\*\* \| \*\*(\d+)", table)
+    assert f"{ram} of 1536 bytes of RAM in use, and {flash} bytes" in text_of("docs/profiles.md")
 
 
 def test_figures_of_cubesense_s_page() -> None:
