@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(args.run(args) or DONE)
     except (KeyboardInterrupt, BrokenPipeError):
         return FAILED
-    except ValueError as error:  # every bad input of ours is a ValueError with a full sentence
+    except ValueError as error:  # all bad input is a ValueError with a full sentence
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return WRONG_CALL
     except OSError as error:

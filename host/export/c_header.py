@@ -113,7 +113,7 @@ def _enumeration(prefix: str, choices: type[IntEnum]) -> Iterator[str]:
 def _message(upper: str, message: Message) -> Iterator[str]:
     kind = "TC" if message.kind is Kind.TELECOMMAND else "TLM"
     name = f"{upper}_{kind}_{message.name}"
-    yield f"/* {message.meaning}{' (ours)' if message.extension else ''} */"
+    yield f"/* {message.meaning}{' (extension)' if message.extension else ''} */"
     yield f"#define {name} {message.id}"
     yield f"#define {name}_LENGTH {message.length}"
     for field in message.fields:

@@ -77,7 +77,7 @@ def _json(interface: Interface) -> str:
                 "id": message.id,
                 "kind": message.kind.value,
                 **picked(message, "name", "length", "meaning"),
-                "ours": message.extension,
+                "extension": message.extension,
                 **picked(message, "steps", "supported", "ordered"),
                 "confidence": message.confidence and message.confidence.name,
                 "fields": [field_json(field) for field in message.fields],

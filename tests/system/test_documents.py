@@ -169,7 +169,7 @@ def test_figures_of_cubesense_s_page() -> None:
     states = [[cell.strip() for cell in row.split("|")[1:8]] for row in rows if row.endswith("% |")]
     counts = {"off": 0, "one": 1, "both": 2, "": 0, "one side": 1, "both sides": 2}
     assert len(states) == 8
-    for processor, *parts, published, ours, _ in states:
+    for processor, *parts, published, measured, _ in states:
         memories, cameras, sides = (counts[part] for part in parts)
         power = PowerModel(Kernel(), CUBESENSE_POWER)
         power.set_state("processor", "on" if processor == "on" else "reset")
@@ -180,5 +180,5 @@ def test_figures_of_cubesense_s_page() -> None:
                 power.set_state(f"sram{number}", "active")
                 power.set_state(f"{side}_fpga", "imaging")
         milliwatts = power.current_ma() * CUBESENSE_POWER.volts
-        assert milliwatts == pytest.approx(float(ours), abs=0.06)
+        assert milliwatts == pytest.approx(float(measured), abs=0.06)
         assert milliwatts == pytest.approx(float(published), rel=0.06)

@@ -14,7 +14,7 @@ pixels that the search ends with, where a straight line through their values mee
 
 Appendix C.3 has two slips that the text has not, here with ``listing``: edges of the last 32 rows
 come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions
-belongs to start addresses of the published gateware, which ours does not have.
+belongs to start addresses of the published gateware, which this one does not have.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence

@@ -1,6 +1,6 @@
 """Numbers with names in AraMiS' star tracker interface: states, outcomes, reasons, actions.
 
-All numbers are ours. Outcomes are those of the AraMiS thesis, section 5.7; the failure reasons
+All numbers are assumed. Outcomes are those of the AraMiS thesis, section 5.7; the failure reasons
 are what its use case for the attitude asks for (section 2.2).
 """
 

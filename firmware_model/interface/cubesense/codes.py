@@ -1,7 +1,7 @@
 """Numbers with names in CubeSense's interface, the picture's geometry, and values of two bytes.
 
 CubeSpace family of nodes with two cameras, interface generation 2; geometry and scales from the
-CubeSense thesis, sections 2.3 to 5.2 and 6.1. What the public material leaves open is ours and is
+CubeSense thesis, sections 2.3 to 5.2 and 6.1. What the public material leaves open is assumed, and
 marked so.
 """
 
@@ -20,13 +20,13 @@ IMAGE_BYTES = COLUMNS * ROWS
 #: Bytes of one frame of a download.
 FRAME_BYTES = 128
 
-#: Frame number of telemetry ImageFrameInfo while no frame is ready; ours.
+#: Frame number of telemetry ImageFrameInfo while no frame is ready; assumed.
 EMPTY_FRAME = 0xFFFF
 
 #: Areas of a camera's mask.
 MASK_AREAS = 5
 
-#: Coordinates of an edge are in 1/32 px, and so many edges fill a telemetry frame; both ours.
+#: Coordinates of an edge are in 1/32 px, and so many edges fill a telemetry frame; both assumed.
 EDGE_UNIT = 32
 EDGES_PER_FRAME = 20
 
@@ -104,7 +104,7 @@ class DetectResult(IntEnum):
 
 
 class Measurement(IntEnum):
-    """Camera and memory in one number, for the register protocol; ours."""
+    """Camera and memory in one number, for the register protocol; an extension."""
 
     SUN_SRAM1 = 0
     SUN_SRAM2 = 1
@@ -123,7 +123,7 @@ class Measurement(IntEnum):
 
 
 class NadirSearch(IntEnum):
-    """How the nadir camera's edges are looked for (CubeSense thesis, 6.5.1 and 9.2.2); ours.
+    """How the nadir camera's edges are looked for (CubeSense thesis, 6.5.1, 9.2.2); an extension.
 
     Along scanned lines, or around samples with addresses that the processor chooses: between two
     unlike samples by halves, or one pixel after the other.
@@ -138,7 +138,7 @@ class ImageSize(IntEnum):
     """Side of a downloaded square; the square of 1024 holds the picture in its middle.
 
     Where the picture lies, and that a smaller square takes every n-th pixel of every n-th row from
-    the first on, is ours.
+    the first on, is assumed.
     """
 
     SIDE_1024 = 0
@@ -174,12 +174,12 @@ class ImageSize(IntEnum):
 
 
 def checksum(frame: bytes) -> int:
-    """Checksum of a downloaded frame: the exclusive or of its bytes; the algorithm is ours."""
+    """Checksum of a downloaded frame: the exclusive or of its bytes; the algorithm is assumed."""
     return reduce(xor, frame, 0)
 
 
 def coefficient(mantissa: int, exponent: int) -> float:
-    """Value of a distortion coefficient: mantissa (i16) / 10^exponent (0 to 255); ours."""
+    """Value of a distortion coefficient: mantissa (i16) / 10^exponent (0 to 255); assumed."""
     return float(mantissa) / 10.0**exponent
 
 

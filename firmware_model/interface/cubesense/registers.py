@@ -90,5 +90,5 @@ _COMMON = (
 REGISTERS = PointerMap(
     i2c_address=0x1C,
     registers=(*_camera(Camera.SUN), *_camera(Camera.NADIR), *_COMMON),
-    note="The protocol is published; which registers there are, and their addresses, are ours.",
+    note="The protocol is published; which registers there are, and their addresses, are assumed.",
 )

@@ -94,9 +94,9 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
 def _coefficients() -> Iterator[Field]:
     for power, value in enumerate(DISTORTION):
         mantissa, exponent = codes.split_coefficient(value)
-        meaning = f"of the factor of r_u^{power}; signed is ours"
+        meaning = f"of the factor of r_u^{power}; signed is assumed"
         yield i16(f"Mantissa{power}", meaning, reset=mantissa)
-        yield u8(f"Exponent{power}", "negative power of ten; ours", reset=exponent)
+        yield u8(f"Exponent{power}", "negative power of ten; assumed", reset=exponent)
 
 
 _COMMON = (

@@ -119,8 +119,8 @@ _STATE = (
         Field(f"bytes{codes.FRAME_BYTES}", "Frame", "pixels, row after row")
     ),
     _high(193, "ImageFrameInfo", "which frame is ready").of(
-        u16("FrameNumber", "65535 (ours): none is ready yet", reset=codes.EMPTY_FRAME),
-        u8("Checksum", "exclusive or of the frame's bytes (ours)"),
+        u16("FrameNumber", "65535 (assumed): none is ready yet", reset=codes.EMPTY_FRAME),
+        u8("Checksum", "exclusive or of the frame's bytes (assumed)"),
     ),
     *(_mask(camera) for camera in codes.Camera),
 )

@@ -1,7 +1,7 @@
 """Numbers with names in CubeStar's interface: task states, reset causes, modes, error codes.
 
-CubeSpace family of nodes, interface version 3. What the published tables leave open is ours and
-is marked so.
+CubeSpace family of nodes, interface version 3. What the published tables leave open is assumed, and
+marked so.
 """
 
 from enum import IntEnum
@@ -70,7 +70,7 @@ class MatchMode(IntEnum):
 
 
 class GridSize(IntEnum):
-    """Side of the centroiding window in pixels; odd, so that it has a middle. The set is ours."""
+    """Side of the centroiding window in pixels; odd, with a middle. The set is assumed."""
 
     GRID_3 = 3
     GRID_5 = 5
@@ -79,7 +79,7 @@ class GridSize(IntEnum):
 
 
 class TestPattern(IntEnum):
-    """Pattern that CaptureTestPatern writes to the picture memory; ours."""
+    """Pattern that CaptureTestPatern writes to the picture memory; assumed."""
 
     __test__ = False  # not a test class, whatever its name says to pytest
 
@@ -89,7 +89,7 @@ class TestPattern(IntEnum):
 
 
 class MemoryTest(IntEnum):
-    """Result of TestSRAM; ours."""
+    """Result of TestSRAM; assumed."""
 
     NOT_RUN = 0
     PASSED = 1
@@ -97,7 +97,7 @@ class MemoryTest(IntEnum):
 
 
 class SwitchState(IntEnum):
-    """Load switch of the imager and the frame buffer; ours."""
+    """Load switch of the imager and the frame buffer; assumed."""
 
     OFF = 0
     ON = 1

@@ -98,7 +98,7 @@ _TELEMETRY = (
         u8("Value", "value"),
         u8("Valid", "1: the sensor acknowledged"),
     ),
-    Message(206, "LoopStatus", "state of the main loop and of the settings that are ours").of(
+    Message(206, "LoopStatus", "state of the main loop and of the settings that are extensions").of(
         u32("Iterations", "iterations since power-up"),
         u8("ModeFlag", "mode for the next picture", choices=MatchMode),
         u16("FrameRate", "the sensor's frame-rate register"),

@@ -135,7 +135,7 @@ def test_json_carries_the_whole_declaration() -> None:
     assert margin["minimum"] == pytest.approx(0.0001)
     assert messages["telemetry", 138]["supported"] is False
     assert messages["telemetry", 151]["steps"] is True
-    assert messages["telecommand", 100]["ours"] is True
+    assert messages["telecommand", 100]["extension"] is True
 
 
 def test_json_carries_registers_and_letters_where_there_are_any() -> None:
@@ -155,7 +155,7 @@ def test_json_carries_registers_and_letters_where_there_are_any() -> None:
 @pytest.mark.parametrize("form", ["table", "markdown"])
 def test_readers_find_registers_letters_and_what_is_ours(form: str) -> None:
     text = render(CUBESENSE, form)
-    assert "which registers there are, and their addresses, are ours" in text
+    assert "which registers there are, and their addresses, are assumed" in text
     assert "0x48" in text
     assert "layout only declared somewhere" in text
     assert re.search(r"\ba\b.*TAKE_NADIR.*'Y'", text)
