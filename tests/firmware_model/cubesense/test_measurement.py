@@ -257,6 +257,16 @@ def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness
     assert unit.now_us - start_us > after + 36_000
 
 
+def test_thresholds(unit: Harness) -> None:
+    unit.scenes[Camera.SUN] = sun_at(3, 4)
+    unit.scenes[Camera.NADIR] = earth(5, 6)
+    unit.command("DetectionThreshold2", Threshold=200)  # above the Earth
+    assert measure(unit, Camera.NADIR)["Detect"] == DetectResult.TOO_FEW_EDGES
+    before = measure(unit, Camera.SUN)["Points"]
+    unit.command("DetectionThreshold1", Threshold=120)
+    assert measure(unit, Camera.SUN)["Points"] > before
+
+
 def test_the_boresight_moves_the_suns_centre(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun(np.array([369.0, 250.0]), 6)
     unit.command("Boresight1", X=359.5, Y=253.25)

@@ -27,6 +27,23 @@ def test_nothing_runs_by_itself(unit: Harness) -> None:
     assert 1_000_000 / SAMPLE_US * 0.9 < unit.meter.counts["adc_conversion"] / 2 < 220
 
 
+def test_jobs_are_done_in_their_order(unit: Harness) -> None:
+    unit.scenes[codes.Camera.NADIR] = earth(5, 5)
+    for camera, sram in ((0, 1), (1, 0), (1, 1), (0, 0)):
+        assert unit.send("CaptureAndDetect", Camera=camera, Sram=sram) == 0
+    unit.log.clear()
+    unit.run()
+    levels, stores = {"SHIFT": 0, "EDGE": 0, "RNW": 0}, []
+    for request in (r for _, r in unit.log if isinstance(r, SetPin)):
+        if request.pin in levels:
+            levels[request.pin] = request.level
+        elif request in (SetPin("SUNEN", 0), SetPin("NADEN", 0)) and not levels["EDGE"]:
+            stores.append((levels["SHIFT"], levels["RNW"], request.pin))
+    linked_from_sun = [(1, 0, "SUNEN"), (1, 0, "NADEN")]
+    linked_from_nadir = [(1, 1, "SUNEN"), (1, 1, "NADEN")]
+    assert stores == [*linked_from_sun, *linked_from_nadir, (0, 0, "NADEN"), (0, 0, "SUNEN")]
+
+
 def test_a_program_reset_starts_anew(unit: Harness) -> None:
     unit.scenes[codes.Camera.NADIR] = earth(5, 5)
     unit.command("DetectionThreshold2", Threshold=99)

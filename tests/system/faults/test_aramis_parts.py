@@ -99,6 +99,16 @@ def test_upsets_of_the_flash_are_corrected_as_it_is_reloaded(active: Tracker) ->
     active.check()
 
 
+@pytest.mark.fault("memory-upsets")
+def test_upsets_of_the_ram_are_found_before_the_catalogue_is_used(active: Tracker) -> None:
+    active.inject("memory-upsets", target="sdram", rate=1e-6)
+    active.client.pause(2)
+    active.faults.clear()
+    assert len(active.faults.log) > 100
+    active.check()
+    assert active.flags() == {"RamError"}
+
+
 @pytest.mark.parametrize("lasting", [False, True])
 @pytest.mark.fault("latch-up")
 def test_a_latched_camera_draws_on_until_the_host_acts(active: Tracker, lasting: bool) -> None:
