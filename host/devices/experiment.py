@@ -52,8 +52,11 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
         """
 
     def row(self, number: int, result: ResultT) -> tuple[str, ...]:
-        """A result in the table: one cell for each of ``columns``; ``number`` counts from 0."""
-        raise NotImplementedError
+        """A result in the table, by default its values: one cell for each of ``columns``.
+
+        ``number`` counts from 0.
+        """
+        return tuple(map(str, result.as_dict().values()))
 
     @abstractmethod
     def summarise(self, results: Sequence[ResultT], wall_s: float) -> Iterable[str]:
