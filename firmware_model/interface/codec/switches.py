@@ -25,6 +25,7 @@ class Switch:
         source: document and section.
         reason: why there is another value.
         choices: all values, as typed.
+        hardware: whether it is a matter of the built board, so that no telecommand can change it.
     """
 
     meaning: str
@@ -33,13 +34,21 @@ class Switch:
     source: str
     reason: str
     choices: tuple[str, ...]
+    hardware: bool = False
 
 
 def switch(
-    meaning: str, published: str, extended: str, *others: str, source: str, reason: str
+    meaning: str,
+    published: str,
+    extended: str,
+    *others: str,
+    source: str,
+    reason: str,
+    hardware: bool = False,
 ) -> Any:
     """A field for a switch, whose default is that of the default profile."""
-    declared = Switch(meaning, published, extended, source, reason, (published, extended, *others))
+    choices = tuple(dict.fromkeys((published, extended, *others)))
+    declared = Switch(meaning, published, extended, source, reason, choices, hardware)
     return field(default=getattr(declared, DEFAULT_PROFILE), metadata={"switch": declared})
 
 
