@@ -51,6 +51,7 @@ def section(text: str, heading: str) -> str:
         ('Keys of `kind = "picture"`', 'kind = "picture"'),
         ('Keys of `kind = "earth-sun"`', EARTH),
         ("Keys of `nadir_camera` and `sun_camera`", f"{EARTH}\n[nadir_camera]"),
+        ("Keys of `nadir_lens` and `sun_lens`", f"{EARTH}\n[sun_lens]"),
         ("Keys of `reflections`", f"{EARTH}\n[[reflections]]"),
     ],
 )

@@ -14,7 +14,7 @@ from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.ov7620.fisheye import FIELD_DEG
+from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, drawn_lens
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.faults.sites import CameraSite, Sites
@@ -86,11 +86,17 @@ class CubeSenseBoard(Board):
             baud, bench_baud: of the serial lines with the node and the bench protocol.
             mcu_addressing: FPGAs with the option that lets the processor choose addresses.
             i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
-            switches: of the program.
+            switches: of the program, and of the lenses, which are those of unit ``seed``.
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
         self.engine = make_engine(_wiring(mcu_addressing=mcu_addressing), engine)
-        self.cameras = {camera: Ov7620(scene, Target[camera.name]) for camera in Camera}
+        drawn = switches.lens == "residuals"
+        self.cameras = {
+            Camera[target.name]: Ov7620(
+                scene, target, lens=drawn_lens(target, seed) if drawn else NOMINAL
+            )
+            for target in Target
+        }
         self._node_link(lambda: self.program.node, baud, i2c_address)
         self.bench_uart = self._serial_line(
             bench_baud, lambda: self.program.bench, "bench_uart", "bench protocol", ".bench"

@@ -3,18 +3,19 @@
 CubeSense thesis, section 5.1.1 (boresight, table 5.1), section 5.2.1 (2.9 px for a degree of field
 angle, equation 5.2.1, and the measured distortion polynomial, equation 5.2.3) and appendix A.3
 (field of 190 deg). By the polynomial the field ends 226.6 px from the boresight; table 5.1 gives
-the rim as 226 px.
+the rim as 226 px. A unit's own lens may differ: `lens_error`.
 
 Equation 5.2.3 gives 0.10 px at no field angle at all. What it puts within that radius is taken to
 be the boresight.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import Target
 from cubestack.emulator.scene.file import SceneError
@@ -25,9 +26,6 @@ DISTORTION = (-2.5572e-6, 7.6076e-5, 0.9953, 0.1036)
 
 PIXELS_PER_DEGREE = 2.9
 """Undistorted pixels for one degree of field angle."""
-
-FIELD_DEG = 95.0
-"""Largest angle from the boresight that the lens images, half of 190 deg (appendix A.3)."""
 
 _NEWTON_STEPS = 8
 
@@ -64,17 +62,20 @@ class Fisheye:
 
     Attributes:
         cx, cy: boresight and centre of distortion, px.
+        error: what the polynomial does not say of it; its centre is in ``cx`` and ``cy`` already.
     """
 
     cx: float
     cy: float
+    error: LensError = NOMINAL
 
     def project(self, vector: ArrayLike) -> NDArray[np.float64] | None:
         """Pixel coordinates (2,) of a direction (3,) in camera axes; None outside the field."""
         angles = np.array(angles_from_vector(vector))
-        theta = float(np.hypot(*angles))
-        if theta > FIELD_DEG:
+        if np.hypot(*angles) > FIELD_DEG:
             return None
+        angles = self.error.displaced(angles)
+        theta = float(np.hypot(*angles))
         if theta == 0:
             return np.array([self.cx, self.cy])
         stretch = distorted(theta * PIXELS_PER_DEGREE) / theta
@@ -85,12 +86,15 @@ class Fisheye:
         offset = np.asarray(pixels, np.float64) - (self.cx, self.cy)
         radius = np.hypot(offset[:, 0], offset[:, 1])
         theta = undistorted(radius) / PIXELS_PER_DEGREE
-        angles = offset * (theta / np.where(radius == 0, 1, radius))[:, None]
+        angles = self.error.restored(offset * (theta / np.where(radius == 0, 1, radius))[:, None])
         return vector_from_angles(angles[:, 0], angles[:, 1])
 
     @cached_property
     def field(self) -> "FieldOfView":
-        """Directions of all pixels that see anything."""
+        """Directions of all pixels that see anything.
+
+        What a pixel covers is as the polynomial says: an error changes it by a few percent.
+        """
         rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
         radius = np.hypot(columns - self.cx, rows - self.cy)
         rim = float(distorted(FIELD_DEG * PIXELS_PER_DEGREE))
@@ -129,3 +133,12 @@ class FieldOfView:
 
 LENSES = {Target.SUN: Fisheye(369, 250), Target.NADIR: Fisheye(371, 236)}
 """Each camera's own boresight (table 5.1)."""
+
+
+@lru_cache(maxsize=8)
+def lens_of(camera: Target, error: LensError = NOMINAL) -> Fisheye:
+    """The lens of ``camera`` with an error of its own; kept, as its field takes a while."""
+    if error == NOMINAL:
+        return LENSES[camera]
+    (x, y), nominal = error.centre_px, LENSES[camera]
+    return Fisheye(nominal.cx + x, nominal.cy + y, error)

@@ -17,7 +17,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.ov7620.fisheye import LENSES, PIXELS_PER_DEGREE, Fisheye
+from cubestack.emulator.camera.ov7620.fisheye import PIXELS_PER_DEGREE, Fisheye, lens_of
+from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
@@ -62,12 +63,15 @@ FAINTEST = 1e-3
 Light = NDArray[np.float32]
 
 
-def scene_light(scene: EarthSunScene, camera: Target, bloom_px: float, time_ps: int) -> Light:
+def scene_light(
+    scene: EarthSunScene, camera: Target, bloom_px: float, time_ps: int, error: LensError = NOMINAL
+) -> Light:
     """Grey values (480, 640) above black that ``camera`` gains in each line time of exposure.
 
-    ``bloom_px`` is the radius of the Sun's image on the boresight of the sun camera.
+    ``bloom_px`` is the radius of the Sun's image on the boresight of the sun camera, ``error``
+    what is particular to the lens.
     """
-    lens = LENSES[camera]
+    lens = lens_of(camera, error)
     light = np.zeros((ROWS, COLUMNS), np.float32)
     sun = scene.seen(scene.sun, camera, time_ps)
     earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(Target.NADIR)
@@ -81,7 +85,7 @@ def scene_light(scene: EarthSunScene, camera: Target, bloom_px: float, time_ps: 
     radiance *= lens.field.lit[seen] * np.float32(earth_level)
     light.ravel()[lens.field.index[seen]] = radiance
     if not scene.hidden(scene.sun):
-        _add_sun(light, bloom_px, camera, sun)
+        _add_sun(light, lens, bloom_px, camera, sun)
     if scene.moon is not None and not scene.hidden(scene.moon):
         moon = scene.seen(scene.moon, camera, time_ps)
         _add_moon(light, lens, moon, earth_level * MOON_RADIANCE * (1 - float(moon @ sun)) / 2)
@@ -97,8 +101,9 @@ def _usual_lines(camera: Target) -> int:
     return USUAL_EXPOSURE[camera] * EXPOSURE_LINES
 
 
-def _add_sun(light: Light, bloom_px: float, camera: Target, vector: NDArray[np.float64]) -> None:
-    lens = LENSES[camera]
+def _add_sun(
+    light: Light, lens: Fisheye, bloom_px: float, camera: Target, vector: NDArray[np.float64]
+) -> None:
     centre = lens.project(vector)
     if centre is None:
         return

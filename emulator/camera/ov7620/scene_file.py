@@ -11,6 +11,10 @@
     [nadir_camera]
     boresight = [0.0, 0.0, 1.0]    # in body axes
     right = [1.0, 0.0, 0.0]
+    [nadir_lens]                   # how it differs from the firmware's polynomial
+    centre_px = [0.3, -0.2]        # optical axis beside the boresight
+    radial_deg = [[40.0, 0.1], [70.0, 0.4]]  # field angles, and errors outwards there
+    decentring_deg = [0.0, 0.05]   # Brown's p1 and p2
     [[reflections]]
     camera = "sun"
     at_deg = [20.0, -10.0]         # alpha and beta
@@ -25,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from cubestack.emulator.camera.ov7620.fisheye import check_field
+from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene import file
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
@@ -57,6 +62,16 @@ def _mounting(value: Any) -> Mounting:
     return Mounting(**values)
 
 
+def _lens(value: Any) -> LensError:
+    return LensError(**file.subtable(_LENS)(value))
+
+
+def _radial(value: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(value, list):
+        raise file.SceneError(f"must be pairs of field angle and error, not {value!r}")
+    return tuple(file.several(2, file.number)(pair) for pair in value)
+
+
 def _camera(value: Any) -> Target:
     names = {camera.name.lower(): camera for camera in Target}
     if value not in names:
@@ -84,6 +99,11 @@ _REFLECTION: file.Readers = {
     "radius_px": file.number,
     "level": file.number,
 }
+_LENS: file.Readers = {
+    "centre_px": file.several(2, file.number),
+    "radial_deg": _radial,
+    "decentring_deg": file.several(2, file.number),
+}
 _SCENE: file.Readers = {
     "nadir": file.several(3, file.number),
     "nadir_deg": file.several(2, file.number),
@@ -94,6 +114,8 @@ _SCENE: file.Readers = {
     "rate_deg_s": file.several(3, file.number),
     "nadir_camera": _mounting,
     "sun_camera": _mounting,
+    "nadir_lens": _lens,
+    "sun_lens": _lens,
     "bloom_px": file.number,
     "unevenness": file.number,
     "glow_km": file.number,

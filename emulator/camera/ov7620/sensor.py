@@ -25,6 +25,7 @@ from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
 from cubestack.emulator.camera.ov7620.fisheye import check_field
+from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.light import scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK, luminance, stuck_pixels
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
@@ -83,16 +84,28 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         scene: EarthSunScene | EarthSunView,
         camera: Target,
         condition: FisheyeCondition | None = None,
+        lens: LensError = NOMINAL,
     ) -> None:
-        """Power up; ``condition`` is what lens and sensor are like, unless ``scene`` says."""
+        """Power up; ``condition`` is what lens and sensor are like, unless ``scene`` says.
+
+        ``lens`` is the unit's own, where neither says another.
+        """
         super().__init__(
             scene, condition or FisheyeCondition(), chip.REGISTERS, chip.PIXEL_CLOCK_HZ
         )
         self.camera = camera
+        self._own_lens = lens
         self.active_columns = chip.COLUMNS
         self._sccb = SccbSlave(chip.REGISTERS.i2c_address, self._write)
         self._frames: OrderedDict[int, _Frame] = OrderedDict()
-        self._light: tuple[EarthSunScene, float, int, Light] | None = None
+        self._light: tuple[EarthSunScene, float, int, LensError, Light] | None = None
+
+    @property
+    def lens(self) -> LensError:
+        """What is particular to the lens: that of the condition, else the unit's own."""
+        condition = self.condition
+        given = condition.sun_lens if self.camera is Target.SUN else condition.nadir_lens
+        return self._own_lens if given is None else given
 
     def _check(self, scene: EarthSunScene, condition: FisheyeCondition) -> None:
         del condition
@@ -238,11 +251,12 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def _light_at(self, time_ps: int) -> Light:
         if not np.any(self.scene.rate_deg_s):
             time_ps = 0  # the same at all times
-        key = self.scene, self.condition.bloom_px, time_ps
-        if self._light is None or self._light[:3] != key:
-            light = scene_light(self.scene, self.camera, self.condition.bloom_px, time_ps)
+        key = self.scene, self.condition.bloom_px, time_ps, self.lens
+        if self._light is None or self._light[:-1] != key:
+            bloom_px = self.condition.bloom_px
+            light = scene_light(self.scene, self.camera, bloom_px, time_ps, self.lens)
             self._light = *key, light
-        return self._light[3]
+        return self._light[-1]
 
     def _wanted(self, time_ps: int) -> float:
         """Line times of exposure at gain 1 that bring the picture's mean to the level aimed at."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from cubestack.emulator.camera.common.view import View
+from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import refuse_negative, refuse_zero
 
@@ -18,6 +19,7 @@ class FisheyeCondition:
         hot_pairs: pairs of such pixels, side by side.
         noise: False makes the sensor ideal but for its hot pixels.
         seed: of noise and hot pixels.
+        nadir_lens, sun_lens: what is particular to a camera's lens; None: the unit's own.
     """
 
     bloom_px: float = 7.0
@@ -25,6 +27,8 @@ class FisheyeCondition:
     hot_pairs: int = 0
     noise: bool = True
     seed: int = 0
+    nadir_lens: LensError | None = None
+    sun_lens: LensError | None = None
 
     def __post_init__(self) -> None:
         """Refuse what can not be."""

@@ -44,6 +44,15 @@ class CubeSenseSwitches(Switches):
         reason="a Sun that overflows the window is cut, and its mean moves; stuck pixels and light "
         "outside of the field are no Sun",
     )
+    lens: str = switch(
+        "what each camera's lens is beside the polynomial that the firmware undoes",
+        "residuals",
+        "nominal",
+        source="sections 5.1.1, 7.1 and 7.2: errors left after the calibration, one polynomial for "
+        "two lenses; drawn for each unit, by its seed",
+        reason="nominal shows what firmware and pixels alone do",
+        hardware=True,
+    )
 
 
 #: Those of the default profile.

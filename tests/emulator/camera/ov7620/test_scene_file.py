@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.ov7620 import scene_file
+from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import Reflection, Target
@@ -57,6 +58,20 @@ def test_example_in_the_documentation_is_a_scene(tmp_path: Path) -> None:
     scene = load_earth_sun_scene(save(tmp_path, textwrap.dedent(example))).scene
     assert scene.reflections == (Reflection(SUN, 20.0, -10.0, 4.0, 200.0),)
     assert scene.truth(NADIR, 0).visible
+
+
+def test_a_lens_from_a_file(tmp_path: Path) -> None:
+    text = f"{KIND}[sun_lens]\ncentre_px = [1, -2]\nradial_deg = [[40, 0.5], [60.0, 1]]"
+    condition = load_earth_sun_scene(save(tmp_path, text)).condition
+    assert condition.sun_lens == LensError((1.0, -2.0), ((40.0, 0.5), (60.0, 1.0)))
+    assert condition.nadir_lens is None
+    for wrong, complaint in [
+        ("radial_deg = 3", "sun_lens: radial_deg must be pairs"),
+        ("radial_deg = [[1]]", "sun_lens: radial_deg must be a list of 2 numbers"),
+        ("radial_deg = [[99, 1]]", "sun_lens: radial_deg must have rising field angles"),
+        ("colour = 1", "unknown key 'colour'; allowed are centre_px"),
+    ]:
+        check_refused(load_earth_sun_scene, save(tmp_path, f"{KIND}[sun_lens]\n{wrong}"), complaint)
 
 
 def test_shortest_file(tmp_path: Path) -> None:

@@ -1,0 +1,142 @@
+"""How a camera's own lens differs from the polynomial that the firmware undoes.
+
+CubeSense thesis, sections 5.2.1 (one polynomial, fitted to the nadir camera every 5 deg, serves
+both cameras), 7.1 (figure 7.1: mean offsets of 0.12, 0.16, 0.13 and 0.15 deg in four directions)
+and 7.2 (the Sun's offsets: below 0.3 deg to 40 deg, up to 1 deg to 60, up to 1.85 deg beyond, back
+to none at 90; nearly all of one sign). Table 5.1 gives both boresights in whole pixels, and 226 px
+as the radius of both rims, so errors end at the rim.
+
+What is read from these, what is chosen, and what is drawn for each unit:
+
+- The optical axis is anywhere in the pixel of table 5.1: drawn, evenly.
+- The nadir lens differs at four field angles by `NADIR_SIGMA_DEG`: fitted, so that units have in
+  the mean the error of figure 7.1 together with what the printed firmware makes. Drawn, normally.
+- The Sun lens has the published offsets at the ends of their ranges: read; the greatest at 75 deg:
+  chosen. They are the largest of four directions, so a unit has `SUN_SHARE` of them: chosen, drawn
+  evenly.
+- Decentring by `DECENTRING_SIGMA_DEG`: chosen, as four directions differ by 0.04 deg; drawn.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.file import SceneError
+
+FIELD_DEG = 95.0
+"""Largest angle from the boresight that the lens images, half of 190 deg (appendix A.3)."""
+
+NADIR_NODES_DEG = (20.0, 40.0, 60.0, 80.0)
+NADIR_SIGMA_DEG = 0.12
+SUN_OFFSETS_DEG = ((40.0, 0.3), (60.0, 1.0), (75.0, 1.85), (90.0, 0.0))
+SUN_SHARE = (0.6, 1.0)
+DECENTRING_SIGMA_DEG = 0.04
+
+MOST_PX = 20.0
+STEEPEST = 0.5
+"""Steepest change of the error by field angle that is taken: the picture must not fold."""
+
+_INVERSION_STEPS = 50
+_INVERSION_DEG = 1e-9
+
+Angles = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LensError:
+    """What the polynomial does not say of one lens; by default nothing.
+
+    A direction is imaged where the polynomial images another one: its angles alpha and beta, plus
+    this error.
+
+    Attributes:
+        centre_px: optical axis (x, y) less the boresight of table 5.1, px, each within 20.
+        radial_deg: pairs of field angle, rising within 0 and 95 deg, and error outwards there; a
+            smooth curve goes through them, 0 on the axis and at the rim, and exceeds none.
+        decentring_deg: coefficients (p1, p2) of Brown's tangential distortion, deg at the rim, but
+            falling off towards it.
+    """
+
+    centre_px: tuple[float, float] = (0.0, 0.0)
+    radial_deg: tuple[tuple[float, float], ...] = ()
+    decentring_deg: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse a lens that can not be: SceneError."""
+        if not max(map(abs, self.centre_px)) <= MOST_PX:
+            raise SceneError(f"centre_px must be within {MOST_PX:g} px, not {self.centre_px}")
+        nodes = [0.0, *(angle for angle, _ in self.radial_deg), FIELD_DEG]
+        if not np.all(np.diff(nodes) > 0):
+            raise SceneError(
+                f"radial_deg must have rising field angles within 0 and {FIELD_DEG:g} deg, "
+                f"not {[list(pair) for pair in self.radial_deg]}"
+            )
+        turn = np.radians(np.arange(0, 360, 15))[:, None]
+        along = np.linspace(0.0, FIELD_DEG, 96)
+        angles = np.stack([along * np.cos(turn), along * np.sin(turn)], axis=-1)
+        slope = np.diff(self.displaced(angles) - angles, axis=1) / along[1]
+        if not np.hypot(slope[..., 0], slope[..., 1]).max() <= STEEPEST:
+            raise SceneError(
+                f"radial_deg and decentring_deg must change by at most {STEEPEST:g} deg a degree"
+            )
+
+    def displaced(self, angles: ArrayLike) -> Angles:
+        """Angles (..., 2) that the polynomial images where this lens images ``angles``."""
+        true = np.asarray(angles, np.float64)
+        if not self.radial_deg and not any(self.decentring_deg):
+            return true
+        theta = np.hypot(true[..., 0], true[..., 1])
+        stretch = 1 + self._radial(theta) / np.where(theta == 0, 1, theta)
+        x, y = np.moveaxis(true / FIELD_DEG, -1, 0)
+        square = x * x + y * y
+        p1, p2 = self.decentring_deg
+        fading = np.maximum(1 - square, 0)
+        across = fading * (p2 * (square + 2 * x * x) + 2 * p1 * x * y)
+        down = fading * (p1 * (square + 2 * y * y) + 2 * p2 * x * y)
+        return np.asarray(true * stretch[..., None] + np.stack([across, down], axis=-1))
+
+    def restored(self, displaced: ArrayLike) -> Angles:
+        """Inverse of `displaced`, to 1e-9 deg within the field."""
+        seen = np.asarray(displaced, np.float64)
+        true = seen
+        for _ in range(_INVERSION_STEPS):
+            missed = seen - self.displaced(true)
+            true = true + missed
+            if not np.abs(missed).max() > _INVERSION_DEG:
+                break
+        return true
+
+    def _radial(self, theta: Angles) -> Angles:
+        """Error outwards at field angles: Hermite's cubics, extremes at nodes only (Fritsch)."""
+        pairs = [(0.0, 0.0), *self.radial_deg, (FIELD_DEG, 0.0)]
+        nodes, values = np.array(pairs).T
+        rise = np.diff(values) / np.diff(nodes)
+        turns = rise[:-1] * rise[1:] <= 0
+        mean = 2 * rise[:-1] * rise[1:] / np.where(turns, 1, rise[:-1] + rise[1:])
+        slopes = np.array([rise[0], *np.where(turns, 0, mean), 0.0])
+        first = np.clip(np.searchsorted(nodes, theta, "right") - 1, 0, len(nodes) - 2)
+        width = nodes[first + 1] - nodes[first]
+        s = np.clip((theta - nodes[first]) / width, 0, 1)
+        begins = (1 + 2 * s) * values[first] + s * width * slopes[first]
+        ends = (3 - 2 * s) * values[first + 1] - (1 - s) * width * slopes[first + 1]
+        return np.asarray((1 - s) ** 2 * begins + s**2 * ends)
+
+
+#: A lens that is exactly as the firmware takes it to be.
+NOMINAL = LensError()
+
+
+def drawn_lens(camera: Target, serial: int) -> LensError:
+    """The lens of ``camera`` of the unit with that serial number."""
+    rng = np.random.default_rng([serial, camera])
+    centre_x, centre_y = rng.uniform(-0.5, 0.5, 2)
+    p1, p2 = rng.normal(0, DECENTRING_SIGMA_DEG, 2)
+    if camera is Target.SUN:
+        share = rng.uniform(*SUN_SHARE)
+        radial = [(angle, share * offset) for angle, offset in SUN_OFFSETS_DEG]
+    else:
+        errors = rng.normal(0, NADIR_SIGMA_DEG, len(NADIR_NODES_DEG))
+        radial = list(zip(NADIR_NODES_DEG, errors.tolist(), strict=True))
+    return LensError((centre_x, centre_y), tuple(radial), (p1, p2))
