@@ -21,6 +21,7 @@ COMMANDS = {
     "emulate": "serve an emulated device on serial ports until Ctrl-C",
     "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude or directions out: each result beside the truth",
+    "fidelity": "measure published figures: theirs, ours in both profiles, and how ours come about",
     "registers": "list a device's telecommands and telemetry",
     "shell": "read, write and watch registers by name",
     "conformance": "check a device's protocol against the tables",

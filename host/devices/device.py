@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.devices.experiment import AnyExperiment
+    from cubestack.host.devices.fidelity import Fidelity
 
 #: How an FPGA is run: compiled where there is a compiler, always compiled, or Amaranth's simulator.
 Engine = Literal["auto", "compiled", "python"]
@@ -157,6 +158,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         reports: further commands about it.
         benchmark: measures the cost of emulating it; None for nothing.
         demo: shows it end to end, with pictures; None for nothing.
+        fidelity: its published figures, and what measures ours; None for a device without any.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
@@ -180,6 +182,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     reports: tuple[Report, ...] = ()
     benchmark: Callable[[], Benchmark] | None = None
     demo: Callable[[], Demo] | None = None
+    fidelity: "Callable[[], Fidelity] | None" = None
     tops: "Callable[[], TopTable]" = dict
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
     prepare: Callable[[Shown], None] = lambda _shown: None

@@ -48,6 +48,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
+    fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
     switches=CubeSenseSwitches,
     options=(
         BoardOption(

@@ -100,6 +100,7 @@ DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
+    fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
     switches=CubeStarSwitches,
     options=(
         BoardOption(

@@ -16,7 +16,7 @@ examples:
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -116,7 +116,7 @@ class AramisOptions(attitudes.SkyOptions):
 _KEYS = (
     *("solved", "right", "outcome", "reason", "centroids", "matched", "wrong"),
     *("candidates", "pivots", "triples", "mode", "error_cross_deg", "error_roll_deg"),
-    *("truth", "quaternion", "image_time_s", "flips", "corrected", "lost"),
+    *("far", "truth", "quaternion", "image_time_s", "flips", "corrected", "lost"),
     *("phase_ms", "wall_ms", "status"),
 )
 
@@ -128,6 +128,9 @@ class AramisResult(attitudes.AttitudeResult):
     Attributes:
         outcome, reason: how the identification ended.
         candidates, pivots, triples: of the identification.
+        far: whether the middle of the triangle, the first three stars with an identity, is more
+            than a field's diameter from the boresight: wrong as appendix E of the thesis counts;
+            None without truth or such stars.
         image_time_s: mid-exposure by the star tracker's clock, since power-up.
         flips, corrected, lost: bits turned over in flash, and what loading made of the words.
     """
@@ -137,6 +140,7 @@ class AramisResult(attitudes.AttitudeResult):
     candidates: int
     pivots: int
     triples: int
+    far: bool | None
     image_time_s: float
     flips: int
     corrected: int
@@ -155,6 +159,12 @@ class AramisResult(attitudes.AttitudeResult):
 class _Experiment(attitudes.AttitudeExperiment["_Opener", AramisOptions, AramisResult]):
     options = AramisOptions
     description = __doc__
+
+    def summarise(self, results: Sequence[AramisResult], wall_s: float) -> Iterator[str]:
+        """Beside the usual ones, what is wrong as the thesis counts."""
+        yield from super().summarise(results, wall_s)
+        far = 100 * sum(bool(result.far) for result in results) / max(1, len(results))
+        yield f"wrong by appendix E's criterion, a triangle more than a field away: {far:.1f} %"
 
     def run(self, opened: _Opener, options: AramisOptions) -> Iterator[AramisResult]:
         from cubestack.emulator.boards.aramis.catalogue import onboard_database
@@ -251,6 +261,7 @@ def _measure(
         centroids=found.detected,
         matched=found.matched if found.valid else 0,
         wrong=_count_wrong(emulated, truth) if found.valid else 0,
+        far=_is_far(aramis, options.field, truth) if found.valid else None,
         candidates=int(summary["Candidates"]),
         pivots=int(summary["Pivots"]),
         triples=int(summary["Triples"]),
@@ -276,6 +287,20 @@ def _count_wrong(emulated: _Emulated, truth: NDArray[np.float64] | None) -> int 
     places = np.array([[star.x_px, star.y_px] for star in named]).reshape(-1, 2)
     hipparcos = [star.hipparcos or 0 for star in named]
     return attitudes.count_wrong(hipparcos, camera.condition.optics.unproject(places), truth)
+
+
+def _is_far(aramis: Aramis, field_deg: float, truth: NDArray[np.float64] | None) -> bool | None:
+    """Appendix E's criterion of a wrong result; None where it can not be told."""
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion
+    from cubestack.emulator.scene.hipparcos import load_sky
+
+    named = [star.hipparcos for star in aramis.stars() if star.hipparcos is not None][:3]
+    if truth is None or len(named) < 3:
+        return None
+    sky = load_sky()
+    middle = sky.vectors[np.searchsorted(sky.hip, named)].mean(axis=0)
+    cosine = middle @ matrix_from_quaternion(truth)[2] / np.linalg.norm(middle)
+    return bool(cosine < np.cos(np.radians(field_deg)))
 
 
 EXPERIMENT = _Experiment()

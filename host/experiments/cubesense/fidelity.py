@@ -1,0 +1,151 @@
+"""CubeSense's published figures (thesis, Stellenbosch University, 2011) and what measures ours."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
+from cubestack.host.experiments.fidelity import measured
+from cubestack.host.experiments.opener import Opener
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.host.experiments.cubesense.measure import SensorResult
+
+_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
+
+ALTITUDE_KM = 750.0  # of the text
+SUN_BANDS = {"40": (0, 40), "60": (40, 60), "90": (60, 90.1), "45": (0, 45), "rest": (45, 90.1)}
+
+
+def _sensor(results: Sequence["SensorResult"]) -> Figures:
+    """Errors along rows (alpha) and columns (beta), in all, and by angle to the boresight; times.
+
+    ``sum`` is section 8's accuracy, mean absolute error plus sigma.
+    """
+    good = [result for result in results if result.detected and result.error_deg is not None]
+    axes = np.array(
+        [
+            (r.alpha_deg - r.truth_alpha_deg, r.beta_deg - r.truth_beta_deg)  # type: ignore[operator]
+            for r in good
+        ]
+    ).reshape(-1, 2)
+    mean, sigma = np.abs(axes).mean(axis=0), axes.std(axis=0)
+    error = np.array([result.error_deg for result in good])
+    angle = np.array([np.hypot(r.truth_alpha_deg, r.truth_beta_deg) for r in good])  # type: ignore[arg-type]
+    figures = {
+        **dict(zip(("alpha", "beta"), mean, strict=True)),
+        **dict(zip(("sigma_alpha", "sigma_beta"), sigma, strict=True)),
+        **dict(zip(("sum_alpha", "sum_beta"), mean + sigma, strict=True)),
+        "mean": error.mean(),
+        "p95": np.percentile(error, 95),
+        "worst": error.max(),
+        "detected": 100 * len(good) / len(results),
+        "least_edges": min((r.edges or 0) for r in good),
+        "most_edges": max((r.edges or 0) for r in good),
+    }
+    for name, (low, high) in SUN_BANDS.items():
+        own = error[(angle >= low) & (angle < high)]
+        figures[f"mean_{name}"] = own.mean() if own.size else np.nan
+        figures[f"worst_{name}"] = own.max() if own.size else np.nan
+    phases = {name: np.array([r.phase_ms[name] for r in good]) for name in good[0].phase_ms}
+    figures |= {f"{name}_ms": values.mean() for name, values in phases.items()}
+    figures["sigma_ms"] = phases["total"].std()
+    figures["imaging_ms"] = (phases["wait"] + phases["store"]).mean()
+    return {name: float(value) for name, value in figures.items()}
+
+
+def _power(_opened: _Opener, _frames: int) -> Figures:
+    """mW of the eight states of table 7.1."""
+    from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
+    from cubestack.emulator.sim.power import PowerModel
+    from cubestack.emulator.sim.virtual_time import Kernel
+
+    power = PowerModel(Kernel(), CUBESENSE_POWER)
+    for channel in CUBESENSE_POWER.channels:
+        power.switch(channel, False)
+    found = {}
+    steps: list[tuple[str, Any]] = [
+        ("reset", partial(power.set_state, "processor", "reset")),
+        ("standby", partial(power.set_state, "processor", "on")),
+        ("memory", partial(power.switch, "SRAM1", True)),
+        ("memories", partial(power.switch, "SRAM2", True)),
+        ("camera", partial(power.switch, "sun_camera", True)),
+        ("cameras", partial(power.switch, "nadir_camera", True)),
+    ]
+    for number, side in enumerate(("sun", "nadir"), 1):
+        image = partial(power.set_state, f"{side}_fpga", "imaging")
+        steps += [
+            ("", image),
+            (f"imaging{number}", partial(power.set_state, f"sram{number}", "active")),
+        ]
+    for name, step in steps:
+        step()
+        found[name] = power.current_ma() * CUBESENSE_POWER.volts
+    return found
+
+
+def _lens(_opened: _Opener, _frames: int) -> Figures:
+    """What follows from the measured polynomial, the Earth's size and the pixels."""
+    from cubestack.emulator.camera.ov7620 import fisheye
+    from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
+
+    a, b, c, d = fisheye.DISTORTION
+    field_px = fisheye.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
+    rim_px = float(fisheye.distorted(field_px))
+    earth_deg = angular_radius_deg(ALTITUDE_KM)
+    earth_px = float(fisheye.distorted(earth_deg * fisheye.PIXELS_PER_DEGREE))
+    # Two points 10 cm apart on a board at 103 cm, near the boresight (section 5.1.3).
+    board_px = float(fisheye.distorted(np.degrees(np.arctan(10 / 103)) * fisheye.PIXELS_PER_DEGREE))
+    ball_mm = 10 * 30 * ALTITUDE_KM / EARTH_RADIUS_KM
+    slant_mm = np.sqrt(1 + ball_mm**2 - 2 * ball_mm * np.cos(np.radians(30)))
+    return {
+        "discriminant": 18 * a * b * c * d
+        - 4 * b**3 * d
+        + (b * c) ** 2
+        - 4 * a * c**3
+        - 27 * (a * d) ** 2,
+        "deg_per_px": fisheye.FIELD_DEG / rim_px,
+        "field_px": field_px,
+        "rim_px": rim_px,
+        "focal_mm": board_px * 0.0076 * 103 / 10,
+        "earth_deg": earth_deg,
+        "earth_px": earth_px,
+        "ball_px": float(fisheye.distorted(182.0)),
+        "ball_cm": ball_mm / 10,
+        "span_angle": 100 * earth_deg / fisheye.FIELD_DEG,
+        "span_px": 100 * 182 / field_px,
+        "off_deg": float(np.degrees(np.arcsin(np.sin(np.radians(30)) / slant_mm))),
+        "off_km": ALTITUDE_KM / slant_mm,
+    }
+
+
+def _memory(_opened: _Opener, _frames: int) -> Figures:
+    """Share of the memory that pictures leave free, and that beyond their last address."""
+    from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
+
+    size = 1 << 19
+    stride = 1 << (COLUMNS - 1).bit_length()
+    beyond = ROWS * stride + COLUMNS
+    return {
+        "free": 100 * (1 - ROWS * COLUMNS / size),
+        "contiguous": 100 * (1 - beyond / size),
+        "beyond": beyond,
+    }
+
+
+FIDELITY = Fidelity(
+    page="fidelity-cubesense.md",
+    trials={
+        "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2),
+        "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2),
+        "sun-time": measured("cubesense", _sensor, 100, 3, 10, sensor="sun", sun_angle=5, seed=2),
+        "power": Trial(_power, profiles=False),
+        "lens": Trial(_lens, profiles=False),
+        "memory": Trial(_memory, profiles=False),
+    },
+    tables=read_tables("cubestack.host.experiments.cubesense"),
+)

@@ -1,0 +1,238 @@
+"""CubeStar's published figures (thesis, Stellenbosch University, 2013) and what measures ours."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
+from cubestack.host.experiments.fidelity import mean, measured
+from cubestack.host.experiments.opener import Opener
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.host.experiments.attitude import AttitudeResult
+
+_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
+
+CRYSTAL_HZ = 10_000_000
+REGISTERS = (30, 9, 8, 7, 6)
+"""Settings of table D.2."""
+
+COVERAGE_EPOCH = 1991.25  # the catalogue's own
+COVERAGE_DEG = 42.33  # diameter; the caption of table 3.6 calls it a radius
+STARS_DRAWN = 18
+
+
+def _field(opened: _Opener, frames: int, **how: Any) -> Figures:
+    """Rates in percent on the published field."""
+    from cubestack.host.experiments.cubestar.published_field import shots
+
+    taken = list(shots(opened, frames, **how))
+    detected = sum(shot.detected for shot in taken)
+    return {
+        "three": 100 * mean(shot.matched - shot.wrong > 2 for shot in taken),
+        "right": 100 * mean(shot.right for shot in taken),
+        "star_wrong": 100 * mean(shot.wrong > 0 for shot in taken),
+        "off": 100 * mean(shot.valid and not shot.right for shot in taken),
+        "share": 100 * sum(shot.matched - shot.wrong for shot in taken) / detected,
+    }
+
+
+def _attitudes(results: Sequence["AttitudeResult"]) -> Figures:
+    """Rates in percent, errors of the right ones in degrees, times in ms."""
+    right = [result for result in results if result.right]
+    cross = [result.error_cross_deg or 0.0 for result in right] or [np.nan]
+    roll = [abs(result.error_roll_deg or 0.0) for result in right] or [np.nan]
+    full = [result.phase_ms for result in results if result.centroids == 20]
+    both = [phases["detect"] + phases["match"] for phases in full] or [np.nan]
+    return {
+        "right": 100 * len(right) / len(results),
+        "off": 100 * mean(result.solved and not result.right for result in results),
+        "cross_worst": max(cross),
+        "roll_worst": max(roll),
+        "cross95": float(np.percentile(cross, 95)),
+        "roll95": float(np.percentile(roll, 95)),
+        "algorithms_ms": max(both),
+        "quest_ms": max((phases["attitude"] for phases in full), default=np.nan),
+    }
+
+
+def _catalogue(_opened: _Opener, _frames: int) -> Figures:
+    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+
+    flown, wider, text = (
+        onboard_catalogue(pair_limit_deg=limit) for limit in (42.101, 42.105, 60.0)
+    )
+    closest = flown.pairs.angle
+    return {
+        "stars": len(flown),
+        "star_kb": flown.star_bytes / 1024,
+        "pairs": len(flown.pairs),
+        "wider": len(wider.pairs),
+        "text": len(text.pairs),
+        "pair_kb": flown.pair_bytes / 1024,
+        "first": float(closest[0]),
+        "second": float(closest[1]),
+    }
+
+
+def _coverage(_opened: _Opener, frames: int) -> Figures:
+    """Fields with three stars and five, and their mean number, by the faintest magnitude."""
+    from cubestack.emulator.scene.hipparcos import load_sky
+
+    rng = np.random.default_rng(1)
+    boresights = rng.standard_normal((frames, 3))
+    boresights /= np.linalg.norm(boresights, axis=1, keepdims=True)
+    figures = {}
+    for limit in (3.0, 3.2, 3.4, 3.5, 3.6, 3.8, 4.0, 5.0):
+        vectors = load_sky(COVERAGE_EPOCH, limit).vectors.astype(np.float32)
+        cosines = boresights.astype(np.float32) @ vectors.T
+        diameter = {3.5: 50.0, 5.0: 20.0}.get(limit, COVERAGE_DEG)  # figure 3.8's two examples
+        seen = np.count_nonzero(cosines > np.cos(np.radians(diameter / 2)), axis=1)
+        name = f"{limit:.1f}".replace(".", "_")
+        figures[f"three_{name}"] = float(100 * np.mean(seen >= 3))
+        figures[f"five_{name}"] = float(100 * np.mean(seen >= 5))
+        figures[f"mean_{name}"] = float(seen.mean())
+    return figures
+
+
+def _centroids(opened: _Opener, frames: int) -> Figures:
+    """Mean errors in px of stars drawn into uploaded pictures, 5 x 5 Gaussians of sigma 1 px."""
+    rng, errors = np.random.default_rng(1), []
+    with opened(None, seed=0) as emulated:
+        for _ in range(frames):
+            cells = rng.permutation(10 * 5)[:STARS_DRAWN]  # one star a cell keeps them apart
+            grid = np.stack([cells % 10 * 100 + 50, cells // 10 * 100 + 50], axis=1)
+            centres = grid + rng.uniform(-20, 20, grid.shape)
+            picture = np.zeros((512, 1024), np.uint8)
+            for x, y in centres:
+                rows, columns = np.mgrid[round(y) - 2 : round(y) + 3, round(x) - 2 : round(x) + 3]
+                squared = (columns - x) ** 2 + (rows - y) ** 2
+                picture[rows, columns] = np.round(255 * np.exp(-squared / 2))
+            emulated.client.upload_image(picture)
+            emulated.client.process_image()
+            found = np.array([(star.x_px, star.y_px) for star in emulated.client.stars()])
+            nearest = np.linalg.norm(found[:, None] - centres, axis=2).argmin(axis=1)
+            errors.append(np.abs(found - centres[nearest]).mean(axis=0))
+    x, y = np.mean(errors, axis=0)
+    return {"x": float(x), "y": float(y)}
+
+
+def _loop(opened: _Opener, frames: int) -> Figures:
+    """Means of the 1 Hz loop's phases in ms, and its power in mW, over so many turns."""
+    from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+
+    warm_up, turns = 3, []
+    with opened(None, seed=0) as device:
+        client, power = device.client.client, device.board.power
+        client.command("Trigger")
+        for turn in range(frames + warm_up):
+            if turn == warm_up:
+                started_s, charge_mas = device.time_s, power.charge_mas()
+            due_s = device.time_s + 1
+            while device.time_s < due_s - 1e-9:
+                client.pause(due_s - device.time_s)
+            if turn >= warm_up:
+                turns.append(device.client.phase_times())
+        mw = CUBESTAR_POWER.volts * (power.charge_mas() - charge_mas) / (device.time_s - started_s)
+    figures = {name: mean(turn[name] for turn in turns) for name in turns[0]}
+    return {**figures, "mw": mw}
+
+
+def _power(_opened: _Opener, _frames: int) -> Figures:
+    """Currents in mA of the four modes of table 6.2."""
+    from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+    from cubestack.emulator.sim.power import PowerModel
+    from cubestack.emulator.sim.virtual_time import Kernel
+
+    power, found = PowerModel(Kernel(), CUBESTAR_POWER), {}
+    modes = {
+        "idle": {},
+        "discard": {"imager": "enabled"},
+        "capture": {"imager": "enabled", "fpga": "storing", "processor": "run"},
+        "transfer": {"fpga": "reading", "processor": "run", "memory": "transfer"},
+    }
+    for name, states in modes.items():
+        for part, model in CUBESTAR_POWER.parts.items():
+            power.set_state(part, states.get(part, next(iter(model.ma))))
+        found[name] = power.current_ma()
+    leds = CUBESTAR_POWER.parts["leds"].ma["on"]
+    return {
+        **found,
+        "peak_w": found["capture"] * CUBESTAR_POWER.volts / 1000,
+        "leds_mw": leds * CUBESTAR_POWER.volts,
+    }
+
+
+def _rates(opened: _Opener, _frames: int) -> Figures:
+    """Frames a second for each setting of the register, of captures one frame apart."""
+    figures = {}
+    with opened(None, seed=0) as device:
+        for register in REGISTERS:
+            device.client.client.command("SetFrameRate", FrameRate=register)
+            period_ms = 1000 * 27e6 / CRYSTAL_HZ / register
+            times = []
+            for delay_ms in (70, round(period_ms) + 5):
+                device.client.client.command("SetDiscardDelay", Delay=delay_ms)
+                device.client.capture()
+                phases = device.client.phase_times()
+                times.append(phases["discard"] + phases["capture"])
+            figures[f"fps_{register}"] = 1000 / (times[1] - times[0])
+    return figures
+
+
+def _optics(_opened: _Opener, _frames: int) -> Figures:
+    """Fields of view by equations 3.5.2 to 3.5.4, and what follows from the sensor's data."""
+    from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
+
+    def angle(size_px: int, focal_mm: float) -> float:
+        return float(np.degrees(2 * np.arctan(size_px * PIXEL_PITCH_MM / 2 / focal_mm)))
+
+    photons = 25e-9 * 535e-9 / (6.63e-34 * 3e8) * (PIXEL_PITCH_MM / 10) ** 2
+    return {
+        "wide": angle(COLUMNS, 6.0),
+        "high": angle(ROWS, 6.0),
+        "round": 2 * float(np.sqrt(angle(COLUMNS, 6.0) * angle(ROWS, 6.0) / np.pi)),
+        "wide_fitted": angle(COLUMNS, 6.28),
+        "high_fitted": angle(ROWS, 6.28),
+        "photons": photons,
+        "saturated_s": (1 << 12) / 1008,
+        "least_fps": 11e6 / 5_413_590,
+    }
+
+
+def _skies() -> dict[str, Trial]:
+    """Tables 4.4 and 4.5: skies and modes."""
+    skies: dict[str, dict[str, Any]] = {f"v{v}": {"mag_limit": v} for v in (3.6, 3.7, 3.8)}
+    skies |= {f"false{n}": {"mag_limit": 3.8, "false_stars": n} for n in (1, 5, 10)}
+    modes = {"lis": None, "assisted": 5.0, "exact": 0.0}
+    return {
+        f"{sky}-{mode}": Trial(partial(_field, hint_deg=hint, **how), 300, 1, 25)
+        for sky, how in skies.items()
+        for mode, hint in modes.items()
+        if mode != "exact" or "false_stars" not in how
+    }
+
+
+FIDELITY = Fidelity(
+    page="fidelity.md",
+    trials={
+        **_skies(),
+        "catalogue": Trial(_catalogue, seconds=2, profiles=False),
+        "coverage": Trial(_coverage, 20_000, 500, 10, profiles=False),
+        "centroids": Trial(_centroids, 20, 1, 30),
+        "noiseless": measured(
+            "cubestar", _attitudes, 100, 2, 10, mag_limit=3.8, no_noise=True, seed=1
+        ),
+        "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8, seed=1),
+        "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5, seed=1),
+        "loop": Trial(_loop, 20, 2, 10),
+        "power": Trial(_power, profiles=False),
+        "rates": Trial(_rates, seconds=2, profiles=False),
+        "optics": Trial(_optics, profiles=False),
+    },
+    tables=read_tables("cubestack.host.experiments.cubestar"),
+)

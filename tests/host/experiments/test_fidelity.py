@@ -1,0 +1,133 @@
+"""Published figures: what devices declare, the command that measures ours, and the pages."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.host.devices import fidelity as declared
+from cubestack.host.devices.fidelity import Fidelity, Row, Trial, read_tables
+from cubestack.host.devices.registry import BUILT_IN, device
+from cubestack.host.experiments import fidelity
+from cubestack.host.experiments.fidelity import Job, fidelity_of
+from tests.conftest import Run
+
+ROOT = Path(__file__).parents[3]
+LEAST_ROWS = 60
+
+
+def test_there_are_enough_rows_and_no_key_twice() -> None:
+    keys = {name: [row.key for row in fidelity_of(name).rows] for name in BUILT_IN}
+    assert sum(map(len, keys.values())) >= LEAST_ROWS
+    for name, own in keys.items():
+        assert len(set(own)) == len(own), name
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_trial_serves_a_row_and_every_row_has_one(name: str) -> None:
+    rows = list(fidelity_of(name).rows)
+    assert {row.trial for row in rows} == set(fidelity_of(name).trials)
+    assert all(all((row.figure, row.source, row.published, row.ours)) for row in rows)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_quick_run_gives_every_row_a_value_in_both_profiles(run: Run, name: str) -> None:
+    lines = run("fidelity", name, "--quick", "--json", "--workers", "1").out.splitlines()
+    rows = [json.loads(line) for line in lines]
+    assert [row["key"] for row in rows] == [row.key for row in fidelity_of(name).rows]
+    for row in rows:
+        assert set(row["ours"]) == {"published", "extended"}, row["key"]
+        for value in row["ours"].values():
+            assert any(character.isdigit() for character in value), (row["key"], value)
+            assert "-" not in value.replace("e-", ""), (row["key"], value)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_commands_of_the_rows_are_real(name: str) -> None:
+    from cubestack.host.cli.main import make_parser
+
+    for row in fidelity_of(name).rows:
+        make_parser().parse_args(fidelity_of(name).command(name, row).split())
+
+
+def test_rows_are_chosen_by_their_keys(run: Run) -> None:
+    out = run("fidelity", "cubesense", "--rows", "power-*", "--workers", "1").out
+    assert "table 7.1" in out
+    assert "equation" not in out
+    refused = run("fidelity", "--rows", "colour")
+    assert refused.code == 2
+    assert refused.line.startswith("cubestack fidelity: no row is like colour")
+
+
+def test_a_part_is_not_written_to_the_pages(run: Run) -> None:
+    refused = run("fidelity", "--write", "--quick")
+    assert refused.code == 2
+    assert "--write wants all rows" in refused.line
+
+
+@pytest.fixture
+def lens_jobs() -> list[Job]:
+    rows = [row for row in fidelity_of("cubesense").rows if row.trial in ("lens", "power")]
+    return fidelity.jobs_of("cubesense", rows)
+
+
+def test_several_processes_find_what_one_does(lens_jobs: list[Job]) -> None:
+    told: list[Job] = []
+    alone = fidelity.run_jobs(lens_jobs, 1, told.append)
+    assert fidelity.run_jobs(lens_jobs, 2, told.append) == alone
+    assert sorted(map(str, told)) == sorted(2 * [str(job) for job in lens_jobs])
+
+
+def test_what_a_profile_does_not_change_runs_once(lens_jobs: list[Job]) -> None:
+    assert {job.trial for job in lens_jobs} == {"lens", "power"}
+    assert len(lens_jobs) == 2
+
+
+def test_frames_are_those_of_the_trial_unless_given() -> None:
+    rows = [row for row in fidelity_of("cubesense").rows if row.trial == "nadir"]
+    trial = fidelity_of("cubesense").trials["nadir"]
+    for options, frames in (({}, trial.frames), ({"quick": True}, trial.quick), ({"frames": 7}, 7)):
+        assert {job.frames for job in fidelity.jobs_of("cubesense", rows, **options)} == {frames}
+
+
+ROW = Row("a", "speed", "section 1", "3 m/s", "fitted", "walk", "{v:.1f} m/s")
+
+
+def test_what_there_is_not_is_a_dash() -> None:
+    assert fidelity.shown(ROW, {"v": float("nan")}) == "- m/s"
+    assert fidelity.shown(ROW, {"v": 2.96}) == "3.0 m/s"
+
+
+def test_a_table_with_another_word_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "published.md").write_text("## t\n| a | b | c | d | guessed | e | f |\n")
+    monkeypatch.setattr(declared.resources, "files", lambda _package: tmp_path)
+    with pytest.raises(ValueError, match="not the cells of key, figure"):
+        read_tables("anything")
+
+
+def test_only_the_tables_of_a_page_are_rewritten(monkeypatch: pytest.MonkeyPatch) -> None:
+    sensor = replace(
+        device("aramis"),
+        fidelity=lambda: Fidelity(
+            "page.md", {"walk": Trial(lambda _opened, _frames: {"v": 2.5})}, {"pace": (ROW,)}
+        ),
+    )
+    monkeypatch.setattr(fidelity, "registered", lambda _name: sensor)
+    rows = fidelity.chosen_rows("aramis")
+    jobs = fidelity.jobs_of("aramis", [row for _, row in rows], ["published"])
+    found = fidelity.run_jobs(jobs, 1, lambda _job: None)
+    page = "above\n<!-- rows: pace -->\nold\n<!-- end of rows -->\nbelow\n"
+    once = fidelity.rewritten(page, list(fidelity.filled("aramis", rows, found)))
+    assert once.startswith("above\n")
+    assert once.endswith("below\n")
+    assert "old" not in once
+    line = "| speed | section 1 | 3 m/s | 2.5 m/s |  | fitted | `fidelity aramis --rows a` |\n"
+    assert line in once
+    assert fidelity.rewritten(once, list(fidelity.filled("aramis", rows, found))) == once
+    with pytest.raises(ValueError, match="no line '<!-- rows: pace -->'"):
+        fidelity.rewritten("", list(fidelity.filled("aramis", rows, found)))
