@@ -168,9 +168,9 @@ class Commands(CommandExecutor):
             self.state.raise_flag(flag)
             return
         now_us: int = yield ReadTimer()
-        delay_s = float(self.state.settings.get("setDelayTimerTimeout", "Time"))
+        delay_us = 10_000 * int(self.state.settings.get("setDelayTimerTimeout", "Time"))
         retained.looping = retained.delaying = 1
-        retained.loop_due_us = now_us + round(1_000_000 * delay_s)
+        retained.loop_due_us = now_us + delay_us
 
     def _stop_loop(self, _command: QueuedCommand) -> None:
         self.state.retained.looping = self.state.retained.delaying = 0

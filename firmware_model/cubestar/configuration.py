@@ -5,16 +5,20 @@ import math
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
+from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
 from cubestack.firmware_model.node.settings import Settings
 
 
 def detection_config(settings: Settings, *, plain_weights: bool = False) -> DetectionConfig:
-    """Region, thresholds and limits of the search; see ``DetectionConfig``."""
+    """Region, thresholds and limits of the search; see ``DetectionConfig``.
+
+    Settings that this hardware can not follow act as the nearest that it can.
+    """
     values = settings.all(
         "setDetectionRegion", "setDetectionThresholds", "setStarPixels", "setDetectionVariables"
     )
     return DetectionConfig(
-        step=values["StepSize"],
+        step=max(values["StepSize"], 1),
         x_start=values["Xstart"],
         x_end=values["Xend"] + 1,
         y_start=values["Ystart"],
@@ -23,8 +27,8 @@ def detection_config(settings: Settings, *, plain_weights: bool = False) -> Dete
         star_threshold=values["StarThreshold"],
         min_pixels=values["MinPixels"],
         max_pixels=values["MaxPixels"],
-        grid_size=values["GridSize"],
-        max_stars=values["MaxStars"],
+        grid_size=values["GridSize"] | 1,
+        max_stars=min(max(values["MaxStars"], 1), MOST_STARS),
         max_invalid=values["MaxInvalidStars"],
         max_noise=values["MaxNoise"],
         plain_weights=plain_weights,

@@ -14,6 +14,7 @@ from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
+from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory
@@ -50,12 +51,12 @@ def _limit(command: str, field: str) -> int:
     """Largest value that a telecommand's parameter may have."""
     declared = INTERFACE.telecommand(command).field(field)
     largest = declared.raw_range[1] if declared.maximum is None else declared.maximum
-    return int(largest)
+    return int(max(largest, declared.also or 0))
 
 
 def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
     """Every buffer of the program with ``catalogue`` in its flash, at the settings' limits."""
-    stars = _limit("setDetectionVariables", "MaxStars")
+    stars = MOST_STARS
     pairs = stars * (stars - 1) // 2
     pixels = _limit("setStarPixels", "MaxPixels")
     invalid = _limit("setDetectionVariables", "MaxInvalidStars") + 1

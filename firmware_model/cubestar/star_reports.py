@@ -8,6 +8,7 @@ import numpy as np
 from cubestack.firmware_model.cubestar.detection import Detection
 from cubestack.firmware_model.cubestar.processing import Processing, Results
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cubestar.telemetry import UNIT_VECTOR_SCALE
 
 NOT_IDENTIFIED = 0xFFFF
 NO_STAR = 0xFF
@@ -113,7 +114,7 @@ class StarReports:
     def _details(self, star: int) -> Values:
         return {
             **named(("CCx", "CCy"), self._results.points[star]),
-            **named(("Vbx", "Vby", "Vbz"), self._results.vectors[star]),
+            **named(("Vbx", "Vby", "Vbz"), UNIT_VECTOR_SCALE * self._results.vectors[star]),
             **named(("ID", "ValidationVote", "confidance"), self._match(star)),
         }
 

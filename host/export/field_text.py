@@ -23,6 +23,8 @@ def field_details(field: Field) -> str:
         parts.append(f"at least {field.minimum:g}")
     elif field.maximum is not None:
         parts.append(f"at most {field.maximum:g}")
+    if field.also is not None:
+        parts.append(f"or {field.also:g}")
     if field.reset and not isinstance(field.reset, bytes):
         parts.append(f"reset {field.label(field.reset)}")
     if field.range_flag:
@@ -44,7 +46,7 @@ def field_json(field: Field) -> dict[str, object]:
     return {
         **picked(field, "name", "type", "bit_offset", "meaning", "unit", "scale"),
         "choices": None if choices is None else {choice.name: int(choice) for choice in choices},
-        **picked(field, "minimum", "maximum", "maximum_by", "range_flag", "flag"),
+        **picked(field, "minimum", "maximum", "also", "maximum_by", "range_flag", "flag"),
         "reset": field.reset.hex() if isinstance(field.reset, bytes) else field.reset,
     }
 

@@ -70,6 +70,7 @@ class Field:
         scale: raw counts for one unit.
         choices: the allowed values and their names, or None.
         minimum, maximum: smallest and largest allowed value, in ``unit``.
+        also: a value that is allowed beyond these limits, or None.
         maximum_by: (other field, {its value: largest allowed value here}), or None.
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.
@@ -86,6 +87,7 @@ class Field:
     choices: Choices | None = None
     minimum: float | None = None
     maximum: float | None = None
+    also: float | None = None
     maximum_by: tuple[str, Mapping[int, float]] | None = None
     range_flag: str = ""
     flag: str = ""
@@ -171,7 +173,7 @@ class Field:
 
     def allows(self, value: Value, others: Mapping[str, Value]) -> bool:
         """Whether a decoded ``value`` is within the limits; ``others`` are its message's values."""
-        if isinstance(value, bytes):
+        if isinstance(value, bytes) or value == self.also:
             return True
         if self.choices is not None and value not in {int(choice) for choice in self.choices}:
             return False

@@ -9,7 +9,6 @@ through a page (SetCameraRegisterPage); telemetry 138 is answered as an unknown 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubestar.codes import (
-    GridSize,
     IdMode,
     ImageBlockSize,
     MatchMode,
@@ -35,7 +34,6 @@ __all__ = [
     "INTERFACE",
     "UPLOAD_BLOCK_BYTES",
     "AckError",
-    "GridSize",
     "IdMode",
     "ImageBlockSize",
     "MatchMode",

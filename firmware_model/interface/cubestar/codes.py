@@ -69,15 +69,6 @@ class MatchMode(IntEnum):
     LOST_IN_SPACE = 2
 
 
-class GridSize(IntEnum):
-    """Side of the centroiding window in pixels; odd, with a middle. The set is assumed."""
-
-    GRID_3 = 3
-    GRID_5 = 5
-    GRID_7 = 7
-    GRID_9 = 9
-
-
 class TestPattern(IntEnum):
     """Pattern that CaptureTestPatern writes to the picture memory; assumed."""
 

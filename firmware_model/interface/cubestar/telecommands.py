@@ -15,8 +15,8 @@ from cubestack.firmware_model.interface.cubestar import codes
 #: Bytes of a picture: one for each pixel, row after row.
 IMAGE_BYTES = COLUMNS * ROWS
 
-LARGEST_AREA = 240
-"""The list of visited pixels must fit the free half of the external SRAM at every setting."""
+MOST_STARS = 20
+"""What the firmware's preassigned arrays hold (CubeStar thesis, section 5.3.4)."""
 
 
 def _focal_length(name: str, meaning: str, reset: float) -> Field:
@@ -36,7 +36,7 @@ _SYSTEM = (
     Message(2, "Reset", "restart the program; settings and counters return to power-up values"),
     Message(3, "MCUReset", "reset the microcontroller, as its system-request reset does"),
     Message(4, "setDelayTimerTimeout", "delay between Trigger and the first capture").of(
-        u8("Time", "delay", "s", scale=10, maximum=1.0, range_flag="DelayTimeSetToLong")
+        u8("Time", "delay", "x 10 ms", reset=1).within(1, 100, "DelayTimeSetToLong")
     ),
     Message(5, "ClearWDGResetCounter", "set the count of watchdog resets to zero"),
     Message(6, "ClearErrorFlags", "clear all flags of telemetry ErrorFlags"),
@@ -56,7 +56,7 @@ _OPTICS = (
         "focal length that turns undistorted pixels into unit vectors (pixel pitch 5.6 um)",
     ).of(
         f32("FocalLength", "focal length", "mm", reset=6.28).within(
-            1.0, 100.0, "FocalLengthRangeError"
+            5.0, 7.0, "FocalLengthRangeError"
         )
     ),
     Message(
@@ -156,17 +156,21 @@ _IMAGE = (
     ),
 )
 
+_LATER = "; published: {} of a 1280 x 1024 sensor, not mapped; beyond this one refused"
+
 _DETECTION = (
     Message(
-        20, "setDetectionRegion", "part of the picture that is searched, both ends included"
+        20,
+        "setDetectionRegion",
+        "part of this sensor's 1024 x 512 pixels that is searched, both ends included",
     ).of(
-        u8("StepSize", "look at every n-th pixel of every n-th row", "px", reset=3).within(
-            1, 32, "ValidImageRangeSetError"
-        ),
-        _edge("Xstart", "first column", COLUMNS - 1, 0),
-        _edge("Xend", "last column", COLUMNS - 1, COLUMNS - 1),
-        _edge("Ystart", "first row", ROWS - 1, 0),
-        _edge("Yend", "last row", ROWS - 1, ROWS - 1),
+        u8(
+            "StepSize", "look at every n-th pixel of every n-th row; 0 acts as 1", "px", reset=3
+        ).within(None, 10, "ValidImageRangeSetError"),
+        _edge("Xstart", f"first column{_LATER.format('0 to 343')}", COLUMNS - 1, 0),
+        _edge("Xend", f"last column{_LATER.format('936 to 1279')}", COLUMNS - 1, COLUMNS - 1),
+        _edge("Ystart", f"first row{_LATER.format('7 to 96')}", ROWS - 1, 0),
+        _edge("Yend", f"last row{_LATER.format('943 to 1030')}", ROWS - 1, ROWS - 1),
         ordered=(("Xstart", "Xend"), ("Ystart", "Yend")),
     ),
     Message(
@@ -178,23 +182,30 @@ _DETECTION = (
         u8("StarThreshold", "for a neighbour while growing", "DN", reset=6),
     ),
     Message(22, "setStarPixels", "number of pixels of a star").of(
-        u8("MinPixels", "fewer are noise", "px", minimum=1, range_flag="StarPixSetError", reset=6),
+        u8("MinPixels", "fewer are noise", "px", reset=6).within(1, 100, "StarPixSetError"),
         u8("MaxPixels", "more are an invalid star", "px", reset=60).within(
-            1, LARGEST_AREA, "StarPixSetError"
+            1, 100, "StarPixSetError"
         ),
         ordered=(("MinPixels", "MaxPixels"),),
     ),
     Message(23, "setDetectionVariables", "centroiding window, and when the search stops").of(
         u8(
             "GridSize",
-            "side of the centroiding window",
+            "side of the centroiding window; an even one acts as the next odd one",
             "px",
-            choices=codes.GridSize,
-            range_flag="CentroidingGridSizeSetError",
-            reset=codes.GridSize.GRID_5,
-        ),
-        u8("MaxStars", "stars found", reset=20).within(2, 20, "MaxStarsSetError"),
-        u8("MaxInvalidStars", "more areas than this were too large", reset=50),
+            reset=5,
+        ).within(None, 15, "CentroidingGridSizeSetError"),
+        u8(
+            "MaxStars",
+            f"stars found; more than {MOST_STARS}, the list's length, act as {MOST_STARS}, 0 as 1",
+            reset=MOST_STARS,
+        ).within(None, 99, "MaxStarsSetError"),
+        u8(
+            "MaxInvalidStars",
+            "more areas than this were too large; 50 is the thesis' own (section 5.3.3)",
+            also=50,
+            reset=50,
+        ).within(None, 15),
         u8("MaxNoise", "more areas than this were too small", reset=255).within(
             1, None, "MaxNoiseSetError"
         ),

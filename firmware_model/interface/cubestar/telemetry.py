@@ -27,7 +27,7 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import codes
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 
-_UNIT_VECTOR_SCALE = 10_000
+UNIT_VECTOR_SCALE = 10_000
 
 _identity = partial(u16, meaning="index in the onboard star list; 65535: not identified")
 _percent = partial(u8, meaning="confidence of the identification", unit="%")
@@ -37,9 +37,9 @@ _temperature = partial(i16, meaning="temperature of the processor", unit="degC",
 
 _STAR_NUMBER = u8("StarNumber", "number of the detected star, from 0")
 _CURRENTS = (
-    u16("Current", "present current of frame buffer and imager", "mA", 10),
-    u16("MaxCurrent", "largest since power-up", "mA", 10),
-    u16("MinCurrent", "smallest since power-up", "mA", 10),
+    u16("Current", "present current of frame buffer and imager", "mA"),
+    u16("MaxCurrent", "largest since power-up", "mA"),
+    u16("MinCurrent", "smallest since power-up", "mA"),
 )
 
 
@@ -50,7 +50,7 @@ def _times(*names_and_meanings: tuple[str, str]) -> tuple[Field, ...]:
 
 def _scaled(meaning: str, *names: str, unit: str = "") -> tuple[Field, ...]:
     """i16/10000 fields, one after the other."""
-    return tuple(i16(name, meaning, unit, _UNIT_VECTOR_SCALE) for name in names)
+    return tuple(i16(name, meaning, unit, UNIT_VECTOR_SCALE) for name in names)
 
 
 def _selected_star(number: int) -> Message:
@@ -59,8 +59,8 @@ def _selected_star(number: int) -> Message:
     return Message(
         169 + number, f"Star{number}Details", f"selected star {number}: centroid, vectors, identity"
     ).of(
-        u16(f"{prefix}CentX", "measured column", "px", 50),
-        u16(f"{prefix}CentY", "measured row", "px", 50),
+        u16(f"{prefix}CentX", "measured column", "px"),
+        u16(f"{prefix}CentY", "measured row", "px"),
         u16(f"{prefix}Mag", "brightness, sum over the centroiding window", "DN"),
         *_scaled("camera unit vector", *(f"{prefix}VB{axis}" for axis in "XYZ")),
         *_scaled("inertial unit vector", *(f"{prefix}VI{axis}" for axis in "XYZ")),
@@ -312,7 +312,7 @@ _ATTITUDE = (
         _STAR_NUMBER,
         f32("CCx", "column without distortion", "px"),
         f32("CCy", "row without distortion", "px"),
-        *_scaled("camera unit vector", "Vbx", "Vby", "Vbz"),
+        *(i16(name, "camera unit vector, in parts of 10 000") for name in ("Vbx", "Vby", "Vbz")),
         _identity("ID"),
         u8("ValidationVote", "other stars whose distance agrees"),
         f32("confidance", "confidence of the identification, 0 to 1"),
@@ -327,7 +327,7 @@ _ATTITUDE = (
 
 _LOG = (
     Message(173, "DelayTime", "delay between Trigger and the first capture").of(
-        u8("Timeout", "delay", "s", 10)
+        u8("Timeout", "delay", "x 10 ms")
     ),
     Message(174, "LogStatus", "state and errors in one frame").of(
         _temperature("Temp"),

@@ -66,3 +66,15 @@ def test_the_field_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
     farthest = np.hypot(x - cx, y - cy).max()
     expected = np.degrees(np.arctan(farthest * 0.0056 / 6.28))
     assert field_radius_deg(camera_parameters(settings)) == pytest.approx(expected, rel=1e-6)
+
+
+def test_settings_that_the_hardware_can_not_follow_act_as_the_nearest() -> None:
+    settings = Settings(INTERFACE, SETTING_COMMANDS)
+    wide = {"GridSize": 4, "MaxStars": 99, "MaxInvalidStars": 50, "MaxNoise": 13}
+    settings.put("setDetectionVariables", wide)
+    config = detection_config(settings)
+    assert (config.grid_size, config.max_stars, config.max_invalid) == (5, 20, 50)
+    settings.put("setDetectionVariables", wide | {"GridSize": 15, "MaxStars": 0})
+    settings.put("setDetectionRegion", settings.all("setDetectionRegion") | {"StepSize": 0})
+    config = detection_config(settings)
+    assert (config.grid_size, config.max_stars, config.step) == (15, 1, 1)

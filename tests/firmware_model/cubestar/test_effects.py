@@ -88,8 +88,8 @@ def test_mcu_reset(unit: Harness) -> None:
 
 @telecommand("setDelayTimerTimeout")
 def test_set_delay_timer_timeout(unit: Harness) -> None:
-    unit.command("setDelayTimerTimeout", Time=0.4)
-    unit.shown("DelayTime", Timeout=0.4)
+    unit.command("setDelayTimerTimeout", Time=40)
+    unit.shown("DelayTime", Timeout=40)
     start_us = unit.now_us
     unit.send("Trigger")
     unit.run(until_us=start_us + 3_000_000)
@@ -229,9 +229,11 @@ def test_registers(unit: Harness) -> None:
 
 @telecommand("setFocalLength")
 def test_set_focal_length(unit: Harness, sky: Sky) -> None:
-    unit.command("setFocalLength", FocalLength=12.0)
-    unit.shown("FocalLengthDetails", FocalLength=12.0, Fx=1147.5, Fy=1147.4)
-    assert first_vector(unit, sky)[2] > 0.98  # half the field
+    before = first_vector(unit, sky)
+    unit.command("setFocalLength", FocalLength=7.0)
+    unit.shown("FocalLengthDetails", FocalLength=7.0, Fx=1147.5, Fy=1147.4)
+    after = first_vector(unit, sky)
+    assert after[1] / after[2] == pytest.approx(6.28 / 7 * before[1] / before[2], rel=1e-3)
 
 
 @telecommand("setFocalLengthComponents")
@@ -353,8 +355,8 @@ def test_set_detection_thresholds(unit: Harness, sky: Sky) -> None:
 
 @telecommand("setStarPixels")
 def test_set_star_pixels(unit: Harness, sky: Sky) -> None:
-    unit.command("setStarPixels", MinPixels=100, MaxPixels=200)
-    unit.shown("StarPixels", MinPixels=100, MaxPixels=200)
+    unit.command("setStarPixels", MinPixels=99, MaxPixels=100)
+    unit.shown("StarPixels", MinPixels=99, MaxPixels=100)
     first(unit, sky)
     summary = unit.telemetry("DetectionSummary")
     assert (summary["NumStarsDetected"], summary["AmountOfNoise"]) == (0, len(sky.stars))

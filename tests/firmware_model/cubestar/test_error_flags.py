@@ -224,7 +224,7 @@ def triggered(unit: Harness, sky: Sky) -> None:
 
 @flag("TimerAlreadyRunning")
 def timer_running(unit: Harness, _: Sky) -> None:
-    unit.command("setDelayTimerTimeout", Time=1.0)
+    unit.command("setDelayTimerTimeout", Time=100)
     unit.send("Trigger")
     unit.send("Trigger")
     unit.command("StopLoop")

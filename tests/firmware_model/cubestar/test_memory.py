@@ -58,8 +58,8 @@ def test_sizes_that_other_sources_give(buffers: tuple[Buffer, ...]) -> None:
 
 
 def test_visited_pixels_fit_at_the_limits_of_all_settings(buffers: tuple[Buffer, ...]) -> None:
-    # 20 stars and 256 invalid areas of 240 pixels, 256 noise areas of 239, four bytes each
-    assert size(buffers, "visited pixels") == 4 * (276 * 240 + 256 * 239)
+    # 20 stars and 51 invalid areas of 100 pixels, 256 noise areas of 99, four bytes each
+    assert size(buffers, "visited pixels") == 4 * (71 * 100 + 256 * 99)
 
 
 def test_the_reduced_list_s_size(buffers: tuple[Buffer, ...], catalogue: StarCatalogue) -> None:

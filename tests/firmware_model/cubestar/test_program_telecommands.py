@@ -118,7 +118,7 @@ def test_a_reset_by_telecommand_ends_the_loop(unit: Harness) -> None:
 
 
 def test_triggering_while_the_delay_timer_runs(unit: Harness) -> None:
-    unit.command("setDelayTimerTimeout", Time=1.0)
+    unit.command("setDelayTimerTimeout", Time=100)
     for _ in range(2):  # also after the loop ran before
         unit.command("ClearErrorFlags")
         unit.log.clear()
@@ -136,7 +136,7 @@ def test_triggering_while_the_delay_timer_runs(unit: Harness) -> None:
 
 
 def test_stopping_while_the_delay_timer_runs(unit: Harness) -> None:
-    unit.command("setDelayTimerTimeout", Time=1.0)
+    unit.command("setDelayTimerTimeout", Time=100)
     unit.start_loop(0.5)
     unit.command("StopLoop")
     assert unit.stored_us() == []

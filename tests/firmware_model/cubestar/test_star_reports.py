@@ -109,7 +109,7 @@ def test_detected_stars(solved: Harness, sky: Sky) -> None:
         corrected = pick(place, "X_CorrectedCoordinate", "Y_CorrectedCoordinate")
         assert corrected == near(ideal[star], 0.06)
         assert pick(vectors[number], "VbX", "VbY", "VbZ") == near(body[star], VECTOR_STEP)
-        assert pick(detail, "Vbx", "Vby", "Vbz") == near(body[star], VECTOR_STEP)
+        assert pick(detail, "Vbx", "Vby", "Vbz") == near(1e4 * body[star], 1)
         assert pick(detail, "CCx", "CCy") == near(ideal[star], 0.06)
         assert pick(detail, "ID", "ValidationVote") == [sky.stars[star], len(stars) - 1]
         assert detail["confidance"] == near((len(stars) - 1) / len(stars), 1e-6)
@@ -161,7 +161,7 @@ def test_selected_are_the_brightest_of_those_with_most_votes(solved: Harness, sk
         identity = int(sky.stars[stars[number]])
         values = solved.telemetry(f"Star{n}Details")
         place = pick(positions[number], "X_Coordinate", "Y_Coordinate")
-        assert pick(values, f"S{n}CentX", f"S{n}CentY") == near(place, 0.011)
+        assert pick(values, f"S{n}CentX", f"S{n}CentY") == near(place, 0.5)
         assert values[f"S{n}Mag"] == positions[number]["Intensity"]
         body = pick(bodies[number], "VbX", "VbY", "VbZ")
         assert [values[f"S{n}VB{axis}"] for axis in "XYZ"] == body

@@ -116,7 +116,7 @@ def test_no_current_behind_an_open_switch_is_no_error(unit: Harness) -> None:
 def test_currents_of_imager_and_memory(unit: Harness, monkeypatch: pytest.MonkeyPatch) -> None:
     unit.command("CaptureImage")
     values = unit.telemetry("PowerStatus")
-    assert (values["Current"], values["MinCurrent"], values["MaxCurrent"]) == (52.8, 52.8, 52.8)
+    assert (values["Current"], values["MinCurrent"], values["MaxCurrent"]) == (53, 53, 53)
 
     def draw(channel: str) -> float:
         by_pins = {(1, 0): 151.7, (1, 1): 40.1}
@@ -128,11 +128,11 @@ def test_currents_of_imager_and_memory(unit: Harness, monkeypatch: pytest.Monkey
         patch.setattr(unit, "supply_current_ma", draw)
         unit.command("CaptureImage")
     values = unit.telemetry("PowerStatus")
-    assert (values["Current"], values["MinCurrent"], values["MaxCurrent"]) == (52.8, 40.1, 151.7)
+    assert (values["Current"], values["MinCurrent"], values["MaxCurrent"]) == (53, 40, 152)
     unit.currents["imager"] = 60.0
     unit.command("MCUReset")
     log = unit.telemetry("LogStatus")
-    assert (log["Current"], log["MinCurrent"], log["MaxCurrent"]) == (60.0, 40.1, 151.7)
+    assert (log["Current"], log["MinCurrent"], log["MaxCurrent"]) == (60, 40, 152)
 
 
 def test_each_channel_is_reported(unit: Harness) -> None:

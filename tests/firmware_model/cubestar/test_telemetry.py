@@ -135,9 +135,9 @@ def test_log_status(unit: Harness) -> None:
         "WDGcounter": 1,
         "Status": TaskStatus.IDENTIFICATION_FAILED,
         "SW": 1,
-        "Current": 60.1,
-        "MaxCurrent": 60.1,
-        "MinCurrent": 52.8,
+        "Current": 60,
+        "MaxCurrent": 60,
+        "MinCurrent": 53,
     }
 
 

@@ -14,18 +14,6 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSiz
 
 PRINTED = Path(__file__).with_name("printed_layouts.txt").read_text(encoding="ascii")
 
-# Fields whose scale is assumed, because the tables print a plain integer and no unit.
-ASSUMED_SCALES = {
-    "setDelayTimerTimeout": {"Time"},
-    "DelayTime": {"Timeout"},
-    "PowerStatus": {"Current", "MaxCurrent", "MinCurrent"},
-    "LogStatus": {"Current", "MaxCurrent", "MinCurrent"},
-    "Star1Details": {"S1CentX", "S1CentY"},
-    "Star2Details": {"S2CentX", "S2CentY"},
-    "Star3Details": {"S3CentX", "S3CentY"},
-    "StarDetails": {"Vbx", "Vby", "Vbz"},
-}
-
 STEPPING = {
     "StarPositions",
     "BodyUnitVectors",
@@ -48,8 +36,7 @@ def test_layout_is_the_printed_one(entry: str) -> None:
     for field, printed in zip(message.fields, fields, strict=True):
         layout, _, scale = printed.partition("/")
         assert f"{field.name}@{field.bit_offset}:{field.type}" == layout
-        if field.name not in ASSUMED_SCALES.get(name, set()):
-            assert field.scale == float(scale or 1)
+        assert field.scale == float(scale or 1)
 
 
 def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
@@ -60,15 +47,14 @@ def test_nothing_is_missing_and_extensions_keep_to_their_range() -> None:
     assert ours <= set(range(100, 128)) | set(range(200, 256))
 
 
-def test_times_are_in_ms_and_currents_in_tenths_of_a_milliampere() -> None:
+def test_times_are_in_ms_and_currents_in_milliamperes() -> None:
     published = [message for message in INTERFACE.telemetries if not message.extension]
     timing = [message for message in published if re.search(r"Tim(e|ing)", message.name)]
     assert len(timing) == 11
     for message in timing:
-        assert {field.unit for field in message.fields} <= {"ms", "s"}
-    assert INTERFACE.telemetry("PowerStatus").unpack(bytes.fromhex("01 c802 0000 0000"))[
-        "Current"
-    ] == pytest.approx(71.2)
+        assert {field.unit for field in message.fields} <= {"ms", "s", "x 10 ms"}
+    status = INTERFACE.telemetry("PowerStatus").unpack(bytes.fromhex("01 4700 0000 0000"))
+    assert status["Current"] == 71
 
 
 def test_published_reset_values() -> None:
@@ -108,11 +94,9 @@ def test_log_status_shows_the_same_bytes_of_flags() -> None:
 @pytest.mark.parametrize(
     ("name", "values", "flag"),
     [
-        ("setFocalLength", {"FocalLength": 0.5}, "FocalLengthRangeError"),
         ("setFocalLength", {"FocalLength": math.nan}, "FocalLengthRangeError"),
         ("setFocalLengthComponents", {"Fx": 1147.5, "Fy": 1e6}, "FocalLengthRangeError"),
         ("setPrincipalPoint", {"Cx": 5000.0, "Cy": 175.5}, "PrincipalPointRangeError"),
-        ("setDelayTimerTimeout", {"Time": 1.1}, "DelayTimeSetToLong"),
         ("CaptureTestPatern", {"TestPaternType": 9}, "TestPatternConfigError"),
         ("ImageBlockSet", {"BlockNumber": 0, "BlockSize": 4}, "ImageBlockSizeError"),
         ("ImageBlockSet", {"BlockNumber": 4096, "BlockSize": 2}, "ImageBlockSizeError"),
@@ -130,9 +114,47 @@ def test_a_bad_parameter_names_its_flag(name: str, values: dict[str, float], fla
     assert [found for _, found in message.violations(received)] == [flag]
 
 
+@pytest.mark.parametrize(
+    ("name", "field", "low", "high", "flag"),
+    [
+        ("setDelayTimerTimeout", "Time", 1, 100, "DelayTimeSetToLong"),
+        ("setFocalLength", "FocalLength", 5, 7, "FocalLengthRangeError"),
+        ("setDetectionRegion", "StepSize", 0, 10, "ValidImageRangeSetError"),
+        ("setDetectionRegion", "Xend", 0, 1023, "ValidImageRangeSetError"),  # this sensor's
+        ("setDetectionRegion", "Yend", 0, 511, "ValidImageRangeSetError"),
+        ("setStarPixels", "MinPixels", 1, 100, "StarPixSetError"),
+        ("setStarPixels", "MaxPixels", 1, 100, "StarPixSetError"),
+        ("setDetectionVariables", "GridSize", 0, 15, "CentroidingGridSizeSetError"),
+        ("setDetectionVariables", "MaxStars", 0, 99, "MaxStarsSetError"),
+        ("setDetectionVariables", "MaxInvalidStars", 0, 15, ""),
+    ],
+)
+def test_published_ranges_hold_at_their_borders(
+    name: str, field: str, low: int, high: int, flag: str
+) -> None:
+    message = INTERFACE.telecommand(name)
+    step = 1e-4 if message.field(field).type == "f32" else 1
+    widest = {"MinPixels": 1, "MaxPixels": 100}
+    usual = {name: widest.get(name, value) for name, value in message.reset_values().items()}
+    for value, refused in ((low, 0), (high, 0), (low - step, 1), (high + step, 1)):
+        if value >= 0:  # what an unsigned field can carry
+            wrong = message.violations(message.unpack(message.pack(**usual | {field: value})))
+            assert {found for _, found in wrong} == {flag} if refused else not wrong
+
+
+def test_the_thesis_limit_of_invalid_areas_can_be_written_back() -> None:
+    message = INTERFACE.telecommand("setDetectionVariables")
+    allowed = [
+        n
+        for n in range(256)
+        if not message.violations(message.reset_values() | {"MaxInvalidStars": n})
+    ]
+    assert allowed == [*range(16), 50]
+
+
 def test_detection_settings_name_their_flags() -> None:
     message = INTERFACE.telecommand("setDetectionVariables")
-    wrong = {"GridSize": 4, "MaxStars": 21, "MaxInvalidStars": 0, "MaxNoise": 0}
+    wrong = {"GridSize": 16, "MaxStars": 100, "MaxInvalidStars": 0, "MaxNoise": 0}
     flags = [flag for _, flag in message.violations(wrong)]
     assert flags == ["CentroidingGridSizeSetError", "MaxStarsSetError", "MaxNoiseSetError"]
     region = INTERFACE.telecommand("setDetectionRegion")
