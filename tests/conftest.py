@@ -6,6 +6,8 @@ from typing import NamedTuple
 import pytest
 from hypothesis import HealthCheck, settings
 
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
+
 settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -26,6 +28,12 @@ class Outcome(NamedTuple):
 
 
 Run = Callable[..., Outcome]
+
+
+@pytest.fixture
+def profile() -> str:
+    """Profile of what is tested; a test about one of them is parametrized with its name."""
+    return DEFAULT_PROFILE
 
 
 @pytest.fixture

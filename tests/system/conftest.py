@@ -70,9 +70,9 @@ def measure(device_name: str) -> Measure:
 
 
 @pytest.fixture
-def session(device_name: str) -> Open:
+def session(device_name: str, profile: str) -> Open:
     """Opens this device, looking at a scene."""
-    return partial(open_device, device_name)
+    return partial(open_device, device_name, profile=profile)
 
 
 @pytest.fixture

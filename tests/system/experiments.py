@@ -36,13 +36,14 @@ from cubestack.emulator.scene.attitude import (
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
-from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.experiments.attitude import errors, is_right, rough_boresight
 from cubestack.host.experiments.cubestar.measure import count_wrong, give_hint
 
 PUBLISHED_PAIR_LIMIT_DEG = 42.1
+EXTENDED = CubeStarSwitches.of("extended")
 SIDEREAL_DEG_S = 360 / 86164.1
 
 #: The field of table 4.4: 54 x 28 degrees, no distortion.
@@ -78,7 +79,7 @@ class Stack:
         self,
         pair_limit_deg: float = PAIR_LIMIT_DEG,
         optics: Optics = LENS,
-        switches: CubeStarSwitches = DEFAULT_SWITCHES,
+        switches: CubeStarSwitches = EXTENDED,
     ) -> None:
         catalogue = onboard_catalogue(pair_limit_deg=pair_limit_deg)
         self.board = CubeStarBoard(SkyScene.pointing(0, 0), catalogue, switches=switches)

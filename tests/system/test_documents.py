@@ -18,6 +18,7 @@ from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.cubesense.memory import Memory, budget, used
 from cubestack.firmware_model.interface.aramis import Reason
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.host.cli.main import COMMANDS, make_parser
 from cubestack.host.cli.reports import reports
 from tests.conftest import Run
@@ -165,7 +166,7 @@ def test_cubesense_s_memory_is_that_of_its_profiles_page(run: Run) -> None:
 
 def test_figures_of_cubesense_s_page() -> None:
     page = text_of("docs/fidelity-cubesense.md")
-    assert f"{used(budget())[Memory.RAM]} of 1536 bytes" in page
+    assert f"{used(budget(CubeSenseSwitches.of('extended')))[Memory.RAM]} of 1536 bytes" in page
     rows = section(page, "Power (table 7.1)").splitlines()
     states = [[cell.strip() for cell in row.split("|")[1:8]] for row in rows if row.endswith("% |")]
     counts = {"off": 0, "one": 1, "both": 2, "": 0, "one side": 1, "both sides": 2}

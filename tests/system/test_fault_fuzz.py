@@ -6,6 +6,7 @@ byte.
 
 import hashlib
 import os
+from dataclasses import replace
 from itertools import accumulate
 from typing import Any
 
@@ -222,7 +223,7 @@ class Fuzzer:
 
 
 SCENES = {
-    "cubestar": SkyScene.pointing(84, -1),
+    "cubestar": replace(SkyScene.pointing(84, -1), mag_limit=3.8),
     "cubesense": EarthSunScene.facing(nadir_deg=(5, 5)),
     "aramis": SkyScene.pointing(84, -1),
 }

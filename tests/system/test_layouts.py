@@ -236,7 +236,7 @@ def test_banks_are_kept_apart_where_there_are_any(node: Node, published: Publish
 
 def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -> None:
     """Twice the rate with two memories; no layout without a copy is older than 500 ms."""
-    assert main(["layouts", "--seconds", "2", "--json"]) == 0
+    assert main(["layouts", "--seconds", "2", "--json", "--profile", "extended"]) == 0
     lines = capsys.readouterr().out.splitlines()
     results = [LayoutResult(**json.loads(line)) for line in lines]
     assert [result.layout for result in results] == [layout.value for layout in Layout]

@@ -23,7 +23,7 @@ from cubestack.host.errors import BadAnswerError
 from tests.system.conftest import Open
 
 ITERATIONS = 6
-ORION = SkyScene.pointing(84, -1)
+ORION = replace(SkyScene.pointing(84, -1), mag_limit=3.8)
 
 #: Table 6.2, in ms.
 PUBLISHED_PHASES = {"idle": 140, "discard": 68, "capture": 388, "transfer": 404}
@@ -125,6 +125,7 @@ def matched_share(opened: Any, rate_deg_s: float, rng: np.random.Generator) -> f
         scene = SkyScene(random_quaternion(rng), rate_deg_s=rate, mag_limit=3.8)
         condition = replace(CONDITION, seed=int(rng.integers(1000)))
         opened.board.camera.scene = SkyView(scene, condition)
+        opened.client.client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
         opened.client.capture_and_process()
         detected += len(stars := opened.client.stars())
         matched += sum(star.hipparcos is not None for star in stars)

@@ -43,7 +43,7 @@ def p95(frames: Frames, key: str) -> float:
 def test_rates_of_identification(
     measure: Measure, options: tuple[object, ...], mode: str, percent: float
 ) -> None:
-    frames = measure(*SAMPLE, *options)
+    frames = measure(*SAMPLE, *options, "--profile", "extended")
     assert percent_right(frames) >= percent
     solved = [frame for frame in frames if frame["solved"]]
     assert all(frame["right"] for frame in solved)
@@ -53,7 +53,7 @@ def test_rates_of_identification(
 def test_profiles_find_the_same_sky_in_their_own_way(measure: Measure) -> None:
     first, *others = (
         measure("--frames", 5, "--seed", 15, "--mag-limit", 3.8, *options)
-        for options in ((), ("--profile", "extended"), ("--profile", "published"))
+        for options in ((), ("--profile", "published"), ("--profile", "extended"))
     )
     assert all(frame["right"] for frames in (first, *others) for frame in frames)
     errors, same, plain = ([one["error_cross_deg"] for one in rows] for rows in (first, *others))

@@ -11,7 +11,7 @@ from typing import Any, Literal, Self, get_args
 
 Profile = Literal["published", "extended"]
 PROFILES: tuple[Profile, ...] = get_args(Profile)
-DEFAULT_PROFILE: Profile = "extended"
+DEFAULT_PROFILE: Profile = "published"
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,11 @@ from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
+EXTENDED = AramisSwitches.of("extended")
+
 
 def test_reset_values_are_the_verified_way() -> None:
-    found = configuration(StoredSettings(FlashStore()))
+    found = configuration(StoredSettings(FlashStore()), EXTENDED)
     assert found.detection == VERIFIED.detection
     assert found.field.fov_deg == pytest.approx(VERIFIED.field.fov_deg, abs=1e-5)
     assert found.profile.sigma_rad == pytest.approx(VERIFIED.profile.sigma_rad, rel=0.01)
@@ -32,7 +34,7 @@ def test_every_setting_arrives() -> None:
     sizes = {"MinPixels": 4, "MaxPixels": 99, "MaxStars": 12}
     settings.put("SetDetection", {"Sigmas": 3.5, "Spikes": 2, "Needed": 9, "Subtract": 0, **sizes})
     settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 1, "Verify": 0, "HintTolerance": 9})
-    found = configuration(settings)
+    found = configuration(settings, EXTENDED)
     assert (found.field.fov_deg, found.field.round) == (18.0, False)
     assert found.detection == Detection(3.5, SpikeRemoval.WINDOW, 9, 4, 99, 12, subtract=False)
     profile = found.profile

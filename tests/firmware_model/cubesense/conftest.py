@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, fine_table
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 
@@ -32,5 +33,5 @@ def node() -> Links:
 
 
 @pytest.fixture
-def unit() -> Harness:
-    return Harness()
+def unit(profile: str) -> Harness:
+    return Harness(CubeSenseSwitches.of(profile))

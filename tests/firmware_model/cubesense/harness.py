@@ -17,6 +17,10 @@ from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS
 from cubestack.firmware_model.interface.cubesense import INTERFACE, pins
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import AwaitPin, Request, Routine, StrobeRead
 
@@ -74,6 +78,7 @@ class Harness(Runner, HostSide):
     """A program on fake hardware.
 
     Attributes:
+        switches: of the program.
         scenes: what each camera sends, (480, 640); None: it is dead.
         memories: what each memory holds.
         wait_us: from the store command to a picture's first row.
@@ -87,10 +92,12 @@ class Harness(Runner, HostSide):
     boot_us = 5_000
     hang_us = 200_000_000  # no job takes longer: a whole picture on the bench UART takes 27 s
 
-    def __init__(self, *, mcu_addressing: bool = False) -> None:
+    def __init__(
+        self, switches: CubeSenseSwitches = DEFAULT_SWITCHES, *, mcu_addressing: bool = False
+    ) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, PIC18F45K20)
-        self.mcu_addressing = mcu_addressing
+        self.switches, self.mcu_addressing = switches, mcu_addressing
         self.serial_number = "CS0042"
         dark = np.full((ROWS, COLUMNS), 34, np.uint8)
         self.scenes: dict[Camera, NDArray[np.uint8] | None] = dict.fromkeys(Camera, dark)
@@ -119,7 +126,7 @@ class Harness(Runner, HostSide):
         self._position = 0
         for pin in (*pins.CAMERA_POWER.values(), *pins.SRAM_POWER.values()):
             self.set_pin(pin, 0)
-        self.program = CubeSenseProgram(self, self.meter)
+        self.program = CubeSenseProgram(self, self.meter, switches=self.switches)
         return self.program.main()
 
     @property

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.commands import SOFTWARE_RESET
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.requests import SetPin, StrobeRead
 
@@ -17,6 +18,9 @@ Effect = Callable[[Harness], None]
 EFFECTS: dict[str, Effect] = {}
 
 SUN_BORESIGHT = (369.0, 250.0)
+
+OF_RESULTS = {"DetectionThreshold", "Boresight", "Mask", "Distortion"}
+"""Their effects show in the figures and codes of a result, as the verified vision gives them."""
 
 
 #: Decorator: the function shows what the named telecommands do.
@@ -44,7 +48,13 @@ def frame(unit: Harness) -> bytes:
     return bytes(unit.telemetry("ImageFrame")["Frame"])
 
 
-@pytest.mark.parametrize("name", [message.name for message in INTERFACE.telecommands])
+@pytest.mark.parametrize(
+    ("name", "profile"),
+    [
+        (message.name, "extended" if message.name[:-1] in OF_RESULTS else DEFAULT_PROFILE)
+        for message in INTERFACE.telecommands
+    ],
+)
 def test_every_telecommand_does_what_it_says(unit: Harness, name: str) -> None:
     EFFECTS[name](unit)
 

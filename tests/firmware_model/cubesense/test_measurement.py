@@ -69,6 +69,7 @@ def edges_of(unit: Harness) -> set[tuple[float, float]]:
     return {(values[f"X{n}"], values[f"Y{n}"]) for n in range(1, values["Count"] + 1)}
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (25.0, -40.0), (-60.0, 35.0)])
 def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
@@ -88,6 +89,7 @@ def test_the_sun_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float,
     assert (measured["Radius"], measured["PixelsRead"]) == (0, 225)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("sram", Sram)
 @pytest.mark.parametrize("truth", [(0.0, 0.0), (15.0, -25.0), (-40.0, 30.0)])
 def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[float, float]) -> None:
@@ -109,6 +111,7 @@ def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[floa
     assert edges_of(unit) == {(x / EDGE_UNIT, y / EDGE_UNIT) for x, y in edges.points}
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize(
     ("picture", "detect"),
     [
@@ -200,6 +203,7 @@ def test_results_are_pending_until_they_are_there(unit: Harness) -> None:
     ]
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("other_is_dead", [False, True])
 def test_the_other_memory_serves(unit: Harness, camera: Camera, other_is_dead: bool) -> None:
@@ -233,6 +237,7 @@ def test_times_are_the_timers(unit: Harness, camera: Camera, wait_us: int) -> No
         assert us == int(round(us / TICK_US) * TICK_US)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_the_published_times(unit: Harness) -> None:
     """Section 7.4 measures 70.4 ms and 245.0 ms, 48 ms of it imaging, sigma 11 ms."""
     unit.scenes[Camera.SUN] = sun(place(0, 0, SUN_BORESIGHT), 7)
@@ -257,6 +262,7 @@ def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness
     assert unit.now_us - start_us > after + 36_000
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_thresholds(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun_at(3, 4)
     unit.scenes[Camera.NADIR] = earth(5, 6)
@@ -267,6 +273,7 @@ def test_thresholds(unit: Harness) -> None:
     assert measure(unit, Camera.SUN)["Points"] > before
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_the_boresight_moves_the_suns_centre(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun(np.array([369.0, 250.0]), 6)
     unit.command("Boresight1", X=359.5, Y=253.25)

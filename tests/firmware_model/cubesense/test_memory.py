@@ -10,9 +10,11 @@ from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitc
 from .harness import Harness
 from .scenery import chequered
 
+EXTENDED = CubeSenseSwitches.of("extended")
+
 
 def sizes() -> dict[str, int]:
-    return {buffer.name: buffer.size for buffer in budget()}
+    return {buffer.name: buffer.size for buffer in budget(EXTENDED)}
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -28,7 +30,7 @@ def test_sizes_follow_from_what_is_kept() -> None:
     assert size["edges"] == 4 * MAX_EDGES
     assert size["Sun window"] == 4 + 15 * 15
     assert size["distortion tables of the reset values"] == 2 * 2 * 227
-    assert len(size) == len(budget())
+    assert len(size) == len(budget(EXTENDED))
 
 
 def test_the_published_program_takes_less_and_its_table_needs_flash() -> None:
@@ -47,6 +49,7 @@ def test_what_shares_a_place_fits_into_it(profile: Profile) -> None:
         assert sum(buffer.size for buffer in buffers if buffer.inside == name) <= size[name]
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_the_programs_buffers_are_as_large_as_the_budget_says(unit: Harness) -> None:
     size = sizes()
     acquisition = unit.program.acquisition

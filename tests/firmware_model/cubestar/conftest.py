@@ -4,6 +4,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 
 from .harness import Harness
 from .sky import Sky, take
@@ -21,8 +22,8 @@ def sky(catalogue: StarCatalogue, pose: Rotation) -> Sky:
 
 
 @pytest.fixture
-def unit(catalogue: StarCatalogue) -> Harness:
-    return Harness(catalogue)
+def unit(catalogue: StarCatalogue, profile: str) -> Harness:
+    return Harness(catalogue, CubeStarSwitches.of(profile))
 
 
 @pytest.fixture

@@ -138,6 +138,7 @@ def test_stars_without_attitude(unit: Harness, monkeypatch: pytest.MonkeyPatch, 
     assert not unit.telemetry("AttitudeQuaternion")["Valid"]
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_lost_in_space_stays_so_when_asked_to(unit: Harness, sky: Sky) -> None:
     for _ in range(2):
         assert process(unit, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
@@ -145,6 +146,7 @@ def test_lost_in_space_stays_so_when_asked_to(unit: Harness, sky: Sky) -> None:
         assert mode_flag(unit) is MatchMode.TRACKING  # the firmware's own flag
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_tracking_without_attitude_and_hint_starts_lost(tracking: Harness, sky: Sky) -> None:
     assert process(tracking, sky.picture)["Mode"] == MatchMode.LOST_IN_SPACE
     assert tracking.flags() == {"IDModeError"}
@@ -160,6 +162,7 @@ def test_a_hint_gives_assisted_then_tracking(tracking: Harness, sky: Sky, pose: 
     assert process(tracking, sky.picture)["Mode"] == MatchMode.TRACKING
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_a_wrong_hint_leads_to_lost_in_space(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, turned(pose, 150))
     assert not process(tracking, sky.picture)["Valid"]
@@ -179,6 +182,7 @@ def test_a_new_hint_replaces_the_attitude(tracking: Harness, sky: Sky, pose: Rot
     assert error_deg(attitude_of(values), elsewhere) < 0.01
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_a_hint_is_used_up_by_the_first_fix(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     hint(tracking, pose)
     process(tracking, sky.picture)
@@ -188,6 +192,7 @@ def test_a_hint_is_used_up_by_the_first_fix(tracking: Harness, sky: Sky, pose: R
     assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize(("degrees", "kept"), [(0.1333, True), (0.29, True), (0.35, False)])
 def test_tracking_follows_up_to_its_rate(
     tracking: Harness, sky: Sky, pose: Rotation, degrees: float, kept: bool
@@ -205,6 +210,7 @@ def test_tracking_follows_up_to_its_rate(
         assert mode_flag(tracking) is MatchMode.ASSISTED
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_failures_lead_one_step_back_each(tracking: Harness, sky: Sky) -> None:
     process(tracking, sky.picture)
     two_stars = DARK.copy()

@@ -101,7 +101,7 @@ def test_an_iteration_processes_while_the_next_picture_is_stored(lit: Harness) -
 def test_the_attitude_of_a_picture_comes_one_iteration_later(
     unit: Harness, catalogue: StarCatalogue, pose: Rotation
 ) -> None:
-    poses = [pose * Rotation.from_euler("z", 3 * step, degrees=True) for step in range(4)]
+    poses = [pose * Rotation.from_euler("z", 0.2 * step, degrees=True) for step in range(4)]
     start_us = unit.start_loop(0.1)
     for number, true in enumerate(poses):
         unit.picture = take(catalogue, true).picture

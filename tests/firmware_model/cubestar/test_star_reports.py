@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
 
 from .harness import Harness
 from .sky import Sky, take, undistort
@@ -72,6 +72,7 @@ def test_frames_step_on_their_own(solved: Harness, frame: str) -> None:
 def test_new_results_start_over(solved: Harness, frame: str) -> None:
     first = solved.telemetry(frame)
     solved.telemetry(frame)
+    solved.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)  # as before
     solved.command("ProcessImage")
     assert solved.telemetry(frame) == first
 

@@ -251,6 +251,7 @@ def test_a_frame_shows_the_times_of_its_steps(unit: Harness) -> None:
             assert values[field] == steps.index(step) + (200 if "Max" in field else 100)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_every_step_is_one_that_the_processing_measures(lit: Harness, sky: Sky) -> None:
     lit.command("CaptureAndProcess")
     lit.command("setIDMode", IdMode=IdMode.TRACKING)

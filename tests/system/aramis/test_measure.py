@@ -7,6 +7,8 @@ from tests.system.conftest import Measure
 GOAL_DEG = 200 / 3600
 """AraMiS thesis, section 2.1: hundreds of seconds of arc."""
 
+EXTENDED = ("--profile", "extended")
+
 
 @pytest.mark.parametrize(
     "options",
@@ -17,14 +19,14 @@ GOAL_DEG = 200 / 3600
     ids=["among false stars", "the likely lens"],
 )
 def test_lost_in_space(measure: Measure, options: tuple[object, ...]) -> None:
-    for frame in measure(*options):
+    for frame in measure(*options, *EXTENDED):
         assert (frame["right"], frame["reason"], frame["wrong"]) == (True, "confirmed", 0)
         assert frame["error_cross_deg"] < GOAL_DEG
 
 
 def test_near_a_rough_direction_as_published_nothing_is_wrong(measure: Measure) -> None:
     near = ("--published", "--mode", "assisted", "--hint-error", 2)
-    frames = measure("--frames", 8, "--seed", 22, *near)
+    frames = measure("--frames", 8, "--seed", 22, *near, *EXTENDED)
     assert sum(frame["right"] for frame in frames) >= 6
     for frame in frames:
         assert frame["right"] == frame["solved"]
@@ -39,15 +41,15 @@ def test_the_published_profile_believes_a_unique_triangle_after_a_pivot(measure:
 
 
 def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Measure) -> None:
-    for frame in measure("--frames", 2, "--seed", 23, "--roll-rate", 10):
+    for frame in measure("--frames", 2, "--seed", 23, "--roll-rate", 10, *EXTENDED):
         assert frame["right"]
         assert frame["error_cross_deg"] < 0.1
         assert abs(frame["error_roll_deg"]) < 0.1
-    for frame in measure("--frames", 2, "--seed", 24, "--rate", 10):
+    for frame in measure("--frames", 2, "--seed", 24, "--rate", 10, *EXTENDED):
         assert (frame["solved"], frame["outcome"], frame["reason"]) == (False, "none", "smear")
 
 
 def test_upsets_in_flash_are_corrected(measure: Measure) -> None:
-    for frame in measure("--frames", 3, "--seed", 25, "--bit-flips", 1e-6):
+    for frame in measure("--frames", 3, "--seed", 25, "--bit-flips", 1e-6, *EXTENDED):
         assert (frame["right"], frame["lost"]) == (True, 0)
         assert 10 < frame["corrected"] <= frame["flips"]

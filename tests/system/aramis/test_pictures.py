@@ -43,7 +43,7 @@ def test_each_is_solved(measure: Measure, tmp_path: Path) -> None:
     truths = json.loads((FOLDER / "truth.json").read_text())["images"]
     for path in PICTURES:
         picture = drawn_anew(path, tmp_path)
-        (frame,) = measure("--image", picture, "--field", FIELD_DEG)
+        (frame,) = measure("--image", picture, "--field", FIELD_DEG, "--profile", "extended")
         assert frame["outcome"] == "conclusive", path.name
         truth = np.array(truths[path.name]["quaternion_xyzw_inertial_to_camera"])
         cross, roll = attitude_error_deg(np.array(frame["quaternion"]), truth)

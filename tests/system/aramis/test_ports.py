@@ -49,7 +49,7 @@ def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
         command(4)
         port.write(bytes.fromhex("1F7F 86 1FFF"))
         answer = port.read_until(b"\x1f\xff")[2:-2].replace(b"\x1f\x1f", b"\x1f")
-    assert answer[32:36] == bytes([1, 2, 0, 1])  # outcome, reason, mode, valid
+    assert answer[32:36] == bytes([1, 1, 0, 1])  # outcome, reason, mode, valid
     cross, roll = attitude_error_deg(np.array(struct.unpack_from("<4f", answer)), TRUTH)
     assert cross < 0.01
     assert abs(roll) < 0.05

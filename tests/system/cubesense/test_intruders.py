@@ -34,6 +34,7 @@ def test_hot_pixels_do_not_move_a_direction(ready: Open, camera: Camera) -> None
     check_right(measure(ready, view, camera))
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 def test_a_light_beside_the_earth_is_dropped_from_its_limb(ready: Open) -> None:
     """A disc on a sample of a scanned row: two edges more, which the fit leaves out."""
     (sample,) = LENSES[Target.NADIR].unproject([(511, 79)])

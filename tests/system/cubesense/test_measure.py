@@ -15,16 +15,17 @@ KEYS = {
     "error_deg", "edges", "phase_ms", "wall_ms",
 }  # fmt: skip
 SUN, NADIR = ("--sensor", "sun"), ("--sensor", "nadir")
+EXTENDED = ("--profile", "extended")
 
 
 @pytest.fixture(scope="module")
 def nadir(measure: Measure) -> Frames:
-    return measure(*NADIR, "--frames", 60, "--seed", 3)
+    return measure(*NADIR, "--frames", 60, "--seed", 3, *EXTENDED)
 
 
 @pytest.fixture(scope="module")
 def sun(measure: Measure) -> Frames:
-    return measure(*SUN, "--frames", 60, "--seed", 3)
+    return measure(*SUN, "--frames", 60, "--seed", 3, *EXTENDED)
 
 
 def test_a_frame_gives_one_result_of_each_sensor(measure: Measure) -> None:
@@ -55,7 +56,8 @@ def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
 
 @pytest.mark.parametrize("bloom", [3, 5, 7])
 def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float) -> None:
-    frames = measure(*SUN, "--bloom", bloom, "--sun-angle", 45, "--frames", 12, "--seed", 5)
+    angles = ("--bloom", bloom, "--sun-angle", 45)
+    frames = measure(*SUN, *angles, "--frames", 12, "--seed", 5, *EXTENDED)
     assert np.percentile([frame["error_deg"] for frame in frames], 95) < 0.2
 
 

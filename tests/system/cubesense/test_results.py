@@ -57,6 +57,7 @@ RESULTS = {
 }
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("name", RESULTS)
 def test_result_of_a_scene(ready: Open, name: str) -> None:
     scene, expected = RESULTS[name]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -22,6 +23,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
@@ -98,7 +100,7 @@ class Bench:
         device: host's view.
     """
 
-    scene: ClassVar[Any] = SkyScene.pointing(*ORION_DEG)
+    scene: ClassVar[Any]
     flags_in = "ErrorFlags"
 
     def __init__(self, opened: AnyEmulated) -> None:
@@ -183,6 +185,7 @@ class Star(Bench):
     """A CubeStar."""
 
     board: CubeStarBoard
+    scene = replace(SkyScene.pointing(*ORION_DEG), mag_limit=3.8)
 
     @property
     def stored(self) -> np.ndarray:
@@ -315,8 +318,9 @@ BENCHES: dict[str, type[Bench]] = {"cubestar": Star, "cubesense": Sense, "aramis
 
 
 @contextmanager
-def powered(name: str) -> Iterator[Any]:
+def powered(name: str, profile: str = DEFAULT_PROFILE) -> Iterator[Any]:
     """A device that sees what it is made for."""
     own = {"catalogue": small_catalogue()} if name == "aramis" else {}
-    with power_up(device(name), BENCHES[name].scene, seed=4, **own) as opened:
+    scene = BENCHES[name].scene
+    with power_up(device(name), scene, seed=4, profile=profile, **own) as opened:
         yield BENCHES[name](opened)

@@ -26,9 +26,9 @@ def one_of(*names: str) -> Any:
     """A fixture that is each of these devices."""
 
     @pytest.fixture(params=names)
-    def powered_up(request: pytest.FixtureRequest) -> Iterator[Any]:
+    def powered_up(request: pytest.FixtureRequest, profile: str) -> Iterator[Any]:
         marker = request.node.get_closest_marker("fault")
-        with powered(request.param) as bench:
+        with powered(request.param, profile) as bench:
             yield bench
             if marker is not None:
                 kinds = marker.args or [request.node.callspec.params["kind"]]

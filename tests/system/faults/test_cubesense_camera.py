@@ -59,6 +59,7 @@ def test_one_hot_pixel_is_not_taken_for_the_sun_but_three_in_a_row_are(sense: Se
     assert (first["FirstX"], first["FirstY"]) == (10, 10)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("blooming")
 def test_blooming_spoils_the_limb(quiet: Sense) -> None:
     clean = quiet.picture()

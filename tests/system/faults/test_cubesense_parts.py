@@ -92,6 +92,7 @@ def test_registers_of_an_idle_fpga_do_not_flip(quiet: Sense) -> None:
     np.testing.assert_array_equal(quiet.picture(), clean)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("register-upsets")
 def test_register_upsets_cost_a_measurement(quiet: Sense) -> None:
     found = quiet.measure_with("register-upsets", target="fpga", rate=10)

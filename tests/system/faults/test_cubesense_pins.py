@@ -111,6 +111,7 @@ def glitch_while_reading(ready: Sense, camera: Camera, pin: str) -> Any:
     ready.inject("control-glitch", target=pin, after_s=SEARCHING_S[camera])
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("pin", PINS)
 @pytest.mark.fault("control-glitch")
 def test_a_glitch_while_scanning_spoils_the_earth(ready: Sense, pin: str) -> None:
@@ -121,6 +122,7 @@ def test_a_glitch_while_scanning_spoils_the_earth(ready: Sense, pin: str) -> Non
     ready.check()
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("pin", PINS)
 @pytest.mark.fault("control-glitch")
 def test_a_glitch_while_the_window_is_read_moves_the_sun(ready: Sense, pin: str) -> None:

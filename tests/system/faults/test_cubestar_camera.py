@@ -73,10 +73,10 @@ def test_a_defect_for_a_while_hits_the_lines_of_that_time(star: Star) -> None:
 
 @pytest.mark.fault("blooming")
 def test_blooming_spoils_the_brightest_stars(star: Star, good: np.ndarray) -> None:
-    outcome = star.capture_with("blooming", threshold=100, length=20)
+    outcome = star.capture_with("blooming", threshold=40, length=20)
     assert outcome == ("IDENTIFICATION_FAILED", {"LessThanThreeStarsID"})
     expected = good.copy()
-    for y, x in np.argwhere(good >= 100):
+    for y, x in np.argwhere(good >= 40):
         expected[max(0, y - 20) : y + 21, x] = 255
     np.testing.assert_array_equal(star.stored, expected)
     assert star.capture()[0] == "CALCULATED"

@@ -78,7 +78,8 @@ def test_a_stuck_bit_is_the_same_in_every_picture(
 def test_a_row_counter_that_flips_puts_the_rest_elsewhere(star: Star, good: np.ndarray) -> None:
     star.faults.inject("register-flip", register="writer.counter.row", bit=8, at_s=STORING_S)
     status, flags = star.capture()
-    assert (status != "CAPTURE_FAILED", flags) == (True, set())
+    assert status != "CAPTURE_FAILED"
+    assert flags <= {"MaxInvalidStarsDetectionError"}  # of memory that nothing was written to
     row = int(np.argmax((star.stored != good).any(axis=1)))
     assert 0 < row < 256
     np.testing.assert_array_equal(star.stored[:row], good[:row])

@@ -69,6 +69,7 @@ def test_with_an_acknowledge_that_is_always_there_noise_is_the_first_picture(
     assert (star.transferred != good).mean() > 0.9
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("ack-stuck")
 def test_with_an_acknowledge_that_is_always_there_the_old_picture_is_new(star: Star) -> None:
     assert star.capture() == GOOD
@@ -110,13 +111,14 @@ def look_at(star: Star, pin: str, at_s: float, levels: list[int]) -> Any:
 def test_a_glitch_while_reading_starts_over(star: Star, good: np.ndarray, pin: str) -> None:
     star.faults.inject("control-glitch", target=pin, at_s=READING_S)
     status, flags = star.capture()
-    assert (status != "CAPTURE_FAILED", flags) == (True, set())
+    assert status != "CAPTURE_FAILED"
+    assert flags <= {"LessThanThreeStarsID"}  # the picture's beginning stands in its middle
     assert star.stored_for_ms == pytest.approx(ONE_FRAME_MS, abs=1)
     np.testing.assert_array_equal(star.stored, good)
     picture, whole = star.transferred.ravel(), good.ravel()
     begun = int(np.argmax(picture != whole))
     assert begun > 100_000
-    starts = range(begun - 200, begun + 1)  # black pixels are the same anywhere
+    starts = range(begun - 2000, begun + 1)  # black pixels are the same anywhere
     start = next(at for at in starts if np.array_equal(picture[at + 2 :], whole[2 : -at or None]))
     number = -(-start // 128) + 1  # the host sees the picture's beginning there
     first = 128 * number - start

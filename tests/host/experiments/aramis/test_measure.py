@@ -41,7 +41,7 @@ def measure(**options: Any) -> list[AramisResult]:
 
 
 def test_a_random_sky_lost_in_space() -> None:
-    frames = measure(frames=3)
+    frames = measure(frames=3, profile="extended")
     for frame in frames:
         assert (frame.right, frame.wrong, frame.flips, frame.status) == (True, 0, 0, "")
         assert (frame.outcome, frame.reason, frame.mode) == ("conclusive", "confirmed", "lis")
@@ -104,7 +104,7 @@ def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
 
 
 def test_a_table_for_readers(run: Run) -> None:
-    shown = run("measure", "aramis", "--frames", "2").out
+    shown = run("measure", "aramis", "--frames", "2", "--profile", "extended").out
     assert all(text in shown for text in ("100.0 % right", "mean time", "confirmed"))
 
 
