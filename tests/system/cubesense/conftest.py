@@ -1,5 +1,6 @@
 """What the tests of a whole CubeSense share."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from cubestack.emulator.boards.cubesense.board import HALVES, CubeSenseBoard
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
 from cubestack.host.clients.cubesense.client import Measurement
-from cubestack.host.devices.emulated import AnyEmulated
+from cubestack.host.devices.emulated import AnyEmulated, open_device
 from tests.system.conftest import Open
 
 SUN_DEG = (20.0, 10.0)
@@ -23,6 +24,12 @@ FACING = EarthSunScene.facing(sun_deg=SUN_DEG, nadir_deg=NADIR_DEG)
 @pytest.fixture(scope="session")
 def device_name() -> str:
     return "cubesense"
+
+
+@pytest.fixture
+def session(device_name: str, profile: str) -> Open:
+    """Opens the device, whose lenses are as its firmware has them: it shows what it looks at."""
+    return partial(open_device, device_name, profile=profile, set="lens=nominal")
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ def test_an_axis_beside_the_boresight_moves_the_earth(ready: Open) -> None:
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
 def test_a_unit_has_the_lenses_of_its_seed(ready: Open, profile: str) -> None:
-    with ready(None, profile=profile, seed=5) as opened:
+    with ready(None, profile=profile, set="", seed=5) as opened:
         for camera, target in zip(Camera, Target, strict=True):
             drawn = drawn_lens(target, 5)
             assert opened.board.cameras[camera].lens == (

@@ -320,7 +320,8 @@ BENCHES: dict[str, type[Bench]] = {"cubestar": Star, "cubesense": Sense, "aramis
 @contextmanager
 def powered(name: str, profile: str = DEFAULT_PROFILE) -> Iterator[Any]:
     """A device that sees what it is made for."""
-    own = {"catalogue": small_catalogue()} if name == "aramis" else {}
+    lenses = {"set": "lens=nominal"} if name == "cubesense" else {}
+    own = {"catalogue": small_catalogue()} if name == "aramis" else lenses
     scene = BENCHES[name].scene
     with power_up(device(name), scene, seed=4, profile=profile, **own) as opened:
         yield BENCHES[name](opened)
