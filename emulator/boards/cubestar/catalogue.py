@@ -5,8 +5,9 @@ degrees; the default here is the true diagonal of the calibrated camera, distort
 solves more pictures (docs/fidelity.md compares both).
 
 The published 405 stars are 406 without alpha Centauri B, which is 0.0001 rad from A: the list
-leaves out stars that close. The two pairs that the thesis names as its closest are 0.0017 and
-0.0067 rad apart.
+leaves out stars that close. The thesis' list must have been without it too, as its closest two
+pairs are 0.0017 and 0.0067 rad apart, and table 4.3 has stars 31 and 401 as far apart as ours are
+at the catalogue's epoch: with B, the stars after it would have other numbers.
 """
 
 from functools import lru_cache

@@ -113,8 +113,8 @@ def verify(
     """Let every pair of centroids vote for its identities, and keep those that all agree.
 
     ``identities`` (n,) are indices into ``vectors`` (stars, 3) or -1. Returns the votes (n,) of the
-    verification round, and the identities with -1 for what was not kept: no vote, votes below one
-    less than the maximum, or, if ``thinned``, a contradiction with the other kept stars.
+    verification round, and the identities with -1 for what was not kept: votes below one less than
+    the maximum or, if ``thinned``, no vote or a contradiction with the other kept stars.
     """
     named = (identities[pairs.first] != NONE) & (identities[pairs.second] != NONE)
     first, second = pairs.first[named], pairs.second[named]
@@ -134,9 +134,9 @@ def verify(
         i32_add=len(first) + 2 * int(agree.sum()),
         ram_write=3 * int(agree.sum()),
     )
-    kept = (votes > 0) & (votes + 1 >= votes.max(initial=0))
+    kept = votes + 1 >= votes.max(initial=0)
     if thinned:
-        kept = _consistent(agreement, kept, meter)
+        kept = _consistent(agreement, kept & (votes > 0), meter)
     return votes, np.where(kept, identities, NONE).astype(np.int32)
 
 

@@ -10,8 +10,8 @@ to 35 deg, the 5 deg by which the boresight may be wrong and 30 deg of field. Pa
 outside are dropped with it; nothing else differs from lost in space.
 
 Voting is done as printed, or by rounds. As printed, the first star with the most votes is taken,
-stars within one vote of the best verified are kept if they have one at all (without that, a best of
-one vote would keep everything), and nothing is refused but fewer than three.
+stars within one vote of the best verified are kept, so all of them where the best has one vote or
+none, and nothing is refused but fewer than three. A star without votes weighs nothing in QUEST.
 What the text leaves open, or leaves to chance, is completed by rounds:
 
 - Between the first round and the identities the voting is repeated over the same entries, and a

@@ -3,6 +3,7 @@ import pytest
 
 from cubestack.emulator.boards.cubestar.catalogue import PAIR_LIMIT_DEG, onboard_catalogue
 from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH
 
 ALPHA_CENTAURI = {71681: "B", 71683: "A"}
 
@@ -11,6 +12,14 @@ def test_published_number_of_stars() -> None:
     listed = set(onboard_catalogue().hip.tolist())
     assert len(listed) == 405
     assert [ALPHA_CENTAURI[hip] for hip in listed & ALPHA_CENTAURI.keys()] == ["A"]
+
+
+@pytest.mark.parametrize(("one", "other", "apart"), [(31, 401, 0.695071), (32, 92, 0.700600)])
+def test_published_numbers_and_distances_of_stars(one: int, other: int, apart: float) -> None:
+    # Table 4.3. Stars are counted from 1; alpha Centauri is between the second and the last of them.
+    listed = onboard_catalogue(epoch=CATALOGUE_EPOCH)
+    first, second = listed.vectors[[one - 1, other - 1]].astype(float)
+    assert np.arccos(first @ second) == pytest.approx(apart, abs=1e-6)
 
 
 def test_every_pair_that_a_picture_can_show_is_listed() -> None:
