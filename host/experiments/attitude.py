@@ -152,7 +152,7 @@ class AttitudeResult(Result):
         solved: the measurement gave an attitude.
         right: it did, and the attitude is right; None without truth.
         centroids, matched: stars found, and stars that the attitude rests on.
-        wrong: identified stars with a wrong identity.
+        wrong: identified stars with a wrong identity, whether or not they gave an attitude.
         mode: "lis", "assisted" or "tracking": how it was found, or looked for.
         error_cross_deg, error_roll_deg: across and about the boresight.
         truth, quaternion: inertial to camera, scalar last; None without attitude.

@@ -21,7 +21,6 @@ CRYSTAL_HZ = 10_000_000
 REGISTERS = (30, 9, 8, 7, 6)
 """Settings of table D.2."""
 
-COVERAGE_EPOCH = 1991.25  # the catalogue's own
 COVERAGE_DEG = 42.33  # diameter; the caption of table 3.6 calls it a radius
 STARS_DRAWN = 18
 
@@ -31,13 +30,12 @@ def _field(opened: _Opener, frames: int, **how: Any) -> Figures:
     from cubestack.host.experiments.cubestar.published_field import shots
 
     taken = list(shots(opened, frames, **how))
-    detected = sum(shot.detected for shot in taken)
     return {
         "three": 100 * mean(shot.matched - shot.wrong > 2 for shot in taken),
         "right": 100 * mean(shot.right for shot in taken),
         "star_wrong": 100 * mean(shot.wrong > 0 for shot in taken),
         "off": 100 * mean(shot.valid and not shot.right for shot in taken),
-        "share": 100 * sum(shot.matched - shot.wrong for shot in taken) / detected,
+        "share": 100 * mean((shot.matched - shot.wrong) / max(shot.detected, 1) for shot in taken),
     }
 
 
@@ -62,11 +60,13 @@ def _attitudes(results: Sequence["AttitudeResult"]) -> Figures:
 
 def _catalogue(_opened: _Opener, _frames: int) -> Figures:
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+    from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH
 
     flown, wider, text = (
         onboard_catalogue(pair_limit_deg=limit) for limit in (42.101, 42.105, 60.0)
     )
     closest = flown.pairs.angle
+    listed = onboard_catalogue(epoch=CATALOGUE_EPOCH).vectors.astype(float)
     return {
         "stars": len(flown),
         "star_kb": flown.star_bytes / 1024,
@@ -76,19 +76,21 @@ def _catalogue(_opened: _Opener, _frames: int) -> Figures:
         "pair_kb": flown.pair_bytes / 1024,
         "first": float(closest[0]),
         "second": float(closest[1]),
+        "between_31_401": float(np.arccos(listed[30] @ listed[400])),
+        "between_32_92": float(np.arccos(listed[31] @ listed[91])),
     }
 
 
 def _coverage(_opened: _Opener, frames: int) -> Figures:
     """Fields with three stars and five, and their mean number, by the faintest magnitude."""
-    from cubestack.emulator.scene.hipparcos import load_sky
+    from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH, load_sky
 
     rng = np.random.default_rng(1)
     boresights = rng.standard_normal((frames, 3))
     boresights /= np.linalg.norm(boresights, axis=1, keepdims=True)
     figures = {}
     for limit in (3.0, 3.2, 3.4, 3.5, 3.6, 3.8, 4.0, 5.0):
-        vectors = load_sky(COVERAGE_EPOCH, limit).vectors.astype(np.float32)
+        vectors = load_sky(CATALOGUE_EPOCH, limit).vectors.astype(np.float32)
         cosines = boresights.astype(np.float32) @ vectors.T
         diameter = {3.5: 50.0, 5.0: 20.0}.get(limit, COVERAGE_DEG)  # figure 3.8's two examples
         seen = np.count_nonzero(cosines > np.cos(np.radians(diameter / 2)), axis=1)

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
@@ -164,7 +164,8 @@ def _measure(
     if picture_truth is None:
         known = emulated.board.truth()
     centroids = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
-    wrong = count_wrong(cubestar, known) if solved else 0
+    named = solved or status is TaskStatus.CALCULATION_FAILED
+    wrong = count_wrong(cubestar, known) if named else 0
     phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
     # The flags say why a task ended as its status tells.
     flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]

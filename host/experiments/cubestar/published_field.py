@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from cubestack.firmware_model.interface.cubestar import IdMode
+from cubestack.firmware_model.interface.cubestar import IdMode, TaskStatus
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.experiments.attitude import errors, is_right, rough_boresight
 from cubestack.host.experiments.cubestar.measure import count_wrong, give_hint
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 WIDTH_DEG = 54.0
+DEFAULT_MARGIN_RAD = 0.001  # about a pixel (section 4.3.5)
 SEED = 1
 
 
@@ -30,7 +31,8 @@ class Shot:
     Attributes:
         valid: it gave an attitude.
         right: the attitude is right.
-        detected, matched, wrong: stars found, identified, and identified wrongly.
+        detected, matched, wrong: stars found, identified, and identified wrongly, whether or not
+            they gave an attitude.
     """
 
     valid: bool
@@ -66,11 +68,15 @@ def calibrate(cubestar: CubeStar, optics: "Optics") -> None:
 
 
 def shots(
-    opened: _Opener, frames: int, hint_deg: float | None = None, **sky: Any
+    opened: _Opener,
+    frames: int,
+    hint_deg: float | None = None,
+    margin_rad: float = DEFAULT_MARGIN_RAD,
+    **sky: Any,
 ) -> Iterator[Shot]:
     """Pictures of random skies, lost in space, or at most ``hint_deg`` from a rough boresight.
 
-    ``sky``: of a ``SkyScene``, as mag_limit and false_stars.
+    ``margin_rad``: search tolerance. ``sky``: of a ``SkyScene``, as mag_limit and false_stars.
     """
     from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.camera.mlx75412.lens import CONDITION
@@ -81,6 +87,7 @@ def shots(
     with opened(None, seed=SEED) as emulated:
         cubestar, client = emulated.client, emulated.client.client
         calibrate(cubestar, optics)
+        client.command("setIDMargin", Margin=margin_rad)
         for number in range(frames):
             scene = SkyScene(quaternion=random_quaternion(rng), seed=number, **sky)
             emulated.scene = SkyView(scene, replace(CONDITION, optics=optics, seed=number))
@@ -88,11 +95,13 @@ def shots(
             client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE if lost else IdMode.TRACKING)
             if hint_deg is not None:
                 give_hint(cubestar, rough_boresight(scene.truth(0), hint_deg, rng))
-            cubestar.capture_and_process()
+            status = cubestar.capture_and_process()
             attitude, truth = cubestar.attitude(), emulated.board.truth()
             assert truth is not None  # a sky has one
             valid = attitude.valid
             detected = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
-            wrong = (count_wrong(cubestar, truth) or 0) if valid else 0
+            named = valid or status is TaskStatus.CALCULATION_FAILED
+            matched = int(client.telemetry("NumIdStars")["numIdStars"]) if named else 0
+            wrong = (count_wrong(cubestar, truth) or 0) if named else 0
             right = valid and is_right(*errors(attitude.quaternion, truth))
-            yield Shot(valid, right, detected, attitude.matched if valid else 0, wrong)
+            yield Shot(valid, right, detected, matched, wrong)

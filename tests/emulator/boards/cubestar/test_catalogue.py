@@ -16,7 +16,7 @@ def test_published_number_of_stars() -> None:
 
 @pytest.mark.parametrize(("one", "other", "apart"), [(31, 401, 0.695071), (32, 92, 0.700600)])
 def test_published_numbers_and_distances_of_stars(one: int, other: int, apart: float) -> None:
-    # Table 4.3. Stars are counted from 1; alpha Centauri is between the second and the last of them.
+    # Table 4.3, where stars are counted from 1; alpha Centauri is between stars 92 and 401.
     listed = onboard_catalogue(epoch=CATALOGUE_EPOCH)
     first, second = listed.vectors[[one - 1, other - 1]].astype(float)
     assert np.arccos(first @ second) == pytest.approx(apart, abs=1e-6)
