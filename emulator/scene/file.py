@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -96,6 +97,7 @@ def _exactly(kind: type[V], what: str) -> Callable[[Any], V]:
 whole = _exactly(int, "a whole number")
 flag = _exactly(bool, "true or false")
 text = _exactly(str, "text")
+moment = _exactly(datetime, "a date and time, as 2013-06-01T20:00:00Z")
 
 
 def several(count: int, of: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]:

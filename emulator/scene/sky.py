@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
 from cubestack.emulator.scene.file import SceneError, refuse_negative
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
@@ -62,7 +63,10 @@ class SkyScene:
         mag_limit: stars with V strictly below it are seen; None for all that the camera resolves.
         false_stars: number of lights at random places of the picture that no catalogue has.
         false_star_mag: range of their magnitudes, brightest first, uniform (assumed).
-        seed: of the false stars.
+        atmosphere: the air that the stars, and only they, are seen through; None in space.
+        still: the stars stand still during each exposure, wherever they are at its middle, as in
+            screenshots of a planetarium.
+        seed: of the false stars and of the air.
     """
 
     quaternion: ArrayLike
@@ -72,6 +76,8 @@ class SkyScene:
     mag_limit: float | None = None
     false_stars: int = 0
     false_star_mag: tuple[float, float] = (2.0, 3.8)
+    atmosphere: Atmosphere | None = None
+    still: bool = False
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -97,8 +103,12 @@ class SkyScene:
 
     @cached_property
     def speed_deg_s(self) -> float:
-        """Largest body rate of all poses, deg/s."""
-        return max(float(np.linalg.norm(np.asarray(p.rate_deg_s))) for p in self._all_poses)
+        """Largest body rate of all poses during an exposure, deg/s."""
+        return (
+            0.0
+            if self.still
+            else max(float(np.linalg.norm(np.asarray(p.rate_deg_s))) for p in self._all_poses)
+        )
 
     def pose_at(self, time_ps: int) -> Pose:
         """The pose that holds at a time."""

@@ -48,9 +48,9 @@ def _open_board(
 
 def _load_scene(path: Path) -> "SkyView":
     from cubestack.emulator.camera.common.scene_file import load_scene
-    from cubestack.emulator.camera.mlx75412.lens import CONDITION
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION, UNCERTAIN
 
-    return load_scene(path, CONDITION)
+    return load_scene(path, CONDITION, UNCERTAIN)
 
 
 def _default_scene() -> "Scene":

@@ -48,7 +48,11 @@ def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDAr
         pixels.append(places * [optics.columns - 1, optics.rows - 1])
         light.append(optics.electrons_per_second(magnitudes))
     electrons = np.concatenate(light) * shutter.exposure_s
-    return _spots(np.concatenate(pixels), electrons, optics)
+    image = _spots(np.concatenate(pixels), electrons, optics)
+    if scene.atmosphere is not None and scene.atmosphere.sky_mag is not None:
+        glow = optics.electrons_per_second(scene.atmosphere.sky_mag) * optics.pixel_arcsec2
+        image += np.float32(glow * shutter.exposure_s) * optics.even_light
+    return image
 
 
 def star_pixels(
@@ -78,9 +82,18 @@ def _stars(
     sky = load_sky(scene.epoch, _limit(scene))
     seconds = shutter.exposure_s + optics.rows * shutter.line_s
     reach = optics.half_field_deg + scene.speed_deg_s * seconds / 2 + 1
-    boresight = matrix_from_quaternion(scene.truth(_time_ps(optics, shutter, 0.5)))[2]
+    middle = _time_ps(optics, shutter, 0.5)
+    boresight = matrix_from_quaternion(scene.truth(middle))[2]
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
-    return sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
+    vectors, rates = sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
+    if scene.atmosphere is None:
+        return vectors, rates
+    # By frame time, as the sensor's noise.
+    generator = np.random.default_rng([scene.seed, 0xA12, max(0, shutter.readout_ps)])
+    vectors, share = scene.atmosphere.seen(
+        vectors, middle / PS_PER_S, shutter.exposure_s, optics.aperture_mm, generator
+    )
+    return vectors, rates * share
 
 
 def _phases(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDArray[np.float64]:

@@ -137,6 +137,18 @@ class Optics:
         return np.asarray(area_cm2 * self.effective_width_a * flux, np.float64)
 
     @property
+    def pixel_arcsec2(self) -> float:
+        """Solid angle of a pixel on the axis, square arcseconds."""
+        return float(np.degrees(1 / self._focal_px) * 3600) ** 2
+
+    @cached_property
+    def even_light(self) -> NDArray[np.float32]:
+        """What each pixel (rows, columns) gets of an evenly bright sky, 1 on the axis."""
+        y, x = np.mgrid[: self.rows, : self.columns]
+        directions = self.unproject(np.stack([x.ravel(), y.ravel()], axis=1))
+        return self.transmission(directions).reshape(self.rows, self.columns).astype(np.float32)
+
+    @property
     def half_field_deg(self) -> float:
         """Angle between the boresight and the farthest corner of the sensor."""
         return float(np.degrees(np.arccos(self.unproject(self._corners)[:, 2].min())))

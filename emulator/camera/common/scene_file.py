@@ -6,6 +6,10 @@
     roll_deg = 30.0                # angle of the picture's up direction, east of north
     rate_deg_s = [0.0, 0.1, 0.0]   # body rate in camera axes: x right, y down, z out of the lens
     mag_limit = 3.8                # leave out to see all stars
+    mount = "earth"                # the camera turns with the Earth
+    [atmosphere]                   # what the stars are seen through
+    latitude_deg = -33.9
+    sidereal_deg = 200.0           # right ascension of the zenith at time 0
 
     kind = "picture"
     file = "night.jpg"             # relative to the scene file
@@ -21,22 +25,29 @@ that the picture was taken with, it scales with any exposure.
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from cubestack.emulator.camera.common.optics import Distortion, Optics
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.scene import file
+from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s, sidereal_deg
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
 
 
-def load_scene(path: Path, condition: SkyCondition) -> SkyView:
+def load_scene(
+    path: Path, condition: SkyCondition, uncertain: Mapping[str, float] = MappingProxyType({})
+) -> SkyView:
     """What the TOML file ``path`` gives; SceneError names the key that is wrong.
 
-    ``condition`` stands for what the file leaves open of lens and sensor.
+    ``condition`` stands for what the file leaves open of lens and sensor, ``uncertain`` has the
+    standard deviations of its optics by name.
     """
     kinds = {
-        "sky": lambda table: _sky(table, condition),
+        "sky": lambda table: _sky(table, condition, uncertain),
         "picture": lambda table: _picture(table, Path(path).parent, condition),
     }
     return file.read_scene_file(path, kinds, '"sky" or "picture"')
@@ -64,8 +75,42 @@ _POSE: file.Readers = {
     "quaternion": file.several(4, file.number),
     "rate_deg_s": file.several(3, file.number),
 }
+_AIR: file.Readers = {
+    "latitude_deg": file.number,
+    "longitude_deg": file.number,
+    "utc": file.moment,
+    "sidereal_deg": file.number,
+    "height_m": file.number,
+    "seeing_arcsec": file.number,
+    "scintillation": file.flag,
+    "extinction_mag": file.number,
+    "sky_mag": file.number,
+}
+
+
+def _atmosphere(value: Any) -> Atmosphere:
+    values = file.subtable(_AIR)(value)
+    place = {key: values.pop(key) for key in ("utc", "longitude_deg") if key in values}
+    if ("sidereal_deg" in values) == bool(place) or len(place) == 1:
+        raise file.SceneError("needs either sidereal_deg, or utc and longitude_deg")
+    if "latitude_deg" not in values:
+        raise file.SceneError("needs the key latitude_deg")
+    if place:
+        values["sidereal_deg"] = sidereal_deg(**place)
+    return Atmosphere(**values)
+
+
+def _mount(value: Any) -> bool:
+    if value not in ("sky", "earth"):
+        raise file.SceneError(f'must be "sky" or "earth", not {value!r}')
+    return bool(value == "earth")
+
+
 _SKY: file.Readers = _POSE | {
+    "mount": _mount,
     "poses": lambda value: value,
+    "atmosphere": _atmosphere,
+    "still": file.flag,
     "epoch": file.number,
     "mag_limit": file.number,
     "false_stars": file.whole,
@@ -84,9 +129,14 @@ _PICTURE: file.Readers = {
 }
 
 
-def _sky(table: Mapping[str, Any], condition: SkyCondition) -> SkyView:
+def _sky(
+    table: Mapping[str, Any], condition: SkyCondition, uncertain: Mapping[str, float]
+) -> SkyView:
     def lens(value: Any) -> Optics:
-        return replace(condition.optics, **file.subtable(_OPTICS)(value))
+        values = file.subtable(_OPTICS | {"drawn": file.whole})(value)
+        seed = values.pop("drawn", None)
+        optics = condition.optics if seed is None else drawn_optics(condition.optics, uncertain, seed)
+        return replace(optics, **values)
 
     values = file.read_table(table, _SKY | {"optics": lens})
     later = values.pop("poses", [])
@@ -94,8 +144,22 @@ def _sky(table: Mapping[str, Any], condition: SkyCondition) -> SkyView:
         raise file.SceneError("poses must be tables, each under [[poses]]")
     poses = tuple(_pose(file.read_table(pose, _POSE | {"start_s": file.number})) for pose in later)
     first = _pose({key: values.pop(key) for key in _POSE if key in values})
+    if values.pop("mount", False):
+        if poses or np.any(np.asarray(first.rate_deg_s)):
+            raise file.SceneError('mount = "earth" needs one pose without rate_deg_s')
+        first = replace(first, rate_deg_s=earth_rate_deg_s(first.quaternion))
     scene = SkyScene(first.quaternion, first.rate_deg_s, poses, **file.values_for(SkyScene, values))
     return SkyView(scene, replace(condition, **file.values_for(condition, values)))
+
+
+def drawn_optics(optics: Optics, uncertain: Mapping[str, float], seed: int) -> Optics:
+    """A lens as it may be, where ``optics`` is what its calibration found."""
+    if seed < 0 or not uncertain:
+        wrong = f"not be negative, not {seed}" if uncertain else "be left out for this lens"
+        raise file.SceneError(f"drawn must {wrong}")
+    generator = np.random.default_rng([seed, 0x1E25])
+    off = {name: sigma * generator.standard_normal() for name, sigma in uncertain.items()}
+    return replace(optics, **{name: getattr(optics, name) + by for name, by in off.items()})
 
 
 def _pose(values: dict[str, Any]) -> Pose:

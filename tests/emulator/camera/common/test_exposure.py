@@ -11,6 +11,8 @@ from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mlx75412.imager import DN12_PER_DN8, ELECTRONS_PER_DN12, ideal_counts
 from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import Pose, SkyScene
 
@@ -222,3 +224,34 @@ def test_published_centroiding_error_of_18_noise_free_stars() -> None:
             errors.append(np.abs(centroid - (x, y)))
     assert len(errors) > 200
     assert np.all(np.mean(errors, axis=0) <= (0.0244, 0.0427))
+
+
+def test_the_glow_of_the_sky_fills_the_field_and_stars_shine_through_it() -> None:
+    clear = Atmosphere(-1, 83.8, seeing_arcsec=0, scintillation=False, extinction_mag=0)
+    dark = replace(ORION, atmosphere=clear)
+    bright = replace(ORION, atmosphere=replace(clear, sky_mag=20.0))
+    glow = light(bright) - light(dark)
+    # A square arcsecond like a star of 20 mag, 184 x 184 of them a pixel.
+    per_pixel = LENS.electrons_per_second(20.0) * (206264.8 * 0.0056 / 6.28) ** 2
+    np.testing.assert_allclose(glow, per_pixel * LONG.exposure_s, rtol=1e-4)
+    shaded = light(bright, LONG, double_gauss()) - light(dark, LONG, double_gauss())
+    assert shaded[512, 640] > 0
+    assert shaded[10, 10] == 0
+    # Only refraction is left, and the light of stars 60 deg high.
+    np.testing.assert_allclose(light(dark).sum(), light(ORION).sum(), rtol=0.02)
+
+
+def test_the_air_is_another_one_in_each_exposure_and_of_each_seed() -> None:
+    air = replace(ORION, atmosphere=Atmosphere(0, 84))
+    later = replace(LONG, readout_ps=2 * 10**12)
+    np.testing.assert_array_equal(light(air), light(air))
+    assert np.abs(light(air, later) - light(air)).max() > 100
+    assert np.abs(light(replace(air, seed=5)) - light(air)).max() > 100
+
+
+def test_still_stars_do_not_streak_and_are_where_they_are_in_the_middle() -> None:
+    scene = vega_at((600.0, 200.0), LONG.mid_exposure_ps(255.5) / 1e12, (0.0, 4.0, 0.0))
+    still = light(replace(scene, still=True, mag_limit=0.1))
+    y, x = np.unravel_index(still.argmax(), still.shape)
+    assert (x, y) == (600, 200)
+    assert still.max() > 10 * light(replace(scene, mag_limit=0.1)).max()

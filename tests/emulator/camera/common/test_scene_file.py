@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.camera.common.optics import Distortion
+from cubestack.emulator.camera.common.optics import Distortion, Optics
 from cubestack.emulator.camera.common.scene_file import load_scene
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
-from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import PictureScene, SceneError, SkyScene
 
@@ -142,3 +143,64 @@ def test_a_file_changes_the_device_s_lens_and_keeps_the_sensor(tmp_path: Path) -
         assert view.condition == replace(usual, optics=replace(usual.optics, psf_sigma_px=2.5))
     with pytest.raises(SceneError, match="columns"):
         load(save(tmp_path, text + "columns = 5\n"))
+
+
+NIGHT = """
+kind = "sky"
+mount = "earth"
+ra_deg = 200
+dec_deg = -33.9
+[atmosphere]
+latitude_deg = -33.9
+sidereal_deg = 200
+seeing_arcsec = 3
+sky_mag = 19.5
+"""
+
+
+def test_a_night_on_the_ground(tmp_path: Path) -> None:
+    scene = load(save(tmp_path, NIGHT)).scene
+    assert isinstance(scene, SkyScene)
+    assert scene.atmosphere == Atmosphere(-33.9, 200, seeing_arcsec=3, sky_mag=19.5)
+    np.testing.assert_allclose(scene.rate_deg_s, earth_rate_deg_s(scene.quaternion))
+    utc = NIGHT.replace("sidereal_deg = 200", "utc = 2013-06-01T20:00:00Z\nlongitude_deg = 18.9")
+    dated = load(save(tmp_path, utc)).scene
+    assert isinstance(dated, SkyScene)
+    assert dated.atmosphere is not None
+    assert dated.atmosphere.sidereal_deg == pytest.approx(209.4, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wrong"),
+    [
+        (
+            "sidereal_deg = 200",
+            "",
+            "atmosphere: needs either sidereal_deg, or utc and longitude_deg",
+        ),
+        ("sidereal_deg", "longitude_deg", "atmosphere: needs either sidereal_deg, or utc"),
+        ("latitude_deg = -33.9", "", "atmosphere: needs the key latitude_deg"),
+        ("seeing_arcsec = 3", "seeing_arcsec = 30", "atmosphere: seeing_arcsec must be in 0..20"),
+        ('"earth"', '"earth"\nrate_deg_s = [0, 1, 0]', 'mount = "earth" needs one pose'),
+        ('"earth"', '"moon"', 'mount must be "sky" or "earth", not \'moon\''),
+        ("sidereal_deg = 200", 'utc = "now"\nlongitude_deg = 0', "utc must be a date and time"),
+    ],
+)
+def test_nights_that_can_not_be(tmp_path: Path, old: str, new: str, wrong: str) -> None:
+    check_refused(load, save(tmp_path, NIGHT.replace(old, new)), wrong)
+
+
+def test_a_lens_drawn_as_its_calibration_knows_it(tmp_path: Path) -> None:
+    def drawn(seed: int, more: str = "") -> Optics:
+        text = f'kind = "sky"\nra_deg = 1\ndec_deg = 2\n[optics]\ndrawn = {seed}\n{more}'
+        return load_scene(save(tmp_path, text), CONDITION, UNCERTAIN).condition.optics
+
+    lenses = [drawn(seed) for seed in range(40)]
+    assert drawn(3) == lenses[3] != drawn(4)
+    for name, sigma in UNCERTAIN.items():
+        off = np.array([getattr(lens, name) - getattr(LENS, name) for lens in lenses]) / sigma
+        assert 0.6 < off.std() < 1.4
+        assert abs(off.mean()) < 0.5
+    assert drawn(3, "cx = 500.0") == replace(lenses[3], cx=500.0)
+    text = 'kind = "sky"\nra_deg = 1\ndec_deg = 2\n[optics]\ndrawn = 1'
+    check_refused(load, save(tmp_path, text), "optics: drawn must be left out for this lens")
