@@ -134,9 +134,10 @@ def _sky(
 ) -> SkyView:
     def lens(value: Any) -> Optics:
         values = file.subtable(_OPTICS | {"drawn": file.whole})(value)
-        seed = values.pop("drawn", None)
-        optics = condition.optics if seed is None else drawn_optics(condition.optics, uncertain, seed)
-        return replace(optics, **values)
+        seed, optics = values.pop("drawn", None), condition.optics
+        return replace(
+            drawn_optics(optics, uncertain, seed) if seed is not None else optics, **values
+        )
 
     values = file.read_table(table, _SKY | {"optics": lens})
     later = values.pop("poses", [])
