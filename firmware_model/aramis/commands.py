@@ -41,7 +41,7 @@ class Commands(CommandExecutor):
         measuring: Measuring,
     ) -> None:
         """Act on the given parts of the program."""
-        super().__init__(hardware, state.settings)
+        super().__init__(hardware, state.settings, state.switches)
         self._meter = meter
         self._state = state
         self._camera = camera

@@ -81,7 +81,6 @@ class Measuring:
     _state: State
     _camera: Camera
     _catalogue: CatalogueStore
-    _switches: AramisSwitches
 
     def __post_init__(self) -> None:
         """Begin without pictures."""
@@ -163,7 +162,7 @@ class Measuring:
         assert database is not None
         assert place is not None
         with self._phases(result):
-            settings = configuration(self._state.settings, self._switches)
+            settings = configuration(self._state.settings, self._state.switches.now)
             exposure = int(self._state.settings.get("SetExposure", "Rows"))
             picture, past = self._camera.picture(place), self._background
             solution = solve(picture, past, settings, database, self._meter, hint, exposure)

@@ -38,11 +38,11 @@ class AramisProgram:
     def __init__(
         self, hardware: AramisHardware, meter: Meter, switches: AramisSwitches = DEFAULT_SWITCHES
     ) -> None:
-        """Reset: settings from flash, everything else anew."""
-        self.state = state = State(hardware.flash)
+        """Reset: settings from flash, ``switches`` of power-up, everything else anew."""
+        self.state = state = State(hardware.flash, switches)
         self._camera = Camera(hardware, state, meter)
         self._catalogue = CatalogueStore(hardware, meter)
-        self._measuring = Measuring(meter, state, self._camera, self._catalogue, switches)
+        self._measuring = Measuring(meter, state, self._camera, self._catalogue)
         self.commands = Commands(
             hardware, meter, state, self._camera, self._catalogue, self._measuring
         )

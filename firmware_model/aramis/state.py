@@ -8,8 +8,10 @@ from cubestack.firmware_model.aramis.solution import Solution
 from cubestack.firmware_model.interface import aramis
 from cubestack.firmware_model.interface.aramis import MS_PER_DAY, MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.aramis.flags import FLAG_NAMES
+from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.state import NodeState
+from cubestack.firmware_model.node.switches import RunningSwitches
 
 
 class Clock:
@@ -73,6 +75,7 @@ class State(NodeState):
 
     Attributes:
         settings: parameters of the setting telecommands.
+        switches: those that the program runs with.
         clock: Julian date.
         sensor: what the star tracker does.
         measurement: the latest one.
@@ -84,10 +87,11 @@ class State(NodeState):
         star: number of the star that telemetry StarDetails shows next.
     """
 
-    def __init__(self, flash: FlashStore) -> None:
-        """Start with the settings in ``flash``."""
+    def __init__(self, flash: FlashStore, switches: AramisSwitches = DEFAULT_SWITCHES) -> None:
+        """Start with the settings in ``flash``, and ``switches`` of power-up."""
         super().__init__(FLAG_NAMES)
         self.settings = StoredSettings(flash)
+        self.switches = RunningSwitches(switches)
         self.clock = Clock()
         self.sensor = SensorState.INACTIVE
         self.measurement = Measurement()

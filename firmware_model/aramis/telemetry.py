@@ -18,6 +18,7 @@ from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
 
@@ -87,6 +88,7 @@ class Telemetry:
             "IdentificationSummary": self._identification_summary,
             "StarDetails": self._star_details,
             "SupplyStatus": self._supply_status,
+            SHOWN: lambda: shown_values(state.switches.now),
         }
 
     def values(self, message: Message) -> Values:

@@ -20,8 +20,10 @@ from cubestack.firmware_model.cubesense.vision.distortion import DistortionError
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import codes
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
+from cubestack.firmware_model.node.switches import SWITCH_COMMANDS
 
 SOFTWARE_RESET = 1
 """Cause of the program's own reset."""
@@ -71,7 +73,7 @@ class Commands:
             "NextImageFrame": self._prepare_frame,
             "SetNadirSearch": self._set_search,
         }
-        self.handled = frozenset({*self._routines, *_SETTINGS})
+        self.handled = frozenset({*self._routines, *_SETTINGS, *SWITCH_COMMANDS})
 
     def execute(self, job: Job) -> Routine[int | None]:
         """Do ``job``; returns a cause when the program has to end in a reset."""
@@ -93,6 +95,8 @@ class Commands:
             setting, camera = _SETTINGS[name]
             self.meter.charge(i8=job.message.length)
             self._set(setting, self.state.cameras[camera], job.values)
+        elif name in SWITCH_COMMANDS:
+            self.state.switches.change(name, job.values)
         else:
             cause = yield from self._routines[name](job)
         yield Pay()
@@ -147,13 +151,14 @@ class Commands:
                 self._set_distortion(settings, distortion_of(values))
 
     def _set_distortion(self, settings: CameraSettings, factors: tuple[float, ...]) -> None:
-        """Keep factors of which the tables can be made; the quick check may be wrong about some.
+        """Keep factors of which any table can be made; the quick check may be wrong about some.
 
         Making one is charged to the measurement that needs it first.
         """
         try:
-            for camera in codes.Camera:
-                make_table(camera, self.measurement.switches, factors, Meter(self.meter.table))
+            for kind in CubeSenseSwitches.declared()["distortion"].choices:
+                switches = CubeSenseSwitches(distortion=kind)
+                make_table(codes.Camera.NADIR, switches, factors, Meter(self.meter.table))
         except DistortionError:
             self.state.last_error = AckError.BAD_PARAMETER
         else:

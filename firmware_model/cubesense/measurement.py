@@ -20,10 +20,7 @@ from cubestack.firmware_model.cubesense.vision.sample_search import Between, aro
 from cubestack.firmware_model.interface.cameras.ov7620 import CLOCKS_PER_LINE, PIXEL_CLOCK_HZ
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
-from cubestack.firmware_model.interface.cubesense.switches import (
-    DEFAULT_SWITCHES,
-    CubeSenseSwitches,
-)
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import INSTRUCTION_HZ, PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
@@ -93,27 +90,22 @@ def _constant_table(camera: codes.Camera, switches: CubeSenseSwitches) -> distor
     return make_table(camera, switches, factors, Meter(PIC18F45K20))
 
 
+#: What a table was made of: factors, and value of switch ``distortion``.
+_Origin = tuple[tuple[float, ...], str]
+
+
 class Measurement:
     """Measures with either camera, into ``State.results``."""
 
     def __init__(
-        self,
-        meter: Meter,
-        state: State,
-        cameras: CameraControl,
-        acquisition: Acquisition,
-        switches: CubeSenseSwitches = DEFAULT_SWITCHES,
+        self, meter: Meter, state: State, cameras: CameraControl, acquisition: Acquisition
     ) -> None:
         """Measure as the settings in ``state`` say."""
         self._meter = meter
         self._state = state
         self._cameras = cameras
         self._acquisition = acquisition
-        self.switches = switches
-        self._tables = {
-            camera: (CameraSettings.at_reset(camera).distortion, _constant_table(camera, switches))
-            for camera in codes.Camera
-        }
+        self._tables: dict[codes.Camera, tuple[_Origin, distortion.RadiusTable]] = {}
 
     def measure(self, camera: codes.Camera, sram: codes.Sram, *, detect: bool) -> Routine[None]:
         """Take a picture of ``camera`` into ``sram`` and, with ``detect``, measure in it."""
@@ -143,7 +135,7 @@ class Measurement:
 
     def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
         """The Earth; False when the memory was cut off."""
-        settings, switches = self._state.cameras[codes.Camera.NADIR], self.switches
+        settings, switches = self._state.cameras[codes.Camera.NADIR], self._state.switches.now
         config = EdgeConfig(
             settings.threshold,
             settings.boresight,
@@ -205,7 +197,7 @@ class Measurement:
             settings.threshold,
             settings.boresight,
             masks=tuple(settings.masks),
-            printed=self.switches.sun == "all-pixels",
+            printed=self._state.switches.now.sun == "all-pixels",
         )
         found = sun_centroid.find_sun(data, config, self._meter)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
@@ -219,16 +211,19 @@ class Measurement:
         return True
 
     def _update_table(self, camera: codes.Camera) -> Routine[None]:
-        """Make the distortion table anew, in flash, when its coefficients have changed."""
-        factors = self._state.cameras[camera].distortion
-        if self._tables[camera][0] == factors:
+        """Make the distortion table anew, in flash, when its coefficients or its kind changed.
+
+        Those of the reset values lie there, one of each kind.
+        """
+        factors, switches = self._state.cameras[camera].distortion, self._state.switches.now
+        origin = factors, switches.distortion
+        if camera in self._tables and self._tables[camera][0] == origin:
             return
-        reset = CameraSettings.at_reset(camera).distortion
-        if factors == reset:
-            table = _constant_table(camera, self.switches)
+        if factors == CameraSettings.at_reset(camera).distortion:
+            table = _constant_table(camera, switches)
         else:
-            table = make_table(camera, self.switches, factors, self._meter)
+            table = make_table(camera, switches, factors, self._meter)
             yield Pay()
             blocks = -(-table.size // FLASH_ERASE_BYTES) + -(-table.size // FLASH_WRITE_BYTES)
             yield from pause(blocks * FLASH_STEP_US)
-        self._tables[camera] = factors, table
+        self._tables[camera] = origin, table

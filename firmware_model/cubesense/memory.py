@@ -9,7 +9,7 @@ looked for at the same time, so their buffers share their places.
 
 from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
-from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES
+from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES, Projection
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
 from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -42,7 +42,7 @@ _WINDOW = "Sun window"
 
 
 def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]:
-    """Every buffer of the program."""
+    """Every buffer of the program, while it runs with ``switches``."""
     checked, cone = switches.limb == "checked", switches.distortion == "stereographic"
     places = {
         "normal equations, their inverse, right side": (9 + (9 if checked or cone else 6) + 3)
@@ -75,10 +75,9 @@ def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]
         **({"edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW)} if checked else {}),
         inside: (places[inside], place),
     }
-    table = TABLE_ENTRIES * (1 if switches.distortion == "byte-table" else INT)
-    flash = {
-        "distortion tables of the reset values": table * (len(Camera) if cone else 1),
-        "distortion tables of other coefficients": table * len(Camera),
+    flash = {  # whatever the switches are, as telecommands change them
+        "distortion tables of the reset values": TABLE_ENTRIES * (1 + INT * len(Projection)),
+        "distortion tables of other coefficients": TABLE_ENTRIES * INT * len(Camera),
         "distortion coefficients": len(Camera) * DISTORTION_TERMS * FLOAT,
     }
     return (
@@ -89,13 +88,16 @@ def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]
 
 
 def _state_bytes() -> int:
-    """As many as telemetry shows of it, boresights, and what the cameras were told."""
+    """As many as telemetry shows of it, boresights, and what the cameras were told; switches."""
     shown = ["CommunicationStatus", "TcmdProcessed", "Configuration", "Power"]
     for number in (camera + 1 for camera in Camera):
         shown += [f"Result{number}", f"Details{number}", f"PhaseTimes{number}"]
     settings = INTERFACE.telemetry("Configuration").length
     boresights = sum(INTERFACE.telecommand(f"Boresight{camera + 1}").length for camera in Camera)
-    return sum(INTERFACE.telemetry(name).length for name in shown) + settings + boresights
+    switches = sum(not one.hardware for one in CubeSenseSwitches.declared().values())
+    return (
+        sum(INTERFACE.telemetry(name).length for name in shown) + settings + boresights + switches
+    )
 
 
 def report(buffers: tuple[Buffer, ...]) -> str:

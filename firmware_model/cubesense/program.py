@@ -46,14 +46,14 @@ class CubeSenseProgram:
         meter: Meter,
         switches: CubeSenseSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        """Reset: RAM starts with the declared reset values."""
+        """Reset: RAM starts with the declared reset values, and ``switches``."""
         self.idle = False
         self._hardware = hardware
-        self.state = state = State()
+        self.state = state = State(switches)
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
         self.acquisition = acquisition = Acquisition(hardware, meter, self._supply)
-        measurement = Measurement(meter, state, self.cameras, acquisition, switches)
+        measurement = Measurement(meter, state, self.cameras, acquisition)
         self._jobs = jobs = JobQueue()
         self.commands = Commands(meter, state, self._supply, self.cameras, acquisition, measurement)
         reader, download = self.commands.reader, self.commands.download

@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telecommands
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.firmware_model.node.state import NodeState
+from cubestack.firmware_model.node.switches import RunningSwitches
 
 ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
 """Of telemetry CommunicationStatus."""
@@ -114,6 +119,7 @@ class State(NodeState):
     """RAM of the program.
 
     Attributes:
+        switches: those that the program runs with.
         cameras: settings of each camera.
         results: latest measurement of each camera.
         over_current: by memory, drew too much since the flag was cleared; it is then kept off.
@@ -123,9 +129,10 @@ class State(NodeState):
         last_command, last_processed, last_error: for telemetry TcmdProcessed.
     """
 
-    def __init__(self) -> None:
-        """Start with the declared reset values."""
+    def __init__(self, switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> None:
+        """Start with the declared reset values, and ``switches`` of power-up."""
         super().__init__(ERROR_FLAGS)
+        self.switches = RunningSwitches(switches)
         self.cameras = {camera: CameraSettings.at_reset(camera) for camera in codes.Camera}
         self.results = {camera: Result(sram=codes.Sram(camera)) for camera in codes.Camera}
         self.over_current = dict.fromkeys(codes.Sram, False)

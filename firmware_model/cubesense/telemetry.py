@@ -13,6 +13,7 @@ from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins, telemetry
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import identification
@@ -54,6 +55,7 @@ class Telemetry:
             "ImageFrame": self._frame,
             "ImageFrameInfo": self._frame_info,
             **{f"NadirEdges{part + 1}": partial(self._edges, part) for part in range(EDGE_FRAMES)},
+            SHOWN: lambda: shown_values(self.state.switches.now),
             "NadirSearchMode": lambda: {"Search": self.state.nadir_search},
         }
         for camera in codes.Camera:

@@ -10,7 +10,7 @@ for the ground's reports.
 """
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -144,6 +144,16 @@ class StarCatalogue:
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of `to_bytes`."""
         return hashlib.sha256(self.to_bytes()).hexdigest()
+
+    def limited(self, pair_limit_deg: float) -> Self:
+        """This catalogue with a narrower pair list: the beginning of its own, as that is sorted."""
+        count = int(np.searchsorted(self.pairs.angle, np.float32(np.radians(pair_limit_deg))))
+        first, second, angle = self.pairs.first, self.pairs.second, self.pairs.angle
+        return replace(
+            self,
+            pairs=PairList(first[:count], second[:count], angle[:count]),
+            pair_limit_deg=min(pair_limit_deg, self.pair_limit_deg),
+        )
 
     def near(
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter

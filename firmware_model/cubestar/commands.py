@@ -35,7 +35,7 @@ class Commands(CommandExecutor):
         """Act on ``processing``."""
         self.processing, self.state = processing, processing.state
         self._meter, self._capture = processing.meter, processing.capture
-        super().__init__(self.state.hardware, self.state.settings)
+        super().__init__(self.state.hardware, self.state.settings, self.state.switches)
         self.memory_test = codes.MemoryTest.NOT_RUN
         self.next_block = 0
         self.blocks_received = 0
@@ -151,7 +151,7 @@ class Commands(CommandExecutor):
     # --- stars --------------------------------------------------------------------------------
 
     def _set_mode(self, command: QueuedCommand) -> None:
-        automatic = self.processing.switches.transitions == "automatic"
+        automatic = self.state.switches.now.transitions == "automatic"
         if automatic and command.values["IdMode"] == codes.IdMode.LOST_IN_SPACE:
             self.state.mode = codes.MatchMode.LOST_IN_SPACE
 

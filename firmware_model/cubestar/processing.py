@@ -26,7 +26,7 @@ from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, identify
 from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import IdMode, MatchMode, TaskStatus
-from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
 
@@ -82,7 +82,6 @@ class Processing:
     state: State
     capture: ImageCapture
     catalogue: StarCatalogue
-    switches: CubeStarSwitches = DEFAULT_SWITCHES
     results: Results = field(default_factory=Results)
     latest_ms: dict[str, float] = field(default_factory=dict)
     longest_ms: dict[str, float] = field(default_factory=dict)
@@ -98,6 +97,10 @@ class Processing:
             yield from self.process()
         else:
             self.discard_results()
+
+    @property
+    def _switches(self) -> CubeStarSwitches:
+        return self.state.switches.now
 
     @contextmanager
     def _cycles(self) -> Iterator[None]:
@@ -135,7 +138,7 @@ class Processing:
         with self._cycles():
             detection = yield from self.capture.pictures.search(
                 configuration.detection_config(
-                    settings, plain_weights=self.switches.weights == "intensity"
+                    settings, plain_weights=self._switches.weights == "intensity"
                 )
             )
             camera = configuration.camera_parameters(settings)
@@ -181,7 +184,7 @@ class Processing:
         return True
 
     def _choose_mode(self) -> MatchMode:
-        if self.switches.transitions == "automatic":
+        if self._switches.transitions == "automatic":
             lost = self.state.mode is MatchMode.LOST_IN_SPACE
         else:
             lost = self.state.settings.get("setIDMode", "IdMode") == IdMode.LOST_IN_SPACE
@@ -194,7 +197,8 @@ class Processing:
 
     def _match(self, mode: MatchMode, vectors: NDArray[np.float32]) -> Identification:
         margin = float(self.state.settings.get("setIDMargin", "Margin"))
-        meter, catalogue, attitude = self.meter, self.catalogue, self.state.attitude
+        catalogue = self.catalogue.limited(float(self._switches.pair_limit))
+        meter, attitude = self.meter, self.state.attitude
         if mode is MatchMode.TRACKING and attitude is not None:
             return track(
                 vectors,
@@ -202,7 +206,7 @@ class Processing:
                 self._rotation(attitude),
                 meter,
                 margin_rad=margin,
-                verified=self.switches.tracking == "verified",
+                verified=self._switches.tracking == "verified",
                 radius_deg=self._radius_deg(mode),
             )
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
@@ -212,7 +216,7 @@ class Processing:
             meter,
             boresight=boresight,
             margin_rad=margin,
-            printed=self.switches.voting == "algorithm-2",
+            printed=self._switches.voting == "algorithm-2",
         )
 
     def _expected_boresight(self) -> NDArray[np.float32]:
@@ -232,7 +236,7 @@ class Processing:
 
     def _radius_deg(self, mode: MatchMode) -> float:
         tracking = mode is MatchMode.TRACKING
-        return float(self.switches.reduction) if tracking else CUT_RADIUS_DEG
+        return float(self._switches.reduction) if tracking else CUT_RADIUS_DEG
 
     def _explain_failure(self, identification: Identification) -> None:
         """Raise the flags that say more about a failure than its outcome."""
@@ -256,7 +260,7 @@ class Processing:
 
     def _step_back(self) -> None:
         lost = MatchMode.LOST_IN_SPACE
-        automatic = self.switches.transitions == "automatic"
+        automatic = self._switches.transitions == "automatic"
         self.state.mode = lost if automatic else MatchMode(min(self.results.mode + 1, lost))
 
     # --- attitude -----------------------------------------------------------------------------
@@ -293,7 +297,7 @@ class Processing:
         except AttitudeError:
             self._step_back()
             return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
-        stored = dcm(quaternion, self.meter) if self.switches.flash_store == "page" else None
+        stored = dcm(quaternion, self.meter) if self._switches.flash_store == "page" else None
         self._record("attitude", (yield from phases.end(self.state, "attitude_us", started_us)))
         self.state.attitude = Attitude(
             quaternion, results.frame, results.image_ms, len(kept), results.mode, stored

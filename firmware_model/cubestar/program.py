@@ -50,12 +50,12 @@ class CubeStarProgram:
         layout: Layout = Layout.COPIED,
         switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        """Reset: set up RAM from the retention registers and flash."""
-        self.state = state = State(hardware, meter if switches.flash_store == "page" else None)
+        """Reset: set up RAM from the retention registers and flash; ``switches``: of power-up."""
+        self.state = state = State(hardware, meter, switches)
         self.supply = SupplyMonitor(state)
         self._pictures = pictures_of(layout, state, meter, self.supply)
         self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)
-        self._processing = Processing(meter, state, self._capture, catalogue, switches)
+        self._processing = Processing(meter, state, self._capture, catalogue)
         self.commands = Commands(self._processing)
         telemetry = Telemetry(self.commands, lambda: bool(self.link.queue))
         self.link = CubeStarLink(meter, state, telemetry.values)

@@ -13,16 +13,24 @@ switch `flash_store` that is paid: each write takes its time, and a worn page ke
 
 import struct
 from dataclasses import dataclass, fields
+from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.interface.codec.switch_messages import (
+    SHOWN,
+    shown_values,
+    switches_shown,
+)
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
+from cubestack.firmware_model.node.switches import RunningSwitches
 
 #: Telecommands whose parameters are kept.
 SETTING_COMMANDS = (
@@ -57,6 +65,7 @@ FLASH_ENDURANCE = 20_000
 """Erasures that a page stands: data sheet of the EFM32GG280."""
 
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
+_SWITCHES = INTERFACE.telemetry(SHOWN)
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF
 
@@ -148,6 +157,7 @@ class State(NodeState):
     Attributes:
         hardware: what the program runs on.
         settings: parameters of the setting telecommands.
+        switches: those that the program runs with; kept as the settings are, but not in flash.
         retained: counters that survive resets.
         task_status: value of telemetry TaskStatus.
         startup_us: time from the reset to the main loop.
@@ -157,26 +167,37 @@ class State(NodeState):
     _COUNTERS = struct.Struct(f"<{len(fields(Retained))}Q")
 
     #: Retention registers in use, in bytes.
-    RETENTION_SIZE = len(_MAGIC) + _SETTINGS_BYTES + _FLAGS.length + _COUNTERS.size
+    RETENTION_SIZE = (
+        len(_MAGIC) + _SETTINGS_BYTES + _SWITCHES.length + _FLAGS.length + _COUNTERS.size
+    )
 
-    def __init__(self, hardware: CubeStarHardware, flash_meter: Meter | None = None) -> None:
+    def __init__(
+        self,
+        hardware: CubeStarHardware,
+        meter: Meter,
+        switches: CubeStarSwitches = DEFAULT_SWITCHES,
+    ) -> None:
         """Restore from ``hardware``: retention registers, else the configuration in flash.
 
-        ``flash_meter`` is charged for erasing and writing; without it flash is free and lasts.
+        ``meter`` is charged for erasing and writing flash, where a switch says so; ``switches`` are
+        those of power-up.
         """
-        self.hardware, self._flash_meter = hardware, flash_meter
+        self.hardware, self._meter = hardware, meter
         super().__init__(field.name for field in _FLAGS.fields)
         self.settings = Settings(INTERFACE, SETTING_COMMANDS)
+        self.switches = RunningSwitches(switches)
         self.retained = Retained()
         self.task_status = TaskStatus.POWERED_UP
         self.startup_us = 0
         magic = len(self._MAGIC)
         if hardware.retention[:magic] == self._MAGIC:
-            data = bytes(hardware.retention[magic : self.RETENTION_SIZE])
-            self.settings.unpack(data[:_SETTINGS_BYTES])
-            flags = _FLAGS.unpack(data[_SETTINGS_BYTES : -self._COUNTERS.size])
+            data = BytesIO(hardware.retention[magic : self.RETENTION_SIZE])
+            self.settings.unpack(data.read(_SETTINGS_BYTES))
+            values = _SWITCHES.unpack(data.read(_SWITCHES.length))
+            self.switches.now = switches_shown(CubeStarSwitches, values)
+            flags = _FLAGS.unpack(data.read(_FLAGS.length))
             self.flags = {name for name, raised in flags.items() if raised}
-            self.retained = Retained(*self._COUNTERS.unpack(data[-self._COUNTERS.size :]))
+            self.retained = Retained(*self._COUNTERS.unpack(data.read()))
         else:
             self.load_config()
 
@@ -187,13 +208,19 @@ class State(NodeState):
         finds them too.
         """
         counters = [getattr(self.retained, field.name) & _U64 for field in fields(Retained)]
-        data = self._MAGIC + self.settings.pack() + _FLAGS.pack(**self.flag_values())
-        self.hardware.retention[: self.RETENTION_SIZE] = data + self._COUNTERS.pack(*counters)
+        self.hardware.retention[: self.RETENTION_SIZE] = (
+            self._MAGIC
+            + self.settings.pack()
+            + _SWITCHES.pack(**shown_values(self.switches.now))
+            + _FLAGS.pack(**self.flag_values())
+            + self._COUNTERS.pack(*counters)
+        )
 
     def forget(self) -> None:
         """Return to the values after power-up; supplies that were cut are still to be restored."""
         self.retained = Retained(cut=self.retained.cut)
         self.flags.clear()
+        self.switches.forget()
         self.load_config()
 
     @property
@@ -218,10 +245,10 @@ class State(NodeState):
         self._write(ATTITUDE_PAGE, attitude.pack())
 
     def _write(self, page: str, data: bytes) -> None:
-        if self._flash_meter is None:
+        if self.switches.now.flash_store == "nothing":
             self.hardware.flash.write(page, data)
         else:
-            self._flash_meter.charge(flash_erase=1, flash_program=-(-len(data) // 4))
+            self._meter.charge(flash_erase=1, flash_program=-(-len(data) // 4))
             self.hardware.flash.write(page, data, FLASH_ENDURANCE)
 
     def save_config(self) -> None:

@@ -11,6 +11,7 @@ from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.star_reports import StarReports, Values, named
 from cubestack.firmware_model.cubestar.state import Attitude
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize, SwitchState
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identification
@@ -122,6 +123,7 @@ class Telemetry:
             "AttitudeQuaternion": self._attitude_quaternion,
             "PerformanceParameters": self._performance,
             "Results": self._counts,
+            SHOWN: lambda: shown_values(state.switches.now),
             **self._stars.sources,
         }
 

@@ -7,6 +7,7 @@ from cubestack.firmware_model.mcu.requests import Pay, Routine, pause
 from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.queue import QueuedCommand
 from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.node.switches import SWITCH_COMMANDS, RunningSwitches
 
 STREAM_PAUSE_US = 20_000
 
@@ -18,11 +19,15 @@ class CommandExecutor:
         running: whether one is being executed, the reset that it asked for included.
     """
 
-    def __init__(self, hardware: NodeHardware, settings: Settings) -> None:
-        """Store into ``settings``; a node adds its actions and routines by telecommand."""
+    def __init__(
+        self, hardware: NodeHardware, settings: Settings, switches: RunningSwitches[Any]
+    ) -> None:
+        """Change ``settings`` and ``switches``; a node adds what its other telecommands do."""
         self._uart = hardware
         self._settings = settings
-        self._actions: dict[str, Callable[[QueuedCommand], None]] = {}
+        self._actions: dict[str, Callable[[QueuedCommand], None]] = dict.fromkeys(
+            SWITCH_COMMANDS, lambda c: switches.change(c.message.name, c.values)
+        )
         self._routines: dict[str, Callable[[QueuedCommand], Routine[Any]]] = {}
         self._reset_cause: int | None = None
         self.running = False

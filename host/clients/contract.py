@@ -8,6 +8,14 @@ from typing import TYPE_CHECKING, Self, TypeVar
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.switch_messages import (
+    SET_PROFILE,
+    SET_SWITCH,
+    SHOWN,
+    switch_parameters,
+    switches_shown,
+)
+from cubestack.firmware_model.interface.codec.switches import Switches
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError, TargetError
 
 if TYPE_CHECKING:
@@ -142,6 +150,24 @@ class DeviceClient(Closable):
         Raises TargetError for a device or a line that carries no picture, and the client's errors.
         """
         raise TargetError(f"{self.client.interface.name} sends no picture")
+
+    def profile(self) -> Switches:
+        """The switches that the device runs with; their ``profile`` says of which one they are.
+
+        Raises InterfaceError for a device without switches, and the client's errors.
+        """
+        return switches_shown(self.client.interface.switches, self.client.telemetry(SHOWN))
+
+    def set_profile(self, profile: str) -> None:
+        """Run "published" or "extended" from the next picture on; the board's switches stay.
+
+        Raises as ``Client.command`` does.
+        """
+        self._perform(SET_PROFILE, Profile=profile)
+
+    def set_switch(self, switch: str, value: str) -> None:
+        """Set one switch, as `cubestack registers DEVICE --switches` lists them; see above."""
+        self._perform(SET_SWITCH, **switch_parameters(switch, value))
 
     def _perform(self, name: str, **parameters: object) -> None:
         """Send a telecommand and wait until it is done."""

@@ -143,7 +143,7 @@ class CheckRun:
             raise SkippedError("needs a serial line")
         return self.target.node
 
-    def perform(self, name: str, values: Mapping[str, Value]) -> None:
+    def perform(self, name: str, values: Mapping[str, object]) -> None:
         """Send a telecommand and wait until it is processed; after a restart, for an answer."""
         node = self.target.node
         node.command(name, **values)
@@ -157,6 +157,18 @@ class CheckRun:
                 except NodeError:
                     node.pause(RESTART_POLL_S)
             raise FailedError(f"no answer for {RESTART_TIMEOUT_S:g} s after {name}") from None
+
+    def expect_error(self, payload: bytes, error: str, what: str) -> None:
+        """A frame with ``payload`` is acknowledged with ``error``, else ``what`` has failed."""
+        codes = self.target.interface.ack_errors
+        answer = self.node.request(payload)
+        if answer is None:
+            raise FailedError(f"{what}: no acknowledge, declared {error}")
+        if answer != bytes([codes[error]]):
+            known = {int(code): code.name for code in codes}
+            name = known.get(answer[0], "unknown") if len(answer) == 1 else "no error code"
+            found = f"acknowledged with {answer.hex()} ({name})"
+            raise FailedError(f"{what}: {found}, declared {error}")
 
     def telemetry(self, message: Message) -> dict[str, Value]:
         """A telemetry frame, its time taken: the best of three, as hosts have hiccups."""

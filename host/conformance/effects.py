@@ -3,8 +3,20 @@
 For devices whose tables have the messages named here; each one says which of them it has.
 """
 
+from dataclasses import replace
+
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import (
+    SET_PROFILE,
+    SET_SWITCH,
+    SHOWN,
+    after,
+    shown_values,
+    switch_parameters,
+    switches_shown,
+)
+from cubestack.firmware_model.interface.codec.switches import PROFILES, Switches
 from cubestack.host.conformance.contract import CheckRun, FailedError
 
 UPLOADED = 3
@@ -78,6 +90,53 @@ def check_camera_register(
         if found != value:
             raise FailedError(f"{value:#x} was written to {address:#x}, {found:#x} is read back")
     seen.append("read back")
+
+
+def check_profile(run: CheckRun, message: Message, seen: list[str]) -> None:
+    """Each profile is shown once it is set; the switches are put back."""
+    before = _switches(run)
+    for number, profile in enumerate(PROFILES):
+        run.perform(message.name, {"Profile": number})
+        _expect_switches(run, after(before, message.name, {"Profile": number}), profile)
+    _put_back(run, before)
+    seen.append("read back")
+
+
+def check_switch(run: CheckRun, message: Message, seen: list[str]) -> None:
+    """Each value of a switch is shown once it is set, and alone; those of the board are refused."""
+    before = _switches(run)
+    for place, (name, one) in enumerate(before.declared().items()):
+        if one.hardware:
+            run.expect_error(bytes([message.id, place, 0]), "BAD_PARAMETER", f"switch {name}")
+            continue
+        for value in (*one.choices, getattr(before, name)):
+            _set(run, name, value)
+            _expect_switches(run, replace(before, **{name: value}), f"{name}={value}")
+    seen.append("read back")
+
+
+#: Checks of the telecommands that every device with switches has.
+OF_SWITCHES = {SET_PROFILE: check_profile, SET_SWITCH: check_switch}
+
+
+def _switches(run: CheckRun) -> Switches:
+    return switches_shown(run.target.interface.switches, run.target.node.telemetry(SHOWN))
+
+
+def _expect_switches(run: CheckRun, wanted: Switches, what: str) -> None:
+    found = run.target.node.telemetry(SHOWN)
+    if found != shown_values(wanted):
+        raise FailedError(f"{what} was set, {SHOWN} is {found}, declared {shown_values(wanted)}")
+
+
+def _put_back(run: CheckRun, switches: Switches) -> None:
+    for name, one in switches.declared().items():
+        if not one.hardware:
+            _set(run, name, getattr(switches, name))
+
+
+def _set(run: CheckRun, name: str, value: str) -> None:
+    run.perform(SET_SWITCH, switch_parameters(name, value))
 
 
 def _camera_register(run: CheckRun, address: int) -> int:

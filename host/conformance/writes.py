@@ -11,6 +11,7 @@ from cubestack.firmware_model.interface.codec.letters import Letter, LetterProto
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
+from cubestack.host.conformance.effects import OF_SWITCHES
 from cubestack.host.conformance.values import (
     keys_of,
     limits_of,
@@ -59,7 +60,7 @@ def _check_unknown(run: CheckRun, seen: list[str]) -> None:
     declared = {m.id for m in run.target.interface.telecommands if m.supported}
     unknown = [identifier for identifier in range(TELEMETRY_BIT) if identifier not in declared]
     for identifier in unknown:
-        _expect_error(run, bytes([identifier]), "INVALID_ID", f"ID {identifier}")
+        run.expect_error(bytes([identifier]), "INVALID_ID", f"ID {identifier}")
     seen.append(f"{len(unknown)} refused")
 
 
@@ -67,7 +68,7 @@ def _check_lengths(run: CheckRun, message: Message, seen: list[str]) -> None:
     data = message.pack(**message.reset_values())
     for wrong in [data + b"\0", data[:-1]] if data else [b"\0"]:
         what = f"{len(wrong)} bytes"
-        _expect_error(run, bytes([message.id]) + wrong, "WRONG_LENGTH", what)
+        run.expect_error(bytes([message.id]) + wrong, "WRONG_LENGTH", what)
         seen.append(f"{what} refused")
 
 
@@ -77,7 +78,7 @@ def _check_range(
     """``field`` at a value that its limits forbid, the others at their reset values."""
     before = _shown(run, message)
     what = f"{field.name} = {field.label(message.unpack(data)[field.name])}"
-    _expect_error(run, bytes([message.id]) + data, "BAD_PARAMETER", what)
+    run.expect_error(bytes([message.id]) + data, "BAD_PARAMETER", what)
     seen.append("refused")
     if _shown(run, message) != before:
         raise FailedError(f"refused, but {what} changed what is read back")
@@ -86,8 +87,9 @@ def _check_range(
 
 def _check_effect(run: CheckRun, message: Message, seen: list[str]) -> None:
     notes = run.notes
-    if message.name in notes.effects:
-        notes.effects[message.name](run, message, seen)
+    effects = {**OF_SWITCHES, **notes.effects}
+    if message.name in effects:
+        effects[message.name](run, message, seen)
         return
     before = _shown(run, message)
     if before is None:
@@ -142,17 +144,6 @@ def _expect_shown(run: CheckRun, message: Message, wanted: Mapping[str, Value]) 
                 f"{field.name} was set to {field.label(wanted[field.name])}, "
                 f"{field.label(found[field.name])} is read back"
             )
-
-
-def _expect_error(run: CheckRun, payload: bytes, error: str, what: str) -> None:
-    codes = run.target.interface.ack_errors
-    answer = run.node.request(payload)
-    if answer is None:
-        raise FailedError(f"{what}: no acknowledge, declared {error}")
-    if answer != bytes([codes[error]]):
-        known = {int(code): code.name for code in codes}
-        name = known.get(answer[0], "unknown") if len(answer) == 1 else "no error code"
-        raise FailedError(f"{what}: acknowledged with {answer.hex()} ({name}), declared {error}")
 
 
 def _expect_flag(run: CheckRun, flag: str, seen: list[str]) -> None:

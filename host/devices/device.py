@@ -152,7 +152,6 @@ class Device(Generic[BoardT_co, ClientT_co]):
         default_scene: what it looks at when nothing is said.
         default_scene_title: that, for the help.
         options: of its board alone.
-        switches: where its firmware can do what its documents print, or better.
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.
         reports: further commands about it.
@@ -176,7 +175,6 @@ class Device(Generic[BoardT_co, ClientT_co]):
     default_scene: Callable[[], Any]
     default_scene_title: str
     options: tuple[BoardOption, ...] = ()
-    switches: type[Switches] = Switches
     has_fpga: bool = True
     experiment: "Callable[[], AnyExperiment] | None" = None
     reports: tuple[Report, ...] = ()
@@ -194,6 +192,11 @@ class Device(Generic[BoardT_co, ClientT_co]):
             raise ValueError(f"a device's name is an identifier of small letters, not {self.name}")
         if self.interface.name.lower() != self.name:
             raise ValueError(f"the interface of {self.name} is called {self.interface.name}")
+
+    @property
+    def switches(self) -> type[Switches]:
+        """Where its firmware can do what its documents print, or better."""
+        return self.interface.switches
 
     @property
     def all_options(self) -> tuple[BoardOption, ...]:

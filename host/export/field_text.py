@@ -13,6 +13,9 @@ def field_details(field: Field) -> str:
     parts = [field.meaning + (f" [{field.unit}]" if field.unit else "")]
     if field.choices is not None:
         parts.append(f"see {field.choices.__name__}")
+    if field.choices_by is not None:
+        other, sets = field.choices_by
+        parts.append(f"by {other}, see {', '.join(choices.__name__ for choices in sets.values())}")
     if field.maximum_by is not None:
         other, limits = field.maximum_by
         listed = ", ".join(f"{limit:g} for {int(value)}" for value, limit in limits.items())
@@ -42,13 +45,18 @@ def choice_rows(choices: Choices) -> list[str]:
 
 def field_json(field: Field) -> dict[str, object]:
     """Every attribute of a field."""
-    choices = field.choices
+    by = field.choices_by
     return {
         **picked(field, "name", "type", "bit_offset", "meaning", "unit", "scale"),
-        "choices": None if choices is None else {choice.name: int(choice) for choice in choices},
+        "choices": _numbers(field.choices),
+        "choices_by": by and (by[0], {at: _numbers(choices) for at, choices in by[1].items()}),
         **picked(field, "minimum", "maximum", "also", "maximum_by", "range_flag", "flag"),
         "reset": field.reset.hex() if isinstance(field.reset, bytes) else field.reset,
     }
+
+
+def _numbers(choices: Choices | None) -> dict[str, int] | None:
+    return None if choices is None else {choice.name: int(choice) for choice in choices}
 
 
 def picked(thing: object, *names: str) -> dict[str, object]:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE
-from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import ConformanceNotes, Device, Engine, Report
@@ -63,7 +62,6 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
-    switches=AramisSwitches,
     has_fpga=False,
     prepare=lambda shown: call(f"{BOARD}.catalogue:onboard_database", progress=shown)(),
     conformance=ConformanceNotes(

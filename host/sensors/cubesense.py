@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
 
@@ -49,7 +48,6 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
-    switches=CubeSenseSwitches,
     options=(
         BoardOption(
             "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
@@ -24,13 +24,15 @@ POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 MAG_LIMIT = 3.8
 """Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
 
+WIDEST_PAIR_DEG = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))
+"""The list in flash has every pair that a switch wants."""
+
 
 def _open_board(
     scene: "Scene | SkyView",
     *,
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
-    switches: CubeStarSwitches = DEFAULT_SWITCHES,
     **common: Any,
 ) -> "CubeStarBoard":
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -38,10 +40,9 @@ def _open_board(
 
     return CubeStarBoard(
         scene,
-        onboard_catalogue(pair_limit_deg=float(switches.pair_limit)),
+        onboard_catalogue(pair_limit_deg=WIDEST_PAIR_DEG),
         baud=baud or INTERFACE.baud,
         layout=Layout(layout),
-        switches=switches,
         **common,
     )
 
@@ -101,7 +102,6 @@ DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
-    switches=CubeStarSwitches,
     options=(
         BoardOption(
             "layout",

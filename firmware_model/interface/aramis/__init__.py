@@ -15,6 +15,7 @@ from cubestack.firmware_model.interface.aramis.codes import (
     SensorState,
     SpikeMethod,
 )
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.interface.aramis.telecommands import (
     BLOCK_BYTES,
     IMAGE_BYTES,
@@ -53,4 +54,5 @@ INTERFACE = Interface(
     telecommands=TELECOMMANDS,
     telemetries=TELEMETRY,
     ack_errors=AckError,
+    switches=AramisSwitches,
 )

@@ -14,9 +14,11 @@ from cubestack.firmware_model.interface.aramis.codes import (
     OnOff,
     SpikeMethod,
 )
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
 
 #: Bytes of a picture: one for each pixel, row after row.
 IMAGE_BYTES = mt9m001.COLUMNS * mt9m001.ROWS
@@ -191,4 +193,11 @@ _EXTENSIONS = (
     ).of(u8("Address", "register's address")),
 )
 
-TELECOMMANDS = _USE_CASES + tuple(replace(message, extension=True) for message in _EXTENSIONS)
+#: Messages of the switches.
+SWITCHES = switch_messages(AramisSwitches, 118, 210, "lost at a reset, and not saved")
+
+TELECOMMANDS = (
+    *_USE_CASES,
+    *(replace(message, extension=True) for message in _EXTENSIONS),
+    *SWITCHES.telecommands,
+)

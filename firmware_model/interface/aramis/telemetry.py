@@ -8,7 +8,11 @@ from dataclasses import replace
 
 from cubestack.firmware_model.interface.aramis import codes
 from cubestack.firmware_model.interface.aramis.flags import flag_fields
-from cubestack.firmware_model.interface.aramis.telecommands import BLOCK_BYTES, TELECOMMANDS
+from cubestack.firmware_model.interface.aramis.telecommands import (
+    BLOCK_BYTES,
+    SWITCHES,
+    TELECOMMANDS,
+)
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
@@ -205,6 +209,7 @@ TELEMETRY = (
     *_NODE,
     *_RESULTS,
     *(replace(message, extension=True) for message in _REPORTS),
+    SWITCHES.telemetry,
     *sorted(
         (_setting(command) for command in TELECOMMANDS if command.name in _SHOWN),
         key=lambda message: message.id,

@@ -72,6 +72,7 @@ class Field:
         minimum, maximum: smallest and largest allowed value, in ``unit``.
         also: a value that is allowed beyond these limits, or None.
         maximum_by: (other field, {its value: largest allowed value here}), or None.
+        choices_by: (other field, {its value: the choices that go with it}), or None.
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.
         reset: value after power-up; None takes zero.
@@ -89,6 +90,7 @@ class Field:
     maximum: float | None = None
     also: float | None = None
     maximum_by: tuple[str, Mapping[int, float]] | None = None
+    choices_by: tuple[str, Mapping[int, Choices]] | None = None
     range_flag: str = ""
     flag: str = ""
     reset: Value | None = None
@@ -177,6 +179,10 @@ class Field:
             return True
         if self.choices is not None and value not in {int(choice) for choice in self.choices}:
             return False
+        if self.choices_by is not None:
+            other, choices = self.choices_by
+            if value not in {int(choice) for choice in choices.get(int(others[other]), ())}:
+                return False
         maximum = self.maximum
         if self.maximum_by is not None:
             other, limits = self.maximum_by

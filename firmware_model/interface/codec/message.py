@@ -21,6 +21,7 @@ from cubestack.firmware_model.interface.codec.field import (
 )
 from cubestack.firmware_model.interface.codec.letters import LetterProtocol
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap
+from cubestack.firmware_model.interface.codec.switches import Switches
 
 #: Set in the IDs of telemetry, clear in those of telecommands.
 TELEMETRY_BIT = 0x80
@@ -86,7 +87,8 @@ class Message:
         if len(set(names)) != len(names):
             raise InterfaceError(f"message {self.name}: two fields of one name")
         related = [name for pair in self.ordered for name in pair]
-        related += [field.maximum_by[0] for field in self.fields if field.maximum_by]
+        dependent = [by for f in self.fields for by in (f.maximum_by, f.choices_by) if by]
+        related += [other for other, _ in dependent]
         for name in related:
             self.field(name)
         if self.kind is Kind.TELECOMMAND:
@@ -178,6 +180,7 @@ class Interface:
         ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
         registers: registers behind another I2C address, or None.
         service_port: one-letter protocol on another serial port, or None.
+        switches: where the firmware can do what its documents print, or better.
     """
 
     name: str
@@ -189,6 +192,7 @@ class Interface:
     ack_errors: type[IntEnum]
     registers: PointerMap | None = None
     service_port: LetterProtocol | None = None
+    switches: type[Switches] = Switches
 
     def __post_init__(self) -> None:
         """Check the declaration; raises InterfaceError."""

@@ -13,6 +13,9 @@ Profile = Literal["published", "extended"]
 PROFILES: tuple[Profile, ...] = get_args(Profile)
 DEFAULT_PROFILE: Profile = "published"
 
+#: What switches are that are of no one profile.
+MIXED = "mixed"
+
 
 @dataclass(frozen=True)
 class Switch:
@@ -88,5 +91,5 @@ class Switches:
 
     @property
     def profile(self) -> str:
-        """The profile that these are; "mixed" where single ones differ."""
-        return next((one for one in PROFILES if self == type(self).of(one)), "mixed")
+        """The profile that these are; ``MIXED`` where single ones differ."""
+        return next((one for one in PROFILES if self == type(self).of(one)), MIXED)

@@ -10,6 +10,7 @@ from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
 from cubestack.firmware_model.interface.cubesense.telemetry import TELEMETRIES
 
@@ -21,6 +22,7 @@ INTERFACE = Interface(
     telecommands=TELECOMMANDS,
     telemetries=TELEMETRIES,
     ack_errors=AckError,
+    switches=CubeSenseSwitches,
     registers=REGISTERS,
     service_port=SERVICE_PORT,
 )

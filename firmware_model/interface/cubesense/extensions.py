@@ -1,10 +1,18 @@
-"""CubeSense's telemetry of our own, IDs from 220 on: what a measurement rests on, its times."""
+"""CubeSense's telemetry of our own, IDs from 220 on: what a measurement rests on, its times.
+
+Also the telecommands that change the switches, and the telemetry that shows them.
+"""
 
 from functools import partial
 
 from cubestack.firmware_model.interface.codec.field import i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
 from cubestack.firmware_model.interface.cubesense import codes
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
+
+#: Messages of the switches.
+SWITCHES = switch_messages(CubeSenseSwitches, 101, 227, "lost when the program restarts")
 
 _extension = partial(Message, extension=True)
 
@@ -68,4 +76,5 @@ EXTENSIONS = (
         u8("Search", "way of the search", choices=codes.NadirSearch)
     ),
     *(_edges(part) for part in range(2)),
+    SWITCHES.telemetry,
 )

@@ -23,6 +23,7 @@ from cubestack.firmware_model.interface.cubestar.extensions import (
     EXTENSION_TELEMETRY,
     UPLOAD_BLOCK_BYTES,
 )
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.interface.cubestar.telecommands import (
     IMAGE_BYTES,
     PUBLISHED_TELECOMMANDS,
@@ -52,4 +53,5 @@ INTERFACE = Interface(
     telecommands=PUBLISHED_TELECOMMANDS + EXTENSION_TELECOMMANDS,
     telemetries=tuple(sorted(PUBLISHED_TELEMETRY + EXTENSION_TELEMETRY, key=lambda m: m.id)),
     ack_errors=AckError,
+    switches=CubeStarSwitches,
 )

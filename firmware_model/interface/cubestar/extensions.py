@@ -9,13 +9,17 @@ from dataclasses import replace
 
 from cubestack.firmware_model.interface.codec.field import Field, bool1, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.interface.cubestar.telecommands import IMAGE_BYTES
 
 #: Bytes that one UploadBlock carries.
 UPLOAD_BLOCK_BYTES = 128
 
 _LARGEST_FRAME_RATE = 39  # of 27 MHz / 1322 clocks a line: a frame outlasts its 512 lines
+
+_SWITCHES = switch_messages(CubeStarSwitches, 108, 208, "kept by every reset but telecommand Reset")
 
 _TELECOMMANDS = (
     Message(100, "UploadBlock", "write a block of the picture memory").of(
@@ -53,6 +57,7 @@ _TELECOMMANDS = (
         106, "SelectCameraRegister", "read an image sensor register into telemetry CameraRegister"
     ).of(u16("Address", "register's address")),
     Message(107, "StopLoop", "end the 1 s loop after its present iteration"),
+    *_SWITCHES.telecommands,
 )
 
 _TELEMETRY = (
@@ -113,6 +118,7 @@ _TELEMETRY = (
         f32("MeanConfidence", "mean confidence of the identified stars, 0 to 1"),
         u8("MaxVotes", "most verification votes of a star"),
     ),
+    _SWITCHES.telemetry,
 )
 
 EXTENSION_TELECOMMANDS = tuple(replace(message, extension=True) for message in _TELECOMMANDS)

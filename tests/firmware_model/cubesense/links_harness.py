@@ -16,7 +16,6 @@ from cubestack.firmware_model.cubesense.links.registers import RegisterLink
 from cubestack.firmware_model.cubesense.state import Result, State
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
-from cubestack.firmware_model.interface.cubesense.switches import DEFAULT_SWITCHES
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
@@ -40,7 +39,6 @@ class Links(Runner, HostSide):
     """
 
     interface = INTERFACE
-    switches = DEFAULT_SWITCHES  # of its measurement
 
     def __init__(self, *, mcu_addressing: bool = False) -> None:
         HostSide.__init__(self)

@@ -48,6 +48,9 @@ def frame(unit: Harness) -> bytes:
     return bytes(unit.telemetry("ImageFrame")["Frame"])
 
 
+LENS = INTERFACE.telecommand("Distortion2").reset_values()
+
+
 @pytest.mark.parametrize(
     ("name", "profile"),
     [
@@ -240,6 +243,30 @@ def set_nadir_search(_: Harness) -> None:
     assert again[0] is detect is codes.DetectResult.SUCCESS
     assert again[1:] == pytest.approx((alpha, beta), abs=0.3)
     assert unit.telemetry("Details2")["PixelsRead"] < lines / 5
+
+
+@telecommand("SetProfile", "SetSwitch")
+def set_switches(_: Harness) -> None:
+    """After a measurement as before the first one; a table of other coefficients is made anew."""
+    seen = []
+    for coefficients in (False, True):
+        for early in (False, True):
+            unit = Harness()
+            lit(unit)
+            unit.command("CaptureOnly", Camera=codes.Camera.NADIR, Sram=0)  # sets the camera up
+            unit.command("SetProfile", Profile="extended")
+            if coefficients:
+                unit.command("Distortion2", **{**LENS, "Mantissa1": 9940})
+            if early:
+                measured(unit, codes.Camera.NADIR)
+            unit.command("SetProfile", Profile="published")
+            unit.command("SetSwitch", Switch="EDGES", Value="SUB_PIXEL")
+            before_us = unit.now_us
+            measured(unit, codes.Camera.NADIR)
+            frames = [unit.telemetry(f"{name}2") for name in ("Result", "Details")]
+            seen.append((round((unit.now_us - before_us) / 1000), frames))
+    assert seen[0] == seen[1] != seen[2] == seen[3]
+    assert seen[2][0] > seen[0][0] + 400
 
 
 def test_a_search_that_the_fpgas_are_not_built_for_is_refused(unit: Harness) -> None:

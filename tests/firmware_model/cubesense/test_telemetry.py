@@ -10,7 +10,9 @@ from cubestack.firmware_model.cubesense.state import Result
 from cubestack.firmware_model.cubesense.telemetry import NODE_TYPE
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.switch_messages import shown_values
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, telemetry
+from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.node.identification import FIRMWARE_VERSION
 
 from .links_harness import Links
@@ -19,6 +21,7 @@ Values = dict[str, Any]
 
 UPTIME_US = 70_123_456
 OVER = 0x10000
+SWITCHES = CubeSenseSwitches.of("extended", "edges=listing")
 
 
 def no_two_alike(node: Links) -> None:
@@ -55,6 +58,7 @@ def no_two_alike(node: Links) -> None:
             total_us=OVER + base + 5,
         )
     state.over_current = {codes.Sram.SRAM1: False, codes.Sram.SRAM2: True}
+    state.switches.now = SWITCHES
     state.nadir_search = codes.NadirSearch.AROUND_SAMPLES
     state.telecommands, state.telemetries = 258, 514
     state.last_command, state.last_processed, state.last_error = 65, 0, AckError.BAD_PARAMETER
@@ -158,6 +162,7 @@ EXPECTED: dict[str, Callable[[], Values]] = {
     "Configuration": configuration,
     "ImageFrame": lambda: {"Frame": (np.arange(128) * 3).astype(np.uint8).tobytes()},
     "ImageFrameInfo": lambda: {"FrameNumber": 4097, "Checksum": 171},
+    "Profile": lambda: shown_values(SWITCHES),
     "NadirSearchMode": lambda: {"Search": codes.NadirSearch.AROUND_SAMPLES},
     "NadirEdges1": lambda: edges(0),
     "NadirEdges2": lambda: edges(1),

@@ -153,3 +153,14 @@ def test_impossible_catalogues_are_refused(change: dict[str, object], message: s
     limits = {"mag_limit": 4.0, "pair_limit_deg": 42.1}
     with pytest.raises(CatalogueError, match=message):
         StarCatalogue.build(**{**sky, **limits, **change})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limit_deg", [10.0, 42.1, 50.0, 57.3])
+def test_a_narrower_list_is_the_beginning_of_a_wider_one(limit_deg: float) -> None:
+    wide, narrow = (
+        StarCatalogue.build(*random_sky(200, 9), mag_limit=9.0, pair_limit_deg=limit)
+        for limit in (50.0, min(limit_deg, 50.0))
+    )
+    found = wide.limited(limit_deg)
+    assert found.pair_limit_deg == narrow.pair_limit_deg
+    assert found.to_bytes() == narrow.to_bytes()

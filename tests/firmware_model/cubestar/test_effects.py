@@ -5,6 +5,7 @@ import pytest
 
 from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
 from cubestack.firmware_model.interface import cubestar
+from cubestack.firmware_model.interface.codec.switch_messages import shown_values
 from cubestack.firmware_model.interface.cubestar import TaskStatus
 from cubestack.firmware_model.mcu.requests import Pay, Request, SetPin
 
@@ -381,6 +382,26 @@ def test_set_id_mode(unit: Harness) -> None:
         unit.command("setIDMode", IdMode=mode)
         unit.shown("IDMode", Mode=mode)
         assert unit.telemetry("Results")["IDMode"] == mode
+
+
+@telecommand("SetProfile", "SetSwitch")
+def test_switches(unit: Harness, sky: Sky) -> None:
+    """They count at once, and a page is paid for from then on."""
+    unit.picture = sky.picture
+    unit.command("SetProfile", Profile="published")
+    unit.command("CaptureAndProcess")
+    assert unit.flash.writes["attitude"] == 1
+    stored = unit.flash.read("attitude")
+    for value, paid in (("NOTHING", False), ("PAGE", True)):
+        unit.command("SetSwitch", Switch="FLASH_STORE", Value=value)
+        before_us = unit.now_us
+        unit.command("EstimateAttitude")
+        assert (unit.now_us - before_us > 20_000) is paid
+        assert (unit.flash.read("attitude") == stored) is paid  # the matrix is stored as well
+    unit.command("MCUReset")
+    assert unit.telemetry("Profile")["Profile"] == 0
+    unit.command("Reset")
+    assert unit.telemetry("Profile") == shown_values(unit.algorithms)
 
 
 @telecommand("setTrackingMode")

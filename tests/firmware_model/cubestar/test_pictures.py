@@ -36,7 +36,7 @@ class Board(Runner):
         self.memories = {select: np.zeros(SIZE, np.uint8) for select in (0, 1)}
         self.pins: dict[str, int] = {}
         self.levels: list[tuple[str, int]] = []
-        self.state = State(self)  # type: ignore[arg-type]  # what it does not use is missing
+        self.state = State(self, self.meter)  # type: ignore[arg-type]  # what it does not use is missing
         self.pictures = pictures_of(layout, self.state, self.meter, SupplyMonitor(self.state))
         self.accesses = 0
         self.stuck: list[int] = []

@@ -8,6 +8,8 @@ import pytest
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
 from cubestack.firmware_model.cubestar.state import Attitude, Retained, State
 from cubestack.firmware_model.interface.cubestar import INTERFACE, MatchMode
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 COUNTERS = [field.name for field in fields(Retained)]
@@ -28,7 +30,7 @@ def memories() -> Memories:
 
 
 def state(memories: Memories) -> State:
-    return State(memories)  # type: ignore[arg-type]
+    return State(memories, Meter(CORTEX_M3))  # type: ignore[arg-type]
 
 
 def test_the_layout_fits_the_retention_registers(memories: Memories) -> None:

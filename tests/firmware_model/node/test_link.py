@@ -48,7 +48,7 @@ class Canned(Runner, HostSide):
         self.retention = bytearray(RETENTION_BYTES)
         self.state: NodeState
         if interface is CUBESTAR:
-            self.state = state = CubeStarState(self)  # type: ignore[arg-type]
+            self.state = state = CubeStarState(self, self.meter)  # type: ignore[arg-type]
             self.served: SatelliteLink = CubeStarLink(self.meter, state, self.values)
         else:
             self.state = other = AramisState(self.flash)

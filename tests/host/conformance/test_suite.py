@@ -7,9 +7,15 @@ import pytest
 
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.switch_messages import (
+    after,
+    shown_values,
+    switches_shown,
+)
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.firmware_model.interface.cubestar import ResetCause
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.effects import check_stream
@@ -44,6 +50,7 @@ def good(node, uart, monkeypatch):
             node.values[telemetry.name][place.name] = reset[field]
     node.values["Identification"]["InterfaceVersion"] = CUBESTAR.version
     node.values["ExtendedIdentification"]["ResetCause"] = 1
+    node.values["Profile"] = shown_values(CubeStarSwitches.of("extended"))
     node.values["TaskStatus"]["taskStatus"] = node.values["LogStatus"]["Status"] = 1
     execute, answer = node.execute, node.answer
 
@@ -62,6 +69,9 @@ def good(node, uart, monkeypatch):
             uart.later += b"".join(encode_frame(block.tobytes()) for block in blocks)
         elif name == "UploadBlock":
             node.values["UploadStatus"]["NextBlock"] = values["BlockNumber"] + 1
+        elif name in ("SetProfile", "SetSwitch"):
+            switches = switches_shown(CubeStarSwitches, node.values["Profile"])
+            node.values["Profile"] = shown_values(after(switches, name, values))
         elif name == "TestWDG":
             identification["WDGResetCount"] = identification.get("WDGResetCount", 0) + 1
             identification["ResetCause"] = ResetCause.WATCHDOG

@@ -1,0 +1,63 @@
+"""Messages made of switches, of which one is the board's."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.field import InterfaceError
+from cubestack.firmware_model.interface.codec.switch_messages import (
+    after,
+    shown_values,
+    switch_messages,
+    switch_parameters,
+    switches_shown,
+)
+from cubestack.firmware_model.interface.codec.switches import Switches, switch
+
+
+@dataclass(frozen=True)
+class Own(Switches):
+    lens: str = switch("", "ideal", "drawn", source="", reason="", hardware=True)
+    star_limit: str = switch("", "3.8", "4", "all", source="", reason="")
+    fit: str = switch("", "all", "some-of-them", source="", reason="")
+
+
+(SET_PROFILE, SET_SWITCH), SHOWN = switch_messages(Own, 100, 200, "kept")
+PUBLISHED, EXTENDED = Own.of("published"), Own.of("extended")
+
+
+def test_a_name_is_one_number_and_a_value_only_its_switchs() -> None:
+    names = [[choice.name for choice in field.choices or ()] for field in SHOWN.fields]
+    assert names[2:] == [["STAR_LIMIT_3_8", "STAR_LIMIT_4", "ALL"], ["ALL", "SOME_OF_THEM"]]
+    assert [field.name for field in SHOWN.fields] == ["Profile", "Lens", "StarLimit", "Fit"]
+    tried = [{"Switch": at, "Value": value} for at in range(5) for value in range(8)]
+    good = [tuple(values.values()) for values in tried if not SET_SWITCH.violations(values)]
+    assert good == [(1, 2), (1, 3), (1, 4), (2, 4), (2, 5)]
+    assert [message.extension for message in (SET_PROFILE, SET_SWITCH, SHOWN)] == [True] * 3
+
+
+@pytest.mark.parametrize("number", [2, 3, 255])
+def test_a_profile_that_is_none_is_refused(number: int) -> None:
+    assert SET_PROFILE.violations({"Profile": number})
+
+
+def test_the_boards_switch_is_shown_and_stays() -> None:
+    with pytest.raises(InterfaceError, match="no choice 'LENS'; known: STAR_LIMIT, FIT"):
+        SET_SWITCH.pack(**switch_parameters("lens", "drawn"))
+    changed = after(PUBLISHED, "SetProfile", {"Profile": 1})
+    assert changed == Own(lens="ideal", star_limit="4", fit="some-of-them")
+    assert shown_values(changed) == {"Profile": 2, "Lens": 0, "StarLimit": 3, "Fit": 5}
+    assert shown_values(EXTENDED)["Profile"] == 1
+
+
+@pytest.mark.parametrize("switches", [PUBLISHED, EXTENDED, Own(lens="drawn", star_limit="all")])
+def test_what_is_shown_is_what_there_is(switches: Own) -> None:
+    values = SHOWN.unpack(SHOWN.pack(**shown_values(switches)))
+    assert switches_shown(Own, values) == switches
+    with pytest.raises(ValueError, match="switch fit has no value with number 9"):
+        switches_shown(Own, values | {"Fit": 9})
+
+
+def test_one_switch_changes_alone() -> None:
+    values = SET_SWITCH.unpack(SET_SWITCH.pack(**switch_parameters("star_limit", "all")))
+    assert after(PUBLISHED, "SetSwitch", values) == Own.of("published", "star_limit=all")

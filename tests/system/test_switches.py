@@ -1,0 +1,178 @@
+"""Telecommands choose profile and switches of a running device; telemetry says which run."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES
+from cubestack.firmware_model.interface.cubesense.codes import ResetTarget
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.devices.registry import device
+from cubestack.host.errors import CommandRefusedError
+
+NAMES = ("cubestar", "cubesense", "aramis")
+
+#: Telecommands that measure once.
+MEASURE: dict[str, list[tuple[str, dict[str, Any]]]] = {
+    "cubestar": [("CaptureAndProcess", {})],
+    "cubesense": [("CaptureAndDetect", {"Camera": c, "Sram": c}) for c in (0, 1)],
+    "aramis": [("Activate", {}), ("GetAttitude", {})],
+}
+
+#: Values of which some are of neither profile.
+OTHERS = {
+    "cubestar": "pair_limit=60,voting=algorithm-2,reduction=30.3",
+    "cubesense": "distortion=equidistant,edges=listing,sun=all-pixels",
+    "aramis": "identities=appendix-e,weights=grey-level",
+}
+
+RESTARTED = [target.name for target in ResetTarget]
+
+#: Telecommands that reset, and whether a changed switch outlives them.
+RESETS = {
+    "cubestar": [("MCUReset", {}, True), ("TestWDG", {}, True), ("Reset", {}, False)],
+    "cubesense": [("Reset", {"Target": target}, target != "MCU") for target in RESTARTED],
+    "aramis": [("Reset", {}, False)],
+}
+
+
+@pytest.fixture(scope="module")
+def extended() -> Iterator[dict[str, AnyEmulated]]:
+    with ExitStack() as stack:
+        yield {n: stack.enter_context(open_device(n, profile="extended")) for n in NAMES}
+
+
+@pytest.fixture(params=NAMES)
+def unit(request: pytest.FixtureRequest, extended: dict[str, AnyEmulated]) -> AnyEmulated:
+    """Powered up with `extended`; tests leave it so."""
+    opened = extended[request.param]
+    opened.client.set_profile("extended")
+    return opened
+
+
+def perform(unit: AnyEmulated, name: str, parameters: dict[str, Any]) -> None:
+    unit.client.client.command(name, **parameters)
+    unit.client.client.wait_processed(10.0)
+
+
+def everything(unit: AnyEmulated) -> dict[str, Any]:
+    """All telemetry, but what reading starts a measurement."""
+    shown = [m for m in unit.device.interface.telemetries if m.supported]
+    return {m.name: unit.client.client.telemetry(m.name) for m in shown if not m.starts_measurement}
+
+
+def test_each_value_of_each_switch_is_set_and_read_back(unit: AnyEmulated) -> None:
+    client, wanted = unit.client, unit.device.switches.of("extended")
+    assert client.profile() == wanted
+    firmware = {name: one for name, one in wanted.declared().items() if not one.hardware}
+    for name, one in firmware.items():
+        for value in (*one.choices[::-1], *one.choices):
+            client.set_switch(name, value)
+            wanted = replace(wanted, **{name: value})
+            assert client.profile() == wanted
+    for profile in PROFILES:
+        client.set_profile(profile)
+        found, full = client.profile(), unit.device.switches.of(profile)
+        assert all(getattr(found, name) == getattr(full, name) for name in firmware)
+
+
+def test_a_value_of_another_switch_is_refused(unit: AnyEmulated) -> None:
+    (first, one), (second, _), *_ = unit.device.switches.declared().items()
+    with pytest.raises(CommandRefusedError):
+        unit.client.set_switch(second, one.published)
+    with pytest.raises(ValueError, match="no choice 'NONSENSE'; "):
+        unit.client.set_switch(first, "nonsense")
+    assert unit.client.profile().profile == "extended"
+
+
+@pytest.mark.parametrize("mixed", [False, True], ids=["profile", "switches"])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_changed_device_measures_as_one_that_was_powered_up_so(name: str, mixed: bool) -> None:
+    """Each telecommand goes to both, so that neither is ahead in time; one board is the other's."""
+    profile, other = PROFILES if mixed else PROFILES[::-1]
+    changes = OTHERS[name] if mixed else ""
+    declared = device(name).switches.declared()
+    board = (f"{key}={getattr(one, profile)}" for key, one in declared.items() if one.hardware)
+    with (
+        open_device(name, profile=profile, set=changes) as same,
+        open_device(name, profile=other, set=",".join(board)) as changed,
+    ):
+        for unit in (same, changed):
+            unit.client.set_profile(profile)
+            for change in filter(None, changes.split(",")):
+                unit.client.set_switch(*change.split("="))
+            for telecommand, parameters in MEASURE[name]:
+                perform(unit, telecommand, parameters)
+        assert everything(changed) == everything(same)
+        assert same.client.profile() == same.device.switches.of(profile, changes)
+        same.client.set_profile(profile)
+        changed.client.set_profile(other)
+        for unit in (same, changed):
+            perform(unit, *MEASURE[name][-1])
+        times = {name for name in everything(same) if name.startswith("PhaseTimes")}
+        assert any(everything(changed)[name] != everything(same)[name] for name in times)
+
+
+def test_what_a_reset_keeps(unit: AnyEmulated) -> None:
+    for telecommand, parameters, kept in RESETS[unit.device.name]:
+        unit.client.set_profile("published")
+        unit.client.client.command(telecommand, **parameters)
+        unit.wait(5.0)
+        published = unit.client.profile() != unit.device.switches.of("extended")
+        assert published is kept, telecommand
+
+
+def test_the_loops_resets_keep_it(extended: dict[str, AnyEmulated]) -> None:
+    unit = extended["cubestar"]
+    unit.client.set_switch("transitions", "automatic")
+    perform(unit, "Trigger", {})
+    unit.wait(3.5)
+    assert unit.client.client.telemetry("LoopStatus")["Iterations"] >= 2
+    perform(unit, "StopLoop", {})
+    assert unit.client.profile().profile == "mixed"
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=15)
+@given(st.data())
+def test_any_sequence_of_parameters_does_what_its_numbers_say(
+    extended: dict[str, AnyEmulated], name: str, data: st.DataObject
+) -> None:
+    """Beside a model that has nothing but the numbers of the tables."""
+    node, interface = extended[name].client.client, extended[name].device.interface
+    assert isinstance(node, NodeClient)
+    ids = [interface.telecommand(f"Set{what}").id for what in ("Profile", "Switch")]
+    fields = interface.telemetry("Profile").fields[1:]
+    numbers = [[int(choice) for choice in field.choices or ()] for field in fields]
+    rows = list(zip(interface.switches.declared().values(), numbers, strict=True))
+    profiles = [[v[one.choices.index(getattr(one, name))] for one, v in rows] for name in PROFILES]
+
+    def shown() -> tuple[int, list[int]]:
+        profile, *values = map(int, node.telemetry("Profile").values())
+        return profile, values
+
+    _, present = shown()
+    for _ in range(8):
+        at = data.draw(st.integers(0, len(rows) + 1))
+        value = data.draw(st.integers(0, 1 + max(max(values) for _, values in rows)))
+        whole = data.draw(st.booleans())
+        answer = node.request(bytes([ids[0], at] if whole else [ids[1], at, value]))
+        node.wait_processed(1.0)
+        if whole and at < len(PROFILES):
+            wanted = profiles[at]
+        elif not whole and at < len(rows) and not rows[at][0].hardware and value in rows[at][1]:
+            wanted = [*present[:at], value, *present[at + 1 :]]
+        else:
+            wanted = None
+        assert answer == bytes([3 if wanted is None else 0])
+        if wanted is not None:
+            pairs = zip(rows, present, wanted, strict=True)
+            present = [old if one.hardware else new for (one, _), old, new in pairs]
+        together = profiles.index(present) if present in profiles else len(PROFILES)
+        assert shown() == (together, present)
