@@ -31,7 +31,7 @@ ORDER = {
     "firmware_model": ("interface", "formats mcu", "attitude node", "cubestar cubesense aramis"),
     "host": (
         "errors options terminal",
-        "transport export",
+        "transport export calibration",
         "clients",
         "recording pictures",
         "devices",

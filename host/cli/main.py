@@ -22,6 +22,7 @@ COMMANDS = {
     "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude or directions out: each result beside the truth",
     "fidelity": "measure published figures: theirs, ours in both profiles, and how ours come about",
+    "calibrate": "fit a camera's lens to pictures of known stars or lights",
     "registers": "list a device's telecommands and telemetry",
     "shell": "read, write and watch registers by name",
     "conformance": "check a device's protocol against the tables",

@@ -13,7 +13,7 @@ examples:
 import argparse
 import json
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from rich.table import Table
@@ -23,7 +23,7 @@ from cubestack.host.cli.device_options import add_engine_arguments, add_option, 
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import devices
-from cubestack.host.experiments.measure import board_options, experiment_of
+from cubestack.host.experiments.measure import board_options
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.terminal import console, progress, say
 
@@ -33,11 +33,18 @@ SHOWN = 40
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices, each with options of its own."""
+    add_devices(parser, lambda device: device.experiment and device.experiment())
+
+
+def add_devices(
+    parser: argparse.ArgumentParser, found: Callable[[AnyDevice], AnyExperiment | None]
+) -> None:
+    """Declare the devices for which an experiment is ``found``, and its options."""
     commands = parser.add_subparsers(dest="device", required=True, metavar="device")
     for device in devices():
-        if device.experiment is None:
+        experiment = found(device)
+        if experiment is None:
             continue
-        experiment = experiment_of(device)
         command = commands.add_parser(
             device.name, help=device.summary, description=experiment.description
         )
@@ -46,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         )
         add_options(command, experiment.options)
         add_board(command, device, experiment)
-        command.set_defaults(measured=device)
+        command.set_defaults(chosen=(device, experiment))
 
 
 def add_board(
@@ -61,8 +68,7 @@ def add_board(
 
 def run(args: argparse.Namespace) -> int:
     """Measure; returns 0 when every result was read, whether anything was found or not."""
-    device: AnyDevice = args.measured
-    return run_experiment(args, device, experiment_of(device))
+    return run_experiment(args, *args.chosen)
 
 
 def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyExperiment) -> int:

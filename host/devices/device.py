@@ -154,6 +154,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         options: of its board alone.
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.
+        calibration: what ``calibrate`` does with it; None for nothing.
         reports: further commands about it.
         benchmark: measures the cost of emulating it; None for nothing.
         demo: shows it end to end, with pictures; None for nothing.
@@ -177,6 +178,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     options: tuple[BoardOption, ...] = ()
     has_fpga: bool = True
     experiment: "Callable[[], AnyExperiment] | None" = None
+    calibration: "Callable[[], AnyExperiment] | None" = None
     reports: tuple[Report, ...] = ()
     benchmark: Callable[[], Benchmark] | None = None
     demo: Callable[[], Demo] | None = None

@@ -87,6 +87,7 @@ DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
     default_scene=_default_scene,
     default_scene_title="Orion",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
+    calibration=get(f"{EXPERIMENTS}.calibrate:EXPERIMENT"),
     reports=(
         Report(
             "layouts",

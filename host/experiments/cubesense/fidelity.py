@@ -90,11 +90,11 @@ def _power(_opened: _Opener, _frames: int) -> Figures:
 
 def _lens(_opened: _Opener, _frames: int) -> Figures:
     """What follows from the measured polynomial, the Earth's size and the pixels."""
-    from cubestack.emulator.camera.ov7620 import fisheye
+    from cubestack.emulator.camera.ov7620 import fisheye, lens_error
     from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
 
     a, b, c, d = fisheye.DISTORTION
-    field_px = fisheye.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
+    field_px = lens_error.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
     rim_px = float(fisheye.distorted(field_px))
     earth_deg = angular_radius_deg(ALTITUDE_KM)
     earth_px = float(fisheye.distorted(earth_deg * fisheye.PIXELS_PER_DEGREE))
@@ -108,7 +108,7 @@ def _lens(_opened: _Opener, _frames: int) -> Figures:
         + (b * c) ** 2
         - 4 * a * c**3
         - 27 * (a * d) ** 2,
-        "deg_per_px": fisheye.FIELD_DEG / rim_px,
+        "deg_per_px": lens_error.FIELD_DEG / rim_px,
         "field_px": field_px,
         "rim_px": rim_px,
         "focal_mm": board_px * 0.0076 * 103 / 10,
@@ -116,7 +116,7 @@ def _lens(_opened: _Opener, _frames: int) -> Figures:
         "earth_px": earth_px,
         "ball_px": float(fisheye.distorted(182.0)),
         "ball_cm": ball_mm / 10,
-        "span_angle": 100 * earth_deg / fisheye.FIELD_DEG,
+        "span_angle": 100 * earth_deg / lens_error.FIELD_DEG,
         "span_px": 100 * 182 / field_px,
         "off_deg": float(np.degrees(np.arcsin(np.sin(np.radians(30)) / slant_mm))),
         "off_km": ALTITUDE_KM / slant_mm,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
+from cubestack.host.calibration.camera import load_camera
+from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import Attitude, CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.device import Device

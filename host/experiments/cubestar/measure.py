@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
-from cubestack.host.clients.cubestar.calibration import calibrate, load_camera
+from cubestack.host.calibration.camera import load_camera
+from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.emulated import EmulatedDevice

@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.clients.cubestar.calibration import Calibration, Camera, calibrate, load_camera
+from cubestack.host.calibration.camera import Camera, load_camera
+from cubestack.host.clients.cubestar.calibration import Calibration, calibrate
 from cubestack.host.errors import CameraFileError
 
 # The camera of the photographs that the project is tried on, cropped to its middle rows.

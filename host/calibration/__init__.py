@@ -1,0 +1,1 @@
+"""Calibrations by least squares: numbers only; no device, no emulator."""

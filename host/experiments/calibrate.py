@@ -1,0 +1,226 @@
+"""What calibrating star trackers has in common: pictures in, stars named by the device, a fit.
+
+The device detects and identifies, with its own firmware: only what comes back over its serial line
+is fitted. The stars' directions are the catalogue's.
+"""
+
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from cubestack.host.calibration.camera import Camera, load_camera, save_camera
+from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
+from cubestack.host.devices.experiment import Experiment, Result
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import PATH, Options, option, whole
+from cubestack.host.pictures.residuals import save_residuals
+
+if TYPE_CHECKING:
+    from cubestack.emulator.camera.common.optics import Optics
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
+DEFAULT_PICTURES = 20
+GRID = (33, 17)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrateOptions(Options):
+    """Options of every star tracker's calibration."""
+
+    scene: Any = option(
+        None, "with --emulated: TOML scene whose camera the unit has", PATH, metavar="FILE"
+    )
+    seed: int = option(0, "seed of everything random (default 0)", whole(0))
+    images: Path | None = option(
+        None, "a picture, or a folder of them", PATH, metavar="PATH", group="pictures"
+    )
+    emulated: int | None = option(
+        None,
+        f"pictures of random skies, taken by an emulated unit (default: {DEFAULT_PICTURES})",
+        whole(1),
+        metavar="N",
+        group="pictures",
+    )
+    camera: Path | None = option(
+        None,
+        "JSON with a rough f_px, cx_px, cy_px, k1, k2, p1, p2; default: the device's tables",
+        PATH,
+        metavar="FILE",
+    )
+    rounds: int = option(
+        2, "times that stars are identified, each with the camera found before", whole(1)
+    )
+    out: Path | None = option(
+        None, "camera file to be written, and beside it a .png of residuals", PATH, metavar="FILE"
+    )
+
+    def check(self) -> None:
+        """A scene is for emulated pictures; the camera's file can be written."""
+        if self.images is not None and self.scene is not None:
+            raise ValueError("--scene belongs to --emulated: it says what lens the unit has")
+        if self.out is not None and (self.out.suffix != ".json" or not self.out.parent.is_dir()):
+            raise ValueError(f"--out must be a file NAME.json in a folder that is, not {self.out}")
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The files of ``images``, in the order of their names; ValueError when there is none."""
+        given = self.images
+        if given is None:
+            return []
+        if not given.is_dir():
+            return [given]
+        found = sorted(path for path in given.iterdir() if path.suffix.lower() in SUFFIXES)
+        if not found:
+            raise ValueError(f"{given} has no pictures: {', '.join(SUFFIXES)}")
+        return found
+
+
+@dataclass(frozen=True)
+class CalibrateResult(Result):
+    """Attributes are those of the JSON output.
+
+    Attributes:
+        camera: the fitted parameters, as a camera file has them, and ``sigma`` their deviations.
+        pairs_f_px: focal length by star pairs near the middle; None without any.
+        pictures: that were used, of all ``tried``; of a large picture each part counts.
+        stars, rejected: that count, and outliers.
+        before_px, after_px: root mean square residual with the camera at first, and fitted.
+        lens_px: root mean square distance of the fitted camera from the emulated unit's lens over
+            the picture, at the best rotation; None for pictures of an unknown lens.
+    """
+
+    camera: dict[str, float]
+    sigma: dict[str, float]
+    pairs_f_px: float | None
+    pictures: int
+    tried: int
+    stars: int
+    rejected: int
+    before_px: float
+    after_px: float
+    lens_px: float | None
+
+
+OpenerT = TypeVar("OpenerT", bound=Opener[Any, Any])
+OptionsT = TypeVar("OptionsT", bound=CalibrateOptions)
+
+
+class StarCalibration(Experiment[OpenerT, OptionsT, CalibrateResult]):
+    """Calibrates a star tracker's camera.
+
+    Attributes:
+        free: parameters that are fitted.
+        size: columns and rows of the sensor.
+    """
+
+    label = ""
+    free: Sequence[str] = PARAMETERS
+    size: tuple[int, int]
+
+    @abstractmethod
+    def guess(self, options: OptionsT) -> Camera:
+        """The camera that the device's tables have."""
+
+    @abstractmethod
+    def optics(self, options: OptionsT) -> "Optics":
+        """The lens of the unit that takes emulated pictures."""
+
+    @abstractmethod
+    def sights(self, opened: OpenerT, options: OptionsT, camera: Camera) -> Iterator[Sight]:
+        """Each picture's identified stars, by a device that has ``camera`` loaded."""
+
+    def run(self, opened: OpenerT, options: OptionsT) -> Iterator[CalibrateResult]:
+        """Identify and fit, several times over."""
+        given = options.camera
+        guess = camera = self.guess(options) if given is None else load_camera(given)
+        for number in range(options.rounds):
+            label = f"identifying stars, round {number + 1}"
+            pictures = opened.shown(
+                self.sights(opened, options, camera), self.tried(options), label
+            )
+            sights = list(pictures)
+            fit = fit_camera(sights, camera, self.free)
+            camera = fit.camera
+        before = fit_camera(sights, guess, ()).after_px
+        if options.out is not None:
+            save_camera(camera, options.out)
+            save_residuals(fit.places, fit.residuals, options.out.with_suffix(".png"))
+        lens_px = None
+        if options.images is None:
+            lens_px = _over_picture(self.optics(options), self.size, camera, ()).after_px
+        yield CalibrateResult(
+            camera=asdict(camera),
+            sigma=fit.sigma,
+            pairs_f_px=fit.pairs_f_px,
+            pictures=fit.pictures,
+            tried=self.tried(options),
+            stars=len(fit.places),
+            rejected=fit.rejected,
+            before_px=before,
+            after_px=fit.after_px,
+            lens_px=lens_px,
+        )
+
+    def tried(self, options: OptionsT) -> int:
+        """Pictures that are looked at in a round."""
+        if options.images is None:
+            return options.emulated or DEFAULT_PICTURES
+        return len(list(self.parts(options)))
+
+    def parts(self, options: OptionsT) -> Iterator[tuple[Path, tuple[int, int]]]:
+        """Pictures, and the left upper corners of parts of the sensor's size, without overlap."""
+        from cubestack.emulator.scene.picture import load_picture
+
+        columns, rows = self.size
+        for path in options.pictures:
+            height, width = load_picture(path).shape
+            for top in range(0, max(1, height - rows + 1), rows):
+                for left in range(0, max(1, width - columns + 1), columns):
+                    yield path, (left, top)
+
+    def summarise(self, results: Sequence[CalibrateResult], wall_s: float) -> Iterable[str]:
+        """Parameters with deviations, and residuals."""
+        for result in results:
+            yield (
+                f"{result.stars} stars of {result.pictures} pictures ({result.tried} tried, "
+                f"{result.rejected} stars left out)"
+            )
+            for name, value in result.camera.items():
+                if name in result.sigma:
+                    yield f"{name:6} {value:12.5f} +- {result.sigma[name]:.5f}"
+            if result.pairs_f_px is not None:
+                yield f"focal length by star pairs near the middle: {result.pairs_f_px:.1f} px"
+            yield f"residual: {result.before_px:.3f} px before, {result.after_px:.3f} px after"
+            if result.lens_px is not None:
+                yield f"from the emulated unit's own lens: {result.lens_px:.3f} px"
+        yield f"{wall_s:.1f} s wall time"
+
+
+def sight_of(named: Mapping[int, tuple[float, float]]) -> Sight:
+    """Stars of a picture by their Hipparcos numbers, with the catalogue's directions."""
+    from cubestack.emulator.scene.hipparcos import load_sky
+
+    sky = load_sky()
+    rows = np.searchsorted(sky.hip, np.array([*named], np.int64))
+    return Sight(np.array([*named.values()], np.float64).reshape(-1, 2), sky.vectors[rows])
+
+
+def camera_like(
+    optics: "Optics", size: tuple[int, int], free: Sequence[str] = PARAMETERS
+) -> Camera:
+    """The camera that is most like a lens over the picture."""
+    f_px = 1000 * optics.focal_length_mm / optics.pixel_pitch_um
+    return _over_picture(optics, size, Camera(f_px, optics.cx, optics.cy), PARAMETERS).camera
+
+
+def _over_picture(
+    optics: "Optics", size: tuple[int, int], camera: Camera, free: Sequence[str]
+) -> Fit:
+    """Fit a camera to a lens over the picture, at the best rotation."""
+    columns, rows = (np.linspace(0, n - 1, m) for n, m in zip(size, GRID, strict=True))
+    pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    return fit_camera([Sight(pixels, optics.unproject(pixels))], camera, free, exact=True)
