@@ -21,6 +21,7 @@ class Site(Enum):
     MEMORY = "memory"
     FPGA = "FPGA"
     SUPPLY = "supply channel"
+    PROCESSOR = "processor"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,13 @@ from typing import Any
 from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import Fault, FaultError, Site
 from cubestack.emulator.faults.injection import FaultEvent, Injection, Mechanism
-from cubestack.emulator.faults.parts import CameraFaults, MemoryFaults, RegisterFaults, SupplyFaults
+from cubestack.emulator.faults.parts import (
+    CameraFaults,
+    MemoryFaults,
+    ProcessorFaults,
+    RegisterFaults,
+    SupplyFaults,
+)
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.plan import Plan
 from cubestack.emulator.faults.sites import Sites
@@ -194,6 +200,8 @@ class Faults:
                 return BusFaults(*who, sites.buses[target])
             case Site.SUPPLY:
                 return SupplyFaults(*who, sites.supplies)
+            case Site.PROCESSOR:
+                return ProcessorFaults(*who, sites.resets[target])
             case Site.MEMORY:
                 pins = None if engine is None else self._pins
                 return MemoryFaults(*who, sites.all_memories()[target], engine, pins)

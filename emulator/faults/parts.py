@@ -1,6 +1,6 @@
-"""Faults of parts: cameras, memories, the FPGA's registers, supplies."""
+"""Faults of parts: cameras, memories, the FPGA's registers, supplies, processors."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any
 
@@ -236,3 +236,15 @@ class SupplyFaults(Mechanism):
         on = "" if self.power.is_on(injection.target) else ", but it is off"
         self.report(self.env.now, injection, f"{fault.extra_ma:g} mA on top{on}")
         self.power.latch_up(injection.target, fault.extra_ma, lasting=fault.lasting)
+
+
+@dataclass(eq=False)
+class ProcessorFaults(Mechanism):
+    """Resets for one reason."""
+
+    reset: Callable[[], None]
+
+    def begin(self, injection: Injection) -> None:
+        """Strike."""
+        self.report(self.env.now, injection, "resets the processor")
+        self.reset()

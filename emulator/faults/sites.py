@@ -44,6 +44,7 @@ class Sites:
         engine: the FPGAs; None without one.
         controls: pins that command the FPGAs.
         cameras: by their names at the engine.
+        resets: what resets the processor, by what brings it about.
         memories: bytes of each memory, beside those at the FPGAs.
     """
 
@@ -55,6 +56,7 @@ class Sites:
     engine: RtlEngine | None = None
     controls: tuple[str, ...] = ()
     cameras: Mapping[str, CameraSite] = field(default_factory=dict)
+    resets: Mapping[str, Callable[[], None]] = field(default_factory=dict)
     memories: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     def targets(self, site: Site) -> tuple[str, ...]:
@@ -65,6 +67,7 @@ class Sites:
             Site.SUPPLY: self.supplies.table.channels,
             Site.CAMERA: self.cameras,
             Site.CONTROL: self.controls,
+            Site.PROCESSOR: self.resets,
             Site.MEMORY: self.all_memories(),
         }
         if self.engine is not None:

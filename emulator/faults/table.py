@@ -196,6 +196,11 @@ class LatchUp(Fault, kind="latch-up", site=Site.SUPPLY, momentary=True):
     lasting: bool = choice(False, "whether it comes back with each switching on", "false", "true")
 
 
+@dataclass(frozen=True)
+class ProcessorReset(Fault, kind="processor-reset", site=Site.PROCESSOR, momentary=True):
+    """The processor starts anew, for the reason that is its target."""
+
+
 #: Every fault by its kind, in the order of their declarations.
 FAULTS: dict[str, type[Fault]] = {fault.kind: fault for fault in Fault.__subclasses__()}
 

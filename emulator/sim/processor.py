@@ -6,6 +6,7 @@ the next scheduled event and within ``LOOK_AHEAD_PS``. What is scheduled from ou
 """
 
 from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import KW_ONLY, dataclass
 from fractions import Fraction
 from math import ceil
@@ -72,6 +73,7 @@ class Processor:
         on_activity: told when the processor falls asleep (False), starts or awakes (True).
         on_access: told when the program begins to use the external bus (True), and when it
             requests something else after that.
+        on_forced_reset: told at a reset that the program did not ask for.
         program: the running program, for the interrupt lines of the peripherals.
         resets: number of resets since power-up.
         waiting: asleep until an interrupt, with no deadline.
@@ -90,21 +92,28 @@ class Processor:
     on_pin: Callable[[str, int], None] = lambda _pin, _level: None
     on_activity: Callable[[bool], None] = lambda _busy: None
     on_access: Callable[[bool], None] = lambda _busy: None
+    on_forced_reset: Callable[[], None] = lambda: None
 
     def __post_init__(self) -> None:
         """Power up."""
         self._accesses = False
+        self._forced = 0, 0
         self._clock = CycleClock(self.meter.table.clock_hz)
         self._wake = self.env.event()
         self.resets = 0
         self.waiting = self.dozing = False
         self.program = self.boot(self.power_on_cause)
-        self.env.process(self._run())
+        self._running = self.env.process(self._run())
 
     def wake(self) -> None:
         """End the running wakeable sleep, or the next one at once."""
         if not self._wake.triggered:
             self._wake.succeed()
+
+    def reset(self, cause: int, hang_us: int = 0) -> None:
+        """Reset now, or after the program has hung for ``hang_us`` with interrupts served."""
+        self._forced = cause, hang_us
+        self._running.interrupt()
 
     def load(self, select: int, address: int, count: int, cycles: int) -> bytes:
         """Read bytes over the external bus in an interrupt, which still has to charge them.
@@ -121,26 +130,45 @@ class Processor:
     def _run(self) -> Steps:
         self.on_activity(True)
         while True:
-            yield self.env.timeout(self.boot_us * PS_PER_US)
-            cause = yield from self._execute(self.program)
+            try:
+                yield self.env.timeout(self.boot_us * PS_PER_US)
+                cause = yield from self._execute(self.program)
+            except simpy.Interrupt:
+                cause = yield from self._stopped()
             self.resets += 1
             self._wake = self.env.event()  # a reset clears pending interrupts
             self.program = self.boot(cause)
 
+    def _stopped(self) -> Steps:
+        """The program was stopped, as ``reset`` wants; the cause of the reset that comes first."""
+        cause, hang_us = self._forced
+        self.waiting = self.dozing = False
+        self.on_activity(True)
+        try:
+            yield self.env.timeout(hang_us * PS_PER_US)
+        except simpy.Interrupt:
+            return (yield from self._stopped())
+        if self._accesses:
+            self._accesses = False
+            self.on_access(False)
+        self._follow()
+        self.on_forced_reset()
+        self.meter.take()
+        return cause
+
     def _execute(self, program: Program) -> Steps:
-        routine = program.main()
         answer: object = None
-        while True:
-            try:
-                request = routine.send(answer)
-            except StopIteration:
-                text = f"{program!r} returned from main: it must end in Reset"
-                raise RuntimeError(text) from None
-            yield from self._pay()
-            if isinstance(request, requests.Reset):
-                routine.close()
-                return request.cause
-            answer = yield from self._perform(request)
+        with closing(program.main()) as routine:
+            while True:
+                try:
+                    request = routine.send(answer)
+                except StopIteration:
+                    text = f"{program!r} returned from main: it must end in Reset"
+                    raise RuntimeError(text) from None
+                yield from self._pay()
+                if isinstance(request, requests.Reset):
+                    return request.cause
+                answer = yield from self._perform(request)
 
     def _pay(self) -> Steps:
         """Be busy for the charged cycles, and for those that interrupts charge meanwhile."""

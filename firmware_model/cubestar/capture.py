@@ -38,7 +38,6 @@ class ImageCapture:
         After a failure there is no picture to process.
         """
         state = self.state
-        state.task_status = TaskStatus.CAPTURING
         failure = yield from self._enable_sensor()
         if failure is None:
             failure = yield from self._store_frame(meanwhile)
@@ -61,18 +60,20 @@ class ImageCapture:
         state.task_status = TaskStatus.CAPTURED
         return True
 
-    def replaced(self) -> Routine[None]:
-        """The picture was made by other means than a capture."""
+    def replaced(self) -> Routine[bool]:
+        """The picture was made by other means than a capture; False: its supply was cut."""
         now_us: int = yield ReadTimer()
         self.state.retained.image_ms = now_us // 1000
-        self.state.retained.image_present = 1
+        self.state.retained.image_present = int(not self.supply.cut)
         self.state.retained.frame += 1
+        return not self.supply.cut
 
     def _enable_sensor(self) -> Routine[str | None]:
         """Start the sensor and let its first, invalid frame pass; returns a failure's flag."""
         failure = yield from self.sensor.configure()
         if failure is not None:
             return failure
+        self.state.task_status = TaskStatus.CAPTURING
         if not (yield from self.sensor.enable(True)):
             return "ISEnableError"
         phases.begin_capture(self.state)

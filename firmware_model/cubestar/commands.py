@@ -4,13 +4,17 @@ A setting telecommand stores its parameters. Others act at once, or take time; a
 in which telecommands that still wait are lost.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from cubestack.firmware_model.cubestar.processing import Processing
+from cubestack.firmware_model.cubestar.tasks import TASKS
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, UPLOAD_BLOCK_BYTES, codes
-from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, pause
+from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
 from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
@@ -45,7 +49,6 @@ class Commands(CommandExecutor):
             "MCUReset": self._reset_processor,
             "ClearWDGResetCounter": self._clear_watchdog_count,
             "ClearErrorFlags": lambda _: self.state.flags.clear(),
-            "ImageBlockSet": self._select_block,
             "setIDMode": self._set_mode,
             "setTrackingMode": self._set_hint,
             "ReadConfig": lambda _: self.state.load_config(),
@@ -56,6 +59,8 @@ class Commands(CommandExecutor):
         sensor = self._capture.sensor
         self._routines |= {
             "TogglePowerSW": self._toggle_supply,
+            "Exposure": lambda _: sensor.apply_settings(),
+            "ImageBlockSet": self._select_block,
             "WriteTo_IS_Register": lambda c: sensor.write_byte(self._paged(c), c.values["DataL"]),
             "ReadFrom_IS_Register": lambda c: sensor.select_register(self._paged(c)),
             "WriteCameraRegister": lambda c: sensor.write_byte(
@@ -77,12 +82,28 @@ class Commands(CommandExecutor):
             "ProcessImage": lambda _: processing.process(),
             "Trigger": self._trigger,
         }
+        self._routines |= {name: self._reporting(name, self._routines[name]) for name in TASKS}
+
+    def _reporting(
+        self, name: str, routine: Callable[[QueuedCommand], Routine[Any]]
+    ) -> Callable[[QueuedCommand], Routine[None]]:
+        """``routine`` with the states of telecommand ``name``; one that returns False failed."""
+        task = TASKS[name]
+
+        def run(command: QueuedCommand) -> Routine[None]:
+            self.state.task_status = task.begun
+            yield Pay()
+            failed = (yield from routine(command)) is False
+            self.state.task_status = task.failed if failed and task.failed else task.done
+
+        return run
 
     # --- node ---------------------------------------------------------------------------------
 
     def _toggle_supply(self, _command: QueuedCommand) -> Routine[None]:
         if self._capture.supply.toggle_imager():
             yield from self._capture.sensor.power_up()
+            yield from self._capture.sensor.apply_settings()
 
     def _reset(self, _command: QueuedCommand) -> None:
         if self.state.retained.imager_off:
@@ -113,32 +134,34 @@ class Commands(CommandExecutor):
 
     # --- picture ------------------------------------------------------------------------------
 
-    def _test_pattern(self, command: QueuedCommand) -> Routine[None]:
+    def _test_pattern(self, command: QueuedCommand) -> Routine[bool]:
         row, column = np.ogrid[:ROWS, :COLUMNS]
         pattern = {
-            codes.TestPattern.COLUMN_RAMP: column,
-            codes.TestPattern.ROW_RAMP: row,
-            codes.TestPattern.DIAGONAL_RAMP: row + column,
+            codes.TestPattern.MOVING: column + self.state.retained.frame % 256,
+            codes.TestPattern.FIXED: row + column,
+            codes.TestPattern.RAMPING: column,
         }[command.values["TestPaternType"]]
         pixels = np.broadcast_to(pattern, (ROWS, COLUMNS)).astype(np.uint8)
         yield from self._capture.pictures.write(0, pixels.reshape(-1))
         self._meter.charge(i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
-        yield from self._capture.replaced()
+        return (yield from self._capture.replaced())
 
-    def _begin_upload(self, _command: QueuedCommand) -> Routine[None]:
+    def _begin_upload(self, _command: QueuedCommand) -> Routine[bool]:
         self.next_block = self.blocks_received = 0
         yield from self._capture.pictures.write(0, np.zeros(IMAGE_BYTES, np.uint8))
         self._meter.charge(loop=IMAGE_BYTES)
-        yield from self._capture.replaced()
+        return (yield from self._capture.replaced())
 
-    def _upload_block(self, command: QueuedCommand) -> Routine[None]:
+    def _upload_block(self, command: QueuedCommand) -> Routine[bool]:
         number, pixels = command.values["BlockNumber"], np.frombuffer(command.values["Data"], "u1")
         yield from self._capture.pictures.write(number * UPLOAD_BLOCK_BYTES, pixels)
         self._meter.charge(loop=UPLOAD_BLOCK_BYTES)
         self.next_block = number + 1
         self.blocks_received += 1
+        return bool(self.state.retained.image_present)  # else nothing was begun, or it was lost
 
-    def _select_block(self, _command: QueuedCommand) -> None:
+    def _select_block(self, _command: QueuedCommand) -> Routine[None]:
+        yield from ()
         self.second_half = False
 
     def _stream_image(self, _command: QueuedCommand) -> Routine[None]:

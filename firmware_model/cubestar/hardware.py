@@ -16,13 +16,14 @@ class CubeStarHardware(NodeHardware, Protocol):
         external_ram: SRAM on the external bus, shape (bytes,), uint8.
         retention: battery-domain registers, kept over software resets, not over power-off.
         flash: non-volatile store.
-        reset_cause: ``ResetCause`` of :mod:`cubestack.firmware_model.interface.cubestar.codes`.
+        reset_causes: register of what reset the processor since the program cleared it; one of
+            the single causes of ``ResetCause`` for each bit that is set.
     """
 
     external_ram: NDArray[np.uint8]
     retention: bytearray
     flash: FlashStore
-    reset_cause: int
+    reset_causes: set[int]
 
     def switch_supply(self, channel: str, on: bool) -> None:
         """Turn the load switch of supply ``channel`` on or off."""

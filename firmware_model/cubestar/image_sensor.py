@@ -9,6 +9,7 @@ from cubestack.firmware_model.cubestar import phases
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.interface.cameras import mlx75412
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, pause
 
 SETTLE_US = 2_000
@@ -79,16 +80,27 @@ class ImageSensor:
             "EXPOSURE": exposure,
             "SYNC": mlx75412.SYNC_APPLY,
         }
+        self.state.task_status = TaskStatus.CAMERA_INITIALISING
         started_us: int = yield ReadTimer()
         if not (yield from self._write_all(set_up)):
+            self.state.task_status = TaskStatus.CAMERA_FAILED
             return failure
+        self.state.task_status = TaskStatus.CAMERA_INITIALISED
         exposing_us: int = yield ReadTimer()
         if not (yield from self._write_all(exposing)):
+            self.state.task_status = TaskStatus.CAMERA_FAILED
             return failure
         yield from phases.end(self.state, "exposure_setup_us", exposing_us)
         yield from phases.end(self.state, "camera_setup_us", started_us)
         retained.camera_setup = wanted
         return None
+
+    def apply_settings(self) -> Routine[bool]:
+        """Set up as ``configure`` does, and raise its flag; False when there was no answer."""
+        failure = yield from self.configure()
+        if failure is not None:
+            self.state.raise_flag(failure)
+        return failure is None
 
     def _write_all(self, values: dict[str, int]) -> Routine[bool]:
         for register, value in values.items():

@@ -1,9 +1,10 @@
 """CubeStar's link to the host: counters that survive resets, and nothing left unfinished by one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.cubestar.tasks import TASKS
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.mcu.costs import Meter
@@ -41,6 +42,12 @@ class CubeStarLink(QueueingLink):
     def idle(self) -> bool:
         """Whether nothing is under way that a reset would cut short: a message or an answer."""
         return not (self.receiving or self.queue or self._hardware.uart_backlog())
+
+    def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
+        flags = super()._refusals(message, values)
+        if flags and message.name in TASKS:
+            self._state.task_status = TASKS[message.name].failed or self._state.task_status
+        return flags
 
     def _values(self, message: Message) -> dict[str, Any] | None:
         values = super()._values(message)

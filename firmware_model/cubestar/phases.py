@@ -4,12 +4,14 @@ The phases are those of table 6.2 in the CubeStar thesis, and the steps of secti
 """
 
 from cubestack.firmware_model.cubestar.state import State
+from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
 
 def started(state: State) -> Routine[None]:
     """The main loop starts: how long that took since the reset counts as idle time."""
     now_us: int = yield ReadTimer()
+    state.task_status = TaskStatus.POWERED_UP
     state.startup_us = now_us - state.retained.reset_us
     state.retained.idling_us += state.startup_us
 

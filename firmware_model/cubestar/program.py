@@ -16,6 +16,7 @@ from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.pictures import pictures_of
 from cubestack.firmware_model.cubestar.processing import Processing
+from cubestack.firmware_model.cubestar.reset_cause import cause_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.cubestar.telemetry import Telemetry
@@ -52,6 +53,7 @@ class CubeStarProgram:
     ) -> None:
         """Reset: set up RAM from the retention registers and flash; ``switches``: of power-up."""
         self.state = state = State(hardware, meter, switches)
+        state.reset_cause = cause_of(hardware.reset_causes)
         self.supply = SupplyMonitor(state)
         self._pictures = pictures_of(layout, state, meter, self.supply)
         self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)
@@ -59,15 +61,15 @@ class CubeStarProgram:
         self.commands = Commands(self._processing)
         telemetry = Telemetry(self.commands, lambda: bool(self.link.queue))
         self.link = CubeStarLink(meter, state, telemetry.values)
-        if hardware.reset_cause == ResetCause.WATCHDOG:
-            state.retained.watchdog_resets += 1
 
     def main(self) -> Routine[None]:
         """Run until a reset."""
         yield from phases.started(self.state)
         yield from self._pictures.start()
-        retained, cause = self.state.retained, self.state.hardware.reset_cause
-        if cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
+        retained, causes = self.state.retained, self.state.hardware.reset_causes
+        retained.watchdog_resets += ResetCause.WATCHDOG in causes
+        causes.clear()
+        if self.state.reset_cause != ResetCause.SYSTEM_REQUEST or not retained.camera_setup:
             yield from self._capture.sensor.power_up()
         while True:
             served = yield from self._serve()

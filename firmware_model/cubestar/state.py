@@ -25,7 +25,7 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
     switches_shown,
 )
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.firmware_model.interface.cubestar.codes import MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar.codes import MatchMode, ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.settings import Settings
@@ -160,6 +160,7 @@ class State(NodeState):
         switches: those that the program runs with; kept as the settings are, but not in flash.
         retained: counters that survive resets.
         task_status: value of telemetry TaskStatus.
+        reset_cause: why the program started.
         startup_us: time from the reset to the main loop.
     """
 
@@ -187,7 +188,8 @@ class State(NodeState):
         self.settings = Settings(INTERFACE, SETTING_COMMANDS)
         self.switches = RunningSwitches(switches)
         self.retained = Retained()
-        self.task_status = TaskStatus.POWERED_UP
+        self.task_status = TaskStatus.POWERING_UP
+        self.reset_cause = ResetCause.UNDETERMINED
         self.startup_us = 0
         magic = len(self._MAGIC)
         if hardware.retention[:magic] == self._MAGIC:

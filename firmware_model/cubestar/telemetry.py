@@ -147,7 +147,7 @@ class Telemetry:
         return {
             "SerialNumber": SERIAL_NUMBER,
             "Temperature": self._hardware.temperature_c(),
-            "ResetCause": self._hardware.reset_cause,
+            "ResetCause": self._state.reset_cause,
             "WDGResetCount": retained.watchdog_resets,
             "TcmdCount": retained.telecommands & 0xFFFF,
             "TlmCount": retained.telemetry & 0xFFFF,

@@ -137,7 +137,7 @@ def test_uploaded_and_drawn_pictures_are_in_memory(node: Node) -> None:
     picture[100:102] = rng.integers(0, 256, (2, 1024))
     node.cubestar.upload_image(picture)
     assert b"".join(map(node.block, range(800, 816))) == picture[100:102].tobytes()
-    node.do("CaptureTestPatern", TestPaternType=TestPattern.DIAGONAL_RAMP)
+    node.do("CaptureTestPatern", TestPaternType=TestPattern.FIXED)
     drawn = (np.add.outer(np.arange(512), np.arange(1024)) % 256).astype(np.uint8)
     for number in range(4090, 4096):
         assert node.block(number) == block_of(drawn, number)

@@ -6,7 +6,9 @@ layouts than the published one are in :mod:`cubestack.emulator.boards.cubestar.l
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES, RETENTION_BYTES
 from cubestack.firmware_model.cubestar.program import CubeStarProgram
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS, ROWS
@@ -98,7 +101,7 @@ class CubeStarBoard(Board):
         meter = Meter(CORTEX_M3)
 
         def boot(cause: int) -> CubeStarProgram:
-            self._hardware.reset_cause = cause
+            self._hardware.reset_causes.add(cause)
             self.program = CubeStarProgram(self._hardware, meter, catalogue, layout, switches)
             return self.program
 
@@ -113,6 +116,7 @@ class CubeStarBoard(Board):
             on_pin=self._pin_changed,
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
             on_access=self._accessed,
+            on_forced_reset=self._reset_by_force,
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
@@ -148,8 +152,31 @@ class CubeStarBoard(Board):
             super()._sites(),
             controls=self._layout.controls,
             cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
+            resets=self._resets(),
             memories={"external": self._hardware.external_ram} if self._layout.external_ram else {},
         )
+
+    def _resets(self) -> dict[str, Callable[[], None]]:
+        """What resets the processor against its program's will, the usual one first."""
+        hangs = {ResetCause.WATCHDOG: WATCHDOG_US}
+        return {
+            name: partial(self.processor.reset, cause, hangs.get(cause, 0))
+            for name, cause in (
+                ("brown-out", ResetCause.BROWN_OUT_UNREGULATED),
+                ("brown-out-regulated", ResetCause.BROWN_OUT_REGULATED),
+                ("reset-pin", ResetCause.EXTERNAL_PIN),
+                ("hang", ResetCause.WATCHDOG),
+                ("lock-up", ResetCause.LOCKUP),
+            )
+        }
+
+    def _reset_by_force(self) -> None:
+        """Pins go low (pulled down: assumed); the retention registers are always up to date."""
+        for pin in self._layout.controls:
+            if self._pins[pin] and self.processor.fpga is not None:
+                self.processor.fpga.set_pin(pin, 0)
+                self._pin_changed(pin, 0)
+        self.program.state.retain()
 
     def _camera_changed(self) -> None:
         self.engine.stream_changed()
@@ -211,7 +238,7 @@ class _Efm32gg(NodePeripherals):
         self.external_ram = np.zeros(bytes_there, np.uint8)
         self.retention = bytearray(RETENTION_BYTES)
         self.flash = FlashStore()
-        self.reset_cause = int(ResetCause.POWER_ON)
+        self.reset_causes: set[int] = set()
 
     def bus_read(self, select: int, address: int, count: int) -> bytes:
         return self._board.processor.load(select, address, count, EBI_READ_CYCLES)

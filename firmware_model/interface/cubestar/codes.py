@@ -10,10 +10,27 @@ from enum import IntEnum
 class TaskStatus(IntEnum):
     """What the node last did, telemetry TaskStatus."""
 
+    POWERING_UP = 0
     POWERED_UP = 1
+    CAMERA_INITIALISING = 2
+    CAMERA_FAILED = 3
+    CAMERA_INITIALISED = 4
+    SETTING_EXPOSURE = 5
+    EXPOSURE_FAILED = 6
+    EXPOSURE_SET = 7
+    WRITING_SENSOR = 8
+    SENSOR_WRITTEN = 9
+    READING_SENSOR = 10
+    SENSOR_READ = 11
+    RECEIVING_IMAGE = 12
+    IMAGE_RECEIVED = 13
+    RECEIVING_FAILED = 14
     CAPTURING = 15
     CAPTURE_FAILED = 16
     CAPTURED = 17
+    SETTING_BLOCK = 18
+    BLOCK_SET = 19
+    BLOCK_FAILED = 20
     DETECTING = 21
     DETECTION_FAILED = 22
     DETECTED = 23
@@ -23,21 +40,31 @@ class TaskStatus(IntEnum):
     CALCULATING = 27
     CALCULATION_FAILED = 28
     CALCULATED = 29
+    TESTING_SRAM = 30
+    SRAM_TESTED = 31
+    CAPTURING_PATTERN = 32
+    PATTERN_CAPTURED = 33
+    PATTERN_FAILED = 34
+    FINDING_BEST_STARS = 35
+    BEST_STARS_FAILED = 36
+    BEST_STARS_FOUND = 37
+    STREAMING_IMAGE = 38
+    IMAGE_STREAMED = 39
 
 
 class ResetCause(IntEnum):
-    """Reset-cause bit of the EFM32GG (reference manual, RMU_RSTCAUSE), counted from 1."""
+    """Why the processor started; two causes at once have numbers of their own."""
 
     POWER_ON = 1
     BROWN_OUT_UNREGULATED = 2
     BROWN_OUT_REGULATED = 3
-    EXTERNAL_PIN = 4
-    WATCHDOG = 5
-    LOCKUP = 6
-    SYSTEM_REQUEST = 7
-    EM4 = 8
-    EM4_WAKE_UP = 9
-    BROWN_OUT_AVDD0 = 10
+    EXTERNAL_OR_WATCHDOG = 4
+    EXTERNAL_PIN = 5
+    WATCHDOG = 6
+    LOCKUP_OR_SYSTEM_REQUEST = 7
+    LOCKUP = 8
+    SYSTEM_REQUEST = 9
+    UNDETERMINED = 10
 
 
 class ImageBlockSize(IntEnum):
@@ -70,13 +97,13 @@ class MatchMode(IntEnum):
 
 
 class TestPattern(IntEnum):
-    """Pattern that CaptureTestPatern writes to the picture memory; assumed."""
+    """Pattern that CaptureTestPatern writes to the picture memory; its pixels are assumed."""
 
     __test__ = False  # not a test class, whatever its name says to pytest
 
-    COLUMN_RAMP = 0
-    ROW_RAMP = 1
-    DIAGONAL_RAMP = 2
+    MOVING = 0
+    FIXED = 1
+    RAMPING = 2
 
 
 class MemoryTest(IntEnum):

@@ -121,7 +121,7 @@ _IMAGE = (
     ).of(
         enum8(
             "TestPaternType",
-            "pattern: column, row, or their sum, modulo 256",
+            "modulo 256: column plus number of the picture, column plus row, column",
             choices=codes.TestPattern,
             range_flag="TestPatternConfigError",
         )

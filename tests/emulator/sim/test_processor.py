@@ -190,6 +190,27 @@ def test_reset_closes_the_program_forgets_a_wake_and_starts_anew_with_its_cause(
     assert desk.processor.program is not before
 
 
+def test_forced_reset_stops_the_program_wherever_it_is(desk_of):
+    """Once asleep, once at work, once while it boots; what was charged is never paid."""
+    desk = desk_of(script(sleep(5_000)), script(9_000, PAY), script(), script(PAY, sleep(900)))
+    told = []
+    desk.processor.on_forced_reset = lambda: told.append(desk.us)
+    for us, cause in ((40, 6), (200, 7), (250, 8)):
+        desk.at(us, lambda cause=cause: desk.processor.reset(cause))
+    assert desk.run().log == [(250 + BOOT_US, None), (900, False)]
+    assert (desk.causes, told) == ([POWER_ON, 6, 7, 8], [40, 200, 250])
+    assert (40, True) in desk.activity  # it woke
+
+
+def test_hanging_program_serves_interrupts_until_it_is_reset(desk_of):
+    desk = desk_of(script(sleep(5_000)), script(PAY))
+    desk.at(10, lambda: desk.processor.reset(5, hang_us=1_000))
+    served = []
+    desk.at(500, lambda: served.append(len(desk.causes)))
+    assert desk.run().log == [(1_010 + BOOT_US, None)]
+    assert (served, desk.causes) == ([1], [POWER_ON, 5])
+
+
 @pytest.mark.parametrize(
     ("step", "error", "text"),
     [

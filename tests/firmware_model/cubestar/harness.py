@@ -79,12 +79,15 @@ class Harness(Runner, HostSide):
         self.switches = {"memory": True, "imager": True}
         self.now_ns = self.backlog = 0
         self.sent.clear()
-        self.resets_before = len(self.resets)
+        self.reset_causes: set[int] = {ResetCause.POWER_ON}
+        self._resets_seen = len(self.resets)
         self._ack_us: int | None = None
         self._boot()
         self.run()
 
     def start(self) -> Routine[None]:
+        self.reset_causes.update(self.resets[self._resets_seen :])
+        self._resets_seen = len(self.resets)
         self.program = CubeStarProgram(self, self.meter, self.catalogue, switches=self.algorithms)
         return self.program.main()
 
@@ -93,11 +96,6 @@ class Harness(Runner, HostSide):
         return self.program.link
 
     # --- what the program uses --------------------------------------------------------------------
-
-    @property
-    def reset_cause(self) -> int:
-        since_power_on = self.resets[self.resets_before :]
-        return since_power_on[-1] if since_power_on else int(ResetCause.POWER_ON)
 
     def switch_supply(self, channel: str, on: bool) -> None:
         self.switches[channel] = on

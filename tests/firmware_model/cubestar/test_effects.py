@@ -270,9 +270,11 @@ def test_distortion_gains(unit: Harness, sky: Sky) -> None:
 def test_capture_test_patern(unit: Harness) -> None:
     y, x = np.mgrid[:512, :1024]
     for pattern, expected in (
-        (cubestar.TestPattern.COLUMN_RAMP, x),
-        (cubestar.TestPattern.ROW_RAMP, y),
-        (cubestar.TestPattern.DIAGONAL_RAMP, x + y),
+        (cubestar.TestPattern.MOVING, x),
+        (cubestar.TestPattern.MOVING, x + 1),
+        (cubestar.TestPattern.FIXED, x + y),
+        (cubestar.TestPattern.FIXED, x + y),
+        (cubestar.TestPattern.RAMPING, x),
     ):
         unit.command("CaptureTestPatern", TestPaternType=pattern)
         assert np.array_equal(image(unit), expected % 256)
@@ -308,7 +310,7 @@ def test_upload(unit: Harness, sky: Sky) -> None:
 
 @telecommand("ImageBlockSet")
 def test_image_block_set(unit: Harness) -> None:
-    unit.command("CaptureTestPatern", TestPaternType=cubestar.TestPattern.COLUMN_RAMP)
+    unit.command("CaptureTestPatern", TestPaternType=cubestar.TestPattern.RAMPING)
     for size, length in enumerate((32, 64, 128)):
         unit.command("ImageBlockSet", BlockNumber=5, BlockSize=size)
         block = unit.telemetry("ImageBlock")["Block"]

@@ -132,7 +132,7 @@ def refusing(refuse: Callable[[bytes], bool], *before: str) -> Act:
 
     def capture(unit: Harness, _: Sky) -> None:
         for name in before:
-            unit.command(name, **({"exposure": 9} if name == "Exposure" else {}))
+            unit.command(name, **({"FrameRate": 9} if name == "SetFrameRate" else {}))
         unit.camera_refuses = refuse
         unit.command("CaptureImage")
 
@@ -203,7 +203,7 @@ ACTS: dict[tuple[str, ...], Act] = {
     ("TlmIDError",): lambda unit, _: unit.frames(b"\xc0"),
     ("StatusError",): lambda unit, _: unit.command("DetectStars"),
     ("ISSetupError",): refusing(lambda _data: True),
-    ("ConfigChangeError",): refusing(lambda _data: True, "CaptureImage", "Exposure"),
+    ("ConfigChangeError",): refusing(lambda _data: True, "CaptureImage", "SetFrameRate"),
     ("ISEnableError",): refusing(lambda data: data[:2] == MODE_SELECT, "CaptureImage"),
     ("ISDisableError",): refusing(lambda data: data == DISABLE, "CaptureImage"),
     ("ImageCaptureError",): image_capture,

@@ -105,7 +105,7 @@ def test_identifying_again_takes_the_validity_back(unit: Harness, sky: Sky) -> N
     [
         ("DetectStars", TaskStatus.DETECTION_FAILED, "StatusError"),
         ("IDStars", TaskStatus.IDENTIFICATION_FAILED, "StatusError"),
-        ("SelectBestStars", TaskStatus.POWERED_UP, "StatusError"),
+        ("SelectBestStars", TaskStatus.BEST_STARS_FAILED, "StatusError"),
         ("EstimateAttitude", TaskStatus.CALCULATION_FAILED, "QuestindexError"),
         ("ProcessImage", TaskStatus.DETECTION_FAILED, "StatusError"),
     ],

@@ -114,6 +114,8 @@ def test_task_status(lit: Harness) -> None:
     steps = [TaskStatus(value) for value in dict.fromkeys(seen)]
     assert steps == [  # between some of them no time passes
         TaskStatus.POWERED_UP,
+        TaskStatus.CAMERA_INITIALISING,
+        TaskStatus.CAMERA_INITIALISED,
         TaskStatus.CAPTURING,
         TaskStatus.DETECTING,
         TaskStatus.IDENTIFYING,

@@ -25,7 +25,7 @@ ENDLESS = {
 
 #: A telecommand whose value may be another one: name, parameters, and where it can be read back.
 SETTINGS: dict[str, tuple[str, dict[str, Any], str, str, float]] = {
-    "cubestar": ("setDelayTimerTimeout", {"Time": 30}, "DelayTime", "Timeout", 26),
+    "cubestar": ("setDelayTimerTimeout", {"Time": 3}, "DelayTime", "Timeout", 7),
     "cubesense": ("DetectionThreshold2", {"Threshold": 80}, "Configuration", "Threshold2", 84),
     "aramis": ("SetReloadPeriod", {"Period": 16}, "ReloadSettings", "Period", 20),
 }

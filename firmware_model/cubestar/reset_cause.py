@@ -1,0 +1,28 @@
+"""What the EFM32GG's register of reset causes means: its bits stay until the program clears them.
+
+The published list has numbers for two pairs of causes. The rest is assumed: what begins with a rise
+of the supply hides all else, and any other mixture is undetermined.
+"""
+
+from collections.abc import Collection
+
+from cubestack.firmware_model.interface.cubestar.codes import ResetCause
+
+_SUPPLY = (ResetCause.POWER_ON, ResetCause.BROWN_OUT_UNREGULATED, ResetCause.BROWN_OUT_REGULATED)
+_OTHERS = (
+    ResetCause.EXTERNAL_PIN,
+    ResetCause.WATCHDOG,
+    ResetCause.LOCKUP,
+    ResetCause.SYSTEM_REQUEST,
+)
+_MEANINGS: dict[frozenset[int], ResetCause] = {
+    frozenset({ResetCause.EXTERNAL_PIN, ResetCause.WATCHDOG}): ResetCause.EXTERNAL_OR_WATCHDOG,
+    frozenset({ResetCause.LOCKUP, ResetCause.SYSTEM_REQUEST}): ResetCause.LOCKUP_OR_SYSTEM_REQUEST,
+    **{frozenset({one}): one for one in _OTHERS},
+}
+
+
+def cause_of(bits: Collection[int]) -> ResetCause:
+    """The published number for the causes whose bits are set, each by its own number."""
+    hiding = [cause for cause in _SUPPLY if cause in bits]
+    return hiding[0] if hiding else _MEANINGS.get(frozenset(bits), ResetCause.UNDETERMINED)

@@ -1,0 +1,98 @@
+"""CubeStar's processor: every published reset cause by what brings it about, and what is kept."""
+
+from functools import partial
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
+from cubestack.firmware_model.interface.cubestar import ResetCause
+
+from .bench import GOOD, READING_S, STORING_S, Star
+
+IN_BOOT_S = 0.001
+
+#: Faults, and the telecommand before them, by the cause that telemetry shows.
+CAUSES: dict[ResetCause, tuple[str | None, tuple[str, ...]]] = {
+    ResetCause.POWER_ON: (None, ()),
+    ResetCause.BROWN_OUT_UNREGULATED: (None, ("brown-out",)),
+    ResetCause.BROWN_OUT_REGULATED: (None, ("brown-out-regulated",)),
+    ResetCause.EXTERNAL_OR_WATCHDOG: ("TestWDG", ("reset-pin",)),
+    ResetCause.EXTERNAL_PIN: (None, ("reset-pin",)),
+    ResetCause.WATCHDOG: (None, ("hang",)),
+    ResetCause.LOCKUP_OR_SYSTEM_REQUEST: ("MCUReset", ("lock-up",)),
+    ResetCause.LOCKUP: (None, ("lock-up",)),
+    ResetCause.SYSTEM_REQUEST: ("MCUReset", ()),
+    ResetCause.UNDETERMINED: ("TestWDG", ("lock-up",)),
+}
+
+
+def node(star: Star) -> dict[str, Any]:
+    return star.telemetry("ExtendedIdentification")
+
+
+def wait_for_resets(star: Star, count: int) -> None:
+    """Until so many resets have begun."""
+    until_s = star.now_s + 3
+    while star.board.processor.resets < count and star.now_s < until_s:
+        star.client.pause(IN_BOOT_S / 2)
+
+
+def test_every_published_cause_has_its_number() -> None:
+    assert list(CAUSES) == list(ResetCause) == list(range(1, 11))
+
+
+@pytest.mark.parametrize("cause", CAUSES, ids=lambda cause: cause.name)
+def test_reset_cause_comes_of_what_happened(star: Star, cause: ResetCause) -> None:
+    """Two causes at once are two resets of which the second comes before the program runs."""
+    telecommand, faults = CAUSES[cause]
+    star.client.pause(0.05)  # else the power-on would hide the rest
+    if telecommand:
+        star.client.command(telecommand)
+        wait_for_resets(star, 1)
+    for fault in faults:
+        star.inject("processor-reset", target=fault)
+    star.client.pause(0.01 + WATCHDOG_US / 1e6 * ("hang" in faults))
+    shown = node(star)
+    assert ResetCause(shown["ResetCause"]) is cause
+    dogs = "hang" in faults or telecommand == "TestWDG"
+    assert shown["WDGResetCount"] == int(dogs)
+    assert star.measure() == "CALCULATED"
+
+
+@pytest.mark.fault("processor-reset")
+def test_a_program_that_hangs_answers_until_the_watchdog_comes(star: Star) -> None:
+    star.client.pause(0.1)
+    star.inject("processor-reset", target="hang")
+    star.client.command("Exposure", exposure=7)  # is queued, and lost
+    star.client.pause(1.5)
+    assert not star.telemetry("TcmdProcessed")["Processed"]
+    assert star.telemetry("Exposure")["exposure"] == 0
+    star.client.pause(1.0)
+    assert star.telemetry("TcmdProcessed")["Processed"]
+    assert star.said() == ["resets the processor"]
+
+
+@pytest.mark.parametrize("at_s", [STORING_S, READING_S])
+@pytest.mark.parametrize("target", ["brown-out", "lock-up"])
+@pytest.mark.fault("processor-reset")
+def test_a_reset_within_a_capture_costs_the_picture(star: Star, target: str, at_s: float) -> None:
+    star.faults.inject("processor-reset", target=target, at_s=at_s)
+    star.client.command("CaptureImage")
+    star.client.wait_processed(5.0)
+    star.client.pause(0.01)
+    assert star.telemetry("TaskStatus")["taskStatus"] == 1
+    assert star.telemetry("PerformanceParameters")["ImageCaptureSuccess"] is False
+    assert star.board._pins == {"ENABLE": 0, "RNW": 0, "BANK": 0}
+    assert star.capture() == GOOD
+
+
+@pytest.mark.fault("processor-reset")
+def test_the_loop_goes_on_after_a_reset(star: Star) -> None:
+    start = partial(star.telemetry, "LoopStatus")
+    star.client.command("Trigger")
+    star.client.pause(1.5)
+    star.inject("processor-reset", target="reset-pin")
+    star.client.pause(2.0)
+    assert (start()["Running"], start()["Iterations"] >= 2) == (True, True)
+    assert star.telemetry("AttitudeQuaternion")["Valid"]
