@@ -47,6 +47,10 @@ class BadAnswerError(NodeError):
     """An answer came that the interface does not allow."""
 
 
+class NotSupportedError(NodeError):
+    """The tables have a message that the node does not."""
+
+
 class StepFailedError(NodeError):
     """The node tried and failed."""
 

@@ -8,11 +8,18 @@ import pty
 import select
 import termios
 import tty
+from collections.abc import Callable
 from pathlib import Path
 
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PortError, poll_now
 from cubestack.emulator.ports.serial_port import SerialPort
+from cubestack.emulator.ports.terminal_settings import (
+    line_format,
+    read_settings,
+    with_baud,
+    write_settings,
+)
 
 
 class PtyEndpoint(SerialPort):
@@ -23,16 +30,33 @@ class PtyEndpoint(SerialPort):
     like new; bytes from the device that nobody is there for are dropped as well. The scheduler
     notices the end at once and the beginning at its next look. A client that closes and opens again
     before that is taken for one that stayed.
+
+    No bit of it has a length, so a client is understood whatever it sets of baud rate, parity and
+    stop bits; of another format than the device's it is told, with the first bytes that it writes.
+    A strict terminal has the client's format, with what becomes of bytes then. A client that sets
+    nothing finds the device's baud rate.
     """
 
-    def __init__(self, path: Path, uart: Uart) -> None:
-        """Open it; ``path`` must be free or a stale link of an earlier run, else PortError."""
+    def __init__(
+        self,
+        path: Path,
+        uart: Uart,
+        *,
+        strict: bool = False,
+        report: Callable[[str], None] = lambda _text: None,
+    ) -> None:
+        """Open it; ``path`` must be free or a stale link of an earlier run, else PortError.
+
+        ``report`` gets one line for each client whose format is not the device's.
+        """
         if path.is_symlink() and not path.exists():
             path.unlink()
         if path.is_symlink() or path.exists():
             raise PortError(f"{path} exists already: choose another --pty path or remove it")
-        self._master, self._terminal = _open_terminal()
-        self._raw = termios.tcgetattr(self._master)
+        self._baud, self._strict, self._report = uart.form.baud, strict, report
+        self._reported = False
+        self._master, self._terminal = _open_terminal(self._baud)
+        self._raw = read_settings(self._master)
         self._path = path
         self.name = str(path)
         try:
@@ -58,18 +82,23 @@ class PtyEndpoint(SerialPort):
     def _look(self) -> object | None:
         hung_up = poll_now(self._master, 0) & select.POLLHUP
         # A client may come and go between two looks, and leave other settings.
-        if hung_up and (self._connected or termios.tcgetattr(self._master) != self._raw):
+        if hung_up and (self._connected or read_settings(self._master) != self._raw):
             self._renew()
         self._connected = not hung_up
+        if self._strict:
+            self._follow(told=True)
         return self._master if self._connected else None
 
     def _read(self, max_bytes: int) -> bytes:
         try:
-            return os.read(self._master, max_bytes)
+            data = os.read(self._master, max_bytes)
         except OSError as error:
             if error.errno not in (errno.EAGAIN, errno.EIO):  # EIO: hung up, and nothing is left
                 raise
             return b""
+        if data and (self._strict or not self._reported):
+            self._follow(told=self._reported)
+        return data
 
     def _write(self, data: bytearray) -> int:
         try:
@@ -77,8 +106,20 @@ class PtyEndpoint(SerialPort):
         except BlockingIOError:
             return 0
 
+    def _follow(self, *, told: bool) -> None:
+        """Have the client's format, where that counts; tell of one that is not the device's."""
+        device = self._line.uart.form
+        form = line_format(read_settings(self._master)) or device
+        if self._strict:
+            self._line.form = form
+        if form != device and not told:
+            effect = "both get garbage" if self._strict else "a real line would carry garbage"
+            self._report(f"{self.name}: a client has set {form}, the device has {device}: {effect}")
+            self._reported = True
+
     def _renew(self) -> None:
         """Undo what the last client left behind."""
+        self._reported = False
         try:
             slave = os.open(self._terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
@@ -86,13 +127,13 @@ class PtyEndpoint(SerialPort):
             self._replace()
             return
         fcntl.ioctl(slave, termios.TIOCNXCL)
-        termios.tcsetattr(slave, termios.TCSANOW, self._raw)
+        write_settings(slave, self._raw)
         termios.tcflush(slave, termios.TCIFLUSH)
         os.close(slave)
 
     def _replace(self) -> None:
         """Put a new terminal under the same link."""
-        master, self._terminal = _open_terminal()
+        master, self._terminal = _open_terminal(self._baud)
         os.dup2(master, self._master, inheritable=False)
         os.close(master)
         new_link = self._path.with_name(f".{self._path.name}.new")
@@ -101,10 +142,11 @@ class PtyEndpoint(SerialPort):
         new_link.replace(self._path)
 
 
-def _open_terminal() -> tuple[int, str]:
+def _open_terminal(baud: int) -> tuple[int, str]:
     """Open a raw pseudo-terminal: its master, and the path of its slave, which is closed."""
     master, slave = pty.openpty()
     tty.setraw(slave)
+    write_settings(slave, with_baud(read_settings(slave), baud))
     path = os.ttyname(slave)
     os.close(slave)
     os.set_blocking(master, False)

@@ -13,6 +13,7 @@ TCP_RECEIVE_BUFFER = 4096
 """Bytes. Small, so that little of a client that floods the port and dies is still delivered."""
 
 REFUSAL = b"cubestack: this port has a client already\r\n"
+"""Plain text, so that no decoder of frames, and no telnet, finds anything in it."""
 
 
 class TcpEndpoint(SerialPort):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.registry import device_names
+from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
@@ -38,6 +39,12 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         help="the same with RFC 2217: clients set the baud rate, a wrong one gives garbage",
     )
     parser.add_argument(
+        "--strict-line",
+        action="store_true",
+        help="pseudo-terminals have the baud rate, parity and stop bits that clients set, as "
+        "with --rfc2217; else they tell of wrong ones",
+    )
+    parser.add_argument(
         "--listen",
         default=LOOPBACK,
         metavar="ADDRESS",
@@ -55,13 +62,15 @@ def open_ports(
 ) -> "list[tuple[AnyEmulated, SerialLine, Endpoint]]":
     """A port for each serial line of each device, in order; ``stack`` closes them.
 
-    Raises ValueError when there are not enough ports from the given one on, PortError when one
-    does not open.
+    Raises ValueError when there are not enough ports from the given one on, or a strict line is
+    wanted of a TCP port; PortError when one does not open.
     """
     from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
     from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
     from cubestack.emulator.ports.tcp import TcpEndpoint
 
+    if args.strict_line and args.tcp is not None:
+        raise ValueError("--strict-line: a TCP client sets no baud rate; use --pty or --rfc2217")
     kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     lines = [(opened, line) for opened in devices for line in opened.board.lines]
@@ -73,7 +82,8 @@ def open_ports(
             path = args.pty or Path(f"tty{name}")
             if args.pty is not None and len(devices) > 1:
                 path = path.with_name(path.name + name)
-            endpoint = PtyEndpoint(path.with_name(path.name + line.suffix), line.uart)
+            path = path.with_name(path.name + line.suffix)
+            endpoint = PtyEndpoint(path, line.uart, strict=args.strict_line, report=say)
         elif first and first + len(lines) - 1 > LAST_PORT:
             raise ValueError(f"{opened.device.title} needs {len(lines)} ports from {first} on")
         else:

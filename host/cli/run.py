@@ -9,7 +9,7 @@ examples:
   cubestack run -- i2cget -y 7 0x1a 0x83
   cubestack run --bus 1 --pace fast -- python3 flight_software.py
   cubestack run --device {first} --device {second} --hz 400000 -- ./program
-  cubestack run --attach -- i2cdump -y 7 0x1a      on the bus of `emulate --i2c 7`
+  cubestack run --attach -- i2cget -y 7 0x1a 0x83  on the bus of `emulate --i2c 7`
 """
 
 import argparse

@@ -16,7 +16,13 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
     switches_shown,
 )
 from cubestack.firmware_model.interface.codec.switches import Switches
-from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError, TargetError
+from cubestack.host.errors import (
+    BadAnswerError,
+    CommandRefusedError,
+    NoAnswerError,
+    NotSupportedError,
+    TargetError,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -68,12 +74,19 @@ class Client(Closable):
     def telemetry(self, name: str) -> dict[str, Value]:
         """Fields of a telemetry frame by name, in the units of the tables.
 
-        Raises InterfaceError, NoAnswerError, BadAnswerError, TransportError.
+        Raises InterfaceError, NotSupportedError, NoAnswerError, BadAnswerError, TransportError.
         """
 
     @abstractmethod
     def pause(self, seconds: float) -> None:
         """Let time pass on the node's side; what it sends meanwhile is lost."""
+
+    def _asked(self, name: str) -> Message:
+        """The telemetry ``name`` means; NotSupportedError where no node answers with it."""
+        message = self.interface.telemetry(name)
+        if not message.supported:
+            raise NotSupportedError(f"telemetry {message.name} is not supported by the node")
+        return message
 
     def stream(self, name: str, count: int) -> Iterator[bytes]:
         """Send telecommand ``name``, then yield the payloads of ``count`` frames without requests.

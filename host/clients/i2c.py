@@ -87,7 +87,7 @@ class I2cClient(Client):
 
     def telemetry(self, name: str) -> dict[str, Value]:
         """Read a telemetry frame; one that steps may skip a record when a transfer broke off."""
-        message = self.interface.telemetry(name)
+        message = self._asked(name)
 
         def read() -> bytes:
             answer = i2c_msg.read(self._address, message.length)

@@ -59,7 +59,7 @@ class NodeClient(Client):
 
     def telemetry(self, name: str) -> dict[str, Value]:
         """Ask for a telemetry frame; one that steps may skip a record when an answer was lost."""
-        message = self.interface.telemetry(name)
+        message = self._asked(name)
         answer = None
         for _ in range(1 + self._retries):
             answer = self.request(bytes([message.id]))

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -101,7 +102,8 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     ) -> subprocess.CompletedProcess[str]:
         """Run a program against the serial line; its exit code and output.
 
-        Every "{port}" in ``command`` becomes the path of a pseudo-terminal. Raises
+        Every "{port}" in ``command`` becomes the path of a pseudo-terminal; a warning tells of a
+        program that sets another baud rate, parity or stop bits than the device has. Raises
         subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
         """
         from cubestack.emulator.i2cdev.scheduler import open_scheduler
@@ -110,7 +112,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         self._client = None
         with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
             port = Path(folder) / "tty"
-            endpoint = PtyEndpoint(port, self.board.uart)
+            endpoint = PtyEndpoint(port, self.board.uart, report=warnings.warn)
             try:
                 words = [str(word).replace(PORT, str(port)) for word in command]
                 with open_scheduler(

@@ -12,6 +12,7 @@ from cubestack.emulator.camera.common.scene_file import load_scene
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+from cubestack.emulator.ports.tcp import REFUSAL
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.emulator.sim.power import PowerModel
@@ -21,6 +22,7 @@ from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.host.cli.main import COMMANDS, make_parser
 from cubestack.host.cli.reports import reports
+from cubestack.host.devices.registry import devices
 from tests.conftest import Run
 from tests.system.conftest import ROOT
 
@@ -151,6 +153,24 @@ def test_experiments_of_the_pages_are_those_there_are() -> None:
     named = re.findall(r"experiments\.py (\w+)", pages)
     there = re.findall(r"experiments\.py (\w+) ", text_of("tests/system/experiments.py"))
     assert {*named} == {*there}
+
+
+def test_reads_that_act_are_those_of_the_tables() -> None:
+    """A telecommand without parameters is whole with its ID, which is where a read begins."""
+    rows = section(text_of("docs/i2c.md"), "Reads that act").splitlines()
+    for device in devices():
+        found = [
+            ", ".join(f"{one.id} {one.name}" for one in messages if one.supported) or "none"
+            for messages in (
+                [one for one in device.interface.telecommands if not one.length],
+                [one for one in device.interface.telemetries if one.has_side_effect],
+            )
+        ]
+        assert f"| {device.title} | {found[0]} | {found[1]} |" in rows
+
+
+def test_the_line_that_refuses_a_second_client_is_the_one_in_the_page() -> None:
+    assert REFUSAL.decode().strip() in section(text_of("docs/serial-ports.md"), "A second client")
 
 
 def test_reasons_of_aramis_page_are_those_of_the_interface() -> None:

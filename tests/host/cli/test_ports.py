@@ -79,3 +79,9 @@ def test_other_machines_must_be_allowed(ports, kind):
 def test_one_end_only(ports):
     with pytest.raises(argparse.ArgumentError, match="not allowed with"):
         ports("--tcp", "0", "--rfc2217", "0")
+
+
+def test_a_tcp_port_has_no_line_to_be_strict_with(ports):
+    with pytest.raises(ValueError, match="a TCP client sets no baud rate; use --pty or --rfc2217"):
+        ports("--tcp", "0", "--strict-line")
+    assert ports("--strict-line") == ports()

@@ -53,6 +53,7 @@ def test_emulated_cubestar_with_a_script(shell, tmp_path):
     [
         (["emulated:cubesense", "-c", "read nothing"], 2, "nothing is called 'nothing'"),
         (["emulated:cubesense", "-c", "write Reset 9"], 1, "refused: BAD_PARAMETER (3)"),
+        (["emulated:cubestar", "-c", "read CameraSetup"], 1, "CameraSetup is not supported"),
         (["emulated:mars", "-c", ""], 2, "no device 'mars' can be emulated"),
         (["emulated:cubesense", "--bench", "x", "-c", ""], 2, "leave out --bench"),
         (["./port", "-c", "", "--scene", "x"], 2, "--scene is for emulated:DEVICE"),

@@ -5,7 +5,8 @@ import pytest
 from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.clients.i2c import I2cClient
-from cubestack.host.errors import CommandRefusedError, NoAnswerError
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.errors import CommandRefusedError, NoAnswerError, NotSupportedError
 
 from ..conftest import I2cLink, over_i2c
 
@@ -54,3 +55,14 @@ def test_a_silent_address_is_named(i2c: Any) -> None:
         client.telemetry("ErrorFlags")
     with pytest.raises(NoAnswerError, match=r"telecommand Reset not acknowledged .* 0x55"):
         client.command("Reset")
+
+
+@pytest.mark.parametrize("bus", ["uart", "i2c"])
+def test_what_the_tables_call_unsupported_is_not_asked_for(
+    bus: str, node: Any, uart: Any, i2c: Any
+) -> None:
+    client = NodeClient(uart, INTERFACE) if bus == "uart" else I2cClient(i2c, INTERFACE)
+    (name,) = (message.name for message in INTERFACE.telemetries if not message.supported)
+    with pytest.raises(NotSupportedError, match=f"telemetry {name} is not supported by the node"):
+        client.telemetry(name)
+    assert node.log == []
