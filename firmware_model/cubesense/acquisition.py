@@ -6,9 +6,14 @@ its own memory, or over the FPGAs' link to the other one; edge data come back th
 
 With address control from the microcontroller (section 9.2.2) single pixels can be read, from the
 memory of the FPGA that is enabled only.
+
+FPGAs with one search each send the whole picture over the link, row after row, where the others
+send edge data. The program lets pass what it does not want, and lets the picture come anew for each
+column, as it has no room for ten of them; assumed, because no program for it is printed.
 """
 
 from collections.abc import Generator, Iterable
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +21,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.supply import SAMPLE_US, Supply
 from cubestack.firmware_model.cubesense.vision.edges import EdgeList, NadirLines
-from cubestack.firmware_model.cubesense.vision.sun_centroid import window_bytes
+from cubestack.firmware_model.cubesense.vision.sun_centroid import COORDINATE_BYTES, window_bytes
 from cubestack.firmware_model.interface.cubesense import codes, fpga, pins
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
@@ -32,6 +37,9 @@ CHUNK = fpga.FULL_SIZE.scan_step
 
 SAMPLE_BYTES = fpga.FULL_SIZE.columns
 """So many bytes are read from one look at the memories' currents to the next."""
+
+_DISCARDED = np.zeros(SAMPLE_BYTES, np.uint8)
+"""Bytes that are clocked and not kept: none of the part's memory."""
 
 SAMPLE_PIXELS = 64
 """The same for pixels that are addressed one by one."""
@@ -49,8 +57,15 @@ def _actions(
 class Acquisition:
     """The pins that both FPGAs share with the program, and its buffers for their bytes."""
 
-    def __init__(self, hardware: CubeSenseHardware, meter: Meter, supply: Supply) -> None:
-        """Both FPGAs are in standby, as at reset."""
+    def __init__(
+        self,
+        hardware: CubeSenseHardware,
+        meter: Meter,
+        supply: Supply,
+        read_out: fpga.ReadOut = fpga.FULL_SIZE,
+    ) -> None:
+        """Both FPGAs are in standby, as at reset; ``read_out`` is theirs."""
+        self._read_out = read_out
         self._mcu_addressing = hardware.mcu_addressing
         self._meter = meter
         self._supply = supply
@@ -86,8 +101,18 @@ class Acquisition:
             return codes.CaptureResult.CAMERA_TIMEOUT
         return codes.CaptureResult.STORED_OWN_SRAM if own else codes.CaptureResult.STORED_OTHER_SRAM
 
+    def edge_data(self, camera: codes.Camera, sram: codes.Sram) -> fpga.ReadOut:
+        """What `scan` and `window` give of ``camera``'s picture in ``sram``."""
+        return fpga.FULL_SIZE if self._picks(camera, sram) else self._read_out
+
+    def _picks(self, camera: codes.Camera, sram: codes.Sram) -> bool:
+        """Whether it is the program that picks them out of a picture."""
+        return self._read_out.one_search and sram is not codes.Sram(camera)
+
     def scan(self, sram: codes.Sram, lines: NadirLines) -> Routine[bool]:
         """Let ``lines`` see the nadir picture in ``sram``; False when it was cut off meanwhile."""
+        if self._picks(codes.Camera.NADIR, sram):
+            return (yield from self._pick_scan(sram, lines))
         yield from self._enter_edge(codes.Camera.NADIR, sram)
         read = 0
         while lines.wanted and self._supply.available(sram):
@@ -103,11 +128,58 @@ class Acquisition:
 
     def window(self, sram: codes.Sram) -> Routine[NDArray[np.uint8] | None]:
         """The Sun window's bytes (229,) in ``sram``, until the next call; None as for ``scan``."""
-        yield from self._enter_edge(codes.Camera.SUN, sram)
-        yield StrobeRead(self._window, self._strobe_cycles)
-        yield from self._supply.sample()
+        if self._picks(codes.Camera.SUN, sram):
+            yield from self._pick_window(sram)
+        else:
+            yield from self._enter_edge(codes.Camera.SUN, sram)
+            yield StrobeRead(self._window, self._strobe_cycles)
+            yield from self._supply.sample()
         yield from self._standby()
         return self._window if self._supply.available(sram) else None
+
+    # --- pictures over the link -----------------------------------------------------------------
+
+    def _pick_scan(self, sram: codes.Sram, lines: NadirLines) -> Routine[bool]:
+        """As `scan`; the presets are any pixel."""
+        size = fpga.FULL_SIZE
+        places = (at[0] + at[1] * size.columns if at else 0 for at in size.scan())
+        while lines.wanted and self._supply.available(sram):
+            space = lines.space
+            wanted = np.fromiter(islice(places, len(space)), int)
+            yield from self._pick(codes.Camera.NADIR, sram, wanted, space)
+            lines.filled()
+        yield from self._standby()
+        return self._supply.available(sram)
+
+    def _pick_window(self, sram: codes.Sram) -> Routine[None]:
+        """The coordinates are in the sun's FPGA, whichever memory has the picture."""
+        size, sun = fpga.FULL_SIZE, codes.Camera.SUN
+        yield from self._enter_edge(sun, codes.Sram(sun))
+        coordinates, pixels = np.split(self._window, [COORDINATE_BYTES])
+        yield StrobeRead(coordinates, self._strobe_cycles)
+        yield from self._standby()
+        x_low, x_high, y_low, y_high = (int(byte) for byte in coordinates)
+        left, top = size.window_origin(x_low + 256 * x_high, y_low + 256 * y_high)
+        rows, columns = np.mgrid[top : top + size.window, left : left + size.window]
+        yield from self._pick(sun, sram, (rows * size.columns + columns).ravel(), pixels)
+
+    def _pick(
+        self,
+        camera: codes.Camera,
+        sram: codes.Sram,
+        wanted: NDArray[np.int64],
+        target: NDArray[np.uint8],
+    ) -> Routine[None]:
+        """Pixels ``wanted`` (n,), counted row by row, into ``target`` (n,)."""
+        starts = [0, *(np.flatnonzero(np.diff(wanted) != 1) + 1), len(wanted)]
+        for start, end in pairwise(starts):
+            if self._open is None or wanted[start] < self._position:
+                yield from self._enter_edge(camera, sram)
+                self._open, self._position, self._unwatched = sram, 0, 0
+            skipped = int(wanted[start]) - self._position
+            chunks = (_DISCARDED[: skipped - at] for at in range(0, skipped, SAMPLE_BYTES))
+            yield from self._strobe(chunks, self._strobe_cycles)
+            yield from self._strobe([target[start:end]], self._scan_cycles)
 
     # --- pictures in sequence -------------------------------------------------------------------
 

@@ -176,7 +176,8 @@ class Measurement:
                 return None
             edges, result.pixels_read = answer
             return edges
-        lines = NadirLines(config, self._meter, buffer=acquisition.buffers[0])
+        read_out = acquisition.edge_data(codes.Camera.NADIR, sram)
+        lines = NadirLines(config, self._meter, read_out, acquisition.buffers[0])
         if not (yield from acquisition.scan(sram, lines)):
             return None
         result.pixels_read = SCANNED_PIXELS
@@ -199,7 +200,8 @@ class Measurement:
             masks=tuple(settings.masks),
             printed=self._state.switches.now.sun == "all-pixels",
         )
-        found = sun_centroid.find_sun(data, config, self._meter)
+        read_out = self._acquisition.edge_data(codes.Camera.SUN, result.sram)
+        found = sun_centroid.find_sun(data, config, self._meter, read_out)
         result.centroid_us = microseconds((yield from ticks_since(searched)))
         result.total_us = microseconds((yield from ticks_since(started)))
         x_low, x_high, y_low, y_high = (int(byte) for byte in data[: sun_centroid.COORDINATE_BYTES])

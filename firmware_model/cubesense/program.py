@@ -16,6 +16,7 @@ from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.cubesense.supply import Supply
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
+from cubestack.firmware_model.interface.cubesense.fpga import READ_OUTS
 from cubestack.firmware_model.interface.cubesense.switches import (
     DEFAULT_SWITCHES,
     CubeSenseSwitches,
@@ -52,7 +53,8 @@ class CubeSenseProgram:
         self.state = state = State(switches)
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
-        self.acquisition = acquisition = Acquisition(hardware, meter, self._supply)
+        read_out = READ_OUTS[switches.gateware]
+        self.acquisition = acquisition = Acquisition(hardware, meter, self._supply, read_out)
         measurement = Measurement(meter, state, self.cameras, acquisition)
         self._jobs = jobs = JobQueue()
         self.commands = Commands(meter, state, self._supply, self.cameras, acquisition, measurement)

@@ -1,7 +1,8 @@
 """Nadir scan: the addresses of every 64th row, then of every 64th column.
 
-CubeSense thesis, section 6.5.1 and figure 6.7. The published listing is off by one or two pixels
-here and there; this one presents the k-th pixel of a line at the line's k-th clock.
+CubeSense thesis, section 6.5.1 and figure 6.7: the k-th pixel of a line at the line's k-th clock.
+As flown (appendix D.3) the address has a register behind its counters, which start at column 1, and
+every pixel comes one clock early; that listing's program (appendix C.3) adds 1 to positions.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
@@ -17,7 +18,7 @@ class NadirScan(Component):
     In reset, and in the two states that preset (the default one and B), the address is 0; the clock
     that leaves such a state presents the byte there, which is no part of a line. States A (rows)
     and C (columns) give the address that the next clock presents. C starts again when it is
-    through.
+    through. As flown, state B leaves the address alone and C runs on beyond the picture.
 
     Ports:
         address: row : column.
@@ -30,8 +31,39 @@ class NadirScan(Component):
         super().__init__({"address": Out(read_out.address_bits)})
 
     def elaborate(self, platform: object) -> Module:
-        """Build one counter along the line and one of lines, which swap roles for the columns."""
+        """Build the states and counters."""
         m = Module()
+        if self._read_out.as_flown:
+            self._as_flown(m)
+        else:
+            self._exact(m)
+        return m
+
+    def _as_flown(self, m: Module) -> None:
+        """A column and a row counter, and the address behind them, as the listing has them."""
+        sync = m.d[self._domain]
+        size = self._read_out
+        column = Signal(size.column_bits, init=size.scan_start)
+        row = Signal(size.row_bits, init=size.first_row)
+        in_columns = Signal()  # state C
+        between = Signal()  # state B; without either A
+        with m.If(between):
+            sync += [between.eq(0), in_columns.eq(1)]
+        with m.Else():
+            sync += self.address.eq(Cat(column, row))
+        with m.If(in_columns):
+            sync += row.eq(row + 1)
+            with m.If(row == size.rows - 1):
+                sync += [row.eq(0), column.eq(column + size.scan_step)]
+        with m.Elif(~between):
+            sync += column.eq(column + 1)
+            with m.If(column == size.columns - 1):
+                sync += [column.eq(0), row.eq(row + size.scan_step)]
+                with m.If(row == size.scan_rows[-1]):
+                    sync += [between.eq(1), column.eq(size.first_column), row.eq(0)]
+
+    def _exact(self, m: Module) -> None:
+        """One counter along the line and one of lines, which swap roles for the columns."""
         sync = m.d[self._domain]
         size = self._read_out
         column_bits, row_bits = size.column_bits, size.row_bits
@@ -72,4 +104,3 @@ class NadirScan(Component):
                 Mux(vertical, along, scanned_row)[:row_bits],
             )
         )
-        return m

@@ -1,11 +1,11 @@
 """First Sun pixel: found while the picture is being stored.
 
 CubeSense thesis, section 6.6.1 and figure 6.15. A lone bright pixel may be a damaged one, so the
-first of three bright pixels side by side counts. The published search also counts across the end
-of a line; this one does not, because pixels there are not side by side.
+first of three bright pixels side by side counts. The search as flown (appendix D.4) also counts
+across the end of a line; the other one does not, because pixels there are not side by side.
 """
 
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD, ReadOut
@@ -19,6 +19,10 @@ class SunSearch(Component):
     and the first Sun pixel's once the third bright pixel is written. What comes after it in the
     same frame is ignored.
 
+    As flown nothing says "not found": the first pixel of every run is noted at once, whatever
+    follows, and a picture without a bright pixel leaves the coordinates as they were. ``start`` is
+    ignored; reset alone begins a new search.
+
     Ports:
         start: between frames; the search begins again with the next one.
         store: ``pixel`` is being written.
@@ -30,6 +34,7 @@ class SunSearch(Component):
     def __init__(self, read_out: ReadOut, *, domain: str = "pix") -> None:
         """Make a search in pictures of ``read_out``'s size."""
         self._column_bits = read_out.column_bits
+        self._as_flown = read_out.as_flown
         self._domain = domain
         written = {"store": In(1), "pixel": In(8), "address": In(read_out.address_bits)}
         sun = {"x": Out(read_out.column_bits), "y": Out(read_out.row_bits)}
@@ -43,6 +48,16 @@ class SunSearch(Component):
         x = Signal.like(self.x, reset_less=True)
         y = Signal.like(self.y, reset_less=True)
         m.d.comb += [self.x.eq(x), self.y.eq(y)]
+
+        if self._as_flown:
+            column, row = self.address[: self._column_bits], self.address[self._column_bits :]
+            count = Signal(range(SUN_RUN + 1))
+            bright_now = self.pixel >= SUN_THRESHOLD
+            with m.If(self.store & (count != SUN_RUN)):
+                sync += count.eq(Mux(bright_now, count + 1, 0))
+                with m.If(bright_now & ~count.any()):
+                    sync += [x.eq(column), y.eq(row)]
+            return m
 
         awake = Signal()  # out of reset, so the coordinates may change
         searching = Signal()

@@ -1,7 +1,7 @@
 """Sun window: the first Sun pixel's coordinates, then the square of pixels around the Sun.
 
-CubeSense thesis, section 6.6.2 and figure 6.16. What happens at the picture's border is not
-published: here the whole window is moved inside of the picture.
+CubeSense thesis, section 6.6.2 and figure 6.16. At the picture's border the whole window is moved
+inside of the picture; as flown (appendix D.4) it wraps over the ends of the address.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -15,7 +15,9 @@ class SunWindow(Component):
 
     States A to D offer the coordinates in ``byte``, one after the other, and hold the address at
     0. State E gives the address of one pixel of the window after the other, row by row, and after
-    the last one the first again.
+    the last one the first again. As flown the address has a register behind its counters, which
+    outlives the reset: the window's first byte is at the address that the read-out before ended
+    with, and past the last one comes the row below.
 
     Ports:
         x, y: first Sun pixel; must stand still while the domain is out of reset.
@@ -33,30 +35,55 @@ class SunWindow(Component):
         super().__init__({**sun, **offered})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the states, the position in the window and the window's origin."""
+        """Build the states and the address."""
         m = Module()
-        size = self._read_out
-
         state = Signal(range(4))  # A, B, C, D
         in_window = Signal()  # state E
-        right, last_column = self._position(m, size.window_left, in_window)
-        down, _ = self._position(m, size.window_above, in_window & last_column)
-        x = self._clamped(m, self.x, size.window_left, size.columns, in_window)
-        y = self._clamped(m, self.y, size.window_above, size.rows, in_window)
-
         m.d[self._domain] += [state.eq(state + 1), in_window.eq(in_window | (state == 3))]
         pair = Mux(state[1], self.y, self.x)
         m.d.comb += [
             self.coordinate.eq(~in_window),
             self.byte.eq(Mux(state[0], pair[8:], pair[:8])),
-            self.address.eq(Cat((x + right)[: len(x)], (y + down)[: len(y)])),
         ]
+        if self._read_out.as_flown:
+            self._wrapping(m, in_window)
+        else:
+            self._moved_inside(m, in_window)
         return m
 
-    def _position(self, m: Module, before: int, step: Value) -> tuple[Signal, Value]:
+    def _wrapping(self, m: Module, in_window: Signal) -> None:
+        """Counters that the listing loads while it waits, here while coordinates are offered."""
+        size, sync = self._read_out, m.d[self._domain]
+        left = (self.x - size.window_left)[: len(self.x)]
+        right = (left + size.window)[: len(left)]
+        column = Signal.like(self.x, name="column")
+        row = Signal.like(self.y, name="row")
+        shown = Signal.like(self.address, reset_less=True)
+        with m.If(~in_window):
+            sync += [column.eq(left), row.eq(self.y - size.window_above)]
+        with m.Else():
+            next_column = Signal.like(column, name="next_column")
+            next_row = Signal.like(row, name="next_row")
+            m.d.comb += [next_column.eq(column + 1), next_row.eq(row)]
+            with m.If((column + 1)[: len(column)] == right):
+                m.d.comb += [next_column.eq(left), next_row.eq(row + 1)]
+            sync += [column.eq(next_column), row.eq(next_row)]
+            sync += shown.eq(Cat(next_column, next_row))
+            m.d.comb += self.address.eq(shown)
+
+    def _moved_inside(self, m: Module, in_window: Signal) -> None:
+        """The position in the window, and the window's origin."""
+        size = self._read_out
+        right, last_column = self._position(m, "right", size.window_left, in_window)
+        down, _ = self._position(m, "down", size.window_above, in_window & last_column)
+        x = self._clamped(m, self.x, size.window_left, size.columns, in_window)
+        y = self._clamped(m, self.y, size.window_above, size.rows, in_window)
+        m.d.comb += self.address.eq(Cat((x + right)[: len(x)], (y + down)[: len(y)]))
+
+    def _position(self, m: Module, name: str, before: int, step: Value) -> tuple[Signal, Value]:
         """Column or row in the window, from ``-before`` on, and whether it is the last one."""
         size = self._read_out.window
-        position = Signal(range(-before, size - before), init=-before)
+        position = Signal(range(-before, size - before), init=-before, name=name)
         last = position == size - before - 1
         with m.If(step):
             m.d[self._domain] += position.eq(Mux(last, -before, position + 1))

@@ -55,18 +55,31 @@ class CubeSenseFpga(PinnedComponent):
     def elaborate(self, platform: object) -> Module:
         """Wire the blocks to the pins."""
         m = Module()
-        is_sun = self.side == "sun"
+        is_sun, one_search = self.side == "sun", self.read_out.one_search
         addressing = self.mcu_addressing
         m.submodules.dataflow = mode = DataflowControl(self.side, mcu_addressing=addressing)
         m.submodules.reader = reader = CubeSenseReader(self.read_out, mcu_addressing=addressing)
-        own_writer = add_writer(m, "pix", mode.store, self.PCLK, self.HREF, self.Y, self.read_out)
+        # With one search the sun's FPGA looks for the Sun in a picture that it sends, too.
+        writing = mode.store | mode.send_picture if one_search and is_sun else mode.store
+        own_writer = add_writer(m, "pix", writing, self.PCLK, self.HREF, self.Y, self.read_out)
         link_clock, link_href = self.LINK_C_I[0], self.LINK_C_I[1]
         link_writer = add_writer(
             m, "link", mode.store_other, link_clock, link_href, self.LINK_D_I, self.read_out
         )
         # The Sun is looked for in the sun camera's picture, whichever memory it goes to.
-        m.submodules.search = search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
-        sun_writer = own_writer if is_sun else link_writer
+        if is_sun or not one_search:
+            sun_writer = own_writer if is_sun else link_writer
+            search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
+            m.submodules.search = search
+            m.d.comb += [
+                # The gap after a complete picture starts no new search.
+                search.start.eq(~sun_writer.vsync & ~sun_writer.ack),
+                search.store.eq(sun_writer.store),
+                search.pixel.eq(sun_writer.data),
+                search.address.eq(sun_writer.address),
+                reader.sun_x.eq(search.x),
+                reader.sun_y.eq(search.y),
+            ]
 
         own_line, other_line = (0, 1) if is_sun else (1, 0)
         orders = (reader.window, reader.scan)
@@ -81,7 +94,12 @@ class CubeSenseFpga(PinnedComponent):
                 reader.address_byte.eq(self.DATA_I),
             ]
         reading = presenting | mode.send_edge
-        storing = ~ResetSignal("pix") | ~ResetSignal("link")
+        own_stores, own_ack = own_writer.store, own_writer.ack
+        own_active = ~ResetSignal("pix")
+        if one_search and is_sun:
+            own_stores, own_ack = own_stores & mode.store, own_ack & mode.store
+            own_active &= mode.store
+        storing = own_active | ~ResetSignal("link")
         shows_enable = ~self.EN & (self.EDGE | ~self.SHIFT)
         m.d.comb += [
             mode.en_n.eq(self.EN),
@@ -89,19 +107,12 @@ class CubeSenseFpga(PinnedComponent):
             mode.rnw.eq(self.RNW),
             mode.edge.eq(self.EDGE),
             mode.shift.eq(self.SHIFT),
-            # The gap after a complete picture starts no new search.
-            search.start.eq(~sun_writer.vsync & ~sun_writer.ack),
-            search.store.eq(sun_writer.store),
-            search.pixel.eq(sun_writer.data),
-            search.address.eq(sun_writer.address),
             reader.clk.eq(self.CLK),
-            reader.picture.eq(mode.read),
+            reader.picture.eq(mode.read | (mode.send_edge if one_search else 0)),
             own_edge.eq(mode.edge_data),
-            other_edge.eq(mode.send_edge),
-            reader.sun_x.eq(search.x),
-            reader.sun_y.eq(search.y),
+            other_edge.eq(0 if one_search else mode.send_edge),
             reader.memory.eq(self.SRAM_D_I),
-            self.ACK.eq(own_writer.ack | link_writer.ack),
+            self.ACK.eq(own_ack | link_writer.ack),
             self.DATA_O.eq(reader.data | (self.LINK_D_I & mode.pass_edge.replicate(8))),
             self.DATA_OE.eq(presenting | mode.pass_edge),
             self.LINK_D_O.eq(reader.data | (self.Y & mode.send_picture.replicate(8))),
@@ -113,13 +124,13 @@ class CubeSenseFpga(PinnedComponent):
             # At most one of the three is out of reset, and in reset an address is 0.
             self.SRAM_A.eq(own_writer.address | link_writer.address | reader.address),
             self.SRAM_D_O.eq(own_writer.data | link_writer.data),
-            self.SRAM_D_OE.eq(own_writer.store | link_writer.store),
+            self.SRAM_D_OE.eq(own_stores | link_writer.store),
             self.SRAM_CE_N.eq(~(reading | storing)),
             self.SRAM_OE_N.eq(~reading),
             # The pulse ends with the clock's rising edge itself, ahead of the address that the
             # same edge moves on.
             self.SRAM_WE_N.eq(
-                ~((own_writer.store & ~self.PCLK) | (link_writer.store & ~self.LINK_C_I[0]))
+                ~((own_stores & ~self.PCLK) | (link_writer.store & ~self.LINK_C_I[0]))
             ),
         ]
         return m

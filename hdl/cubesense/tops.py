@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OUTS, ReadOut
 from cubestack.firmware_model.interface.cubesense.pins import CLK, PCLK
 from cubestack.hdl.blocks.frame_gap import FrameGap
 from cubestack.hdl.blocks.frame_writer import FrameWriter
@@ -23,25 +23,35 @@ LINK_CLOCK = Clock("LINK_C[0]", 74, "the other camera's PCLK, over the link")
 _CLK = Clock(CLK, 400, "two instructions of the microcontroller at 5 MHz")
 
 _OPTION = ", the microcontroller sets the address"
+_AS_FLOWN = READ_OUTS["as-flown"]
+_VARIANTS = {name: READ_OUTS[name] for name in ("as-flown", "one-search")}
 
 
-def _fpga(side: Side, mcu_addressing: bool) -> Top:
+def _title(mcu_addressing: bool, read_out: ReadOut) -> str:
+    variant = ", as flown" * read_out.as_flown + ", with one search" * read_out.one_search
+    return _OPTION * mcu_addressing + variant
+
+
+def _fpga(side: Side, mcu_addressing: bool = False, read_out: ReadOut = FULL_SIZE) -> Top:
     return Top(
-        partial(CubeSenseFpga, side, FULL_SIZE, mcu_addressing),
-        f"CubeSense, {side} sensor's FPGA{_OPTION * mcu_addressing}",
+        partial(CubeSenseFpga, side, read_out, mcu_addressing),
+        f"CubeSense, {side} sensor's FPGA{_title(mcu_addressing, read_out)}",
         (PIXEL_CLOCK, LINK_CLOCK, _CLK),
         pulled_up=("LINK_C",),
+        fits=not read_out.as_flown or read_out.one_search,
     )
 
 
-def _pair(mcu_addressing: bool) -> Top:
+def _pair(mcu_addressing: bool = False, read_out: ReadOut = FULL_SIZE) -> Top:
     return Top(
-        partial(CubeSensePair, FULL_SIZE, mcu_addressing),
-        f"CubeSense, model of both FPGAs and their link{_OPTION * mcu_addressing}",
+        partial(CubeSensePair, read_out, mcu_addressing),
+        f"CubeSense, model of both FPGAs and their link{_title(mcu_addressing, read_out)}",
         (*(PIXEL_CLOCK._replace(port=f"{half}_PCLK") for half in ("SUN", "NAD")), _CLK),
         parts=2,
     )
 
+
+_EDGE_BLOCKS = {"nadir scan": NadirScan, "Sun search": SunSearch, "Sun window": SunWindow}
 
 #: Their tracked area, as ``cubestack hdl area --ice40 --fmax --json`` prints it.
 AREA_FILE = Path(__file__).parent / "area.json"
@@ -52,15 +62,26 @@ TOPS: TopTable = {
         for addressing in (False, True)
         for side in SIDES
     },
-    "cubesense-pair": _pair(mcu_addressing=False),
+    **{
+        f"cubesense-{side}-{variant}": _fpga(side, read_out=read_out)
+        for variant, read_out in _VARIANTS.items()
+        for side in SIDES
+    },
+    "cubesense-pair": _pair(),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),
+    **{
+        f"cubesense-pair-{variant}": _pair(read_out=read_out)
+        for variant, read_out in _VARIANTS.items()
+    },
     "matrix counter 640 x 480": Block(partial(MatrixCounter, 640, 480)),
     "Gray counter of 307200": Block(partial(GrayCounter, 640 * 480)),
     "frame writer 640 x 480": Block(partial(FrameWriter, 640, 480)),
     "frame gap of 858 clocks": Block(partial(FrameGap, 858)),
-    "nadir scan": Block(partial(NadirScan, FULL_SIZE)),
-    "Sun search": Block(partial(SunSearch, FULL_SIZE)),
-    "Sun window": Block(partial(SunWindow, FULL_SIZE)),
+    **{
+        f"{name}{', as flown' * size.as_flown}": Block(partial(make, size))
+        for size in (FULL_SIZE, _AS_FLOWN)
+        for name, make in _EDGE_BLOCKS.items()
+    },
     "CubeSense reader": Block(partial(CubeSenseReader, FULL_SIZE)),
     "the same, addressing": Block(partial(CubeSenseReader, FULL_SIZE, mcu_addressing=True)),
 }

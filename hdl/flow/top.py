@@ -28,6 +28,7 @@ class Top:
         parts: AGLN030s that it fills; more than one for a model of several chips.
         pulled_up: pins that need a pull-up.
         reset: what makes the registers' state.
+        fits: whether the part has room for it, by the estimate of tiles.
     """
 
     make: Callable[[], PinnedComponent]
@@ -36,6 +37,7 @@ class Top:
     parts: int = 1
     pulled_up: tuple[str, ...] = ()
     reset: str = "standby"
+    fits: bool = True
 
 
 @dataclass(frozen=True)

@@ -179,6 +179,11 @@ DOCUMENTED = {
     'CubeSenseFpga("nadir")': "cubesense-nadir",
     'CubeSenseFpga("sun", mcu_addressing=True)': "cubesense-sun-addressing",
     'CubeSenseFpga("nadir", mcu_addressing=True)': "cubesense-nadir-addressing",
+    **{
+        f'CubeSenseFpga("{side}", READ_OUTS["{gateware}"])': f"cubesense-{side}-{gateware}"
+        for gateware in ("as-flown", "one-search")
+        for side in ("sun", "nadir")
+    },
     "MatrixCounter(640, 480)": "matrix counter 640 x 480",
     "GrayCounter(307200)": "Gray counter of 307200",
 }

@@ -20,13 +20,14 @@ from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.interface.cubesense.codes import ROWS, Camera, Sram
-from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, Action, actions
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OUTS, Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS, ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
@@ -36,6 +37,7 @@ from cubestack.firmware_model.interface.cubesense.switches import (
 )
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
+from cubestack.hdl.cubesense.pair import CubeSensePair
 
 BOOT_US = 1_000
 """Oscillator start-up and the C library's own start: assumed."""
@@ -46,8 +48,11 @@ HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
 STORING = (Action.STORE, Action.STORE_OTHER)
 CLOCKED = (*STORING, Action.SEND_PICTURE)
 
-_wiring = lru_cache(maxsize=2)(cubesense_wiring)
-"""Kept, as an engine knows its library by the design's text, a slow thing."""
+
+@lru_cache(maxsize=4)
+def _wiring(gateware: str, mcu_addressing: bool) -> Wiring:
+    """Kept, as an engine knows its library by the design's text, a slow thing."""
+    return cubesense_wiring(CubeSensePair(READ_OUTS[gateware], mcu_addressing))
 
 
 class CubeSenseBoard(Board):
@@ -86,10 +91,11 @@ class CubeSenseBoard(Board):
             baud, bench_baud: of the serial lines with the node and the bench protocol.
             mcu_addressing: FPGAs with the option that lets the processor choose addresses.
             i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
-            switches: of the program, and of the lenses, which are those of unit ``seed``.
+            switches: of the program, the FPGAs' gateware, and the lenses, which are those of unit
+                ``seed``.
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
-        self.engine = make_engine(_wiring(mcu_addressing=mcu_addressing), engine)
+        self.engine = make_engine(_wiring(switches.gateware, mcu_addressing), engine)
         drawn = switches.lens == "residuals"
         self.cameras = {
             Camera[target.name]: Ov7620(

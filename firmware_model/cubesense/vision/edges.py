@@ -13,8 +13,9 @@ An extension, with ``sub_pixel``: the previous sample is a bound, and the edge l
 pixels that the search ends with, where a straight line through their values meets the threshold.
 
 Appendix C.3 has two slips that the text has not, here with ``listing``: edges of the last 32 rows
-come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions
-belongs to start addresses of the published gateware, which this one does not have.
+come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions is
+right for gateware as flown (appendix D.3), which presents each pixel one clock early
+(``ReadOut.scan_start``); so samples are one pixel further on there.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -191,6 +192,7 @@ class _Piece:
     line: int | None = None
     vertical: bool = False
     start: int = 0
+    first: bool = False
 
 
 class NadirLines:
@@ -214,6 +216,7 @@ class NadirLines:
         self._config = config
         self._meter = meter
         self._pieces = _pieces(read_out)
+        self._scan_start = read_out.scan_start
         self._piece: _Piece | None = next(self._pieces)
         self._buffer = np.zeros(read_out.scan_step, np.uint8) if buffer is None else buffer
         self._previous = 0
@@ -237,7 +240,7 @@ class NadirLines:
 
     def _examine(self, piece: _Piece, line: int) -> None:
         """Compare the buffer's last pixel, the sample, with the one before."""
-        before = self._previous if piece.start else 0
+        before = 0 if piece.first else self._previous
         sample = int(self._buffer[piece.size - 1])
         self._previous = sample
         self._meter.charge(array_byte=2, i8=3, loop16=1)
@@ -249,8 +252,9 @@ class NadirLines:
             steps = bisect(wide, threshold, self._meter)
             found = answered(steps, lambda position: int(self._buffer[position - start]))
         else:
-            first = start // 2 if self._config.listing and piece.size == LISTED_REST else start
-            bright = first + self._listed_search(piece.size, sample >= threshold)
+            if self._config.listing and piece.size == LISTED_REST:
+                start = (start - self._scan_start) // 2 + self._scan_start
+            bright = start + self._listed_search(piece.size, sample >= threshold)
             found = Crossing(bright, bright, sample, sample)
         self.edges.add(line, piece.vertical, found)
 
@@ -274,4 +278,5 @@ def _pieces(size: ReadOut) -> Iterator[_Piece]:
     for vertical, (lines, length) in enumerate(scans):
         yield _Piece(1)
         for line, start in product(lines, range(0, length, size.scan_step)):
-            yield _Piece(min(size.scan_step, length - start), line, bool(vertical), start)
+            pixels = min(size.scan_step, length - start)
+            yield _Piece(pixels, line, bool(vertical), start + size.scan_start, not start)

@@ -4,8 +4,8 @@ CubeSense thesis, sections 4.4.2, 6.6.2, 6.6.3, appendix C.6 and table 5.1: mean
 of all pixels that reach the threshold, weighted by value, plus the window's origin, less the
 boresight; then undistorted.
 
-As printed that is all; only a division by 0 is no Sun. The window is where our FPGA has it: inside
-of the picture.
+As printed that is all; only a division by 0 is no Sun. Where the window lies at the picture's
+border is a matter of the gateware (``ReadOut.window_origin``).
 
 An extension: a Sun that overflows the window is cut, mostly at the bottom, and its mean moves. A
 row that reaches the window's left or right border is then left out of the mean of x, a column that

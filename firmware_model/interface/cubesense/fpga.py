@@ -2,11 +2,11 @@
 
 CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), section 6.5.1 and figure
 6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window), section 9.2.2
-(address control from the microcontroller).
+(address control from the microcontroller), appendices D.3 and D.4 (gateware as flown).
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -134,6 +134,12 @@ class ReadOut:
         window: side of the Sun window.
         window_left, window_above: the window's origin is so far left of and above the first Sun
             pixel, unless the picture's border is nearer.
+        as_flown: as appendices D.3 and D.4 print them: the scan presents each pixel one clock
+            earlier, and the window crosses the picture's border.
+        one_search: each FPGA has its own sensor's search only. Where another one's edge data are
+            commanded, the owner of the memory sends the picture from its first pixel on, as the
+            words of table 6.4 have it, and the first Sun pixel is looked for in the FPGA of the
+            camera, not of the memory.
     """
 
     columns: int = 640
@@ -145,6 +151,8 @@ class ReadOut:
     window: int = 15
     window_left: int = 5
     window_above: int = 3
+    as_flown: bool = False
+    one_search: bool = False
 
     def __post_init__(self) -> None:
         """Check that the read-outs fit the picture; ValueError when one does not."""
@@ -198,17 +206,33 @@ class ReadOut:
         horizontal = len(self.scan_rows) * self.columns
         return 1 + horizontal + 1 + len(self.scan_columns) * self.rows
 
+    @property
+    def scan_start(self) -> int:
+        """Position on its line of the first pixel behind a preset."""
+        return int(self.as_flown)
+
     def scan(self) -> Iterator[tuple[int, int] | None]:
-        """Pixel (x, y) that each clock of the nadir scan presents, None for the two presets."""
-        yield None
-        for y in self.scan_rows:
-            yield from ((x, y) for x in range(self.columns))
-        yield None
-        for x in self.scan_columns:
-            yield from ((x, y) for y in range(self.rows))
+        """Pixel (x, y) that each clock of the nadir scan presents.
+
+        None for a preset; as flown the second one presents the first column's first pixel, each
+        line ends with the next line's first pixel, the last row with its own last one, and the last
+        column with a pixel beyond the picture.
+        """
+        rows = [(x, y) for y in self.scan_rows for x in range(self.columns)]
+        columns = [(x, y) for x in self.scan_columns for y in range(self.rows)]
+        if self.as_flown:
+            beyond = (self.scan_columns[-1] + self.scan_step) % (1 << self.column_bits)
+            yield from (None, *rows[1:], rows[-1], *columns, (beyond, 0))
+        else:
+            yield from (None, *rows, None, *columns)
 
     def window_origin(self, x: int, y: int) -> tuple[int, int]:
-        """First pixel (x, y) of the window around first Sun pixel (x, y), inside of the picture."""
+        """First pixel (x, y) of the window around first Sun pixel (x, y).
+
+        Inside of the picture; as flown wherever it comes to lie, below 0 too.
+        """
+        if self.as_flown:
+            return x - self.window_left, y - self.window_above
         return (
             min(max(x - self.window_left, 0), self.columns - self.window),
             min(max(y - self.window_above, 0), self.rows - self.window),
@@ -217,6 +241,13 @@ class ReadOut:
 
 #: The OV7620's picture and the published read-outs.
 FULL_SIZE = ReadOut()
+
+#: By the value of switch ``gateware``.
+READ_OUTS = {
+    "as-flown": replace(FULL_SIZE, as_flown=True),
+    "corrected": FULL_SIZE,
+    "one-search": replace(FULL_SIZE, as_flown=True, one_search=True),
+}
 
 
 def address_bytes(x: int, y: int, size: ReadOut = FULL_SIZE) -> bytes:

@@ -53,6 +53,17 @@ class CubeSenseSwitches(Switches):
         reason="nominal shows what firmware and pixels alone do",
         hardware=True,
     )
+    gateware: str = switch(
+        "what the FPGA presents without a Sun and at the picture's border, and over the link",
+        "as-flown",
+        "corrected",
+        "one-search",
+        source="appendices D.3 and D.4; one-search: table 6.4 to the word, section 9.2.3",
+        reason="as flown the coordinates stay those of an earlier Sun or of a lone bright pixel, "
+        "and the window wraps into memory that no picture fills; one search less in each FPGA "
+        "sends whole pictures over the link, for seconds",
+        hardware=True,
+    )
 
 
 #: Those of the default profile.

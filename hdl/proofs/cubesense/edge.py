@@ -3,7 +3,7 @@
 from functools import partial
 from types import SimpleNamespace
 
-from amaranth.hdl import Array, Assert, Module, Mux, Signal, Value
+from amaranth.hdl import Array, Assert, Cat, Module, Mux, Signal, Value
 
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD
 from cubestack.hdl.cubesense.dataflow import Side
@@ -58,7 +58,7 @@ def _scans(m: Module, d: SimpleNamespace) -> None:
 _WINDOW = {
     **{"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"},
     **wires_below("reader.window", "in_window", "state"),
-    **{"right": "reader.window.position", "down": "reader.window.position$4"},
+    **{"right": "reader.window.right", "down": "reader.window.down"},
 }
 
 
@@ -156,6 +156,119 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
         Assert(~store | (column == 0) | (count == 0) | ((last_x + 1 == column) & (last_y == row))),
         Assert(~store | (column == 0) | (count <= column)),
     ]
+
+
+# As flown: what the listings of appendices D.3 and D.4 do.
+
+
+def _scans_early(m: Module, d: SimpleNamespace) -> None:
+    """Every clock but a preset's moves the address on as two counters would, one clock late."""
+    size = d.size
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.CLK, ~d.scan)
+    column = Signal(size.column_bits, init=size.scan_start)
+    row = Signal(size.row_bits, init=size.first_row)
+    shown = Signal(size.address_bits)
+    phase = Signal(2)  # rows, between, columns
+    row_ends, column_ends = column == size.columns - 1, row == size.rows - 1
+    rows_end = row_ends & (row == size.scan_rows[-1])
+    with m.If(phase != 1):
+        sync += shown.eq(Cat(column, row))
+    with m.If(phase == 0):
+        sync += [
+            column.eq(Mux(rows_end, size.first_column, Mux(row_ends, 0, column + 1))),
+            row.eq(Mux(rows_end, 0, Mux(row_ends, row + size.scan_step, row))),
+            phase.eq(rows_end),
+        ]
+    with m.Elif(phase == 1):
+        sync += phase.eq(2)
+    with m.Else():
+        sync += [
+            row.eq(Mux(column_ends, 0, row + 1)),
+            column.eq(Mux(column_ends, column + size.scan_step, column)),
+        ]
+    m.d.comb += [
+        Assert(~d.scan | (shown == d.SRAM_A)),
+        # What makes this inductive.
+        Assert((d.flown_column == column) & (d.flown_row == row)),
+        Assert((phase != 3) & (d.between == (phase == 1)) & (d.in_columns == (phase == 2))),
+    ]
+
+
+def _keeps_coordinates(m: Module, d: SimpleNamespace) -> None:
+    """Only a bright pixel that is written changes them, into its own."""
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.PCLK, d.writer_rst)
+    known, bright = Signal(), Signal()
+    before, written = (Signal(d.size.address_bits, name=name) for name in ("before", "written"))
+    now = Cat(d.x, d.y)
+    sync += [
+        known.eq(1),
+        bright.eq(d.writer_store & (d.pixel >= SUN_THRESHOLD)),
+        before.eq(now),
+        written.eq(Cat(d.writer_column, d.writer_row)),
+    ]
+    m.d.comb += Assert(~known | (now == before) | (bright & (now == written)))
+
+
+def _wraps(m: Module, d: SimpleNamespace) -> None:
+    """Behind the first byte, whose address is old, row by row in the address' own arithmetic."""
+    size = d.size
+    starts_in(m, d.EN)
+    sync = domain(m, "monitor", d.CLK, ~d.window)
+    clocks = Signal(range(6))  # of the coordinates, and of the window's first byte
+    i, j = Signal(range(size.window)), Signal.like(d.y, name="j")
+    begun = clocks == 5
+    with m.If(~begun):
+        sync += clocks.eq(clocks + 1)
+    with m.If(clocks >= 4):
+        sync += i.eq(Mux(i == size.window - 1, 0, i + 1))
+        with m.If(i == size.window - 1):
+            sync += j.eq(j + 1)
+    column, row = column_row(d)
+    x = (d.x - size.window_left + i)[: len(d.x)]
+    y = (d.y - size.window_above + j)[: len(d.y)]
+    m.d.comb += [
+        Assert(~d.window | ~begun | ((column == x) & (row == y))),
+        # What makes this inductive.
+        Assert(clocks <= 5),
+        Assert((i < size.window) & (d.in_window == (clocks >= 4))),
+        Assert((clocks >= 4) | (d.state == clocks)),
+        Assert(begun | ((j == 0) & (i == 0))),
+        Assert(~d.window | (clocks == 0) | ((d.at_column == x) & (d.at_row == y))),
+    ]
+
+
+def as_flown_proofs() -> dict[str, Proof]:
+    """Of the sun's FPGA, which is the nadir's too but for the side of its camera."""
+    make = fpga("sun", gateware="as-flown")
+    flown = {"flown_column": "reader.scan.column", "flown_row": "reader.scan.row"}
+    at = {"at_column": "reader.window.column", "at_row": "reader.window.row"}
+    window = {"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"}
+    return {
+        "sun-scan-as-flown": Proof(
+            "As flown the nadir scan presents each pixel one clock early",
+            make,
+            _scans_early,
+            Fault("reader.scan.between", 0),
+            {"scan": "reader.scan", **wires_below("reader.scan", "between", "in_columns"), **flown},
+        ),
+        "sun-keeps-coordinates-as-flown": Proof(
+            "As flown the coordinates stay until a bright pixel is written",
+            make,
+            _keeps_coordinates,
+            Fault("search.store", 1),
+            writer_wires("writer", "pix", below="pix_writer")
+            | wires_below("search", "x", "y", "pixel"),
+        ),
+        "sun-window-as-flown": Proof(
+            "As flown the Sun window wraps over the ends of the address",
+            make,
+            _wraps,
+            Fault("reader.window.next_column", 3),
+            {**window, **wires_below("reader.window", "in_window", "state"), **at},
+        ),
+    }
 
 
 def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:

@@ -1,12 +1,13 @@
 """CubeSense's designs for proofs: at full size, or so small that a counterexample is short."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 
 from amaranth.hdl import Value
 from amaranth.lib.wiring import Component
 
-from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
+from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OUTS, ReadOut
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
@@ -19,19 +20,21 @@ SMALL = ReadOut(
 )
 
 
-def made(design: Callable[[ReadOut], Component]) -> Make:
+def made(design: Callable[[ReadOut], Component], gateware: str = "corrected") -> Make:
     """What makes a design for :class:`cubestack.hdl.proofs.prover.Proof`."""
 
     def make(small: bool) -> tuple[Component, ReadOut]:
-        size = SMALL if small else FULL_SIZE
+        known = READ_OUTS[gateware]
+        options = {"as_flown": known.as_flown, "one_search": known.one_search}
+        size = replace(SMALL if small else FULL_SIZE, **options)
         return design(size), size
 
     return make
 
 
-def fpga(side: Side, mcu_addressing: bool = False) -> Make:
+def fpga(side: Side, mcu_addressing: bool = False, gateware: str = "corrected") -> Make:
     """What makes the FPGA of a side."""
-    return made(lambda size: CubeSenseFpga(side, size, mcu_addressing))
+    return made(lambda size: CubeSenseFpga(side, size, mcu_addressing), gateware)
 
 
 def column_row(d: SimpleNamespace) -> tuple[Value, Value]:

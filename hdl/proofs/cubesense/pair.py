@@ -1,5 +1,6 @@
 """Formal properties of CubeSense's FPGAs."""
 
+from collections.abc import Collection
 from functools import partial
 from itertools import product
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ from cubestack.firmware_model.interface.cubesense.pins import FPGA, PREFIXES
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
-from cubestack.hdl.proofs.cubesense.edge import edge_proofs
+from cubestack.hdl.proofs.cubesense.edge import as_flown_proofs, edge_proofs
 from cubestack.hdl.proofs.cubesense.made import column_row, fpga, made
 from cubestack.hdl.proofs.properties import starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
@@ -27,7 +28,7 @@ _COUNTERS = {
 _POSITIONS = {
     **{f"{source}_{n}": f"{c}.{n}" for source, c in _COUNTERS.items() for n in ("column", "row")},
     **wires_below("reader.scan", "along", "line", "vertical"),
-    **{"right": "reader.window.position", "down": "reader.window.position$4"},
+    **{"right": "reader.window.right", "down": "reader.window.down"},
 }
 
 
@@ -55,9 +56,9 @@ def _address_stays_inside(m: Module, d: SimpleNamespace) -> None:
 # Idle is reset.
 
 
-def _idle(m: Module, d: SimpleNamespace) -> None:
+def _idle(m: Module, d: SimpleNamespace, further: Collection[str] = ()) -> None:
     properties.outputs_rest(m, d, d.EN, FPGA)
-    properties.idle_is_reset(m, d, d.EN, {"search.x", "search.y"})
+    properties.idle_is_reset(m, d, d.EN, {"search.x", "search.y", *further})
 
 
 # ACK exactly when all rows are stored.
@@ -184,6 +185,23 @@ PROOFS = {
         )
         for mcu_addressing in (False, True)
     },
+    **{
+        f"pair-drivers-{gateware}": Proof(
+            "No wire of the two FPGAs has two drivers in any settled state",
+            made(CubeSensePair, gateware),
+            partial(_drivers, False),
+            Fault("nadir.dataflow.pass_edge", 1),
+            _DRIVERS,
+        )
+        for gateware in ("as-flown", "one-search")
+    },
+    **as_flown_proofs(),
+    "sun-idle-as-flown": Proof(
+        "With EN high every register but the Sun's coordinates and the window's address is reset",
+        fpga("sun", gateware="as-flown"),
+        partial(_idle, further=("reader.window.shown",)),
+        Fault("pix_writer.pix_rst", 0),
+    ),
     **_proofs("sun"),
     **_proofs("nadir"),
 }

@@ -27,8 +27,9 @@ POLL_PERIOD_S = 0.04
 #: What hosts give a capture.
 CAPTURE_TIMEOUT_S = 1.0
 
-#: What a detection is given after its capture; assumed, a good ten times the published 245 ms.
-DETECT_TIMEOUT_S = 3.0
+#: What a detection is given after its capture; assumed: the longest takes 14 s, where a nadir
+#: picture crosses the link of FPGAs with one search each.
+DETECT_TIMEOUT_S = 20.0
 
 
 def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:

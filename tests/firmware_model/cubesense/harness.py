@@ -4,6 +4,7 @@ Cameras, FPGAs, memories and supplies are as simple as the program can tell them
 FPGAs do follows from the levels of their pins alone, by the command table.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ class Harness(Runner, HostSide):
     """A program on fake hardware.
 
     Attributes:
-        switches: of the program.
+        switches: of the program; the FPGAs are not those as flown.
         scenes: what each camera sends, (480, 640); None: it is dead.
         memories: what each memory holds.
         wait_us: from the store command to a picture's first row.
@@ -97,7 +98,8 @@ class Harness(Runner, HostSide):
     ) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, PIC18F45K20)
-        self.switches, self.mcu_addressing = switches, mcu_addressing
+        self.switches = replace(switches, gateware="corrected")
+        self.mcu_addressing = mcu_addressing
         self.serial_number = "CS0042"
         dark = np.full((ROWS, COLUMNS), 34, np.uint8)
         self.scenes: dict[Camera, NDArray[np.uint8] | None] = dict.fromkeys(Camera, dark)

@@ -149,7 +149,8 @@ def _digital(light: NDArray[np.float64], rng: np.random.Generator | None) -> NDA
 @lru_cache(maxsize=64)
 def _scan_order(read_out: ReadOut) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Flat index of each clock's pixel, and which clocks present one."""
-    at = list(read_out.scan())
+    # Beyond the picture a memory holds anything; here the first row's end.
+    at = [None if a is None else (min(a[0], read_out.columns - 1), a[1]) for a in read_out.scan()]
     flat = np.array(
         [0 if pixel is None else pixel[1] * read_out.columns + pixel[0] for pixel in at]
     )

@@ -10,6 +10,7 @@ from cubestack.firmware_model.cubesense.vision import nadir, sun_centroid
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, RadiusTable, byte_table
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES, EdgeConfig
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
+from cubestack.firmware_model.interface.cubesense.fpga import READ_OUTS
 from cubestack.firmware_model.mcu.costs import Meter
 
 from ..scenery import chequered, earth, edges_in, rough, scan, sun, window
@@ -28,10 +29,12 @@ def binary_search(search: list[int], light: int, dark: int, runtime: int) -> int
     return light
 
 
-def edge_detect(clocks: Iterator[int], rim: tuple[int, int], last: int) -> list[list[int]]:
-    """Edges of the bytes of a scan; ``last`` row is the one before the last 32 of a column.
+def edge_detect(
+    clocks: Iterator[int], rim: tuple[int, int], last: int, added: int = 1
+) -> list[list[int]]:
+    """Edges of the bytes of a scan; ``last`` is the first of the last 32 rows of a column.
 
-    Positions are 1 less than in the listing, whose FPGA starts elsewhere.
+    The listing has 1 ``added`` to positions on a line, which is right for its own FPGA only.
     """
     found: list[list[int]] = []
 
@@ -50,13 +53,13 @@ def edge_detect(clocks: Iterator[int], rim: tuple[int, int], last: int) -> list[
     for y in range(1, 9):
         prev = 0
         for x in range(1, 11):
-            prev = examine(64, prev, lambda at: [(x << 6) - 64 + at, (y << 6) + 15 - 64])  # noqa: B023
+            prev = examine(64, prev, lambda at: [(x << 6) - 64 + added + at, (y << 6) + 15 - 64])  # noqa: B023
     next(clocks)
     for x in range(1, 11):
         prev = 0
         for y in range(1, 8):
-            prev = examine(64, prev, lambda at: [(x << 6) - 1, (y << 6) - 64 + at])  # noqa: B023
-        examine(32, prev, lambda at: [(x << 6) - 1, last + at])  # noqa: B023
+            prev = examine(64, prev, lambda at: [(x << 6) - 1, (y << 6) - 64 + added + at])  # noqa: B023
+        examine(32, prev, lambda at: [(x << 6) - 1, last + added + at])  # noqa: B023
     assert next(clocks, None) is None
     return found
 
@@ -113,16 +116,34 @@ def printed(meter: Meter) -> nadir.NadirConfig:
 @pytest.mark.parametrize(
     ("listing", "rim", "last"), [(False, (371, 236), 448), (True, (367, 237), 224)]
 )
+@pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
 @pytest.mark.parametrize("seed", range(2))
-def test_edges(meter: Meter, seed: int, listing: bool, rim: tuple[int, int], last: int) -> None:
+def test_edges(
+    meter: Meter, seed: int, gateware: str, listing: bool, rim: tuple[int, int], last: int
+) -> None:
+    read_out = READ_OUTS[gateware]
     rng = np.random.default_rng(seed)
     tilted = earth(*rng.uniform(-25, 25, 2), rng=rng)
     for picture in (rough(rng), tilted, earth(0, 29), chequered()):
         config = EdgeConfig(sub_pixel=False, listing=listing)
-        edges = edges_in(picture, meter, config)
-        expected = edge_detect(map(int, scan(picture)), rim, last)
+        edges = edges_in(picture, meter, config, read_out)
+        expected = edge_detect(map(int, scan(picture, read_out)), rim, last, read_out.as_flown)
         assert len(expected) >= 8
         assert (edges.points // 32).tolist() == expected[:MAX_EDGES]
+
+
+def test_gateware_and_program_as_flown_are_right_together(meter: Meter) -> None:
+    """The 1 of the program and the start columns of the gateware cancel.
+
+    Not as printed, where a bright line that ends with a sample, another one here, ends late.
+    """
+    config, picture = EdgeConfig(sub_pixel=True), earth(6, -11)
+    places = {
+        gateware: {tuple(point) for point in edges_in(picture, meter, config, read_out).points}
+        for gateware, read_out in READ_OUTS.items()
+    }
+    assert places["as-flown"] == places["corrected"]
+    assert len(places["as-flown"]) > 15
 
 
 @pytest.mark.parametrize("seed", range(12))
