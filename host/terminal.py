@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 def say(text: str) -> None:
     """A line for the reader, not for a script: on standard error."""
-    _errors.print(text, markup=False, highlight=False)
+    _errors.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def progress_bar() -> bars.Progress:

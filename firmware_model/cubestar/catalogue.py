@@ -127,19 +127,25 @@ class StarCatalogue:
         """Flash that the pair list takes: two 16-bit names and a float a pair."""
         return len(self.pairs) * (2 + 2 + 4)
 
-    def to_bytes(self) -> bytes:
-        """The seven constant arrays in order, little-endian.
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The seven constant arrays by name, in order, little-endian.
 
         Names, x, y and z of the stars; first name, second name and angle in rad of the pairs.
         """
-        arrays = (
-            np.arange(len(self), dtype="<u2"),
-            *self.vectors.T.astype("<f4"),
-            self.pairs.first.astype("<u2"),
-            self.pairs.second.astype("<u2"),
-            self.pairs.angle.astype("<f4"),
-        )
-        return b"".join(array.tobytes() for array in arrays)
+        x, y, z = self.vectors.T.astype("<f4")
+        return {
+            "star": np.arange(len(self), dtype="<u2"),
+            "star_x": x,
+            "star_y": y,
+            "star_z": z,
+            "pair_first": self.pairs.first.astype("<u2"),
+            "pair_second": self.pairs.second.astype("<u2"),
+            "pair_angle": self.pairs.angle.astype("<f4"),
+        }
+
+    def to_bytes(self) -> bytes:
+        """`arrays` one after the other."""
+        return b"".join(array.tobytes() for array in self.arrays().values())
 
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of `to_bytes`."""

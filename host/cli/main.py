@@ -25,6 +25,8 @@ COMMANDS = {
     "calibrate": "fit a camera's lens to pictures of known stars or lights",
     "registers": "list a device's telecommands and telemetry",
     "shell": "read, write and watch registers by name",
+    "picture": "make the picture that a star tracker takes at a known attitude",
+    "log": "log a device's results to a CSV file",
     "conformance": "check a device's protocol against the tables",
     "replay": "play a recording to an emulated device, compare what it says",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",

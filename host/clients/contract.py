@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 #: Called with (pieces done, pieces in all) during a transfer.
 Progress = Callable[[int, int], None]
 
+#: A line of a log by the names of its columns; None where there is no value.
+Columns = dict[str, bool | int | float | str | None]
+
 T = TypeVar("T")
 
 #: Time between two polls of a node.
@@ -181,6 +184,21 @@ class DeviceClient(Closable):
     def set_switch(self, switch: str, value: str) -> None:
         """Set one switch, as `cubestack registers DEVICE --switches` lists them; see above."""
         self._perform(SET_SWITCH, **switch_parameters(switch, value))
+
+    def take_picture(self) -> None:
+        """Take a picture of the sky, whatever the device makes of it.
+
+        Raises TargetError for a device that is no star tracker, and the client's errors.
+        """
+        raise TargetError(f"{self.client.interface.name} takes no picture of the sky")
+
+    def latest(self) -> Columns:
+        """The latest result, for a log; angles that are not valid are None.
+
+        Columns of angles end in "_deg"; "image_time_s" is the picture's time by the node's clock,
+        where it tells that. Raises TargetError for a device without, and the client's errors.
+        """
+        raise TargetError(f"{self.client.interface.name} has no results that could be logged")
 
     def _perform(self, name: str, **parameters: object) -> None:
         """Send a telecommand and wait until it is done."""

@@ -9,10 +9,11 @@ import pytest
 
 from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
 from cubestack.emulator.camera.common.scene_file import load_scene
-from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.ports.tcp import REFUSAL
+from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.emulator.sim.power import PowerModel
@@ -37,7 +38,7 @@ def load(folder: Path, text: str) -> Any:
     """What a scene file gives."""
     path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
-    return load_earth_sun_scene(path) if EARTH in text else load_scene(path, CONDITION)
+    return load_earth_sun_scene(path) if EARTH in text else load_scene(path, CONDITION, UNCERTAIN)
 
 
 def section(text: str, heading: str) -> str:
@@ -50,6 +51,7 @@ def section(text: str, heading: str) -> str:
     [
         ('Keys of `kind = "sky"`', 'kind = "sky"'),
         ("Keys of `poses`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[[poses]]'),
+        ("Keys of `atmosphere`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[atmosphere]'),
         ("Keys of `optics`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[optics]'),
         ('Keys of `kind = "picture"`', 'kind = "picture"'),
         ('Keys of `kind = "earth-sun"`', EARTH),
@@ -70,6 +72,7 @@ def test_every_key_of_a_scene_is_documented(tmp_path: Path, heading: str, scene:
 @pytest.mark.parametrize(
     ("heading", "defaults"),
     [
+        ("Keys of `atmosphere`", (Atmosphere(0, 0),)),
         ("Keys of `optics`", (LENS,)),
         ('Keys of `kind = "sky"`', (SkyScene.pointing(0, 0), CONDITION)),
         ('Keys of `kind = "earth-sun"`', (EarthSunScene(), FisheyeCondition())),
@@ -88,14 +91,17 @@ def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ..
             if isinstance(default, int | float):
                 assert default == float(value), key
                 checked += 1
-    assert checked >= 4
+    assert checked >= 3
 
 
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
-    sky, picture, earth = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
+    sky, night, picture, earth = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
     scene = load(tmp_path, sky).scene
     assert isinstance(scene, SkyScene)
     assert len(scene.poses) == 1
+    ground = load(tmp_path, night).scene
+    assert isinstance(ground, SkyScene)
+    assert ground.atmosphere is not None
     assert len(load(tmp_path, earth).scene.reflections) == 1
     assert tomllib.loads(picture)["kind"] == "picture"
     with pytest.raises(SceneError, match=r"night\.jpg"):  # read, but there is no such file here

@@ -106,6 +106,11 @@ class ImageSensor(ABC, Generic[S, C]):
         self._restarted(now_ps)
         self.on_change()
 
+    @property
+    def rendered(self) -> Grey | None:
+        """The picture (rows, columns) that was rendered last, of the latest frame looked at."""
+        return None if self._made is None else self._made[1]
+
     @abstractmethod
     def _restarted(self, now_ps: int) -> None:
         """Forget all that was under way when the part started or stopped."""

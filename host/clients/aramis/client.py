@@ -16,8 +16,8 @@ from cubestack.firmware_model.interface import aramis
 from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, MS_PER_DAY, CatalogueState
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import Value
-from cubestack.host.clients.contract import DeviceClient, Progress
-from cubestack.host.clients.quaternions import unit_quaternion
+from cubestack.host.clients.contract import Columns, DeviceClient, Progress
+from cubestack.host.clients.quaternions import attitude_columns, unit_quaternion
 from cubestack.host.errors import StepFailedError, TargetError
 
 PROGRAM_TIMEOUT_S = 300.0
@@ -127,6 +127,11 @@ class Aramis(DeviceClient):
             self._perform("GetAttitude")
         return self.attitude()
 
+    def take_picture(self) -> None:
+        """Start the star tracker, if need be, and measure once."""
+        self.activate()
+        self.measure()
+
     def attitude(self) -> Attitude:
         """The latest attitude; raises BadAnswerError when it is no rotation."""
         values = self.client.telemetry("Attitude")
@@ -142,6 +147,22 @@ class Aramis(DeviceClient):
             image_uptime_s=int(values["ImageUptime"]) / 1000,
             julian_date=_julian_date(values),
         )
+
+    def latest(self) -> Columns:
+        """The latest attitude, its picture's times, and how the measurement ended."""
+        found = self.attitude()
+        return {
+            "valid": found.valid,
+            **attitude_columns(found.quaternion if found.valid else None),
+            "image_time_s": found.image_uptime_s,
+            "julian_date": found.julian_date,
+            "frame": found.frame,
+            "mode": found.mode.name,
+            "outcome": found.outcome.name,
+            "reason": found.reason.name,
+            "detected": found.detected,
+            "matched": found.matched,
+        }
 
     def body_quaternion(self) -> NDArray[np.float64] | None:
         """The latest attitude of the spacecraft (4,), inertial to body; None before the first."""

@@ -17,7 +17,7 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
-from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.contract import Columns, DeviceClient
 from cubestack.host.clients.cubesense.download import download_image, picture_of
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
@@ -140,6 +140,19 @@ class CubeSense(DeviceClient):
     def result(self, camera: Camera) -> Measurement:
         """A camera's latest measurement."""
         return self._measurement(camera, RESULTS[camera])
+
+    def latest(self) -> Columns:
+        """Both cameras' latest angles, and what became of their captures and detections."""
+        columns: Columns = {"uptime_s": self.uptime_s()}
+        for camera in Camera:
+            found, name = self.result(camera), camera.name.lower()
+            columns |= {
+                f"{name}_alpha_deg": found.alpha_deg if found.detected else None,
+                f"{name}_beta_deg": found.beta_deg if found.detected else None,
+                f"{name}_capture": found.capture.name,
+                f"{name}_detect": found.detect.name,
+            }
+        return columns
 
     def result_then_schedule(self, camera: Camera, sram: Sram | None = None) -> Measurement:
         """A camera's latest measurement; reading it starts the next one, into ``sram``."""

@@ -5,7 +5,6 @@ down, z out of the lens. Quaternions are scalar last and turn inertial vectors i
 v_camera = q v_inertial q*; pixel coordinates count from the middle of the first pixel.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -15,8 +14,8 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface import cubestar
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import ImageBlockSize, MatchMode, TaskStatus
-from cubestack.host.clients.contract import DeviceClient, Progress
-from cubestack.host.clients.quaternions import unit_quaternion
+from cubestack.host.clients.contract import Columns, DeviceClient, Progress
+from cubestack.host.clients.quaternions import attitude_columns, pointing_deg, unit_quaternion
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
 
@@ -49,14 +48,12 @@ class Attitude:
     @property
     def ra_deg(self) -> float:
         """Right ascension of the boresight, 0 to 360."""
-        x, y, _ = self.boresight
-        return math.degrees(math.atan2(y, x)) % 360.0
+        return pointing_deg(self.quaternion)[0]
 
     @property
     def dec_deg(self) -> float:
         """Declination of the boresight."""
-        x, y, z = self.boresight
-        return math.degrees(math.atan2(z, math.hypot(x, y)))
+        return pointing_deg(self.quaternion)[1]
 
 
 @dataclass(frozen=True)
@@ -100,6 +97,10 @@ class CubeStar(DeviceClient):
         status = self.task_status()
         if status is not TaskStatus.CAPTURED:
             raise StepFailedError(f"no picture captured: task status {status.name}")
+
+    def take_picture(self) -> None:
+        """As ``capture`` does."""
+        self.capture()
 
     def capture_and_process(self) -> TaskStatus:
         """Capture a picture, detect, identify and estimate; returns how far it came."""
@@ -183,6 +184,19 @@ class CubeStar(DeviceClient):
             frame=int(values["FrameCounter"]),
             image_time_s=int(values["ImageTime"]) / 1000.0,
         )
+
+    def latest(self) -> Columns:
+        """The latest attitude and its picture's time, the state of the task and its stars."""
+        found = self.attitude()
+        return {
+            "valid": found.valid,
+            **attitude_columns(found.quaternion if found.valid else None),
+            "image_time_s": found.image_time_s,
+            "frame": found.frame,
+            "mode": found.mode.name,
+            "matched": found.matched,
+            "task": self.task_status().name,
+        }
 
     def coarse_quaternion(self) -> NDArray[np.float64]:
         """The latest quaternion (4,) of published telemetry, in steps of 1e-4.

@@ -4,14 +4,17 @@ examples:
   cubestack catalogue cubestar                         as flown: V < 3.8
   cubestack catalogue cubestar --pair-limit 42.1       the published number of pairs
   cubestack catalogue cubestar --mag-limit 4 --json
+  cubestack catalogue cubestar --c catalogue.c         star list and pair list as C arrays
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Lookup
-from cubestack.host.options import NUMBER, Options, option
+from cubestack.host.export.c_arrays import c_arrays
+from cubestack.host.options import NUMBER, PATH, Options, option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +24,7 @@ class CatalogueOptions(Options):
     mag_limit: float | None = option(None, "faintest star; default 3.8", NUMBER, metavar="V")
     epoch: float = option(2026.0, "default 2026", NUMBER, metavar="YEAR")
     pair_limit: float | None = option(None, "default: as flown", NUMBER, metavar="DEG")
+    c: Path | None = option(None, "write star list and pair list as C arrays", PATH, metavar="FILE")
 
 
 class _Catalogue(Lookup[CatalogueOptions]):
@@ -33,6 +37,16 @@ class _Catalogue(Lookup[CatalogueOptions]):
         mag_limit = flown.MAG_LIMIT if options.mag_limit is None else options.mag_limit
         pair_limit = flown.PAIR_LIMIT_DEG if options.pair_limit is None else options.pair_limit
         catalogue = flown.onboard_catalogue(mag_limit, pair_limit, options.epoch)
+        if options.c is not None:
+            about = (
+                f"CubeStar's catalogue: V < {mag_limit:g}, pairs closer than {pair_limit:g} deg,"
+                f" epoch {options.epoch:g}; SHA-256 of the arrays {catalogue.sha256()}"
+            )
+            text = c_arrays("catalogue", catalogue.arrays(), about)
+            try:
+                options.c.write_text(text, encoding="ascii")
+            except OSError as error:
+                raise ValueError(f"can not write {options.c}: {error.strerror}") from None
         return {
             "mag_limit": mag_limit,
             "pair_limit_deg": pair_limit,
