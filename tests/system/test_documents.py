@@ -95,7 +95,9 @@ def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ..
 
 
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
-    sky, night, picture, earth = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
+    sky, night, picture, earth = re.findall(
+        r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL
+    )
     scene = load(tmp_path, sky).scene
     assert isinstance(scene, SkyScene)
     assert len(scene.poses) == 1
