@@ -20,6 +20,9 @@ LINE_WORDS = 8
 FLASH_READ_NS = 70
 """Access time of the M29W320D flash, one 16-bit word (data sheet; thesis, appendix A.2)."""
 
+FLASH_FRAME_BUS_CLOCKS = 2
+"""Of a read on the asynchronous bus, beside the access: one of set-up, one of hold (assumed)."""
+
 
 def blackfin_bf533(*, clock_hz: int = CORE_HZ) -> CostTable:
     """Costs in core cycles; at another clock memory keeps its speed in bus clocks and ns."""
@@ -27,7 +30,8 @@ def blackfin_bf533(*, clock_hz: int = CORE_HZ) -> CostTable:
     core = "Blackfin Programming Reference: most instructions take one cycle"
     line_fill = LINE_FILL_BUS_CLOCKS * BUS_DIVIDER
     cached = 1 + -(-line_fill // LINE_WORDS)
-    flash = max(1, -(-FLASH_READ_NS * clock_hz // 1_000_000_000))
+    access = -(-FLASH_READ_NS * (clock_hz // BUS_DIVIDER) // 1_000_000_000)
+    flash = (access + FLASH_FRAME_BUS_CLOCKS) * BUS_DIVIDER
 
     def published(cycles: int, source: str = library) -> Cost:
         return Cost(cycles, "published", source)
@@ -59,7 +63,9 @@ def blackfin_bf533(*, clock_hz: int = CORE_HZ) -> CostTable:
             "ram_read": assumed(cached, f"32-bit word, an eighth of a line fill of {line_fill}"),
             "ram_write": assumed(cached, "as a read: the line is filled, then written back"),
             "flash_read": assumed(
-                flash, f"16-bit word on the asynchronous bus, {FLASH_READ_NS} ns"
+                flash,
+                f"16-bit word on the asynchronous bus, {FLASH_READ_NS} ns in whole bus clocks, "
+                "set-up and hold",
             ),
             "port_read": assumed(10, "memory-mapped register across the peripheral bus"),
             "port_write": assumed(10, "memory-mapped register across the peripheral bus"),

@@ -4,7 +4,8 @@ A star that moves during the exposure leaves a streak. Its second moments along 
 the square of the streak's length over twelve, as those of a line do, whatever the star's own width.
 A long streak of a faint star is lost among the noise of single pixels, and even of blocks of them;
 but as all streaks of a turn lie the same way, they show together: the blocks of the picture are
-alike to those some way off in that one direction. Stars at rest are alike to nothing.
+alike to those some way off in that one direction. Stars at rest are alike to nothing. Blocks are
+compared in integers, as the processor has no floats.
 """
 
 from math import cos, pi, sin, sqrt
@@ -48,8 +49,11 @@ above 7."""
 QUARTILES_APART = 1.349
 """Between the quartiles of a normal distribution, in standard deviations."""
 
-_LEAST = 1e-3
-"""Taken as the quartiles' distance when there is no noise at all."""
+UNIT = 1024
+"""Of a block's brightness, for one sigma: sums of products of a whole picture then fit the
+Blackfin's 40-bit accumulator."""
+
+Ints = NDArray[np.int32]
 
 
 def _lags() -> tuple[tuple[frozenset[tuple[int, int]], ...], tuple[tuple[int, int], ...]]:
@@ -82,20 +86,19 @@ def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool
     Blocks near the edge of the field do not count.
     """
     inside: Mask = np.all(_blocks(field.mask), axis=(1, 3))
-    around = _box(inside.astype(np.float32))
-    inside &= around > (2 * SURROUNDINGS + 1) ** 2 - 0.5
+    inside &= _box(inside.astype(np.int32)) == (2 * SURROUNDINGS + 1) ** 2
     count = int(inside.sum())
     if count == 0:
         return False
-    bright = _brightness(picture, inside, meter)
-    chance = float(np.square(bright).sum()) / sqrt(count)
+    bright = _brightness(picture, inside, meter).astype(np.int64)
+    chance = int(np.vdot(bright, bright)) / sqrt(count)
     rows, columns = bright.shape
     alike = {}
     for down, across in LAGS:
         left, right = max(0, -across), columns - max(0, across)
         here = bright[: rows - down, left:right]
         there = bright[down:, left + across : right + across]
-        alike[down, across] = float(np.vdot(here, there))
+        alike[down, across] = int(np.vdot(here, there))
     steps = count * (1 + len(LAGS))
     meter.charge(ram_read=2 * steps, i32_mul=steps, i32_add=steps, loop=steps)
     meter.charge(f32_add=DIRECTIONS * FARTHEST, f32_div=DIRECTIONS, f32_compare=DIRECTIONS)
@@ -104,35 +107,36 @@ def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool
     return max(directions) - float(np.median(directions)) > ALIKE_SIGMAS * chance
 
 
-def _brightness(picture: NDArray[np.uint8], inside: Mask, meter: Meter) -> Floats:
-    """How much brighter each block is than those around it, in sigmas; 0 outside."""
+def _brightness(picture: NDArray[np.uint8], inside: Mask, meter: Meter) -> Ints:
+    """How much brighter each block is than those around it, in 1 / `UNIT` sigma; 0 outside."""
     sums = _blocks(picture).sum(axis=(1, 3), dtype=np.int32)
-    clipped = _clipped(sums.astype(np.float32), inside)
-    level = _box(clipped) / np.float32((2 * SURROUNDINGS + 1) ** 2)
+    clipped = _clipped(sums, inside)
+    level = _box(clipped) // (2 * SURROUNDINGS + 1) ** 2
     blocks = sums.size
     # Quartiles are found by halving the range of 16 bits, twice; then the boxes.
     steps = picture.size + (2 * 16 + 8) * blocks
     meter.charge(pixel_read=picture.size, i32_add=steps, ram_write=4 * blocks, loop=steps)
-    meter.charge(i32_div=3 * blocks)
-    return np.where(inside, _clipped(clipped - level, inside), np.float32(0))
+    meter.charge(i32_div=3 * blocks, i32_mul=2 * blocks)
+    return np.where(inside, _clipped(clipped - level, inside), np.int32(0))
 
 
-def _clipped(values: Floats, inside: Mask) -> Floats:
-    """Values (rows, columns) less the median, in sigmas of those inside, clipped."""
-    low, middle, high = np.percentile(values[inside], (25, 50, 75))
-    sigma = max(high - low, _LEAST) / QUARTILES_APART
-    clipped: Floats = ((values - middle) / sigma).astype(np.float32)
-    return np.clip(clipped, -CLIPPED_SIGMAS, CLIPPED_SIGMAS)
+def _clipped(values: Ints, inside: Mask) -> Ints:
+    """Values (rows, columns) less the median, in 1 / `UNIT` sigma of those inside, clipped."""
+    low, middle, high = np.percentile(values[inside], (25, 50, 75), method="lower").astype(np.int32)
+    scale = round(UNIT * QUARTILES_APART)
+    scaled = (values - middle) * scale // max(high - low, 1)
+    most = int(UNIT * CLIPPED_SIGMAS)
+    return np.asarray(np.clip(scaled, -most, most), np.int32)
 
 
-def _box(values: Floats) -> Floats:
+def _box(values: Ints) -> Ints:
     """Sum over the square of `SURROUNDINGS` to all sides of each value (rows, columns)."""
     for axis in (0, 1):
-        sums = np.cumsum(np.insert(values, 0, 0, axis=axis), axis=axis, dtype=np.float64)
+        sums = np.cumsum(np.insert(values, 0, 0, axis=axis), axis=axis, dtype=np.int32)
         places = np.arange(values.shape[axis])
         last = np.minimum(places + SURROUNDINGS + 1, len(places))
         first = np.maximum(places - SURROUNDINGS, 0)
-        values = (sums.take(last, axis) - sums.take(first, axis)).astype(np.float32)
+        values = sums.take(last, axis) - sums.take(first, axis)
     return values
 
 

@@ -5,9 +5,14 @@ Method 1 steps a 5 x 5 window by one pixel and judges the pixel in its middle; m
 five and judges the bright pixels in it. Half of the window's pixels, 13 of 25, decide. A window
 cut by the border is judged by the same part of the pixels that it has.
 
-The text finds no significant difference between what the two remove, and picks method 2 as the
-quicker one; the flight code of appendix E calls method 1. Here they do differ: method 2 loses stars
-that fall on the border of windows, none of which has half of its pixels lit.
+The text finds no significant difference between what the two remove. Of the time it says both that
+method 1's was better and that method 2 is chosen for its lower cost; appendix E calls method 1, and
+its comment has method 2 as the faster. Here method 2 is faster, and they do differ in what they
+remove: method 2 loses stars that fall on the border of windows, none of which has half of its
+pixels lit.
+
+Method 1 is charged as printed: every window's pixels are read again, 25 for each pixel. A program
+that kept the sums of columns would look at a fifth of them.
 """
 
 from enum import IntEnum

@@ -11,8 +11,6 @@ apart or join have wrong centroids, and the outer ones have most say in `b`, so 
 count less, the more so the worse: a weight of 1 / (1 + (distance / twice the median)^2).
 """
 
-from math import sqrt
-
 import numpy as np
 
 from cubestack.firmware_model.aramis.arrays import Floats
@@ -73,11 +71,11 @@ def at_middle_row(
     meter.charge(f32_mul=9 * count, f32_add=6 * count, loop=count)
     straight: Floats = vectors - np.cross(turns, vectors)
     left = apart - design @ found
-    spare = max(2 * float(weights.sum()) - 3, 1)  # the turn is held by its stiffness
-    variance = max(float(weights @ np.sum(left * left, axis=1)) / spare, float(_FLOOR) ** 2)
-    sigma = sqrt(variance * float(np.linalg.inv(normal)[2, 2]))
+    spare = np.maximum(2 * weights.sum() - np.float32(3), _ONE)  # its stiffness holds the turn
+    variance = np.maximum(weights @ np.sum(left * left, axis=1) / spare, _FLOOR**2)
+    sigma = np.sqrt(variance * np.linalg.inv(normal)[2, 2])
     meter.charge(f32_mul=4 * count + 42, f32_add=4 * count + 42, f32_div=7, f32_sqrt=1)
-    return straight, weights, sigma
+    return straight, weights, float(sigma)
 
 
 def _design(predicted: Floats, heights: Floats) -> Floats:

@@ -10,7 +10,6 @@ place makes others likely, so stars that are all close together confirm nothing.
 """
 
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 
@@ -91,14 +90,15 @@ def confirm(
         apart = vectors[None, :, :] - predicted[:, None, :]
         chord2 = apart[..., 0] ** 2 + apart[..., 1] ** 2 + apart[..., 2] ** 2
         measured, stars = _nearest(chord2, np.float32(tolerance_rad) ** 2)
-        reach = len(vectors) * np.pi * tolerance_rad**2 / field.solid_angle_sr
+        reach = np.float32(len(vectors) * np.pi * tolerance_rad**2 / field.solid_angle_sr)
         further, found = expected - 3, len(measured) - 3
-        chance = float(hypotheses)
-        if found > 0:
-            chance *= comb(further, found) * reach**found
-            meter.charge(f32_mul=3 * found + 3, f32_div=found + 1)
+        chance = np.float32(hypotheses)
+        for number in range(max(found, 0)):  # of the binomial, factor by factor
+            chance *= reach * np.float32(further - number) / np.float32(number + 1)
+        meter.charge(f32_mul=2 + 2 * max(found, 0), f32_div=1 + max(found, 0))
+        meter.charge(f32_convert=2 * max(found, 0), loop=max(found, 0))
         spread_rad = _spread(vectors[measured], meter)
-        return Confirmation(measured, seen[stars], expected, chance, spread_rad)
+        return Confirmation(measured, seen[stars], expected, float(chance), spread_rad)
 
 
 def _spread(vectors: Floats, meter: Meter) -> float:

@@ -10,7 +10,7 @@ examples:
   cubestack measure aramis --frames 20                       lost in space
   cubestack measure aramis --frames 200 --json > frames.jsonl
   cubestack measure aramis --mode assisted --hint-error 3    rough boresight
-  cubestack measure aramis --published --frames 100          as the thesis runs it
+  cubestack measure aramis --profile extended --frames 100   what is believed is confirmed
   cubestack measure aramis --field 18 --roll-rate 10 --exposure 20
   cubestack measure aramis --bit-flips 1e-6                  upsets in flash
 """
@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.aramis import OnOff, SpikeMethod
+from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.devices.emulated import EmulatedDevice
@@ -65,9 +65,6 @@ class AramisOptions(attitudes.SkyOptions):
 
     mode: str = option(
         "lis", "lost in space (default), or near a rough direction", choices=("lis", "assisted")
-    )
-    published: bool = option(
-        False, "believe a unique triangle, as the thesis does, without verification"
     )
     field: float = option(
         FIELD_DEG,
@@ -221,20 +218,12 @@ def _view(options: AramisOptions, condition: "SkyCondition", rng: np.random.Gene
 def _configure(aramis: Aramis, options: AramisOptions) -> None:
     """Send what differs from the settings after power-up."""
     client = aramis.client
-    interface = client.interface
     client.command("SetField", FieldOfView=options.field, Round=OnOff.ON)
     if options.exposure is not None:
         client.command("SetExposure", Rows=max(1, round(options.exposure / 1000 / ROW_S)))
     if options.gain is not None:
         client.command("SetGain", Gain=options.gain)
     client.wait_processed(1.0)
-    if options.published:
-        detection = interface.telecommand("SetDetection").reset_values()
-        detection |= {"Spikes": SpikeMethod.WINDOW, "Subtract": OnOff.OFF}
-        client.command("SetDetection", **detection)
-        matching = interface.telecommand("SetIdentification").reset_values()
-        client.command("SetIdentification", **(matching | {"Verify": OnOff.OFF, "Noise": 0.26}))
-        client.wait_processed(1.0)
 
 
 def _measure(

@@ -92,3 +92,17 @@ def test_a_skewed_picture_is_refused_and_a_smeared_one_is_not() -> None:
         assert found.outcome is outcome
     still = StarList(made.centroids, made.brightness, 2.0, 9.0)
     assert identify(still, FIELD, VERIFIED.profile, database(), meter()).quaternion is not None
+
+
+def test_a_picture_is_compared_in_integers() -> None:
+    spent = meter()
+    is_drawn_out(swept(95, 40, light=800), FIELD, spent)
+    assert spent.counts["i32_mul"] > 1_000_000
+    assert sum(count for name, count in spent.counts.items() if name.startswith("f32")) < 1000
+
+
+@pytest.mark.parametrize("level", [1, 40])
+def test_a_level_added_to_all_pixels_changes_nothing(level: int) -> None:
+    for image in (swept(95, 40, light=800), swept(0, 0, light=800)):
+        lighter = np.minimum(image.astype(int) + level, 255).astype(np.uint8)
+        assert is_drawn_out(lighter, FIELD, meter()) == is_drawn_out(image, FIELD, meter())

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,17 @@ from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.emulator.camera.mt9m001.registers import read_settings
-from cubestack.emulator.scene.attitude import attitude_error_deg
+from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
-from cubestack.host.experiments.aramis.measure import NOISE_TERMS, AramisResult
+from cubestack.host.experiments.aramis.measure import (
+    EXPERIMENT,
+    FIELD_DEG,
+    NOISE_TERMS,
+    AramisResult,
+    _is_far,
+)
 from cubestack.host.experiments.measure import measure as measure_device
 
 from ....conftest import Run
@@ -66,7 +73,7 @@ def test_modes_noise_rates_and_published_settings() -> None:
     assert (aided.right, aided.mode) == (True, "assisted")
     (ideal,), (quiet,) = measure(no_noise=True), measure(without=NOISE_TERMS)
     assert ideal.error_cross_deg == quiet.error_cross_deg
-    (published,) = measure(published=True, exposure=100, gain=8)
+    (published,) = measure(profile="published", exposure=100, gain=8)
     assert published.reason not in ("confirmed", "unconfirmed")
     (turning,) = measure(roll_rate=10, exposure=100)
     assert turning.right
@@ -126,3 +133,24 @@ def test_a_table_for_readers(run: Run) -> None:
 def test_options_that_make_no_sense_are_refused(options: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         measure(**options)
+
+
+@pytest.mark.parametrize(
+    ("third", "turned_deg", "far"),
+    [(25930, 0, False), (25930, 20, False), (25930, 24, True), (None, 0, None)],
+)
+def test_a_triangle_more_than_a_field_away_is_wrong_as_the_thesis_counts(
+    third: int | None, turned_deg: float, far: bool | None
+) -> None:
+    named = [SimpleNamespace(hipparcos=one) for one in (26311, 26727, third)]
+    belt = SimpleNamespace(stars=lambda: named)
+    truth = quaternion_from_pointing(84.05, -1.2 + turned_deg, 0.0)
+    assert _is_far(belt, FIELD_DEG, truth) == far  # type: ignore[arg-type]
+    assert _is_far(belt, FIELD_DEG, None) is None  # type: ignore[arg-type]
+
+
+def test_what_is_far_is_told_beside_what_is_wrong() -> None:
+    (frame,) = found = measure(frames=1, profile="published")
+    assert frame.far is False
+    lines = list(EXPERIMENT.summarise([*found, replace(frame, far=True)], 1.0))
+    assert lines[-1].endswith("more than a field away: 50.0 %")
