@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, MOST_CATALOGU
 MB = 1 << 20
 
 SDRAM_BYTES = 32 * MB
-FLASH_BYTES = 12 * MB
+FLASH_BYTES = 12 * MB  # chosen: three of the published parts of 4 MB
 
 SECTOR_BYTES = 1 << 16
 """Smallest part of the flash that can be erased."""

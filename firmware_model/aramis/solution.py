@@ -48,7 +48,7 @@ class Profile:
         motion_sigma_rad: that much doubt.
     """
 
-    sigma_rad: float = 0.26 * 0.3759 / 582
+    sigma_rad: float = 0.26 * 0.3759 / 582  # chosen by appendix E
     pivots: int = 3
     always_pivot: bool = False
     filtered: bool = True

@@ -62,7 +62,7 @@ ATTITUDE_PAGE = "attitude"
 MODE_PAGE = "mode"
 
 FLASH_ENDURANCE = 20_000
-"""Erasures that a page stands: data sheet of the EFM32GG280."""
+"""Erasures that a page stands: chosen, the data sheet of the EFM32GG280."""
 
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
 _SWITCHES = INTERFACE.telemetry(SHOWN)

@@ -12,10 +12,10 @@ from cubestack.firmware_model.mcu.costs import Cost, CostTable
 INSTRUCTION_HZ = 5_000_000
 
 FITTED_SUN_SECONDS = 0.0704 - 0.048
-"""Section 7.4: from imaging to the Sun's centre, less the imaging itself (section 7.3)."""
+"""What is fitted to: from imaging to the Sun's centre (section 7.4), less the imaging (7.3)."""
 
 FITTED_SUN_PIXELS = 109
-"""Pixels that the fit takes to reach the sun threshold.
+"""Pixels that the fit takes to reach the sun threshold: chosen.
 
 The thesis does not say how many, and they decide the factor. This is a Sun 7 px in radius at the
 30 % level, between the published 8 and 6 px (table 5.3), whose spot of light reaches the threshold

@@ -14,7 +14,7 @@ from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
 _PIXCLK = Clock(PIXCLK, 100, "image sensor at 10 MHz")
-_DCLK = Clock(DCLK, 770.8, "37 cycles of the microcontroller's 48 MHz")
+_DCLK = Clock(DCLK, 770.8, "37 cycles (fitted) of the microcontroller's 48 MHz")
 _ENABLE = Clock(ENABLE, 1000, "microcontroller, a few times a second; latches BANK")
 _ALE = Clock(ALE, 83, "bus accesses of four cycles at 48 MHz")
 

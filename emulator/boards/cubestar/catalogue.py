@@ -17,8 +17,8 @@ import numpy as np
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH, load_sky
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
-MAG_LIMIT = 3.8
-PAIR_LIMIT_DEG = 57.3
+MAG_LIMIT = 3.8  # chosen, as published
+PAIR_LIMIT_DEG = 57.3  # chosen; the published number of pairs fixes 42.1
 
 
 @lru_cache(maxsize=4)

@@ -28,7 +28,7 @@ PUBLISHED_FIELD_DEG = 21.53463888888889
 LIKELY_FIELD_DEG = 18.0
 """Of the lens that the thesis expects to be built."""
 
-F_NUMBER = 1.2
+F_NUMBER = 1.2  # chosen, as the next two
 EFFECTIVE_WIDTH_A = 1500.0
 SPOT_SIGMA_PX = 1.5
 

@@ -22,7 +22,7 @@ class FisheyeCondition:
         nadir_lens, sun_lens: what is particular to a camera's lens; None: the unit's own.
     """
 
-    bloom_px: float = 7.0
+    bloom_px: float = 7.0  # chosen between the published 8 and 6
     hot_pixels: int = 0
     hot_pairs: int = 0
     noise: bool = True

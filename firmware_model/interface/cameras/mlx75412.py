@@ -24,7 +24,7 @@ PIXEL_PITCH_MM = 0.0056
 LINE_CLOCKS = 1322
 
 #: CubeStar's crystal: all measured frame rates fit 10 MHz, though 11 MHz is printed in places.
-CRYSTAL_HZ = 10_000_000
+CRYSTAL_HZ = 10_000_000  # chosen: the published frame rates need it, one place says 11 MHz
 
 #: Value of SYNC that makes written values take effect.
 SYNC_APPLY = 0x03

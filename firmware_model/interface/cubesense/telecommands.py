@@ -24,7 +24,7 @@ _medium = partial(Message, confidence=Confidence.MEDIUM)
 _low = partial(Message, confidence=Confidence.LOW)
 
 _NAMES = {codes.Camera.SUN: "the Sun camera", codes.Camera.NADIR: "the nadir camera"}
-_THRESHOLDS = {codes.Camera.SUN: 225, codes.Camera.NADIR: 70}
+_THRESHOLDS = {codes.Camera.SUN: 225, codes.Camera.NADIR: 70}  # chosen by section 5.7
 _EXPOSURES = {codes.Camera.SUN: 1, codes.Camera.NADIR: 4}
 _BORESIGHTS = {codes.Camera.SUN: (369.0, 250.0), codes.Camera.NADIR: (371.0, 236.0)}
 

@@ -40,6 +40,7 @@ _TELECOMMANDS = (
             reset=7,
         ).within(6, _LARGEST_FRAME_RATE, "ConfigChangeError")
     ),
+    # The reset value is chosen: the published wait, which the published 68 ms follow from.
     Message(103, "SetDiscardDelay", "wait between enabling the image sensor and storing").of(
         u16("Delay", "less than a read-out (67.7 ms) splits the picture", "ms", reset=70).within(
             None, 1000, "DelayTimeSetToLong"

@@ -40,8 +40,6 @@ def _attitudes(results: Sequence["AramisResult"]) -> Figures:
         "cross": mean(errors["cross"]),
         "cross95": float(np.percentile(errors["cross"], 95)),
         "roll95": float(np.percentile(errors["roll"], 95)),
-        "total_ms": mean(result.phase_ms["total"] for result in results),
-        "spikes_ms": mean(result.phase_ms["spikes"] for result in results),
     }
 
 
