@@ -133,7 +133,7 @@ def test_commands_of_the_readme_exist() -> None:
     [
         ("fidelity", "cubestar", 5, 0),
         ("fidelity-cubesense", "cubesense", 7, 0),
-        ("fidelity-aramis", "aramis", 7, 2),
+        ("fidelity-aramis", "aramis", 5, 2),
     ],
 )
 def test_commands_and_files_of_the_fidelity_pages_exist(

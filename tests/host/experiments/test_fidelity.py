@@ -131,3 +131,18 @@ def test_only_the_tables_of_a_page_are_rewritten(monkeypatch: pytest.MonkeyPatch
     assert fidelity.rewritten(once, list(fidelity.filled("aramis", rows, found))) == once
     with pytest.raises(ValueError, match="no line '<!-- rows: pace -->'"):
         fidelity.rewritten("", list(fidelity.filled("aramis", rows, found)))
+
+
+@pytest.mark.parametrize("name", ["aramis"])
+def test_rows_of_a_page_are_those_that_are_declared(name: str) -> None:
+    wanted = fidelity_of(name)
+    page = (ROOT / "docs" / wanted.page).read_text(encoding="utf-8")
+    for table, rows in wanted.tables.items():
+        begin, end = fidelity.marks(table)
+        lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
+        cells = [line.removeprefix("| ").removesuffix(" |").split(" | ") for line in lines]
+        assert [(*one[:3], *one[5:]) for one in cells] == [
+            (row.figure, row.source, row.published, row.word, f"`{wanted.command(name, row)}`")
+            for row in rows
+        ], table
+        assert all(one[3] and one[4] for one in cells), table
