@@ -6,7 +6,7 @@ what comes back over the serial line. The truth is known to this command alone.
 
 examples:
   cubestack measure {first} --frames 20
-  cubestack measure {second} --frames 20
+  cubestack measure {second} --frames 20 --min-right 90    exit code 1 below 90 % right
   cubestack measure DEVICE --help
 """
 
@@ -18,28 +18,37 @@ from typing import Any
 
 from rich.table import Table
 
-from cubestack.host.cli.arguments import add_options, chosen
+from cubestack.host.cli.arguments import add_options, chosen, typed
 from cubestack.host.cli.device_options import add_engine_arguments, add_option, tell_notices
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import board_options
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import between
 from cubestack.host.terminal import console, progress, say
 
+PERCENT = between(0, 100, "a number of percent in 0..100")
 SHOWN = 40
 """Rows of a table."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices, each with options of its own."""
-    add_devices(parser, lambda device: device.experiment and device.experiment())
+    for command in add_devices(parser, lambda device: device.experiment and device.experiment()):
+        command.add_argument(
+            "--min-right",
+            type=typed(PERCENT),
+            metavar="PCT",
+            help="exit code 1 when fewer percent of the results are right",
+        )
 
 
 def add_devices(
     parser: argparse.ArgumentParser, found: Callable[[AnyDevice], AnyExperiment | None]
-) -> None:
-    """Declare the devices for which an experiment is ``found``, and its options."""
+) -> list[argparse.ArgumentParser]:
+    """Declare the devices for which an experiment is ``found``, and its options; their parsers."""
+    parsers = []
     commands = parser.add_subparsers(dest="device", required=True, metavar="device")
     for device in devices():
         experiment = found(device)
@@ -54,6 +63,8 @@ def add_devices(
         add_options(command, experiment.options)
         add_board(command, device, experiment)
         command.set_defaults(chosen=(device, experiment))
+        parsers.append(command)
+    return parsers
 
 
 def add_board(
@@ -67,7 +78,7 @@ def add_board(
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure; returns 0 when every result was read, whether anything was found or not."""
+    """Measure; returns 0 when every result was read, and enough are right if `--min-right` asks."""
     return run_experiment(args, *args.chosen)
 
 
@@ -84,14 +95,30 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
 
     opened = Opener(device, getattr(args, "engine", "auto"), board, bar)
     started = time.monotonic()
-    results = []
+    results: list[Result] = []
+    least: float | None = getattr(args, "min_right", None)
     for result in bar(experiment.run(opened, options), experiment.count(options), experiment.label):
         results.append(result)
+        if least is not None and not hasattr(result, "right"):
+            raise ValueError(f"results of {device.name} do not say what is right: no --min-right")
         if args.json:
             print(json.dumps(result.as_dict()), flush=True)
     if not args.json:
         _report(experiment, results, time.monotonic() - started)
-    return 0 if experiment.succeeded(results) else 1
+    enough = least is None or _are_right(results, least)
+    return 0 if enough and experiment.succeeded(results) else 1
+
+
+def _are_right(results: list[Result], least: float) -> bool:
+    """Whether ``least`` percent are right; says so if not. Without a truth, none is."""
+    verdicts = [getattr(result, "right", None) for result in results]
+    share = 100 * verdicts.count(True) / max(1, len(verdicts))
+    if share >= least:
+        return True
+    unknown = verdicts.count(None)
+    beside = f", of {unknown} the truth is not known" if unknown else ""
+    say(f"{share:.1f} % of {len(verdicts)} right{beside}; --min-right wants {least:g} %")
+    return False
 
 
 def _report(experiment: AnyExperiment, results: list[Result], wall_s: float) -> None:

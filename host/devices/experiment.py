@@ -8,7 +8,11 @@ from cubestack.host.options import Options
 
 
 class Result:
-    """One result; a frozen dataclass whose attributes are those of the JSON output."""
+    """One result; a frozen dataclass whose attributes are those of the JSON output.
+
+    With an attribute ``right``, true, false, or None where the truth is not known, results can be
+    judged by `--min-right`.
+    """
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3
+POOR = 0.5  # part of right results below which a reader is told what to change
 SAME_STAR_DEG = 0.2
 """An identified star further than this from where the truth puts it has a wrong identity."""
 
@@ -211,6 +212,7 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
     def summarise(self, results: Sequence[AttitudeResultT], wall_s: float) -> Iterator[str]:
         """Rates over all frames; over the right ones 95th percentiles of errors, mean time."""
         right = [result for result in results if result.right]
+        judged = sum(result.right is not None for result in results)
         solved = sum(result.solved for result in results)
         count = max(1, len(results))
         yield (
@@ -227,6 +229,12 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
                 f"across, {arcsec(percentile_95(result.error_roll_deg for result in right))} "
                 f"about the boresight{time}"
             )
+        if judged and len(right) < POOR * judged:
+            yield f"what may help: {self.advice(results)}"
+
+    def advice(self, results: Sequence[AttitudeResultT]) -> str:
+        """What to change where few results are right; one phrase."""
+        return "--mode assisted --hint-error 3, or --profile extended"
 
 
 def percentile_95(values: Iterator[float | None]) -> float | None:

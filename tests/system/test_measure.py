@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cubestack.firmware_model.interface.codec.switches import PROFILES
 from tests.system.conftest import Frames, Measure
 
 KEYS = {
     "solved", "right", "centroids", "matched", "wrong", "mode", "error_cross_deg",
-    "error_roll_deg", "truth", "quaternion", "phase_ms", "wall_ms", "status",
+    "error_roll_deg", "truth", "quaternion", "phase_ms", "wall_ms", "status", "threshold",
+    "searched",
 }  # fmt: skip
 PHASES = {"idle", "discard", "capture", "transfer", "detect", "match", "attitude"}
 
@@ -59,6 +61,19 @@ def test_profiles_find_the_same_sky_in_their_own_way(measure: Measure) -> None:
     errors, same, plain = ([one["error_cross_deg"] for one in rows] for rows in (first, *others))
     assert errors == same
     assert sum(a != b for a, b in zip(errors, plain, strict=True)) >= 4  # centroids weigh others
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_the_first_call_of_a_user_finds_the_threshold(measure: Measure, profile: str) -> None:
+    """All stars in view: with the threshold of 6 most pictures fail, or are wrong (--seed 1)."""
+    first, *others = measure("--frames", 5, "--profile", profile)
+    assert first["right"]
+    assert sum(frame["right"] for frame in others) >= 3
+    assert {(f["searched"], f["threshold"]) for f in (first, *others)} == {(True, 16)}
+    (plain,) = measure("--threshold", 16, "--profile", profile)
+    assert (plain["searched"], plain["threshold"]) == (False, 16)
+    assert plain["truth"] == pytest.approx(first["truth"])  # the search has skies of its own
+    assert plain["right"]
 
 
 def test_errors_without_noise(measure: Measure) -> None:

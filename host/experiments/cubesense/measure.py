@@ -44,6 +44,9 @@ FRAME_S = 525 * 858 / 13.5e6
 """A camera's frame time: captures start at a random phase of it."""
 
 #: Options of the random pose.
+GOAL_DEG, SUN_WIDE_DEG, SUN_WIDE_GOAL_DEG = 0.2, 45.0, 2.0
+"""Accuracy that the thesis aimed at (sections 7.1 and 7.2), and for a Sun beyond an angle."""
+
 POSE = ("tilt", "sun_angle", "altitude", "bloom", "no_noise")
 
 
@@ -103,6 +106,9 @@ class SensorResult(Result):
         alpha_deg, beta_deg: measured angles along the picture's rows and columns.
         truth_alpha_deg, truth_beta_deg: what they should be.
         error_deg: angle between the measured and the true direction.
+        tolerance_deg: error up to which a direction is right: the thesis' goals, sections 7.1 and
+            7.2, by sensor and, for the Sun, by its angle to the boresight.
+        right: whether the direction is, or nothing was found where nothing can be seen.
         edges: edges that the nadir sensor's fit used; None for the sun sensor.
         sun_pixels: pixels of the sun sensor's mean; None for the nadir sensor.
         pixels_read: pixels that the processor read from the FPGA.
@@ -118,6 +124,8 @@ class SensorResult(Result):
     truth_alpha_deg: float | None
     truth_beta_deg: float | None
     error_deg: float | None
+    tolerance_deg: float
+    right: bool
     edges: int | None
     sun_pixels: int | None
     pixels_read: int
@@ -131,7 +139,8 @@ def _told(results: Sequence[SensorResult]) -> str:
     """How many detected their target; over those the errors, and the mean time."""
     errors = [result.error_deg for result in results if result.error_deg is not None]
     times = [result.phase_ms["total"] for result in results if result.detected]
-    text = f"{len(times)} of {len(results)} detected"
+    right = sum(result.right for result in results)
+    text = f"{len(times)} of {len(results)} detected, {right} right"
     if not errors:
         return text
     return (
@@ -230,6 +239,9 @@ def _measure(
     wall_ms = 1000 * (time.perf_counter() - started)
     truth = emulated.board.truth(sensor) if measured.capture.stored else None
     visible = truth if truth is not None and truth.visible else None
+    error_deg = None if visible is None else _error_deg(measured, visible)
+    tolerance_deg = _tolerance_deg(sensor, visible)
+    nothing = measured.capture.stored and visible is None and not measured.detected
     details = cubesense.details(sensor)
     points = int(details["Points"])
     return SensorResult(
@@ -239,7 +251,9 @@ def _measure(
         beta_deg=measured.beta_deg if measured.detected else None,
         truth_alpha_deg=None if visible is None else visible.alpha_deg,
         truth_beta_deg=None if visible is None else visible.beta_deg,
-        error_deg=None if visible is None else _error_deg(measured, visible),
+        error_deg=error_deg,
+        tolerance_deg=tolerance_deg,
+        right=nothing if error_deg is None else error_deg <= tolerance_deg,
         edges=points if sensor is Camera.NADIR else None,
         sun_pixels=points if sensor is Camera.SUN else None,
         pixels_read=int(details["PixelsRead"]),
@@ -248,6 +262,12 @@ def _measure(
         phase_ms=cubesense.phase_times(sensor),
         wall_ms=wall_ms,
     )
+
+
+def _tolerance_deg(sensor: Camera, truth: "SensorTruth | None") -> float:
+    """Goals of sections 7.1 and 7.2."""
+    wide = truth is not None and float(truth.vector[2]) < np.cos(np.radians(SUN_WIDE_DEG))
+    return SUN_WIDE_GOAL_DEG if sensor is Camera.SUN and wide else GOAL_DEG
 
 
 def _error_deg(measured: Measurement, truth: "SensorTruth") -> float | None:

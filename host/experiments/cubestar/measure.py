@@ -4,12 +4,15 @@ Every frame is captured and processed by the emulated device; the host sees only
 what comes back over the serial line. The truth is known to this command alone
 and is printed beside the result.
 
-The camera sees more stars than the onboard list has. With all of them in view
-the published detection threshold lets many pictures fail; --mag-limit 3.8 cuts
-the sky at the list's own limit.
+The camera sees more stars than the onboard list has, so the published detection
+threshold of 6 fills pictures with stars that have no name. Where all stars are in
+view, the threshold is therefore searched first, with telecommands alone: over a few
+random skies, or in the picture of --image. --mag-limit 3.8 cuts the sky at the list's
+own limit and leaves the threshold as it is. So do --scene and --faults, for their times.
 
 examples:
-  cubestack measure cubestar --frames 20 --mag-limit 3.8      lost in space
+  cubestack measure cubestar --frames 20                      lost in space
+  cubestack measure cubestar --threshold 13 --min-right 90    exit code 1 below 90 % right
   cubestack measure cubestar --frames 200 --mag-limit 3.8 --json > frames.jsonl
   cubestack measure cubestar --mode assisted --hint-error 5   rough boresight
   cubestack measure cubestar --image sky.jpg --crop 0,256 --camera camera.json
@@ -18,7 +21,7 @@ examples:
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -26,7 +29,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode, MatchMode, TaskStatus
 from cubestack.host.calibration.camera import load_camera
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
@@ -35,7 +38,7 @@ from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.errors import CameraFileError
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import ANGLE, CORNER, PATH, option
+from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -51,6 +54,15 @@ MODE_NAMES = {
 }
 
 UNIT_TOLERANCE = 1e-3
+FEWEST_STARS, MOST_STARS = 3, 20  # that an attitude needs, that a search of a picture ends with
+SEARCH = "search"
+SKIES = 5
+"""Random skies that a threshold is searched with."""
+
+_DN = whole(1, 255)
+THRESHOLD = Kind(
+    f"{_DN.what} DN, or {SEARCH}", lambda given: given if given == SEARCH else _DN(given)
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +79,13 @@ class CubeStarOptions(attitudes.SkyOptions):
         "largest error of the hint (assisted) or of the last attitude (tracking)",
         ANGLE,
         metavar="DEG",
+    )
+    threshold: int | str | None = option(
+        None,
+        "detection threshold, or 'search' (default where all stars are in view, without --scene "
+        "and --faults)",
+        THRESHOLD,
+        metavar="DN",
     )
     crop: tuple[int, int] = option(
         (0, 0), "with --image: left upper corner of the 1024 x 512 part", CORNER, metavar="X,Y"
@@ -88,14 +107,33 @@ class CubeStarOptions(attitudes.SkyOptions):
                 "has the keys mag_limit, false_stars and noise"
             )
 
+    @property
+    def searches(self) -> bool:
+        """Whether a threshold is searched before the first frame."""
+        if self.threshold is not None:
+            return self.threshold == SEARCH
+        uncut = self.is_random and self.mag_limit is None and self.faults is None
+        return uncut or self.image is not None
 
-class _Experiment(
-    attitudes.AttitudeExperiment["_Opener", CubeStarOptions, attitudes.AttitudeResult]
-):
+
+@dataclass(frozen=True)
+class CubeStarResult(attitudes.AttitudeResult):
+    """Attributes are those of the JSON output.
+
+    Attributes:
+        threshold: of detection, in DN.
+        searched: whether it was searched with some skies, or the picture, before.
+    """
+
+    threshold: int
+    searched: bool
+
+
+class _Experiment(attitudes.AttitudeExperiment["_Opener", CubeStarOptions, CubeStarResult]):
     options = CubeStarOptions
     description = __doc__
 
-    def run(self, opened: _Opener, options: CubeStarOptions) -> Iterator[attitudes.AttitudeResult]:
+    def run(self, opened: _Opener, options: CubeStarOptions) -> Iterator[CubeStarResult]:
         from cubestack.emulator.camera.mlx75412.lens import CONDITION
         from cubestack.emulator.scene.sky import PictureScene
 
@@ -112,12 +150,52 @@ class _Experiment(
         with opened(scene, seed=options.seed, faults=options.faults) as emulated:
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
-            if options.image is not None:
-                find_threshold(emulated.client)
+            threshold = _threshold(emulated, options)
             for number in range(options.frames):
                 if number and options.is_random:
                     emulated.scene = attitudes.random_view(options, CONDITION, rng)
-                yield _measure(emulated, options, picture_truth, rng)
+                yield _measure(emulated, options, picture_truth, rng, threshold)
+
+    def summarise(self, results: Sequence[CubeStarResult], wall_s: float) -> Iterator[str]:
+        if any(result.searched for result in results):
+            yield (
+                f"detection threshold {results[0].threshold} DN, found by trying, lost in space; "
+                "--threshold DN sets one"
+            )
+        yield from super().summarise(results, wall_s)
+
+    def advice(self, results: Sequence[CubeStarResult]) -> str:
+        stars, threshold = np.median([result.centroids for result in results]), results[0].threshold
+        if stars < FEWEST_STARS:
+            return f"{stars:.0f} stars found: --threshold below {threshold}, or a darker sky"
+        if stars >= MOST_STARS:
+            return f"pictures full of stars: --threshold above {threshold}, or --threshold search"
+        return "--mode assisted --hint-error 5 or --profile extended solve more"
+
+
+def _threshold(emulated: _Emulated, options: CubeStarOptions) -> int:
+    """Search or set the detection threshold as the options say; the one that holds."""
+    command, name = "setDetectionThresholds", "DetectionThreshold"
+    found = options.threshold
+    if options.searches:
+        found = find_threshold(emulated.client, _views(emulated, options))
+    elif found is not None:
+        emulated.client.client.command(command, DetectionThreshold=found, StarThreshold=found)
+    return int(found or INTERFACE.telecommand(command).reset_values()[name])
+
+
+def _views(emulated: _Emulated, options: CubeStarOptions) -> Iterator[None]:
+    """What a threshold is searched with: some random skies, or what the camera looks at."""
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
+
+    if not options.is_random:
+        yield
+        return
+    scene, rng = emulated.scene, np.random.default_rng([options.seed, SKIES])
+    for _ in range(SKIES):
+        emulated.scene = attitudes.random_view(options, CONDITION, rng)
+        yield
+    emulated.scene = scene
 
 
 def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | None:
@@ -140,7 +218,8 @@ def _measure(
     options: CubeStarOptions,
     picture_truth: NDArray[np.float64] | None,
     rng: np.random.Generator,
-) -> attitudes.AttitudeResult:
+    threshold: int,
+) -> CubeStarResult:
     started = time.perf_counter()
     cubestar, client = emulated.client, emulated.client.client
     client.command("ClearErrorFlags")
@@ -170,7 +249,7 @@ def _measure(
     phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
     # The flags say why a task ended as its status tells.
     flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]
-    return attitudes.AttitudeResult(
+    return CubeStarResult(
         **attitudes.compare(attitude.quaternion if solved else None, known),
         centroids=centroids,
         matched=attitude.matched if solved else 0,
@@ -179,6 +258,8 @@ def _measure(
         phase_ms=phases,
         wall_ms=1000 * (time.perf_counter() - started),
         status=" ".join([status.name.lower(), *flags]),
+        threshold=threshold,
+        searched=options.searches,
     )
 
 

@@ -412,6 +412,7 @@ def test_set_tracking_mode(unit: Harness) -> None:
     assert unit.telemetry("LoopStatus")["ModeFlag"] == cubestar.MatchMode.ASSISTED
 
 
+@pytest.mark.parametrize("profile", ["extended"])  # as printed, stars without votes have names
 @telecommand("setIDMargin")
 def test_set_id_margin(unit: Harness, sky: Sky) -> None:
     unit.command("setIDMargin", Margin=0.0001)

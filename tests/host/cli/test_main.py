@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ from PIL import Image
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.host.cli.main import COMMANDS
+from cubestack.host.cli.measure import _are_right
 from cubestack.host.cli.reports import reports
+from cubestack.host.devices.experiment import Result
 from cubestack.host.experiments.cubestar.demo import RENDERED
 
 from ...conftest import Outcome, Run
@@ -218,8 +221,47 @@ def test_a_scene_of_the_other_device_is_refused(run: Run, tmp_path: Path, comman
     check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", "sky", "earth-sun")
 
 
-LATCH_UP = "[[fault]]\nkind = 'latch-up'\nat = 0.3\n"
 NEEDS_COMPILER = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@dataclass(frozen=True)
+class Judged(Result):
+    right: bool | None
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "least", "said"),
+    [
+        ([True] * 9 + [False], 90, ""),
+        ([True] * 9 + [False], 90.5, "90.0 % of 10 right; --min-right wants 90.5 %\n"),
+        (
+            [True, None],
+            60,
+            "50.0 % of 2 right, of 1 the truth is not known; --min-right wants 60 %\n",
+        ),
+        ([None, False], 0, ""),
+    ],
+)
+def test_enough_results_are_right(
+    capsys: pytest.CaptureFixture[str], verdicts: list[bool | None], least: float, said: str
+) -> None:
+    assert _are_right([Judged(verdict) for verdict in verdicts], least) is (not said)
+    assert capsys.readouterr().err == said
+
+
+@NEEDS_COMPILER
+def test_measure_as_a_check(run: Run) -> None:
+    call = ["measure", "cubestar", "--threshold", "250", "--frames", "2"]
+    outcome = run(*call, "--min-right", "50", "--json")
+    assert (outcome.code, outcome.err) == (FAILED, "0.0 % of 2 right; --min-right wants 50 %\n")
+    assert len(outcome.out.splitlines()) == 2
+    outcome = run(*call, "--min-right", "0")
+    assert outcome.code == DONE
+    assert "what may help: 0 stars found: --threshold below 250" in outcome.out
+    check_one_line(run(*call, "--min-right", "101"), "'101'", "0..100")
+
+
+LATCH_UP = "[[fault]]\nkind = 'latch-up'\nat = 0.3\n"
 
 
 @NEEDS_COMPILER

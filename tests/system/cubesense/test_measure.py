@@ -12,7 +12,7 @@ from tests.system.conftest import Frames, Measure
 
 KEYS = {
     "sensor", "detected", "alpha_deg", "beta_deg", "truth_alpha_deg", "truth_beta_deg",
-    "error_deg", "edges", "phase_ms", "wall_ms",
+    "error_deg", "tolerance_deg", "right", "edges", "phase_ms", "wall_ms",
 }  # fmt: skip
 SUN, NADIR = ("--sensor", "sun"), ("--sensor", "nadir")
 EXTENDED, NOMINAL = ("--profile", "extended"), ("--set", "lens=nominal")
@@ -32,6 +32,7 @@ def test_a_frame_gives_one_result_of_each_sensor(measure: Measure) -> None:
     frames = measure("--frames", 2)
     assert [frame["sensor"] for frame in frames] == ["sun", "nadir"] * 2
     assert all(frame.keys() >= KEYS for frame in frames)
+    assert all(f["right"] == (f["error_deg"] <= f["tolerance_deg"]) for f in frames)
     assert frames[0]["phase_ms"].keys() == {"wait", "store", "search", "centroid", "total"}
 
 
@@ -52,6 +53,7 @@ def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
     errors = np.array([frame["error_deg"] for frame in sun])
     assert np.percentile(errors[angle <= 45], 95) < 0.2
     assert np.percentile(errors[angle > 45], 95) < 2
+    assert [f["tolerance_deg"] for f in sun] == np.where(angle > 45, 2.0, 0.2).tolist()
 
 
 @pytest.mark.parametrize("bloom", [3, 5, 7])
