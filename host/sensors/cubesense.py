@@ -38,6 +38,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     ),
     default_scene_title="Earth and Sun",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
+    calibration=get(f"{EXPERIMENTS}.calibrate:EXPERIMENT"),
     reports=(
         Report(
             "memory",

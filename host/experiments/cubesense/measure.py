@@ -28,7 +28,7 @@ from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
-    from cubestack.emulator.camera.ov7620.view import EarthSunView
+    from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
     from cubestack.emulator.scene.earth_sun import SensorTruth
 
 _Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
@@ -165,7 +165,7 @@ class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
         sampling = search is not NadirSearch.LINES
         given = None if options.scene is None else opened.device.scene(options.scene)
         with opened(
-            given or _random_view(options, options.sensors[0], rng),
+            given or random_view(options, options.sensors[0], rng),
             seed=options.seed,
             faults=options.faults,
             mcu_addressing=sampling,
@@ -174,10 +174,10 @@ class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
                 emulated.client.client.command("SetNadirSearch", Search=search)
             for _ in range(options.frames):
                 for sensor in options.sensors:
-                    emulated.scene = given or _random_view(options, sensor, rng)
+                    emulated.scene = given or random_view(options, sensor, rng)
                     emulated.client.client.pause(float(rng.uniform(0, FRAME_S)))
                     sram = Sram(sensor if options.memory == "own" else 1 - sensor)
-                    yield _measure(emulated, sensor, sram)
+                    yield measure_once(emulated, sensor, sram)
 
     def row(self, number: int, result: SensorResult) -> tuple[str, ...]:
         return (
@@ -204,35 +204,49 @@ def _degrees(value: float | None, digits: int = 2) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _random_view(
+def random_view(
     options: CubeSenseOptions, sensor: Camera, rng: np.random.Generator
 ) -> "EarthSunView":
     """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
-    from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
+    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 
     reach = _or(options.sun_angle, 90.0) if sensor is Camera.SUN else _or(options.tilt, 30.0)
     radius, towards = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random()
     angles = (float(radius * np.cos(towards)), float(radius * np.sin(towards)))
-    seed, altitude_km = int(rng.integers(1 << 31)), _or(options.altitude, 750.0)
+    condition = FisheyeCondition(
+        bloom_px=_or(options.bloom, 7.0),
+        noise=not options.no_noise,
+        seed=int(rng.integers(1 << 31)),
+    )
+    return view_of(sensor, angles, condition, _or(options.altitude, 750.0))
+
+
+def view_of(
+    sensor: Camera,
+    angles: tuple[float, float],
+    condition: "FisheyeCondition",
+    altitude_km: float = 750.0,
+) -> "EarthSunView":
+    """A sensor's target at its angles alpha and beta, and the Earth at noon."""
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+
+    others: dict[str, Any] = {"altitude_km": altitude_km, "seed": condition.seed}
     if sensor is Camera.SUN:
-        scene = EarthSunScene.facing(sun_deg=angles, altitude_km=altitude_km, seed=seed)
-        scene = replace(scene, nadir=-np.asarray(scene.sun))
-    else:
-        scene = EarthSunScene.facing(nadir_deg=angles, altitude_km=altitude_km, seed=seed)
-        scene = replace(scene, sun=-np.asarray(scene.nadir))
-    bloom_px = _or(options.bloom, 7.0)
-    condition = FisheyeCondition(bloom_px=bloom_px, noise=not options.no_noise, seed=seed)
-    return EarthSunView(scene, condition)
+        scene = EarthSunScene.facing(sun_deg=angles, **others)
+        return EarthSunView(replace(scene, nadir=-np.asarray(scene.sun)), condition)
+    scene = EarthSunScene.facing(nadir_deg=angles, **others)
+    return EarthSunView(replace(scene, sun=-np.asarray(scene.nadir)), condition)
 
 
 def _or(given: float | None, default: float) -> float:
     return default if given is None else given
 
 
-def _measure(
+def measure_once(
     emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]", sensor: Camera, sram: Sram
 ) -> SensorResult:
+    """One measurement into ``sram``, beside the truth."""
     cubesense = emulated.client
     started = time.perf_counter()
     measured = cubesense.capture_and_detect(sensor, sram)

@@ -1,0 +1,78 @@
+"""`cubestack calibrate cubesense`: a unit's own lenses are found, and it errs less with them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cubestack.emulator.camera.ov7620.fisheye import lens_of
+from cubestack.emulator.camera.ov7620.lens_error import LensError, drawn_lens
+from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.host.cli.main import main
+
+LENS = "[{}_lens]\ncentre_px = [0.8, -0.5]\nradial_deg = [[40.0, 0.2], [75.0, 1.0]]\n"
+
+
+def calibrate(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
+    assert main(["calibrate", "cubesense", "--json", *map(str, arguments)]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[str]) -> None:
+    which = ("--sensor", "nadir", "--seed", 2, "--emulated", 30, "--check-poses", 10)
+    found = calibrate(capsys, *which, "--profile", "extended", "--set", "lens=residuals")
+    assert found["error_after_deg"] < 0.06 < 0.2 < found["error_before_deg"]
+    centre = np.add((371, 236), drawn_lens(Target.NADIR, 2).centre_px)
+    np.testing.assert_allclose(found["boresight_px"], centre, atol=0.15)
+
+
+def test_a_lens_of_a_scene_is_found(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    scene, out = tmp_path / "unit.toml", tmp_path / "unit.json"
+    scene.write_text('kind = "earth-sun"\n' + LENS.format("sun"), encoding="utf-8")
+    which = ("--sensor", "sun", "--scene", scene, "--emulated", 24, "--check-poses", 8)
+    found = calibrate(capsys, *which, "--profile", "extended", "--out", out)
+    np.testing.assert_allclose(found["boresight_px"], (369.8, 249.5), atol=0.1)
+    assert found["error_after_deg"] < 0.5 * found["error_before_deg"]
+    assert json.loads(out.read_text(encoding="utf-8"))["sun"] == found
+
+
+def test_pictures_of_a_light_give_the_lens(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    lens = lens_of(Target.NADIR, LensError((0.8, -0.5), ((40.0, 0.2), (75.0, 0.6))))
+    lines = ["file,alpha_deg,beta_deg"]
+    y, x = np.mgrid[:480, :640]
+    for number, turn in enumerate(np.arange(0, 20, 1.3)):
+        alpha, beta = (3.5 * turn * np.cos(turn), 3.5 * turn * np.sin(turn) + 1)
+        column, row = lens.project(vector_from_angles(alpha, beta))
+        spot = 30 + 150 * np.exp(-((x - column) ** 2 + (y - row) ** 2) / 18)
+        Image.fromarray(spot.astype(np.uint8)).save(tmp_path / f"{number}.png")
+        lines.append(f"{number}.png,{alpha},{beta}")
+    csv = tmp_path / "bench.csv"
+    csv.write_text("\n".join(lines), encoding="utf-8")
+    given = ("--images", tmp_path, "--angles", csv, "--sensor", "nadir")
+    found = calibrate(capsys, *given)
+    np.testing.assert_allclose(found["boresight_px"], (371.8, 235.5), atol=0.1)
+    assert found["after_px"] < 0.3 < 1 < found["before_px"]
+    for text, complaint in [
+        ("file,alpha_deg\n0.png,1", "line 2: must be file,alpha_deg,beta_deg"),
+        ("\n".join(lines[:5]), "needs 8 places at least; 4 were found"),
+        (f"{lines[0]}\nnone.png,1,2", "none.png can not be read"),
+        (f"{lines[0]}\nblack.png,1,2", "black.png shows no light"),
+    ]:
+        Image.new("L", (640, 480)).save(tmp_path / "black.png")
+        csv.write_text(text, encoding="utf-8")
+        assert main(["calibrate", "cubesense", *map(str, given)]) == 2
+        said = capsys.readouterr().err
+        assert complaint in said
+        assert said.count("\n") == 1
+
+
+def test_pictures_need_their_angles(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "cubesense", "--images", "x"]) == 2
+    assert "--images and --angles belong together" in capsys.readouterr().err
+    assert main(["calibrate", "cubesense", "--images", "x", "--angles", "y"]) == 2
+    assert "--sensor sun or nadir" in capsys.readouterr().err
