@@ -45,6 +45,11 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
             "list the firmware's buffers against the processor's memories",
             get(f"{EXPERIMENTS}.memory:EXPERIMENT"),
         ),
+        Report(
+            "ball",
+            "turn the nadir sensor before the ball of its bench",
+            get(f"{EXPERIMENTS}.ball:EXPERIMENT"),
+        ),
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),

@@ -27,7 +27,7 @@ from cubestack.host.devices.registry import devices
 from tests.conftest import Run
 from tests.system.conftest import ROOT
 
-EARTH = 'kind = "earth-sun"'
+EARTH, BALL = 'kind = "earth-sun"', 'kind = "ball"'
 
 
 def text_of(name: str) -> str:
@@ -38,7 +38,11 @@ def load(folder: Path, text: str) -> Any:
     """What a scene file gives."""
     path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
-    return load_earth_sun_scene(path) if EARTH in text else load_scene(path, CONDITION, UNCERTAIN)
+    return (
+        load_earth_sun_scene(path)
+        if EARTH in text or BALL in text
+        else load_scene(path, CONDITION, UNCERTAIN)
+    )
 
 
 def section(text: str, heading: str) -> str:
@@ -55,6 +59,7 @@ def section(text: str, heading: str) -> str:
         ("Keys of `optics`", 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n[optics]'),
         ('Keys of `kind = "picture"`', 'kind = "picture"'),
         ('Keys of `kind = "earth-sun"`', EARTH),
+        ('Keys of `kind = "ball"`', BALL),
         ("Keys of `nadir_camera` and `sun_camera`", f"{EARTH}\n[nadir_camera]"),
         ("Keys of `nadir_lens` and `sun_lens`", f"{EARTH}\n[sun_lens]"),
         ("Keys of `reflections`", f"{EARTH}\n[[reflections]]"),
@@ -95,7 +100,7 @@ def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ..
 
 
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
-    sky, night, picture, earth = re.findall(
+    sky, night, picture, earth, ball = re.findall(
         r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL
     )
     scene = load(tmp_path, sky).scene
@@ -105,6 +110,7 @@ def test_examples_of_scenes_load(tmp_path: Path) -> None:
     assert isinstance(ground, SkyScene)
     assert ground.atmosphere is not None
     assert len(load(tmp_path, earth).scene.reflections) == 1
+    assert load(tmp_path, ball).scene.glow_km == 0
     assert tomllib.loads(picture)["kind"] == "picture"
     with pytest.raises(SceneError, match=r"night\.jpg"):  # read, but there is no such file here
         load(tmp_path, picture)

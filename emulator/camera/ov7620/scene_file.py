@@ -23,6 +23,7 @@
 
 Directions are in scene axes, the satellite's body axes at time 0. Each key goes to the scene or to
 the cameras' condition, whichever has it; ``seed`` to both.
+The ball of the nadir sensor's bench is another kind, "ball", with the arguments of ``ball_scene``.
 """
 
 from pathlib import Path
@@ -32,14 +33,21 @@ from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene import file
+from cubestack.emulator.scene.ball import ball_scene
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
 
 
 def load_earth_sun_scene(path: Path) -> EarthSunView:
     """What the TOML file ``path`` gives; SceneError names the key that is wrong."""
-    return file.read_scene_file(
-        path, {"earth-sun": _view}, '"earth-sun" for a sun and nadir sensor'
-    )
+    kinds = {"earth-sun": _view, "ball": _ball}
+    return file.read_scene_file(path, kinds, '"earth-sun" or "ball" for a sun and nadir sensor')
+
+
+def _ball(table: dict[str, Any]) -> EarthSunView:
+    values = file.read_table(table, _BALL)
+    condition = FisheyeCondition(**file.values_for(FisheyeCondition, values))
+    scene = ball_scene(**{key: values[key] for key in _BALL_SCENE if key in values})
+    return EarthSunView(scene, condition)
 
 
 def _view(table: dict[str, Any]) -> EarthSunView:
@@ -124,4 +132,15 @@ _SCENE: file.Readers = {
     "hot_pairs": file.whole,
     "noise": file.flag,
     "seed": file.whole,
+}
+_BALL_SCENE: file.Readers = {
+    "angle_deg": file.several(2, file.number),
+    "radius_mm": file.number,
+    "distance_mm": file.number,
+    "offset_mm": file.several(3, file.number),
+    "unevenness": file.number,
+    "seed": file.whole,
+}
+_BALL = _BALL_SCENE | {
+    key: _SCENE[key] for key in ("nadir_lens", "hot_pixels", "hot_pairs", "noise")
 }

@@ -88,7 +88,7 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("", 'kind must be "earth-sun" for a sun and nadir sensor, not None'),
+        ("", 'kind must be "earth-sun" or "ball" for a sun and nadir sensor, not None'),
         ('kind = "sky"', "not 'sky'"),
         ("kind", "is no TOML file"),
         (f"{KIND}height = 3", "unknown key 'height'; allowed are nadir, nadir_deg"),
@@ -116,3 +116,19 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
 )
 def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
     check_refused(load_earth_sun_scene, save(tmp_path, text), complaint)
+
+
+def test_the_ball_of_the_bench(tmp_path: Path) -> None:
+    text = 'kind = "ball"\nangle_deg = [20, -10]\nseed = 4\nnoise = false\n[nadir_lens]\n'
+    view = load_earth_sun_scene(save(tmp_path, text + "centre_px = [1, 0]"))
+    truth = view.scene.truth(Target.NADIR, 0)
+    assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((20, -10))
+    assert view.scene.altitude_km == pytest.approx(748.4, abs=0.1)
+    assert view.condition.nadir_lens == LensError(centre_px=(1.0, 0.0))
+    assert (view.condition.noise, view.condition.seed, view.scene.seed) == (False, 4, 4)
+    for wrong, complaint in (
+        ("radius_mm = 0", "radius_mm and distance_mm must be above 0"),
+        ("offset_mm = [0, 0, 40]", "offset_mm must leave the camera outside of the ball"),
+        ("nadir = [0, 0, 1]", "unknown key 'nadir'; allowed are angle_deg"),
+    ):
+        check_refused(load_earth_sun_scene, save(tmp_path, f'kind = "ball"\n{wrong}'), complaint)

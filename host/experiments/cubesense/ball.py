@@ -1,0 +1,133 @@
+"""Measure CubeSense's nadir sensor before the ball of its bench (thesis, section 7.1).
+
+A rotary stage turns the sensor before a lit ball as large as the Earth from 750 km.
+At each angle several pictures are measured; their mean less the stage's angle is
+the offset, as in figure 7.1, and they scatter by sigma, as in figure 7.2.
+
+examples:
+  cubestack ball                                  every 5 deg to 30, 10 pictures each
+  cubestack ball --step 1 --samples 100           as published; takes long
+  cubestack ball --profile extended --off-axis 1  optic point 1 mm before the axis
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.devices.experiment import Experiment, Result
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import Options, between, option, whole
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+
+_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
+
+DIRECTIONS = {"right": (1, 0), "left": (-1, 0), "down": (0, 1), "up": (0, -1)}
+"""Where the ball goes in the picture; figure 7.1 does not say which of its four parts is which."""
+
+REACH_DEG = 30.0
+"""The ball's edge reaches that of the field there (section 7.1)."""
+
+PUBLISHED = "offset 0.12, 0.16, 0.13, 0.15 deg in the four directions; sigma below 0.18 deg"
+FRAME_S = 525 * 858 / 13.5e6
+"""A camera's frame time: captures start at a random phase of it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallOptions(Options):
+    """Options of `cubestack ball`."""
+
+    step: float = option(
+        5.0, "of the stage (default 5)", between(0.5, 30, "an angle in 0.5..30 degrees")
+    )
+    samples: int = option(10, "pictures at each angle (default 10)", whole(2), metavar="N")
+    off_axis: float = option(
+        0.0,
+        "optic point so far before the stage's axis (default 0)",
+        between(-30, 30, "a length in -30..30 mm"),
+        metavar="MM",
+    )
+    seed: int = option(0, "seed of everything random (default 0)", whole(0))
+
+    @property
+    def angles(self) -> list[float]:
+        """The stage's."""
+        return [float(angle) for angle in np.arange(0, REACH_DEG + 1e-9, self.step)]
+
+
+@dataclass(frozen=True)
+class BallResult(Result):
+    """One direction; angles in degrees. Attributes are those of the JSON output.
+
+    Attributes:
+        direction: where the ball goes in the picture.
+        detected, pictures: how many of how many.
+        offset_deg: mean size of the offsets of the angle along the direction.
+        worst_deg: the largest of them.
+        sigma_deg: largest standard deviation at one angle.
+    """
+
+    direction: str
+    detected: int
+    pictures: int
+    offset_deg: float | None
+    worst_deg: float | None
+    sigma_deg: float | None
+
+
+class _Ball(Experiment[_Opener, BallOptions, BallResult]):
+    options = BallOptions
+    description = __doc__
+    title = "nadir sensor before the ball: offset from the stage's angle"
+    columns = ("direction", "offset", "worst", "sigma", "detected")
+
+    def count(self, options: BallOptions) -> int:
+        return len(DIRECTIONS)
+
+    def run(self, opened: _Opener, options: BallOptions) -> Iterator[BallResult]:
+        from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+        from cubestack.emulator.scene.ball import ball_scene
+
+        rng, offset_mm = np.random.default_rng(options.seed), (0.0, 0.0, options.off_axis)
+        with opened(ball_scene(), seed=options.seed) as emulated:
+            for name, axis in DIRECTIONS.items():
+                means, sigmas, detected = [], [], 0
+                for angle in options.angles:
+                    scene = ball_scene((axis[0] * angle, axis[1] * angle), offset_mm=offset_mm)
+                    found = []
+                    for _ in range(options.samples):
+                        condition = FisheyeCondition(seed=int(rng.integers(1 << 31)))
+                        emulated.scene = EarthSunView(scene, condition)
+                        emulated.client.client.pause(float(rng.uniform(0, FRAME_S)))
+                        measured = emulated.client.capture_and_detect(Camera.NADIR)
+                        if measured.detected:
+                            along = axis[0] * measured.alpha_deg + axis[1] * measured.beta_deg
+                            found.append(along - angle)
+                    detected += len(found)
+                    if found:
+                        means.append(abs(float(np.mean(found))))
+                        sigmas.append(float(np.std(found)))
+                yield BallResult(
+                    name,
+                    detected,
+                    options.samples * len(options.angles),
+                    float(np.mean(means)) if means else None,
+                    max(means, default=None),
+                    max(sigmas, default=None),
+                )
+
+    def row(self, number: int, result: BallResult) -> tuple[str, ...]:
+        angles = (result.offset_deg, result.worst_deg, result.sigma_deg)
+        shown = ("-" if angle is None else f"{angle:.3f}" for angle in angles)
+        return (result.direction, *shown, f"{result.detected} of {result.pictures}")
+
+    def summarise(self, results: Sequence[BallResult], wall_s: float) -> Iterable[str]:
+        yield f"published: {PUBLISHED}"
+
+
+EXPERIMENT = _Ball()
