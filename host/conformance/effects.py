@@ -3,8 +3,6 @@
 For devices whose tables have the messages named here; each one says which of them it has.
 """
 
-from dataclasses import replace
-
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import (
@@ -94,24 +92,25 @@ def check_camera_register(
 
 def check_profile(run: CheckRun, message: Message, seen: list[str]) -> None:
     """Each profile is shown once it is set; the switches are put back."""
-    before = _switches(run)
-    for number, profile in enumerate(PROFILES):
-        run.perform(message.name, {"Profile": number})
-        _expect_switches(run, after(before, message.name, {"Profile": number}), profile)
-    _put_back(run, before)
+    now = before = _switches(run)
+    for profile in PROFILES:
+        now = _change(run, now, message, Profile=profile)
+    single = run.target.interface.telecommand(SET_SWITCH)
+    for name, one in before.declared().items():
+        if not one.hardware:
+            now = _change(run, now, single, **switch_parameters(name, getattr(before, name)))
     seen.append("read back")
 
 
 def check_switch(run: CheckRun, message: Message, seen: list[str]) -> None:
     """Each value of a switch is shown once it is set, and alone; those of the board are refused."""
-    before = _switches(run)
-    for place, (name, one) in enumerate(before.declared().items()):
+    now = _switches(run)
+    for place, (name, one) in enumerate(now.declared().items()):
         if one.hardware:
             run.expect_error(bytes([message.id, place, 0]), "BAD_PARAMETER", f"switch {name}")
             continue
-        for value in (*one.choices, getattr(before, name)):
-            _set(run, name, value)
-            _expect_switches(run, replace(before, **{name: value}), f"{name}={value}")
+        for value in (*one.choices, getattr(now, name)):
+            now = _change(run, now, message, **switch_parameters(name, value))
     seen.append("read back")
 
 
@@ -123,20 +122,14 @@ def _switches(run: CheckRun) -> Switches:
     return switches_shown(run.target.interface.switches, run.target.node.telemetry(SHOWN))
 
 
-def _expect_switches(run: CheckRun, wanted: Switches, what: str) -> None:
+def _change(run: CheckRun, now: Switches, message: Message, **parameters: str) -> Switches:
+    """The switches after a telecommand, which telemetry must show."""
+    run.perform(message.name, parameters)
+    wanted = after(now, message.name, message.unpack(message.pack(**parameters)))
     found = run.target.node.telemetry(SHOWN)
     if found != shown_values(wanted):
-        raise FailedError(f"{what} was set, {SHOWN} is {found}, declared {shown_values(wanted)}")
-
-
-def _put_back(run: CheckRun, switches: Switches) -> None:
-    for name, one in switches.declared().items():
-        if not one.hardware:
-            _set(run, name, getattr(switches, name))
-
-
-def _set(run: CheckRun, name: str, value: str) -> None:
-    run.perform(SET_SWITCH, switch_parameters(name, value))
+        raise FailedError(f"{parameters} was set, {SHOWN} is {found}, not {shown_values(wanted)}")
+    return wanted
 
 
 def _camera_register(run: CheckRun, address: int) -> int:

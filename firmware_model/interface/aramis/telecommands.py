@@ -194,10 +194,12 @@ _EXTENSIONS = (
 )
 
 #: Messages of the switches.
-SWITCHES = switch_messages(AramisSwitches, 118, 210, "lost at a reset, and not saved")
+*SET_SWITCHES, SWITCHES_SHOWN = switch_messages(
+    AramisSwitches, 118, 210, "lost at a reset, and not saved"
+)
 
 TELECOMMANDS = (
     *_USE_CASES,
     *(replace(message, extension=True) for message in _EXTENSIONS),
-    *SWITCHES.telecommands,
+    *SET_SWITCHES,
 )

@@ -10,7 +10,7 @@ from cubestack.firmware_model.interface.aramis import codes
 from cubestack.firmware_model.interface.aramis.flags import flag_fields
 from cubestack.firmware_model.interface.aramis.telecommands import (
     BLOCK_BYTES,
-    SWITCHES,
+    SWITCHES_SHOWN,
     TELECOMMANDS,
 )
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
@@ -209,7 +209,7 @@ TELEMETRY = (
     *_NODE,
     *_RESULTS,
     *(replace(message, extension=True) for message in _REPORTS),
-    SWITCHES.telemetry,
+    SWITCHES_SHOWN,
     *sorted(
         (_setting(command) for command in TELECOMMANDS if command.name in _SHOWN),
         key=lambda message: message.id,

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from enum import IntEnum
 from types import new_class
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from cubestack.firmware_model.interface.codec.field import Choices, Value, enum8, u8
 from cubestack.firmware_model.interface.codec.message import Message
@@ -22,83 +22,58 @@ SET_PROFILE, SET_SWITCH, SHOWN = "SetProfile", "SetSwitch", "Profile"
 _PROFILES = (*PROFILES, MIXED)
 
 
-class SwitchMessages(NamedTuple):
-    """What an interface has for its switches."""
-
-    telecommands: tuple[Message, ...]
-    telemetry: Message
-
-
 def switch_messages(
     switches: type[Switches], telecommand: int, telemetry: int, kept: str
-) -> SwitchMessages:
-    """Messages for ``switches``, extensions all.
+) -> tuple[Message, ...]:
+    """SetProfile, SetSwitch and telemetry Profile of ``switches``, extensions all.
 
     ``telecommand`` is the first of two IDs, ``telemetry`` the third's; ``kept`` says what becomes
     of a change at a reset. Switches of the board are shown, and no telecommand knows them.
     """
-    declared, numbers = switches.declared(), _value_numbers(switches)
-    values = {
-        name: _choices(
-            _field_name(name),
-            f"Values of switch {name}: {one.meaning}.",
-            {key: numbers[key] for key in (_value_name(name, value) for value in one.choices)},
-        )
+    declared, numbers = switches.declared(), _numbers(switches)
+    values = [
+        _choices(_field_name(name), f"Values of switch {name}: {one.meaning}.", numbers[name])
         for name, one in declared.items()
-    }
+    ]
+    shown = [
+        enum8(_field_name(name), one.meaning, choices=choices)
+        for (name, one), choices in zip(declared.items(), values, strict=True)
+    ]
     places = {name: at for at, name in enumerate(declared) if not declared[name].hardware}
-    of_switch = {at: values[name] for name, at in places.items()}
-    every = {one.name: int(one) for choices in of_switch.values() for one in choices}
-    profile = enum8(
-        "Profile",
-        "of all switches together",
-        choices=_choices("Profile", "How switches are set.", _numbered(_PROFILES)),
-    )
+    every = {key: number for name in places for key, number in numbers[name].items()}
+    which = _choices("Switch", "Switches of the firmware.", places)
+    any_value = _choices("SwitchValue", "Values of all switches of the firmware.", every)
+    of_switch = {at: values[at] for at in places.values()}
+    first = min(of_switch)
+    profiles = _choices("Profile", "How switches are set.", _numbered(_PROFILES))
+    profile = enum8("Profile", "of all switches together", choices=profiles)
+    settable = profile.within(None, len(PROFILES) - 1)
+    switch = u8("Switch", "which one", choices=which, reset=first)
+    value = u8("Value", "one of that switch's values", choices=any_value, reset=min(values[first]))
     effect = f"of the firmware from the next picture on; {kept}"
-    messages = (
-        Message(telecommand, SET_PROFILE, f"set switches {effect}").of(
-            profile.within(None, len(PROFILES) - 1)
+    return (
+        Message(telecommand, SET_PROFILE, f"set switches {effect}", extension=True).of(settable),
+        Message(telecommand + 1, SET_SWITCH, f"set a switch {effect}", extension=True).of(
+            switch, replace(value, choices_by=("Switch", of_switch))
         ),
-        Message(telecommand + 1, SET_SWITCH, f"set a switch {effect}").of(
-            u8(
-                "Switch",
-                "which one",
-                choices=_choices("Switch", "Switches of the firmware.", places),
-                reset=min(of_switch),
-            ),
-            u8(
-                "Value",
-                "one of that switch's values",
-                choices=_choices("SwitchValue", "Values of all switches of the firmware.", every),
-                choices_by=("Switch", of_switch),
-                reset=min(of_switch[min(of_switch)]),
-            ),
-        ),
-        Message(telemetry, SHOWN, "which algorithms the device runs").of(
-            profile,
-            *(
-                enum8(_field_name(name), one.meaning, choices=values[name])
-                for name, one in declared.items()
-            ),
+        Message(telemetry, SHOWN, "which algorithms the device runs", extension=True).of(
+            profile, *shown
         ),
     )
-    *telecommands, shown = (replace(message, extension=True) for message in messages)
-    return SwitchMessages(tuple(telecommands), shown)
 
 
 def shown_values(switches: Switches) -> dict[str, int]:
     """What telemetry shows of them."""
-    numbers = _value_numbers(type(switches))
     values = {"Profile": _PROFILES.index(switches.profile)}
-    for name in switches.declared():
+    for name, numbers in _numbers(type(switches)).items():
         values[_field_name(name)] = numbers[_value_name(name, getattr(switches, name))]
     return values
 
 
 def switches_shown(switches: type[SwitchesT], values: Mapping[str, Value]) -> SwitchesT:
     """The ``switches`` of which telemetry has these ``values``; ValueError for a wrong one."""
-    numbers = {name: int(values[_field_name(name)]) for name in switches.declared()}
-    return switches(**{name: _value(switches, name, at) for name, at in numbers.items()})
+    names = switches.declared()
+    return switches(**{n: _value(switches, n, int(values[_field_name(n)])) for n in names})
 
 
 def after(switches: SwitchesT, telecommand: str, values: Mapping[str, Value]) -> SwitchesT:
@@ -117,20 +92,20 @@ def switch_parameters(switch: str, value: str) -> dict[str, str]:
     return {"Switch": switch.upper(), "Value": _value_name(switch, value)}
 
 
-def _value(switches: type[Switches], name: str, number: int) -> str:
-    numbers, choices = _value_numbers(switches), switches.declared()[name].choices
-    for value in choices:
-        if numbers[_value_name(name, value)] == number:
-            return value
-    raise ValueError(f"switch {name} has no value with number {number}")
-
-
-def _value_numbers(switches: type[Switches]) -> dict[str, int]:
-    return _numbered(
-        _value_name(name, value)
+def _numbers(switches: type[Switches]) -> dict[str, dict[str, int]]:
+    """By switch, the number of each value's name."""
+    names = {
+        name: [_value_name(name, value) for value in one.choices]
         for name, one in switches.declared().items()
-        for value in one.choices
-    )
+    }
+    numbers = _numbered(name for ours in names.values() for name in ours)
+    return {switch: {name: numbers[name] for name in ours} for switch, ours in names.items()}
+
+
+def _value(switches: type[Switches], name: str, number: int) -> str:
+    """The value as declared; one that there is not is the number, which no switch takes."""
+    values = zip(_numbers(switches)[name].values(), switches.declared()[name].choices, strict=True)
+    return dict(values).get(number, str(number))
 
 
 def _numbered(names: Iterable[str]) -> dict[str, int]:

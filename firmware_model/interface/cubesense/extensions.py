@@ -11,8 +11,10 @@ from cubestack.firmware_model.interface.codec.switch_messages import switch_mess
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 
-#: Messages of the switches.
-SWITCHES = switch_messages(CubeSenseSwitches, 101, 227, "lost when the program restarts")
+#: Telecommands of the switches.
+*SET_SWITCHES, _SHOWN = switch_messages(
+    CubeSenseSwitches, 101, 227, "lost when the program restarts"
+)
 
 _extension = partial(Message, extension=True)
 
@@ -76,5 +78,5 @@ EXTENSIONS = (
         u8("Search", "way of the search", choices=codes.NadirSearch)
     ),
     *(_edges(part) for part in range(2)),
-    SWITCHES.telemetry,
+    _SHOWN,
 )

@@ -12,7 +12,7 @@ from functools import partial
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
 from cubestack.firmware_model.interface.cubesense import codes
-from cubestack.firmware_model.interface.cubesense.extensions import SWITCHES
+from cubestack.firmware_model.interface.cubesense.extensions import SET_SWITCHES
 
 #: r_d = sum of DISTORTION[k] r_u^k, both radii in px from the boresight.
 DISTORTION = (0.1036, 0.9953, 7.6076e-5, -2.5572e-6, 0.0)
@@ -137,7 +137,7 @@ _COMMON = (
     Message(
         100, "SetNadirSearch", "how the nadir camera's edges are looked for", extension=True
     ).of(u8("Search", "way of the search", choices=codes.NadirSearch)),
-    *SWITCHES.telecommands,
+    *SET_SWITCHES,
 )
 
 TELECOMMANDS = tuple(

@@ -19,7 +19,9 @@ UPLOAD_BLOCK_BYTES = 128
 
 _LARGEST_FRAME_RATE = 39  # of 27 MHz / 1322 clocks a line: a frame outlasts its 512 lines
 
-_SWITCHES = switch_messages(CubeStarSwitches, 108, 208, "kept by every reset but telecommand Reset")
+*_SET_SWITCHES, _SWITCHES_SHOWN = switch_messages(
+    CubeStarSwitches, 108, 208, "kept by every reset but telecommand Reset"
+)
 
 _TELECOMMANDS = (
     Message(100, "UploadBlock", "write a block of the picture memory").of(
@@ -58,7 +60,7 @@ _TELECOMMANDS = (
         106, "SelectCameraRegister", "read an image sensor register into telemetry CameraRegister"
     ).of(u16("Address", "register's address")),
     Message(107, "StopLoop", "end the 1 s loop after its present iteration"),
-    *_SWITCHES.telecommands,
+    *_SET_SWITCHES,
 )
 
 _TELEMETRY = (
@@ -119,7 +121,7 @@ _TELEMETRY = (
         f32("MeanConfidence", "mean confidence of the identified stars, 0 to 1"),
         u8("MaxVotes", "most verification votes of a star"),
     ),
-    _SWITCHES.telemetry,
+    _SWITCHES_SHOWN,
 )
 
 EXTENSION_TELECOMMANDS = tuple(replace(message, extension=True) for message in _TELECOMMANDS)

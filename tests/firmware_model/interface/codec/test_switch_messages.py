@@ -22,7 +22,7 @@ class Own(Switches):
     fit: str = switch("", "all", "some-of-them", source="", reason="")
 
 
-(SET_PROFILE, SET_SWITCH), SHOWN = switch_messages(Own, 100, 200, "kept")
+SET_PROFILE, SET_SWITCH, SHOWN = switch_messages(Own, 100, 200, "kept")
 PUBLISHED, EXTENDED = Own.of("published"), Own.of("extended")
 
 
@@ -44,6 +44,8 @@ def test_a_profile_that_is_none_is_refused(number: int) -> None:
 def test_the_boards_switch_is_shown_and_stays() -> None:
     with pytest.raises(InterfaceError, match="no choice 'LENS'; known: STAR_LIMIT, FIT"):
         SET_SWITCH.pack(**switch_parameters("lens", "drawn"))
+    with pytest.raises(InterfaceError, match="no choice 'NONSENSE'; known: STAR_LIMIT_3_8, "):
+        SET_SWITCH.pack(**switch_parameters("fit", "nonsense"))
     changed = after(PUBLISHED, "SetProfile", {"Profile": 1})
     assert changed == Own(lens="ideal", star_limit="4", fit="some-of-them")
     assert shown_values(changed) == {"Profile": 2, "Lens": 0, "StarLimit": 3, "Fit": 5}
@@ -54,7 +56,7 @@ def test_the_boards_switch_is_shown_and_stays() -> None:
 def test_what_is_shown_is_what_there_is(switches: Own) -> None:
     values = SHOWN.unpack(SHOWN.pack(**shown_values(switches)))
     assert switches_shown(Own, values) == switches
-    with pytest.raises(ValueError, match="switch fit has no value with number 9"):
+    with pytest.raises(ValueError, match="switch fit must be one of all, some-of-them, not '9'"):
         switches_shown(Own, values | {"Fit": 9})
 
 
