@@ -6,21 +6,25 @@ is fitted. The stars' directions are the catalogue's.
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
+from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import PATH, Options, option, whole
 from cubestack.host.pictures.residuals import save_residuals
 
 if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import Board
     from cubestack.emulator.camera.common.optics import Optics
+    from cubestack.emulator.camera.common.view import SkyCondition
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 DEFAULT_PICTURES = 20
@@ -79,6 +83,15 @@ class CalibrateOptions(Options):
         return found
 
 
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What the device looks at: a sky, or the part of a picture from ``corner`` on."""
+
+    scene: Any
+    picture: Path | None = None
+    corner: tuple[int, int] = (0, 0)
+
+
 @dataclass(frozen=True)
 class CalibrateResult(Result):
     """Attributes are those of the JSON output.
@@ -105,44 +118,62 @@ class CalibrateResult(Result):
     lens_px: float | None
 
 
-OpenerT = TypeVar("OpenerT", bound=Opener[Any, Any])
-OptionsT = TypeVar("OptionsT", bound=CalibrateOptions)
+ClientT = TypeVar("ClientT", bound=DeviceClient)
+_Opener: TypeAlias = "Opener[Board, ClientT]"
 
 
-class StarCalibration(Experiment[OpenerT, OptionsT, CalibrateResult]):
+class StarCalibration(
+    Experiment["_Opener[ClientT]", CalibrateOptions, CalibrateResult], Generic[ClientT]
+):
     """Calibrates a star tracker's camera.
 
+    The firmware that names the stars is the extended one: as printed, it names few with a lens
+    that is a pixel off.
+
     Attributes:
-        free: parameters that are fitted.
         size: columns and rows of the sensor.
+        free: parameters that are fitted.
+        mag_limit: of the emulated sky; None for none.
     """
 
+    options = CalibrateOptions
     label = ""
-    free: Sequence[str] = PARAMETERS
+    decides = ("profile", "set")
     size: tuple[int, int]
+    free: Sequence[str] = PARAMETERS
+    mag_limit: float | None = None
 
     @abstractmethod
-    def guess(self, options: OptionsT) -> Camera:
-        """The camera that the device's tables have."""
+    def tables(self) -> "Optics":
+        """The lens that the device's tables have."""
 
     @abstractmethod
-    def optics(self, options: OptionsT) -> "Optics":
-        """The lens of the unit that takes emulated pictures."""
+    def condition(self, options: CalibrateOptions) -> "SkyCondition":
+        """What the camera is like of the unit that takes emulated pictures."""
 
     @abstractmethod
-    def sights(self, opened: OpenerT, options: OptionsT, camera: Camera) -> Iterator[Sight]:
-        """Each picture's identified stars, by a device that has ``camera`` loaded."""
+    def load(self, client: ClientT, camera: Camera, light: Path | None) -> None:
+        """Tell the device its camera, and what else it needs for a picture, if it is one."""
 
-    def run(self, opened: OpenerT, options: OptionsT) -> Iterator[CalibrateResult]:
+    @abstractmethod
+    def identify(self, client: ClientT) -> Mapping[int, tuple[float, float]]:
+        """Take a picture; places of the stars that the device names, by Hipparcos number."""
+
+    def board(self, camera: Camera) -> Mapping[str, Any]:
+        """Options of the board that go with a camera."""
+        return {}
+
+    def run(
+        self, opened: "_Opener[ClientT]", options: CalibrateOptions
+    ) -> Iterator[CalibrateResult]:
         """Identify and fit, several times over."""
         given = options.camera
-        guess = camera = self.guess(options) if given is None else load_camera(given)
+        guess = camera = self._like(self.tables()) if given is None else load_camera(given)
+        looks = self._looks(options)
         for number in range(options.rounds):
             label = f"identifying stars, round {number + 1}"
-            pictures = opened.shown(
-                self.sights(opened, options, camera), self.tried(options), label
-            )
-            sights = list(pictures)
+            pictures = self._sights(opened, options.seed, looks, camera)
+            sights = list(opened.shown(pictures, len(looks), label))
             fit = fit_camera(sights, camera, self.free)
             camera = fit.camera
         before = fit_camera(sights, guess, ()).after_px
@@ -151,13 +182,13 @@ class StarCalibration(Experiment[OpenerT, OptionsT, CalibrateResult]):
             save_residuals(fit.places, fit.residuals, options.out.with_suffix(".png"))
         lens_px = None
         if options.images is None:
-            lens_px = _over_picture(self.optics(options), self.size, camera, ()).after_px
+            lens_px = self._over_picture(self.condition(options).optics, camera, ()).after_px
         yield CalibrateResult(
             camera=asdict(camera),
             sigma=fit.sigma,
             pairs_f_px=fit.pairs_f_px,
             pictures=fit.pictures,
-            tried=self.tried(options),
+            tried=len(looks),
             stars=len(fit.places),
             rejected=fit.rejected,
             before_px=before,
@@ -165,22 +196,58 @@ class StarCalibration(Experiment[OpenerT, OptionsT, CalibrateResult]):
             lens_px=lens_px,
         )
 
-    def tried(self, options: OptionsT) -> int:
-        """Pictures that are looked at in a round."""
+    def _looks(self, options: CalibrateOptions) -> list[_Look]:
+        """All that the device looks at; large pictures in parts that do not overlap."""
+        from cubestack.emulator.camera.common.view import SkyView
+        from cubestack.emulator.scene.attitude import random_quaternion
+        from cubestack.emulator.scene.picture import PictureScene, load_picture
+        from cubestack.emulator.scene.sky import SkyScene
+
         if options.images is None:
-            return options.emulated or DEFAULT_PICTURES
-        return len(list(self.parts(options)))
-
-    def parts(self, options: OptionsT) -> Iterator[tuple[Path, tuple[int, int]]]:
-        """Pictures, and the left upper corners of parts of the sensor's size, without overlap."""
-        from cubestack.emulator.scene.picture import load_picture
-
-        columns, rows = self.size
+            rng, own = np.random.default_rng(options.seed), self.condition(options)
+            skies = [
+                SkyScene(random_quaternion(rng), mag_limit=self.mag_limit)
+                for _ in range(options.emulated or DEFAULT_PICTURES)
+            ]
+            return [
+                _Look(SkyView(sky, replace(own, seed=number))) for number, sky in enumerate(skies)
+            ]
+        looks = []
         for path in options.pictures:
-            height, width = load_picture(path).shape
-            for top in range(0, max(1, height - rows + 1), rows):
-                for left in range(0, max(1, width - columns + 1), columns):
-                    yield path, (left, top)
+            sides = zip(load_picture(path).shape, reversed(self.size), strict=True)
+            tops, lefts = (range(0, max(1, there - own + 1), own) for there, own in sides)
+            for corner in product(lefts, tops):
+                looks.append(_Look(PictureScene(path, crop=corner), path, corner))
+        return looks
+
+    def _sights(
+        self, opened: "_Opener[ClientT]", seed: int, looks: Sequence[_Look], camera: Camera
+    ) -> Iterator[Sight]:
+        """Each picture's identified stars, by a device that has ``camera`` loaded."""
+        from cubestack.emulator.scene.hipparcos import load_sky
+
+        sky = load_sky()
+        own = self.board(camera)
+        with opened(looks[0].scene, seed=seed, profile="extended", **own) as emulated:
+            for look in looks:
+                emulated.scene = look.scene
+                self.load(emulated.client, camera.cropped(*look.corner), look.picture)
+                named = self.identify(emulated.client)
+                places = np.array([*named.values()], np.float64).reshape(-1, 2) + look.corner
+                rows = np.searchsorted(sky.hip, np.array([*named], np.int64))
+                yield Sight(places, sky.vectors[rows])
+
+    def _like(self, optics: "Optics") -> Camera:
+        """The camera that is most like a lens over the picture."""
+        f_px = 1000 * optics.focal_length_mm / optics.pixel_pitch_um
+        return self._over_picture(optics, Camera(f_px, optics.cx, optics.cy), self.free).camera
+
+    def _over_picture(self, optics: "Optics", camera: Camera, free: Sequence[str]) -> Fit:
+        """Fit a camera to a lens over the picture, at the best rotation."""
+        sides = zip(self.size, GRID, strict=True)
+        columns, rows = (np.linspace(0, side - 1, places) for side, places in sides)
+        pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        return fit_camera([Sight(pixels, optics.unproject(pixels))], camera, free, exact=True)
 
     def summarise(self, results: Sequence[CalibrateResult], wall_s: float) -> Iterable[str]:
         """Parameters with deviations, and residuals."""
@@ -198,29 +265,3 @@ class StarCalibration(Experiment[OpenerT, OptionsT, CalibrateResult]):
             if result.lens_px is not None:
                 yield f"from the emulated unit's own lens: {result.lens_px:.3f} px"
         yield f"{wall_s:.1f} s wall time"
-
-
-def sight_of(named: Mapping[int, tuple[float, float]]) -> Sight:
-    """Stars of a picture by their Hipparcos numbers, with the catalogue's directions."""
-    from cubestack.emulator.scene.hipparcos import load_sky
-
-    sky = load_sky()
-    rows = np.searchsorted(sky.hip, np.array([*named], np.int64))
-    return Sight(np.array([*named.values()], np.float64).reshape(-1, 2), sky.vectors[rows])
-
-
-def camera_like(
-    optics: "Optics", size: tuple[int, int], free: Sequence[str] = PARAMETERS
-) -> Camera:
-    """The camera that is most like a lens over the picture."""
-    f_px = 1000 * optics.focal_length_mm / optics.pixel_pitch_um
-    return _over_picture(optics, size, Camera(f_px, optics.cx, optics.cy), PARAMETERS).camera
-
-
-def _over_picture(
-    optics: "Optics", size: tuple[int, int], camera: Camera, free: Sequence[str]
-) -> Fit:
-    """Fit a camera to a lens over the picture, at the best rotation."""
-    columns, rows = (np.linspace(0, n - 1, m) for n, m in zip(size, GRID, strict=True))
-    pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    return fit_camera([Sight(pixels, optics.unproject(pixels))], camera, free, exact=True)

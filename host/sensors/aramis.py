@@ -52,6 +52,7 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     default_scene=call("cubestack.emulator.scene.sky:SkyScene.pointing", *POINTING_DEG),
     default_scene_title="Orion",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
+    calibration=get(f"{EXPERIMENTS}.calibrate:EXPERIMENT"),
     reports=(
         Report(
             "catalogue",
