@@ -7,7 +7,8 @@ Program code is not modelled, so flash must leave room for it. The Earth and the
 looked for at the same time, so their buffers share their places.
 """
 
-from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
+from cubestack.firmware_model.cubesense.links.bench import LETTERS
+from cubestack.firmware_model.cubesense.links.picture_sender import CHUNK_BYTES
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES, Projection
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES

@@ -9,6 +9,7 @@ from cubestack.firmware_model.cubesense.camera_control import CameraControl
 from cubestack.firmware_model.cubesense.commands import Commands
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import JobQueue
+from cubestack.firmware_model.cubesense.links.backup_uart import BackupUart
 from cubestack.firmware_model.cubesense.links.bench import BenchLink
 from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.links.registers import RegisterLink
@@ -36,6 +37,7 @@ class CubeSenseProgram:
     Attributes:
         node: the node protocol; its methods are the interrupts of its UART and I2C address.
         registers: the register protocol; the same of its I2C address.
+        backup: the register protocol on the node's UART, where that is chosen.
         bench: the bench protocol; the same of its UART.
         idle: nothing waits to be done.
         state: what the program remembers; traces read it.
@@ -61,6 +63,7 @@ class CubeSenseProgram:
         reader, download = self.commands.reader, self.commands.download
         self.node = NodeLink(jobs, Telemetry(hardware, meter, state, self._supply, download))
         self.registers = RegisterLink(hardware, meter, state, jobs, reader)
+        self.backup = BackupUart(hardware, meter, state, jobs, reader)
         self.bench = BenchLink(hardware, meter, state, jobs, reader, measurement)
 
     def main(self) -> Routine[None]:

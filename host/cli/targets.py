@@ -13,7 +13,10 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="TARGET", help=FORMS)
     parser.add_argument("--device", choices=device_names(), help="where the target does not tell")
     parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
-    parser.add_argument("--baud", type=whole(1), help="of the node protocol's line")
+    parser.add_argument(
+        "--backup", action="store_true", help="the serial line has the register protocol"
+    )
+    parser.add_argument("--baud", type=whole(1), help="of the serial line")
     parser.add_argument("--scene", type=Path, metavar="FILE", help="of an emulated device")
     parser.add_argument("--seed", type=whole(0), default=0, help="of an emulated device")
     parser.add_argument("--record", type=Path, metavar="FILE", help="what is said, to a recording")
@@ -25,6 +28,7 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
         text,
         args.device,
         service_port=args.bench,
+        backup=args.backup,
         baud=args.baud,
         scene=args.scene,
         seed=args.seed,

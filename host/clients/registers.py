@@ -1,5 +1,7 @@
 """Client of a register-pointer protocol on I2C, through any object with smbus2's ``i2c_rdwr``.
 
+``RegisterLine`` is such an object for a serial line that has the same protocol.
+
 Registers come from a map (CubeSense thesis, section 6.4.3). The slave can not refuse anything, so
 what the map forbids is refused here, before it is sent.
 """
@@ -13,9 +15,13 @@ from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 from cubestack.host.clients.contract import Progress
 from cubestack.host.clients.i2c import I2cBus, T, acknowledged
+from cubestack.host.transport.streams import READ_BYTES, Transport
 
 #: Longest read that the Linux kernel's I2C_RDWR takes.
 CHUNK_BYTES = 8192
+
+#: Flag of a message that reads.
+I2C_READ = 1
 
 
 class RegisterClient:
@@ -105,3 +111,37 @@ class RegisterClient:
         where = f"I2C address {self._address:#04x} in {times}"
         what = f"register {register.name} not acknowledged at {where}"
         return acknowledged(transfer, attempts, self._wait, what)
+
+
+class RegisterLine:
+    """A serial line as the bus of a ``RegisterClient``.
+
+    A message is the slave's address with the direction in its lowest bit, the register's address
+    and, to write, one data byte (CubeSense thesis, section 6.4.3).
+    """
+
+    def __init__(self, line: Transport, timeout_s: float = 1.0) -> None:
+        """Speak on ``line``, which stays its owner's; ``timeout_s`` is the longest silence."""
+        self._line = line
+        self._timeout_s = timeout_s
+        self._ahead = bytearray()  # of a read that goes on
+
+    def i2c_rdwr(self, *i2c_msgs: i2c_msg) -> None:
+        """A write, a read behind one, or a read that goes on; TimeoutError without an answer."""
+        *_, last = i2c_msgs
+        reads = bool(last.flags & I2C_READ)
+        if len(i2c_msgs) > reads:
+            self._ahead.clear()
+            while self._line.read(READ_BYTES, 0.0):  # what came late is no answer
+                pass
+            self._line.write(bytes([last.addr << 1 | reads]) + bytes(i2c_msgs[0]))
+        if not reads:
+            return
+        while len(self._ahead) < last.len:
+            data = self._line.read(READ_BYTES, self._timeout_s)
+            if not data:
+                raise TimeoutError(f"{len(self._ahead)} of {last.len} bytes came")
+            self._ahead += data
+        for index in range(last.len):
+            last.buf[index] = bytes([self._ahead[index]])
+        del self._ahead[: last.len]

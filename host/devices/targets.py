@@ -26,7 +26,7 @@ from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.contract import Client
 from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.emulated import open_device
@@ -94,6 +94,7 @@ def open_target(
     device: str | None = None,
     *,
     service_port: str | None = None,
+    backup: bool = False,
     baud: int | None = None,
     scene: Path | None = None,
     seed: int = 0,
@@ -106,7 +107,8 @@ def open_target(
         device: name of the device; not needed for emulated devices, recordings and default I2C
             addresses.
         service_port: another serial line, with the one-letter protocol.
-        baud: of the node protocol's line; None for the published one.
+        backup: the serial line has the register protocol in place of the node protocol.
+        baud: of the serial line; None for the published one.
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.
         record: file for a recording of what is said; of an emulated device, at its pins.
@@ -117,6 +119,8 @@ def open_target(
         RecordingError: a file is no recording.
         ValueError: a scene file that is none, or a file that can not be written.
     """
+    if backup and text.startswith((EMULATED, RECORDED, I2C)):
+        raise TargetError(f"--backup is for a serial line, not for {text}")
     if text.startswith(EMULATED):
         if service_port is not None:
             raise TargetError(f"{text} has its bench protocol already: leave out --bench")
@@ -130,7 +134,7 @@ def open_target(
         if text.startswith(RECORDED):
             target = _open_recorded(text)
         else:
-            target = _open_real(text, device, service_port, baud, tape)
+            target = _open_real(text, device, service_port, backup, baud, tape)
         target.on_close.insert(0, stack.pop_all().close)
         return target
 
@@ -172,6 +176,7 @@ def _open_real(
     text: str,
     name: str | None,
     service_port: str | None,
+    backup: bool,
     baud: int | None,
     tape: HostRecorder | None,
 ) -> Target:
@@ -181,12 +186,17 @@ def _open_real(
         bauds: dict[str, int] = {}
     else:
         found = device_of(name, text)
-        baud = baud or found.interface.baud
+        registers = found.interface.registers if backup else None
+        if backup and (registers is None or registers.baud is None):
+            raise TargetError(f"{found.title} has no registers on a UART: leave out --backup")
+        baud = baud or (registers and registers.baud) or found.interface.baud
         line = open_transport(text, baud)
         if tape is not None:
             line = tape.line(line, "uart", baud)
         node = NodeClient(line, found.interface)
         target = Target(text, found.interface, node, line, device=found, on_close=[line.close])
+        if registers is not None:
+            target.registers = RegisterClient(RegisterLine(line), registers)
         bauds = {"uart": baud}
     if service_port is not None:
         bauds["bench_uart"] = _open_service_port(target, service_port, tape)

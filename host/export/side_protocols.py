@@ -11,6 +11,11 @@ from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.register_pointer import FILL, PointerMap
 from cubestack.host.export.field_text import field_details, field_json, field_type, picked
 
+_UART = (
+    "On a UART: the I2C address with the direction in its lowest bit (1 reads), the register's "
+    "address, and a data byte or the answer; where there is nothing, no answer. "
+)
+
 
 def side_table(interface: Interface) -> Iterator[str]:
     """Plain text, one line for each register and letter."""
@@ -42,7 +47,7 @@ def side_markdown(interface: Interface) -> Iterator[str]:
             "bytes are signed, the most significant first. Writing the address latches the value; "
             "a read without it continues where the last one stopped. Where there is nothing, "
             f"{FILL:#04x} is read. What can not or must not be written is ignored. "
-            f"{interface.registers.note}",
+            f"{_UART * (interface.registers.baud is not None)}{interface.registers.note}",
             "",
             "| address | access | type | register | meaning |",
             "|-|-|-|-|-|",
@@ -72,7 +77,7 @@ def side_json(interface: Interface) -> dict[str, object]:
     content: dict[str, object] = {}
     if interface.registers is not None:
         content["registers"] = {
-            **picked(interface.registers, "i2c_address", "note"),
+            **picked(interface.registers, "i2c_address", "note", "baud"),
             "registers": [
                 {
                     "address": register.address,
@@ -103,6 +108,8 @@ def side_c(interface: Interface) -> Iterator[str]:
     if interface.registers is not None:
         yield from ("", "/* Registers; two bytes are signed, the most significant first. */")
         yield f"#define {upper}_REGISTER_I2C_ADDRESS 0x{interface.registers.i2c_address:02X}"
+        if interface.registers.baud is not None:
+            yield f"#define {upper}_REGISTER_BAUD {interface.registers.baud}"
         for register in interface.registers:
             name, field = f"{upper}_REGISTER_{register.name}", register.field
             unit = f" [{field.unit}]" if field.unit else ""
@@ -120,7 +127,8 @@ def side_c(interface: Interface) -> Iterator[str]:
 
 
 def _address(registers: PointerMap) -> str:
-    return f"I2C address {registers.i2c_address:#04x} (7 bits)"
+    line = "" if registers.baud is None else f", or on a UART at {registers.baud} baud 8N1"
+    return f"I2C address {registers.i2c_address:#04x} (7 bits){line}"
 
 
 def _line(protocol: LetterProtocol) -> str:

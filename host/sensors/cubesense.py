@@ -15,12 +15,10 @@ if TYPE_CHECKING:
 EXPERIMENTS = "cubestack.host.experiments.cubesense"
 
 
-def _open_board(
-    scene: "EarthSunScene | EarthSunView", *, baud: int | None = None, **common: Any
-) -> "CubeSenseBoard":
+def _open_board(scene: "EarthSunScene | EarthSunView", **common: Any) -> "CubeSenseBoard":
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-    return CubeSenseBoard(scene, baud=baud or INTERFACE.baud, **common)
+    return CubeSenseBoard(scene, **common)
 
 
 DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
@@ -57,6 +55,12 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     options=(
         BoardOption(
             "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"
+        ),
+        BoardOption(
+            "uart",
+            "protocol of the satellite's serial line (default node)",
+            ("node", "registers"),
+            "node",
         ),
     ),
     tops=get("cubestack.hdl.cubesense.tops:TOPS"),

@@ -73,10 +73,11 @@ class CubeSenseBoard(Board):
         *,
         seed: int = 0,
         engine: EngineKind = "auto",
-        baud: int = INTERFACE.baud,
+        baud: int | None = None,
         kernel: Kernel | None = None,
         i2c_bus: I2cBus | None = None,
         mcu_addressing: bool = False,
+        uart: str = "node",
         bench_baud: int = SERVICE_PORT.baud,
         i2c_address: int = INTERFACE.i2c_address,
         register_address: int = REGISTERS.i2c_address,
@@ -88,7 +89,9 @@ class CubeSenseBoard(Board):
             scene: what the cameras see.
             seed, kernel, i2c_bus: see ``Board``.
             engine: see ``make_engine``.
-            baud, bench_baud: of the serial lines with the node and the bench protocol.
+            baud, bench_baud: of the serial lines with the node and the bench protocol; None for
+                the published rate.
+            uart: protocol of the first of them: "node" or "registers".
             mcu_addressing: FPGAs with the option that lets the processor choose addresses.
             i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
             switches: of the program, the FPGAs' gateware, and the lenses, which are those of unit
@@ -103,7 +106,12 @@ class CubeSenseBoard(Board):
             )
             for target in Target
         }
-        self._node_link(lambda: self.program.node, baud, i2c_address)
+        if uart == "registers":
+            rate = baud or REGISTERS.baud or INTERFACE.baud
+            self._serial_line(rate, lambda: self.program.backup, title="register protocol")
+            self.i2c_bus.attach(i2c_address, Forwarder(lambda: [self.program.node]))
+        else:
+            self._node_link(lambda: self.program.node, baud or INTERFACE.baud, i2c_address)
         self.bench_uart = self._serial_line(
             bench_baud, lambda: self.program.bench, "bench_uart", "bench protocol", ".bench"
         )

@@ -13,20 +13,16 @@ from dataclasses import dataclass
 from cubestack.firmware_model.cubesense.download import PictureReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
+from cubestack.firmware_model.cubesense.links.picture_sender import PictureSender
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.letters import Letter
 from cubestack.firmware_model.interface.cubesense import codes, service_port
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
+from cubestack.firmware_model.mcu.requests import Routine
 
 LETTERS = 4
 """Letters that wait."""
-
-CHUNK_BYTES = 24
-"""Bytes of a picture that are read and handed to the UART at once, while as many may still wait."""
-
-_BYTE_US = -(-10 * 1_000_000 // service_port.SERVICE_PORT.baud)
 
 _CAMERAS: dict[Letter, codes.Camera] = {
     letter: camera
@@ -50,7 +46,7 @@ class BenchLink:
         """No letter waits."""
         self._letters: deque[Letter] = deque()
         self._work = Background(self._serve)
-        self._sent = 0
+        self._picture = PictureSender(self.hardware, self.meter, self.reader, Port.BENCH)
 
     def uart_byte(self, byte: int) -> None:
         """Interrupt: a byte came."""
@@ -72,10 +68,10 @@ class BenchLink:
         if letter == service_port.CAPTURES[camera]:
             done = yield from self._capture(letter, camera)
         else:
-            done = yield from self._send(codes.Sram(camera))
+            done = yield from self._picture.send_some(codes.Sram(camera))
         if done:
             self._letters.popleft()
-            self._sent = 0
+            self._picture.begin()
         if self._letters:
             self.queue.request(self._work, next_turn=True)
 
@@ -84,24 +80,5 @@ class BenchLink:
         self.state.schedule(camera, sram, detect=False)
         yield from self.measurement.measure(camera, sram, detect=False)
         if self.state.results[camera].capture.stored:
-            self._uart_send(letter.answer or b"")
+            self._picture.send(letter.answer or b"")
         return True
-
-    def _send(self, sram: codes.Sram) -> Routine[bool]:
-        """Send what there is room for; True at the picture's end."""
-        too_many = self.hardware.uart_backlog(Port.BENCH) - CHUNK_BYTES
-        if too_many > 0:
-            now_us: int = yield ReadTimer()
-            yield Sleep(now_us + too_many * _BYTE_US)
-            return False
-        count = min(CHUNK_BYTES, codes.IMAGE_BYTES - self._sent)
-        data = yield from self.reader.read_run(sram, self._sent, count)
-        if data is None:
-            return True
-        self._uart_send(data)
-        self._sent += count
-        return self._sent == codes.IMAGE_BYTES
-
-    def _uart_send(self, data: bytes) -> None:
-        self.meter.charge(uart_interrupt=len(data))
-        self.hardware.uart_send(data, Port.BENCH)

@@ -126,7 +126,8 @@ class RegisterLink:
         if self._written == 1:
             self._register = registers.REGISTERS.at(byte)
         elif self._written == 2:
-            self._write(byte)
+            if self._register is not None:
+                self.write(self._register.address, byte)
         else:
             return False
         self._latch()
@@ -158,8 +159,12 @@ class RegisterLink:
         if register is None or not register.readable or streams:
             self._latched = b""
             return
+        self._latched = self.read(register)
+
+    def read(self, register: PointerRegister) -> bytes:
+        """Value of one that can be read and is no stream."""
         self.meter.charge(host_message=1)
-        self._latched = register.encode(self._value(register.name))
+        return register.encode(self._value(register.name))
 
     def _value(self, name: str) -> float:
         if name in _SETTINGS:
@@ -175,8 +180,9 @@ class RegisterLink:
         }
         return others[name]
 
-    def _write(self, byte: int) -> None:
-        register = self._register
+    def write(self, address: int, byte: int) -> None:
+        """Store ``byte``, or act on it; ignored where it may not be."""
+        register = registers.REGISTERS.at(address)
         if register is None or register.streams:
             return
         value = register.field.decode(byte)

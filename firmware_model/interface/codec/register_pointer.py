@@ -1,4 +1,4 @@
-"""Registers behind a register pointer on I2C, as data.
+"""Registers behind a register pointer on I2C, and on a UART, as data.
 
 A host writes the address of a register, then either one data byte in the same transfer, or it reads
 the value after a repeated start or in a transfer of its own (CubeSense thesis, section 6.4.3).
@@ -11,6 +11,9 @@ Values of two bytes are signed. What is assumed, because the text leaves it open
 - A read beyond the end of a value, or of an address without a register, gives ``FILL`` bytes.
 - A slave can not refuse: a write to an address without a register, to one that can not be written,
   or of a value that is not allowed, is ignored.
+
+On a UART a message is the I2C address with the direction in its lowest bit, the register's address
+and, to write, one data byte; a read is answered with the value.
 """
 
 from collections.abc import Iterator
@@ -90,14 +93,22 @@ class PointerRegister:
 
 
 class PointerMap:
-    """All registers behind one I2C address; ``note`` is a sentence on the map as a whole."""
+    """All registers behind one I2C address; ``note`` is a sentence on the map as a whole.
+
+    ``baud`` is the rate of a UART that the same protocol can be chosen for, None for none.
+    """
 
     def __init__(
-        self, i2c_address: int, registers: tuple[PointerRegister, ...], note: str = ""
+        self,
+        i2c_address: int,
+        registers: tuple[PointerRegister, ...],
+        note: str = "",
+        baud: int | None = None,
     ) -> None:
         """Make the map; InterfaceError when registers share a name or an address."""
         self.i2c_address = i2c_address
         self.note = note
+        self.baud = baud
         self._by_address: dict[int, PointerRegister] = {}
         self._by_name: dict[str, PointerRegister] = {}
         for register in sorted(registers, key=lambda r: r.address):

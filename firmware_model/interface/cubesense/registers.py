@@ -1,4 +1,4 @@
-"""CubeSense's register map for the thesis' register-pointer protocol on I2C.
+"""CubeSense's register map for the thesis' register-pointer protocol on I2C and backup UART.
 
 CubeSense thesis, section 6.4.3: configuration registers of one byte, measurement registers that
 return a signed 16-bit number, and an image register that streams the whole picture. Which
@@ -89,6 +89,7 @@ _COMMON = (
 
 REGISTERS = PointerMap(
     i2c_address=0x1C,
+    baud=115_200,  # that of appendix E: the part has one UART
     registers=(*_camera(Camera.SUN), *_camera(Camera.NADIR), *_COMMON),
     note="The protocol is published; which registers there are, and their addresses, are assumed.",
 )

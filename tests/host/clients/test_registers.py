@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
-from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.errors import NoAnswerError
 
 from ..conftest import Slave
@@ -91,3 +91,39 @@ def test_a_silent_address_is_named(slave: Slave) -> None:
     with pytest.raises(NoAnswerError, match=r"register SUN_X .* address 0x33 in 3 attempts"):
         client.read("SUN_X")
     assert len(slave.waits) == 2
+
+
+class Line:
+    """A serial line: requests, and answers in pieces of 5000 bytes; the first so many fail."""
+
+    def __init__(self, answer: bytes, failures: int = 0) -> None:
+        self.answer, self.failures, self.written = answer, failures, b""
+        self._coming = b""
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+        self.failures -= 1
+        self._coming = self.answer if self.failures < 0 else self.answer[:1]
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        count = min(max_bytes, 5000) if timeout_s else 0
+        data, self._coming = self._coming[:count], self._coming[count:]
+        return data
+
+    def close(self) -> None:
+        raise AssertionError("the line stays its owner's")
+
+
+def test_registers_on_a_serial_line() -> None:
+    picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
+    line = Line(picture, failures=1)
+    client = RegisterClient(RegisterLine(line), REGISTERS, wait=lambda _s: None)
+    assert client.read_stream("IMAGE") == picture
+    assert line.written == bytes([0x39, 0x60]) * 2
+    line.answer = bytes.fromhex("FB2E")
+    assert client.read("nadir_x") == -12.34
+    client.write("SUN_THRESHOLD", 85)
+    assert line.written[4:] == bytes([0x39, REGISTERS["NADIR_X"].address, 0x38, 0, 85])
+    line.answer = b""
+    with pytest.raises(NoAnswerError, match="register SUN_X not acknowledged at I2C address 0x1c"):
+        client.read("SUN_X")

@@ -77,6 +77,19 @@ def test_recording_of_a_bus_on_which_nothing_was_said(tmp_path):
         open_target(f"recorded:{path}").node.telemetry("Identification")
 
 
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("i2c:7:0x1a", "--backup is for a serial line, not for i2c:7:0x1a"),
+        ("emulated:cubesense", "--backup is for a serial line"),
+        ("./tty", "CubeStar has no registers on a UART: leave out --backup"),
+    ],
+)
+def test_backup_where_there_is_none(text, error):
+    with pytest.raises(TargetError, match=error):
+        open_target(text, "cubestar", backup=True)
+
+
 def test_service_port_of_a_device_without_one():
     master, slave = os.openpty()
     with pytest.raises(TargetError, match="CubeStar has no bench protocol: leave out --bench"):

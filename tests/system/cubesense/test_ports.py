@@ -11,12 +11,13 @@ import serial
 from smbus2 import i2c_msg
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.devices.targets import open_target
 from tests.system.conftest import ROOT, Emulate, Open
 
 from .conftest import NADIR_DEG, SUN_DEG, check_right, sent
@@ -81,6 +82,37 @@ def test_examples_of_escapes_are_answered(served: Path) -> None:
             port.write(bytes.fromhex("1F7F A8 1FFF"))
             answer = port.read_until(b"\x1f\xff").hex()
         assert answer == wanted
+
+
+def test_registers_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
+    """Plain pyserial, then the client."""
+    tty = tmp_path / "tty"
+    with emulate("--uart", "registers", "--pty", "tty", "--pace", "fast"):
+        with serial.Serial(str(tty), 115_200, timeout=60) as port:
+
+            def read(address: int, count: int) -> bytes:
+                port.write(bytes([0x39, address]))
+                return port.read(count)
+
+            assert read(0x00, 1) == b"\xe1"
+            port.write(b"\x38\x00\xdc")
+            assert read(0x00, 1) == b"\xdc"
+            port.write(b"\x38\x10\x03")
+            deadline = time.monotonic() + 20
+            while (detect := read(0x29, 1)[0]) == DetectResult.PENDING:
+                assert time.monotonic() < deadline
+            assert detect == DetectResult.SUCCESS
+            centre = np.frombuffer(read(0x48, 2) + read(0x49, 2), ">i2") / 100 / 2.9
+            assert centre == pytest.approx((-8, 12), abs=0.5)
+            port.write(b"\x38\x12\x01")
+        target = open_target(str(tty), "cubesense", backup=True)
+        assert target.registers is not None
+        assert target.registers.read("SUN_THRESHOLD") == 220
+        data = target.registers.read_stream("IMAGE")
+        target.close()
+    picture = np.frombuffer(data, np.uint8).reshape(480, 640)
+    assert picture[236 + 36, 371 - 24] > 100  # the Earth
+    assert picture[5, 5] < 50
 
 
 def test_pictures_over_the_bench_are_what_the_camera_sent(ready: Open) -> None:

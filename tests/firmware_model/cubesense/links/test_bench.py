@@ -3,7 +3,8 @@
 import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
-from cubestack.firmware_model.cubesense.links.bench import CHUNK_BYTES, LETTERS
+from cubestack.firmware_model.cubesense.links.bench import LETTERS
+from cubestack.firmware_model.cubesense.links.picture_sender import CHUNK_BYTES
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,
