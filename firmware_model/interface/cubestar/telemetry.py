@@ -70,8 +70,11 @@ def _selected_star(number: int) -> Message:
 
 
 _QUATERNION = (
-    *_scaled("vector part, inertial to camera", "Qbar0", "Qbar1", "Qbar2"),
-    *_scaled("scalar part", "Qbar3"),
+    *(
+        field
+        for index, part in enumerate(("x of the vector part", "y", "z", "scalar part"))
+        for field in _scaled(f"{part}, inertial to camera", f"Qbar{index}")
+    ),
 )
 
 _NODE = (

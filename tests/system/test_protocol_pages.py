@@ -1,0 +1,66 @@
+"""The pages on the protocols: layouts are those of the tables, examples those of the device."""
+
+import re
+
+import pytest
+
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.devices.emulated import open_device
+from tests.system.conftest import ROOT
+
+PAGES = {
+    "protocols": ("cubestar", {131, 167, 177, 200}),
+    "protocols-cubesense": ("cubesense", {131, 148, 168, 193}),
+    "protocols-aramis": ("aramis", {131, 132, 134}),
+}
+
+
+def text_of(page: str) -> str:
+    return (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+
+
+def sections(text: str, mark: str) -> dict[str, str]:
+    """Text below each heading of a level, up to the next one of that level or above."""
+    parts = re.split(rf"^{mark} (.*)$", text, flags=re.MULTILINE)
+    end = rf"^#{{1,{len(mark)}}} "
+    return {
+        head: re.split(end, body, flags=re.MULTILINE)[0].strip()
+        for head, body in zip(parts[1::2], parts[2::2], strict=True)
+    }
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_layouts_of_the_pages_are_those_of_the_tables(page: str) -> None:
+    """A table that differs is to be copied from the page on the registers, which is generated."""
+    device, frames = PAGES[page]
+    declared = sections(text_of(f"registers-{device}"), "##")
+    shown = sections(text_of(page), "###")
+    assert shown == {head: declared[head] for head in shown}
+    told = {int(number) for number in re.findall(r"Telemetry (\d+)", " ".join(shown))}
+    assert told >= frames
+    codes = set(re.findall(r"; see (\w+)", "".join(shown.values()))) - {"AckError"}
+    assert codes <= shown.keys()
+
+
+def test_the_attitude_of_the_page_is_that_of_the_device() -> None:
+    page = text_of("protocols")
+    (block,) = re.findall(r"```wire-sky\n(.*?)```", page, re.DOTALL)
+    lines = [(line[:2], bytes.fromhex(line[3:])) for line in block.splitlines()]
+    answers = {}
+    scene = SkyScene.pointing(84.0, -1.0, 20.0)
+    with open_device("cubestar", scene, seed=4, profile="extended") as device:
+        port = device.serial(timeout=0.2)
+        for (_, request), (_, answer) in zip(lines[::2], lines[1::2], strict=True):
+            port.write(request)
+            assert port.read(100).hex(" ") == answer.hex(" "), request.hex(" ")
+            answers[request[2]] = answer[2:-2]
+            device.wait(1.5 if request[2] == 36 else 0.0)
+    rows = re.findall(r"^\| (\d+) \| `([\w ]+)` \| (\w+) \| (\S+) \|$", page, re.MULTILINE)
+    assert len(rows) >= 12
+    for number, raw, name, value in rows:
+        message = INTERFACE.telemetry(int(number))
+        field, data = message.field(name), answers[int(number)]
+        start = field.bit_offset // 8
+        assert data[start : start + field.bits // 8] == bytes.fromhex(raw)
+        assert float(message.unpack(data)[name]) == pytest.approx(float(value), rel=1e-6)
