@@ -8,7 +8,8 @@
         assert driver.attitude().valid
 
 Marker ``cubestack(scene=…, seed=…, faults=…)`` sets a device up: ``scene`` and ``faults`` are
-paths, or a scene of the emulator and the text of a plan. Seed, virtual time and number of fault
+paths, or a scene of the emulator and the text of a plan. It takes every option of the device's
+board too: ``profile="extended"``. Seed, virtual time and number of fault
 events go into the JUnit report; what the faults did is shown below a test that failed.
 """
 
@@ -18,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from cubestack.host.devices.registry import device_names
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
+from cubestack.host.devices.registry import device_names, devices
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
@@ -40,6 +42,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--cubestack-seed", type=int, default=0, metavar="N", help="seed of all emulated devices"
     )
     group.addoption(
+        "--cubestack-profile",
+        choices=PROFILES,
+        help=f"of all devices without one of their own (default {DEFAULT_PROFILE})",
+    )
+    group.addoption(
         "--cubestack-engine",
         choices=("auto", "compiled", "python"),
         default="auto",
@@ -50,7 +57,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker, and a fixture for each device."""
     config.addinivalue_line(
-        "markers", f"{MARKER}(scene, seed, faults): set up the emulated device of this test"
+        "markers",
+        f"{MARKER}(scene, seed, faults, profile, ...): set up the emulated device of this test",
     )
     fixtures = ModuleType("cubestack_fixtures")
     for name in device_names():
@@ -68,9 +76,13 @@ def _fixture(name: str) -> Any:
 
         options = _options(request.node)
         config = request.config
+        own, profile = device(name), config.getoption("--cubestack-profile")
+        board = {one: value for one, value in options.items() if one not in KEYS}
+        if profile is not None and own.switches.declared():
+            board = {"profile": profile, **board}
         seed = options.get("seed", config.getoption("--cubestack-seed"))
-        engine: Engine = config.getoption("--cubestack-engine") if device(name).has_fpga else "auto"
-        with open_device(name, options.get("scene"), seed=seed, engine=engine) as opened:
+        engine: Engine = config.getoption("--cubestack-engine") if own.has_fpga else "auto"
+        with open_device(name, options.get("scene"), seed=seed, engine=engine, **board) as opened:
             plan = options.get("faults")
             if plan is not None:
                 text = isinstance(plan, str) and ("\n" in plan or "=" in plan)
@@ -91,9 +103,10 @@ def _fixture(name: str) -> Any:
 def _options(item: pytest.Item) -> dict[str, Any]:
     options: dict[str, Any] = {}
     for marker in reversed(list(item.iter_markers(MARKER))):  # the closest one has the last word
-        if marker.args or not set(marker.kwargs) <= set(KEYS):
+        known = dict.fromkeys((*KEYS, *(one.name for own in devices() for one in own.all_options)))
+        if marker.args or not set(marker.kwargs) <= set(known):
             raise pytest.UsageError(
-                f"{item.nodeid}: marker {MARKER} takes {', '.join(KEYS)} by name, nothing else"
+                f"{item.nodeid}: marker {MARKER} takes {', '.join(known)} by name, nothing else"
             )
         options |= marker.kwargs
     return options

@@ -35,10 +35,29 @@ def refuse_zero(thing: Any, *names: str) -> None:
             raise SceneError(f"{name} must be above 0, not {getattr(thing, name)}")
 
 
+DEVICE_KEYS = ("profile", "set")
+"""Keys of a scene file that are for the device that looks at it: which switches it runs with."""
+
+
+def device_keys(path: Path) -> dict[str, str]:
+    """What a scene file says of the device that looks at it, by key; SceneError for no text.
+
+    Nothing for a file that can not be read as TOML: what is wrong with it, its reader tells.
+    """
+    try:
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    readers: Readers = dict.fromkeys(DEVICE_KEYS, text)
+    return read_table({key: table[key] for key in DEVICE_KEYS if key in table}, readers)
+
+
 def read_scene_file(
     path: Path, kinds: Mapping[str, Callable[[dict[str, Any]], V]], right: str
 ) -> V:
     """What the reader of its ``kind`` makes of the file's other keys; ``right`` tells the kinds.
+
+    The keys of ``DEVICE_KEYS`` are left out, as a scene knows no device.
 
     Raises SceneError for a file that can not be read or is no TOML, and for what its reader
     refuses by a ValueError.
@@ -51,6 +70,7 @@ def read_scene_file(
         raise SceneError(f"{path} is no TOML file: {error}") from None
     try:
         kind = table.pop("kind", None)
+        table = {key: value for key, value in table.items() if key not in DEVICE_KEYS}
         if not isinstance(kind, str) or kind not in kinds:
             raise SceneError(f"kind must be {right}, not {kind!r}")
         return kinds[kind](table)

@@ -16,6 +16,7 @@ import argparse
 import json
 from collections import Counter
 
+from cubestack.host.cli.device_options import given_options
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.suite import compare, run_suite
@@ -43,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
         if number:  # options are the first target's, but for the device
             args.bench = args.scene = args.baud = args.record = None
             args.backup = False
+            vars(args).update(dict.fromkeys(given_options(args)))
         target = open_any_target(text, args)
         try:
             args.device = args.device or target.interface.name.lower()

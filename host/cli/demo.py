@@ -11,6 +11,8 @@ import argparse
 from pathlib import Path
 
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.device_options import add_option, given_options
+from cubestack.host.devices.device import PROFILE_OPTIONS
 from cubestack.host.devices.registry import devices
 
 
@@ -30,13 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=whole(0), default=1, help="seed of the sensors' noise (default 1)"
     )
+    for option in PROFILE_OPTIONS:
+        add_option(parser, option)
 
 
 def run(args: argparse.Namespace) -> int:
     """Show the devices; returns 1 when one of them did not find what it looked for."""
     args.out.mkdir(parents=True, exist_ok=True)
+    board = [f"--{name}={value}" for name, value in given_options(args).items()]
     found = [
-        one.demo()(one, args.out, args.seed, args.photographs)
+        one.demo()(one, args.out, args.seed, args.photographs, board)
         for one in devices()
         if one.demo is not None and args.device in (None, one.name)
     ]

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
-from cubestack.host.devices.emulated import AnyEmulated
+from cubestack.host.devices.emulated import AnyEmulated, check_options
 from cubestack.host.devices.records import create_file, start_recorder, start_trace
 from cubestack.host.devices.registry import devices
+from cubestack.host.options import flag
 
 if TYPE_CHECKING:
     from cubestack.emulator.faults.injector import Faults
@@ -72,21 +73,17 @@ def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str
         )
 
 
+def given_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The board options that were given, whichever device has them."""
+    names = dict.fromkeys(option.name for device in devices() for option in device.all_options)
+    return {name: value for name in names if (value := getattr(args, name, None)) is not None}
+
+
 def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any]:
-    """The board options that were given, but for defaults; ValueError for another device's."""
-    own = {option.name for option in device.all_options}
-    chosen = {}
-    for other in devices():
-        for option in other.all_options:
-            value = getattr(args, option.name, None)
-            if value is None or value == option.default:
-                continue
-            if option.name not in own:
-                raise ValueError(
-                    f"{option.flag} is an option of {other.name}, not of {device.name}"
-                )
-            chosen[option.name] = value
-    return chosen
+    """The same for a device; ValueError for another one's."""
+    options = given_options(args)
+    check_options(device, options, flag)
+    return options
 
 
 def tell_notices(

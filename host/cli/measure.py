@@ -13,7 +13,7 @@ examples:
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from rich.table import Table
@@ -23,7 +23,7 @@ from cubestack.host.cli.device_options import add_engine_arguments, add_option, 
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import devices
-from cubestack.host.experiments.measure import board_options
+from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import between
 from cubestack.host.terminal import console, progress, say
@@ -87,6 +87,9 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
     options = chosen(args, experiment.options)
     given = {name: getattr(args, name, None) for name in board_options(device, experiment)}
     board = {name: value for name, value in given.items() if value is not None}
+    if experiment.powers_up:
+        board = board_as_said(device, options, board)
+    runs = running(device, experiment, board)
     if not args.json:
         tell_notices(device, board, say)
 
@@ -102,9 +105,9 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
         if least is not None and not hasattr(result, "right"):
             raise ValueError(f"results of {device.name} do not say what is right: no --min-right")
         if args.json:
-            print(json.dumps(result.as_dict()), flush=True)
+            print(json.dumps(result.as_dict() | runs), flush=True)
     if not args.json:
-        _report(experiment, results, time.monotonic() - started)
+        _report(experiment, results, time.monotonic() - started, runs)
     enough = least is None or _are_right(results, least)
     return 0 if enough and experiment.succeeded(results) else 1
 
@@ -121,10 +124,15 @@ def _are_right(results: list[Result], least: float) -> bool:
     return False
 
 
-def _report(experiment: AnyExperiment, results: list[Result], wall_s: float) -> None:
-    """Show a table of the first results, and what all are together."""
+def _report(
+    experiment: AnyExperiment, results: list[Result], wall_s: float, runs: Mapping[str, Any]
+) -> None:
+    """Show a table of the first results, and what all are together; ``runs`` as ``running``."""
     if experiment.columns:
-        table = Table(title=experiment.title)
+        profile = f"; profile {runs['profile']}" if runs else ""
+        for name, value in runs.get("switches", {}).items():
+            profile += f", {name}={value}"
+        table = Table(title=experiment.title + profile)
         for column in experiment.columns[:-1]:
             table.add_column(column, justify="right")
         table.add_column(experiment.columns[-1], overflow="fold")

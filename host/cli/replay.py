@@ -70,6 +70,11 @@ def _open(recording: Recording, setup: Setup, engine: Engine) -> AnyEmulated:
     """The device, made as ``setup`` says."""
     found = device(recording.device)
     options: dict[str, Any] = dict(setup.options)
+    made = recording.setup
+    if found.switches.declared() and "profile" not in options and not (made and made.target):
+        options["profile"] = "extended"
+        if made is not None:
+            say(f"{recording.name} names no profile: it is older than they are, and runs extended")
     unknown = options.keys() - {option.name for option in found.all_options}
     if unknown:
         raise ValueError(f"{recording.name}: its setup has an unknown option {min(unknown)!r}")

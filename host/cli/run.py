@@ -22,9 +22,14 @@ from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.device_options import add_start_arguments, inject_plan
+from cubestack.host.cli.device_options import (
+    add_board_arguments,
+    add_start_arguments,
+    chosen_options,
+    inject_plan,
+)
 from cubestack.host.devices.emulated import AnyEmulated, open_device
-from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
@@ -69,6 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
     )
     add_start_arguments(parser)
+    add_board_arguments(parser)
     parser.add_argument(
         "--hz", type=whole(1), default=STANDARD_HZ, help="bits a second (default 100000)"
     )
@@ -131,8 +137,11 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
     opened: list[AnyEmulated] = []
     for name in names:
         beside = opened[0] if opened else None
+        options = chosen_options(args, device(name))
         opened.append(
-            open_device(name, args.scene, seed=args.seed, engine=args.engine, beside=beside)
+            open_device(
+                name, args.scene, seed=args.seed, engine=args.engine, beside=beside, **options
+            )
         )
         stack.callback(opened[-1].close)
     board = opened[0].board
@@ -157,10 +166,10 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
 def _addresses() -> dict[str, int]:
     """What is where at first: each device's node, and its registers behind another address."""
     found = {}
-    for device in devices():
-        found[device.name] = device.interface.i2c_address
-        if device.interface.registers is not None:
-            found[f"{device.name}-registers"] = device.interface.registers.i2c_address
+    for one in devices():
+        found[one.name] = one.interface.i2c_address
+        if one.interface.registers is not None:
+            found[f"{one.name}-registers"] = one.interface.registers.i2c_address
     return found
 
 

@@ -4,8 +4,10 @@ import argparse
 from pathlib import Path
 
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.device_options import add_board_arguments, given_options, tell_notices
 from cubestack.host.devices.registry import device_names
 from cubestack.host.devices.targets import FORMS, Target, open_target
+from cubestack.host.terminal import say
 
 
 def add_target_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,12 +21,14 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--baud", type=whole(1), help="of the serial line")
     parser.add_argument("--scene", type=Path, metavar="FILE", help="of an emulated device")
     parser.add_argument("--seed", type=whole(0), default=0, help="of an emulated device")
+    add_board_arguments(parser)
     parser.add_argument("--record", type=Path, metavar="FILE", help="what is said, to a recording")
 
 
 def open_any_target(text: str, args: argparse.Namespace) -> Target:
     """Open the target ``text`` with these options; raises what ``open_target`` does."""
-    return open_target(
+    options = given_options(args)
+    target = open_target(
         text,
         args.device,
         service_port=args.bench,
@@ -33,4 +37,8 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
         scene=args.scene,
         seed=args.seed,
         record=args.record,
+        options=options,
     )
+    if target.device is not None:
+        tell_notices(target.device, options, say)
+    return target

@@ -5,7 +5,7 @@ Command, shell, fixtures, conformance, registers, recordings, faults and gatewar
 loads none of it.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
@@ -98,9 +98,9 @@ class ConformanceNotes:
     optional: frozenset[str] = frozenset()
 
 
-#: Shows a device: (device, folder of the pictures, seed, folder with photographs or None); whether
-#: all was found.
-Demo = Callable[[Any, Path, int, "Path | None"], bool]
+#: Shows a device: (device, folder of the pictures, seed, folder with photographs or None, words of
+#: `cubestack emulate` that choose its board); whether all was found.
+Demo = Callable[[Any, Path, int, "Path | None", Sequence[str]], bool]
 
 
 @dataclass(frozen=True)

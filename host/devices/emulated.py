@@ -14,7 +14,7 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -46,11 +46,13 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         device: what it is.
         board: the emulated board, with all its parts.
         seed: of everything random.
+        chosen: its profile, and the switches that differ, as keywords of ``open_device``.
     """
 
     device: Device[BoardT_co, ClientT_co]
     board: BoardT_co
     seed: int
+    chosen: Mapping[str, str] = field(default_factory=dict)
     _client: ClientT_co | None = field(default=None, init=False, repr=False)
 
     @property
@@ -82,6 +84,9 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 
     @scene.setter
     def scene(self, scene: Any) -> None:
+        for key, value in scene_options(self.device, scene).items():
+            if value != self.chosen.get(key, ""):
+                raise ValueError(f"{scene}: {key} is chosen when the device is powered up")
         self.board.scene = self.device.scene(scene)
 
     # --- ports ----------------------------------------------------------------------------------
@@ -166,8 +171,13 @@ def _watch(
         scheduler.stop()
 
 
-def check_options(device: AnyDevice, options: Mapping[str, object]) -> None:
-    """Refuse options, and values, that ``device`` does not have; ValueError says what it has."""
+def check_options(
+    device: AnyDevice, options: Mapping[str, object], shown: Callable[[str], str] = str
+) -> None:
+    """Refuse options, and values, that ``device`` does not have; ValueError says what it has.
+
+    ``shown`` is how an option's name is told.
+    """
     own = {option.name: option for option in device.all_options}
     for name, value in options.items():
         if name not in own:
@@ -175,11 +185,29 @@ def check_options(device: AnyDevice, options: Mapping[str, object]) -> None:
                 one.name for one in devices() for option in one.all_options if option.name == name
             ]
             whose = f"an option of {', '.join(owners)}, not" if owners else "no option"
-            raise ValueError(f"{name} is {whose} of {device.name}")
+            raise ValueError(f"{shown(name)} is {whose} of {device.name}")
         choices = own[name].choices or (False, True)
         if value not in choices and not own[name].metavar:
             known = ", ".join(map(str, choices))
             raise ValueError(f"{name} of {device.name} must be one of {known}, not {value!r}")
+
+
+def scene_options(device: AnyDevice, scene: Any) -> dict[str, str]:
+    """What a scene file says of the device that looks at it, as keywords of ``open_device``.
+
+    Nothing where ``scene`` is no file's path. ValueError names the file, and what is right.
+    """
+    if not isinstance(scene, str | Path):
+        return {}
+    from cubestack.emulator.scene.file import device_keys
+
+    try:
+        found = device_keys(Path(scene))
+        check_options(device, found)
+        device.switches.of(found.get("profile", DEFAULT_PROFILE), found.get("set", ""))
+    except ValueError as error:
+        raise ValueError(f"{scene}: {error}") from None
+    return found
 
 
 def power_up(
@@ -191,14 +219,22 @@ def power_up(
     beside: AnyEmulated | None = None,
     **options: Any,
 ) -> EmulatedDevice[BoardT_co, ClientT_co]:
-    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board."""
+    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board.
+
+    Profile and switches that are not given are those of the scene file.
+    """
+    chosen = {}
     if beside is not None:
         options |= {"kernel": beside.board.kernel, "i2c_bus": beside.board.i2c_bus}
     if device.switches.declared():
+        options = scene_options(device, scene) | options
         profile, changes = options.pop("profile", DEFAULT_PROFILE), options.pop("set", "")
         options["switches"] = device.switches.of(profile, changes)
+        chosen = {"profile": profile, **({"set": changes} if changes else {})}
+    else:
+        scene_options(device, scene)  # there are none
     board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
-    return EmulatedDevice(device, board, seed)
+    return EmulatedDevice(device, board, seed, chosen)
 
 
 def open_device(

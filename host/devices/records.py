@@ -1,6 +1,7 @@
 """Recordings and traces of an emulated device, made at its pins."""
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -15,10 +16,15 @@ if TYPE_CHECKING:
 def start_recorder(
     emulated: AnyEmulated, stream: IO[str], setup: "Setup | None" = None
 ) -> "Recorder":
-    """Record every byte of all ports; before any is opened. ``setup`` is for the header."""
+    """Record every byte of all ports; before any is opened.
+
+    ``setup`` is for the header, which tells the profile in any case.
+    """
     from cubestack.emulator.recording.recorder import Recorder
 
     board = emulated.board
+    if setup is not None:
+        setup = replace(setup, options={**setup.options, **emulated.chosen})
     recorder = Recorder(stream, emulated.device.name, board.uarts, setup)
     recorder.listen(board.i2c_bus)
     return recorder

@@ -15,7 +15,7 @@ emulated:DEVICE             a device that is powered up in this process; time pa
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -99,6 +99,7 @@ def open_target(
     scene: Path | None = None,
     seed: int = 0,
     record: Path | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> Target:
     """Open the target that ``text`` names.
 
@@ -112,6 +113,7 @@ def open_target(
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.
         record: file for a recording of what is said; of an emulated device, at its pins.
+        options: of an emulated device's board, its profile among them.
 
     Raises:
         TargetError: the text names nothing, or the device is not told.
@@ -124,9 +126,9 @@ def open_target(
     if text.startswith(EMULATED):
         if service_port is not None:
             raise TargetError(f"{text} has its bench protocol already: leave out --bench")
-        return _open_emulated(text, baud, scene, seed, record)
-    if scene is not None:
-        raise TargetError(f"--scene is for emulated:DEVICE, not for {text}")
+        return _open_emulated(text, baud, scene, seed, record, options or {})
+    for name in (*(["scene"] if scene is not None else []), *(options or {})):
+        raise TargetError(f"--{name} is for emulated:DEVICE, not for {text}")
     with ExitStack() as stack:
         tape = None
         if record is not None:
@@ -140,20 +142,25 @@ def open_target(
 
 
 def _open_emulated(
-    text: str, baud: int | None, scene: Path | None, seed: int, record: Path | None
+    text: str,
+    baud: int | None,
+    scene: Path | None,
+    seed: int,
+    record: Path | None,
+    options: Mapping[str, Any],
 ) -> Target:
     """Power a device up in this process."""
     name = text.removeprefix(EMULATED).lower()
     if name not in device_names():
         known = ", ".join(EMULATED + one for one in device_names())
         raise TargetError(f"no device {name!r} can be emulated; known: {known}")
-    emulated = open_device(name, scene, seed=seed, baud=baud)
+    emulated = open_device(name, scene, seed=seed, baud=baud, **options)
     board, interface = emulated.board, emulated.device.interface
     with ExitStack() as stack:
         stack.callback(emulated.close)
         controls = EmulatedControls(emulated)
         if record is not None:
-            setup = emulated_setup(seed, scene)
+            setup = emulated_setup(seed, scene, options=options)
             recorder = start_recorder(emulated, create_file(record, stack), setup)
             stack.callback(recorder.close)
             controls.on_act = lambda words, said: recorder.control(board.kernel.now, words, said)

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -38,12 +38,16 @@ class Demo:
 
     @contextmanager
     def client(
-        self, device: Device[BoardT_co, ClientT_co], scene: str
+        self, device: Device[BoardT_co, ClientT_co], scene: str, board: Sequence[str] = ()
     ) -> Iterator[tuple[ClientT_co, Path]]:
-        """A client of a ``device`` that sees ``scene``, a TOML text; and its port's path."""
+        """A client of a ``device`` that sees ``scene``, a TOML text; and its port's path.
+
+        ``board`` are words of `cubestack emulate`.
+        """
         path = self.out / f"{self.name}.toml"
         path.write_text(scene, encoding="utf-8")
-        with _served(device.name, path, self.out / f"tty{device.name.upper()}") as port:
+        words = [device.name, "--scene", str(path), *board]
+        with _served(words, self.out / f"tty{device.name.upper()}") as port:
             line = open_transport(str(port), device.interface.baud)
             node = NodeClient(line, device.interface, timeout_s=ANSWER_TIMEOUT_S)
             yield device.client(node), port
@@ -58,10 +62,10 @@ class Demo:
 
 
 @contextmanager
-def _served(device: str, scene: Path, port: Path) -> Iterator[Path]:
-    """An emulator process that serves ``device``, which sees ``scene``, on ``port``."""
-    command = [sys.executable, "-m", "cubestack", "emulate", device]
-    command += ["--scene", str(scene), "--pty", str(port), "--pace", "fast"]
+def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
+    """An emulator process, of what ``words`` say, that serves on ``port``."""
+    command = [sys.executable, "-m", "cubestack", "emulate", *words]
+    command += ["--pty", str(port), "--pace", "fast"]
     say("starting the emulator; its first start on a machine compiles what it needs")
     emulator = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:

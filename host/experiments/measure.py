@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
-from cubestack.host.devices.emulated import check_options
+from cubestack.host.devices.emulated import check_options, scene_options
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import Options
 
 
 def measure(
@@ -41,6 +43,7 @@ def measure(
             raise ValueError(f"measure has no option {one!r} for {device.name}; known: {every}")
     check_options(device, board)
     checked = experiment.options(**own)
+    board = board_as_said(device, checked, board)
     results = experiment.run(Opener(device, engine, board), checked)
     return results if progress is None else _counted(results, experiment.count(checked), progress)
 
@@ -56,6 +59,22 @@ def board_options(device: AnyDevice, experiment: AnyExperiment) -> Mapping[str, 
     """Options of the device's board that the experiment leaves to the user."""
     options = device.all_options if experiment.powers_up else ()
     return {one.name: one for one in options if one.name not in experiment.decides}
+
+
+def board_as_said(device: AnyDevice, options: Options, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of the board: those that were given, and what the scene file says beside them."""
+    return scene_options(device, getattr(options, "scene", None)) | dict(given)
+
+
+def running(
+    device: AnyDevice, experiment: AnyExperiment, board: Mapping[str, Any]
+) -> dict[str, Any]:
+    """For each result: the profile that ran, and the switches that differ from it, if any."""
+    if "profile" not in board_options(device, experiment):
+        return {}
+    profile = board.get("profile", DEFAULT_PROFILE)
+    switches = device.switches.of(profile, board.get("set", "")).beside(profile)
+    return {"profile": profile, **({"switches": switches} if switches else {})}
 
 
 def _counted(

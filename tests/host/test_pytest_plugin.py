@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.registry import device_names
 
 PLUGIN = "cubestack.host.pytest_plugin"
@@ -61,10 +62,26 @@ def test_seeds_come_from_the_command_line(run: Run) -> None:
     assert run(text, "--cubestack-seed=8").returncode == 0
 
 
+def test_the_profile_is_the_marker_s_the_command_line_s_or_the_default(run: Run) -> None:
+    text = (
+        "def test_it(cubestar, aramis):\n"
+        "    assert cubestar.chosen == aramis.chosen == {'profile': '{}'}\n"
+        "@pytest.mark.cubestack(profile='published', set='weights=grey-level')\n"
+        "def test_own(aramis):\n"
+        "    assert aramis.chosen == {'profile': 'published', 'set': 'weights=grey-level'}\n"
+    )
+    for options in ((), ("--cubestack-profile=extended",)):
+        profile = options[0].split("=")[1] if options else DEFAULT_PROFILE
+        done = run(text.replace("{}", profile), *options)
+        assert done.returncode == 0, done.stdout
+
+
 WRONG_MARKERS = {
-    "(3)": "marker cubestack takes scene, seed, faults by name, nothing else",
-    "(sead=3)": "marker cubestack takes scene, seed, faults by name, nothing else",
+    "(3)": "marker cubestack takes scene, seed, faults, layout, profile, set",
+    "(sead=3)": "marker cubestack takes scene, seed, faults, layout, profile, set",
     "(faults='seed = -1')": "seed must be a whole number from 0, not -1",
+    "(layout='2')": "layout is an option of cubestar, not of aramis",
+    "(profile='best')": "profile of aramis must be one of published, extended, not 'best'",
     "(faults='none.toml')": "none.toml: No such file or directory",
 }
 

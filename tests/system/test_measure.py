@@ -17,7 +17,7 @@ from tests.system.conftest import Frames, Measure
 KEYS = {
     "solved", "right", "centroids", "matched", "wrong", "mode", "error_cross_deg",
     "error_roll_deg", "truth", "quaternion", "phase_ms", "wall_ms", "status", "threshold",
-    "searched",
+    "searched", "profile",
 }  # fmt: skip
 PHASES = {"idle", "discard", "capture", "transfer", "detect", "match", "attitude"}
 

@@ -85,9 +85,18 @@ class Switches:
             name, equals, value = change.partition("=")
             if not equals or name not in declared:
                 known = ", ".join(declared) or "none"
-                raise ValueError(f"{change!r} is not SWITCH=VALUE; switches: {known}")
+                raise ValueError(f"set: {change!r} is not SWITCH=VALUE; switches: {known}")
             values[name] = value
         return cls(**values)
+
+    def beside(self, profile: str) -> dict[str, str]:
+        """Those that differ from a profile, by name."""
+        plain = type(self).of(profile)
+        return {
+            name: value
+            for name in self.declared()
+            if (value := getattr(self, name)) != getattr(plain, name)
+        }
 
     @property
     def profile(self) -> str:

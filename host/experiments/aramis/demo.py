@@ -1,5 +1,6 @@
 """AraMiS: a sky captured, solved lost in space and near a rough direction, and downloaded."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,11 @@ ROUGHLY_OFF_DEG = 2.0
 
 
 def show(
-    device: "Device[AramisBoard, Aramis]", out: Path, seed: int, _photographs: Path | None
+    device: "Device[AramisBoard, Aramis]",
+    out: Path,
+    seed: int,
+    _photographs: Path | None,
+    board: Sequence[str],
 ) -> bool:
     """Measure twice and download; returns whether both measurements were conclusive."""
     from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
@@ -30,7 +35,7 @@ def show(
     ra, dec, roll = POINTING_DEG
     truth = quaternion_from_pointing(ra, dec, roll)
     scene = f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\nseed = {seed}\n'
-    with demo.client(device, scene) as (aramis, _):
+    with demo.client(device, scene, board) as (aramis, _):
         console.print(f"activated; catalogue: {aramis.activate().name.lower()}")
         lost = aramis.measure()
         _report("lost in space", lost, truth)

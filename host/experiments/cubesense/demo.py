@@ -1,5 +1,6 @@
 """CubeSense: the Sun and the Earth measured and their pictures downloaded."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,11 @@ PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}
 
 
 def show(
-    device: "Device[CubeSenseBoard, CubeSense]", out: Path, seed: int, _photographs: Path | None
+    device: "Device[CubeSenseBoard, CubeSense]",
+    out: Path,
+    seed: int,
+    _photographs: Path | None,
+    board: Sequence[str],
 ) -> bool:
     """Measure with both sensors; returns whether both found what they looked for."""
     demo = Demo(out, "earth-sun", "sun and nadir sensor: the Sun, and the Earth from 750 km")
@@ -35,7 +40,7 @@ def show(
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
         f"seed = {seed}\n"
     )
-    with demo.client(device, scene) as (cubesense, port):
+    with demo.client(device, scene, board) as (cubesense, port):
         line = open_transport(f"{port}.bench", SERVICE_PORT.baud)
         bench = ServicePortClient(line)
         found = [

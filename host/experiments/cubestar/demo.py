@@ -1,6 +1,7 @@
 """CubeStar: a rendered sky and a photograph captured, solved and downloaded."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,10 +54,15 @@ class _Subject:
 
 
 def show(
-    device: "Device[CubeStarBoard, CubeStar]", out: Path, seed: int, photographs: Path | None
+    device: "Device[CubeStarBoard, CubeStar]",
+    out: Path,
+    seed: int,
+    photographs: Path | None,
+    board: Sequence[str],
 ) -> bool:
     """Show both subjects; returns whether both were solved."""
-    solved = [_show(device, subject, out) for subject in (_sky(seed), _photograph(photographs))]
+    subjects = _sky(seed), _photograph(photographs)
+    solved = [_show(device, subject, out, board) for subject in subjects]
     return all(solved)
 
 
@@ -99,10 +105,12 @@ def _shipped() -> _Subject:
     )
 
 
-def _show(device: "Device[CubeStarBoard, CubeStar]", subject: _Subject, out: Path) -> bool:
+def _show(
+    device: "Device[CubeStarBoard, CubeStar]", subject: _Subject, out: Path, board: Sequence[str]
+) -> bool:
     """Capture, solve and download one subject; returns whether it was solved."""
     demo = Demo(out, subject.name, subject.title)
-    with demo.client(device, subject.scene) as (cubestar, _):
+    with demo.client(device, subject.scene, board) as (cubestar, _):
         if subject.camera is not None:
             fit = calibrate(load_camera(subject.camera).cropped(*CROP))
             cubestar.configure(fit.settings)

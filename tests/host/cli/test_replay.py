@@ -109,6 +109,25 @@ def test_a_session_of_each_device_replays(tmp_path, run, device, commands):
     check_same(run("replay", made))
 
 
+def test_a_recording_has_its_profile_and_without_one_is_of_the_extended(tmp_path, run):
+    made, header = (
+        tmp_path / "session.rec",
+        '"options":{"profile":"extended","set":"voting=rounds"}',
+    )
+    said = ("--profile", "extended", "--set", "voting=rounds", "--record", made)
+    commands = "write CaptureAndProcess; read Quaternion; write Exposure 9; read DetectionSummary"
+    assert run("shell", "emulated:cubestar", *said, "-c", commands).code == 0
+    text = made.read_text()
+    assert header in text
+    check_same(run("replay", made))
+    made.write_text(text.replace("," + header, ""))
+    outcome = run("replay", made)
+    assert (outcome.code, "no difference" in outcome.out) == (0, True)
+    assert "namesnoprofile" in "".join(outcome.err.split())
+    made.write_text(text.replace('"extended","set":"voting=rounds"', '"published"'))
+    assert run("replay", made).code == 1
+
+
 def test_what_is_not_as_it_was_is_told(session, run, tmp_path):
     made, scenes, _ = session
     plan = tmp_path / "plan.toml"

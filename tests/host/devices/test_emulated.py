@@ -3,13 +3,19 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.devices.emulated import open_device
+from cubestack.firmware_model.interface.codec.switches import Switches
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+from cubestack.host.devices.emulated import open_device, power_up
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.experiments.measure import measure
 
 ASK = bytes([0x1F, 0x7F, 128, 0x1F, 0xFF])
 
@@ -87,3 +93,60 @@ def test_a_profile_that_there_is_not_is_refused(options: dict[str, str], text: s
     with pytest.raises(ValueError, match=r"profile|switch") as refused:
         open_device("cubestar", **options)
     assert str(refused.value) == text
+
+
+SKY = 'kind = "sky"\nra_deg = 10\ndec_deg = 20\n'
+
+
+def test_a_scene_file_chooses_the_profile_unless_something_else_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "sky.toml"
+    path.write_text(SKY + 'profile = "extended"\nset = "tracking=nearest"\n')
+    said = {"profile": "extended", "set": "tracking=nearest"}
+    cubestar, given = registered("cubestar"), []
+
+    def open_board(*scene: Any, switches: Switches, **options: Any) -> Any:
+        given.append(switches)
+        return cubestar.open_board(*scene, switches=switches, **options)
+
+    watched = replace(cubestar, open_board=open_board)
+    for options in ({}, {"profile": "published"}, {"set": "voting=rounds"}):
+        with power_up(watched, path, **options) as device:
+            assert given.pop() == CubeStarSwitches.of(*(said | options).values())
+            assert device.chosen == said | options
+            other = tmp_path / "other.toml"
+            other.write_text(SKY + 'profile = "best"\n')
+            with pytest.raises(ValueError, match=r"other\.toml: profile of cubestar must be"):
+                device.scene = other
+            other.write_text(SKY + 'set = "tracking=verified"\n')
+            with pytest.raises(ValueError, match=r"other\.toml: set is chosen when"):
+                device.scene = other
+            other.write_text(SKY + f'profile = "{device.chosen["profile"]}"\n')
+            device.scene = other
+
+
+@pytest.mark.parametrize(
+    ("device", "line", "text"),
+    [
+        ("cubestar", 'profile = "best"', "profile of cubestar must be one of published, extended"),
+        ("cubestar", "profile = 3", "profile must be text, not 3"),
+        ("cubestar", 'set = "far"', "set: 'far' is not SWITCH=VALUE; switches: voting, weights"),
+        ("cubestar", 'set = "voting=far"', "switch voting must be one of algorithm-2, rounds"),
+        ("aramis", 'set = "voting=rounds"', "set: 'voting=rounds' is not SWITCH=VALUE; s"),
+    ],
+)
+def test_what_a_scene_file_can_not_choose_is_named(
+    device: str, line: str, text: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "sky.toml"
+    path.write_text(SKY + line)
+    for open_it in (open_device, lambda name, scene: measure(name, scene=scene)):
+        with pytest.raises(ValueError, match=r"sky\.toml: ") as refused:
+            open_it(device, path)
+        assert text in str(refused.value)
+
+
+def test_a_device_without_switches_has_no_profile(tmp_path: Path) -> None:
+    plain = replace(registered("cubestar"), switches=Switches)
+    (tmp_path / "sky.toml").write_text(SKY + 'profile = "extended"')
+    with pytest.raises(ValueError, match=r"sky\.toml: profile is .* of .*aramis, not of cubestar"):
+        power_up(plain, tmp_path / "sky.toml")
