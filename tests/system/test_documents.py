@@ -15,6 +15,7 @@ from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.ports.tcp import REFUSAL
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.file import DEVICE_KEYS
 from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
@@ -100,10 +101,10 @@ def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ..
 
 
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
-    sky, night, picture, earth, ball = re.findall(
-        r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL
-    )
-    scene = load(tmp_path, sky).scene
+    examples = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
+    device, sky, night, picture, earth, ball = examples
+    scene = load(tmp_path, device + sky).scene
+    assert {*tomllib.loads(device)} == {*DEVICE_KEYS}
     assert isinstance(scene, SkyScene)
     assert len(scene.poses) == 1
     ground = load(tmp_path, night).scene

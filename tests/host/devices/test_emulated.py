@@ -146,7 +146,8 @@ def test_what_a_scene_file_can_not_choose_is_named(
 
 
 def test_a_device_without_switches_has_no_profile(tmp_path: Path) -> None:
-    plain = replace(registered("cubestar"), switches=Switches)
+    cubestar = registered("cubestar")
+    plain = replace(cubestar, interface=replace(cubestar.interface, switches=Switches))
     (tmp_path / "sky.toml").write_text(SKY + 'profile = "extended"')
     with pytest.raises(ValueError, match=r"sky\.toml: profile is .* of .*aramis, not of cubestar"):
         power_up(plain, tmp_path / "sky.toml")
