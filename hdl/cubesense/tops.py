@@ -42,10 +42,10 @@ def _fpga(side: Side, mcu_addressing: bool = False, read_out: ReadOut = FULL_SIZ
     )
 
 
-def _pair(mcu_addressing: bool = False, read_out: ReadOut = FULL_SIZE) -> Top:
+def _pair(mcu_addressing: bool) -> Top:
     return Top(
-        partial(CubeSensePair, read_out, mcu_addressing),
-        f"CubeSense, model of both FPGAs and their link{_title(mcu_addressing, read_out)}",
+        partial(CubeSensePair, FULL_SIZE, mcu_addressing),
+        f"CubeSense, model of both FPGAs and their link{_OPTION * mcu_addressing}",
         (*(PIXEL_CLOCK._replace(port=f"{half}_PCLK") for half in ("SUN", "NAD")), _CLK),
         parts=2,
     )
@@ -67,12 +67,8 @@ TOPS: TopTable = {
         for variant, read_out in _VARIANTS.items()
         for side in SIDES
     },
-    "cubesense-pair": _pair(),
+    "cubesense-pair": _pair(mcu_addressing=False),
     "cubesense-pair-addressing": _pair(mcu_addressing=True),
-    **{
-        f"cubesense-pair-{variant}": _pair(read_out=read_out)
-        for variant, read_out in _VARIANTS.items()
-    },
     "matrix counter 640 x 480": Block(partial(MatrixCounter, 640, 480)),
     "Gray counter of 307200": Block(partial(GrayCounter, 640 * 480)),
     "frame writer 640 x 480": Block(partial(FrameWriter, 640, 480)),
