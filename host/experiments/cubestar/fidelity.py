@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
+RATES = (0.0635, 0.1333, 0.3, 2.0, 8.0)
+"""Of section 6.2, in deg/s."""
 CRYSTAL_HZ = 10_000_000
 REGISTERS = (30, 9, 8, 7, 6)
 """Settings of table D.2."""
@@ -36,6 +38,21 @@ def _field(opened: _Opener, frames: int, **how: Any) -> Figures:
         "star_wrong": 100 * mean(shot.wrong > 0 for shot in taken),
         "off": 100 * mean(shot.valid and not shot.right for shot in taken),
         "share": 100 * mean((shot.matched - shot.wrong) / max(shot.detected, 1) for shot in taken),
+    }
+
+
+def _slew(opened: _Opener, frames: int, rate_deg_s: float) -> Figures:
+    """Rates in percent of pictures a second apart, and the median error in degrees."""
+    from cubestack.host.experiments.cubestar.slew import PICTURES, slewing
+
+    shots, tracked, cross = zip(*slewing(opened, frames, rate_deg_s), strict=True)
+    later = [way for number, way in enumerate(tracked) if number % PICTURES]
+    return {
+        "right": 100 * mean(shot.right for shot in shots),
+        "tracked": 100 * mean(later) if later else np.nan,
+        "off": 100 * mean(shot.valid and not shot.right for shot in shots),
+        "share": 100 * sum(s.matched for s in shots) / max(1, sum(s.detected for s in shots)),
+        "cross": float(np.nanmedian(cross)) if np.isfinite(cross).any() else np.nan,
     }
 
 
@@ -223,6 +240,7 @@ FIDELITY = Fidelity(
     page="fidelity.md",
     trials={
         **_skies(),
+        **{f"slew-{rate}": Trial(partial(_slew, rate_deg_s=rate), 100, 2, 10) for rate in RATES},
         "catalogue": Trial(_catalogue, seconds=2, profiles=False),
         "coverage": Trial(_coverage, 20_000, 500, 10, profiles=False),
         "centroids": Trial(_centroids, 20, 1, 30),

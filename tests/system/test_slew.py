@@ -1,0 +1,23 @@
+"""Section 6.2: what is tracked at the rates of the telescope's mount and of a satellite's orbit."""
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.cubestar.slew import PICTURES, slewing
+from cubestack.host.experiments.opener import Opener
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("rate", [0.0635, 0.1333])
+def test_slow_turns_are_tracked_by_every_star(profile: str, rate: float) -> None:
+    taken = list(slewing(Opener(device("cubestar"), board={"profile": profile}), PICTURES, rate))
+    assert all(shot.right and shot.matched >= shot.detected - 1 for shot, _, _ in taken)
+    assert [tracked for _, tracked, _ in taken] == [False] + [True] * (PICTURES - 1)
+
+
+@pytest.mark.parametrize(("profile", "rate"), [("published", 2), ("published", 8), ("extended", 8)])
+def test_streaks_are_not_tracked(profile: str, rate: float) -> None:
+    taken = list(slewing(Opener(device("cubestar"), board={"profile": profile}), 6, rate))
+    assert not any(tracked for _, tracked, _ in taken)
+    assert sum(shot.right for shot, _, _ in taken) <= (2 if rate < 8 else 0)
