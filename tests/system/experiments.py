@@ -8,6 +8,7 @@ Each runs the whole stack, reads the serial line and prints what it found::
     .venv/bin/python tests/system/experiments.py thresholds     the uncut sky
     .venv/bin/python tests/system/experiments.py times          figure 5.7
     .venv/bin/python tests/system/experiments.py repeatability  table 6.1
+    .venv/bin/python tests/system/experiments.py slew           section 6.2, lost in space
     .venv/bin/python tests/system/experiments.py loop           table 6.2
 """
 
@@ -242,6 +243,27 @@ def repeatability(frames: int) -> None:
             )
 
 
+def slew(frames: int) -> None:
+    """Section 6.2, lost in space, body rates across the boresight."""
+    for rate in (0.0, 0.1333, 0.3, 0.5, 1.0, 2.0, 4.0):
+        rng = np.random.default_rng(1)
+        with closing(Stack()) as stack:
+            shots = []
+            for number in range(frames):
+                side = rng.uniform(0, 2 * math.pi)
+                turning = (rate * math.cos(side), rate * math.sin(side), 0.0)
+                pose = random_quaternion(rng)
+                shots.append(
+                    stack.shoot(quaternion=pose, rate_deg_s=turning, seed=number, mag_limit=3.8)
+                )
+        cross = [shot.cross for shot in shots if shot.right] or [math.nan]
+        print(
+            f"{rate} deg/s: {percent(shots, 'valid')} solved, {percent(shots, 'right')} right, "
+            f"{matched_share(shots)}, median error {np.median(cross):.4f} deg across",
+            flush=True,
+        )
+
+
 def loop(frames: int) -> None:
     """Table 6.2: phases and mean power of the 1 Hz loop."""
     with closing(Stack()) as stack:
@@ -266,7 +288,7 @@ def loop(frames: int) -> None:
 
 EXPERIMENTS = {
     experiment.__name__: experiment
-    for experiment in (field, margins, pairs, thresholds, times, repeatability, loop)
+    for experiment in (field, margins, pairs, thresholds, times, repeatability, slew, loop)
 }
 
 
