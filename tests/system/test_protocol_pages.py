@@ -1,11 +1,13 @@
 """The pages on the protocols: layouts are those of the tables, examples those of the device."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.cubestar.tasks import TASKS
+from cubestack.firmware_model.interface.cubestar import INTERFACE, TaskStatus
 from cubestack.host.devices.emulated import open_device
 from tests.system.conftest import ROOT
 
@@ -43,12 +45,26 @@ def test_layouts_of_the_pages_are_those_of_the_tables(page: str) -> None:
     assert codes <= shown.keys()
 
 
+def test_states_of_the_page_are_those_of_the_program() -> None:
+    part = sections(text_of("protocols"), "##")["States of a task"]
+    rows = [line.strip("|").split("|") for line in part.splitlines() if line.startswith("|")][2:]
+    states = [cell.strip() for row in rows for cell in row[1:] if cell.strip()]
+    assert {*map(int, states)} == {*TaskStatus}
+    told = {
+        name: tuple(int(cell) if cell.strip() else None for cell in row[1:])
+        for row in rows
+        for name in re.findall(r"\d+ (\w+)", row[0])
+        if name in TASKS
+    }
+    assert told == TASKS
+
+
 def test_the_attitude_of_the_page_is_that_of_the_device() -> None:
     page = text_of("protocols")
     (block,) = re.findall(r"```wire-sky\n(.*?)```", page, re.DOTALL)
     lines = [(line[:2], bytes.fromhex(line[3:])) for line in block.splitlines()]
     answers = {}
-    scene = SkyScene.pointing(84.0, -1.0, 20.0)
+    scene = replace(SkyScene.pointing(84.0, -1.0, 20.0), mag_limit=3.8)
     with open_device("cubestar", scene, seed=4, profile="extended") as device:
         port = device.serial(timeout=0.2)
         for (_, request), (_, answer) in zip(lines[::2], lines[1::2], strict=True):

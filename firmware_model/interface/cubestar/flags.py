@@ -57,7 +57,9 @@ _FLAGS = (
     ErrorFlag(43, "TlmIDError", "unknown telemetry ID"),
     ErrorFlag(44, "TriggerAlreadySet", "trigger while the loop was triggered already"),
     ErrorFlag(45, "TimerAlreadyRunning", "trigger while the delay timer was running"),
-    ErrorFlag(46, "DelayTimeSetToLong", "delay time out of range", "TimerTimeSetToLong"),
+    ErrorFlag(
+        46, "DelayTimeSetToLong", "delay time longer than one second, or none", "TimerTimeSetToLong"
+    ),
     ErrorFlag(
         48, "StarPixSetError", "pixel limits out of range or in the wrong order", "PixSetError"
     ),
