@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubestar.tasks import TASKS
@@ -151,17 +150,3 @@ def test_an_exposure_is_with_the_sensor_when_it_is_set(unit: Harness) -> None:
     unit.command("CaptureImage")
     transfers = [what for _, what in unit.log if isinstance(what, CameraTransfer)]
     assert len(transfers) == 2  # enable, disable
-
-
-def test_a_stuck_memory_is_tested_and_does_not_pass(unit: Harness) -> None:
-    write = unit.external_ram.__class__
-
-    class Stuck(write):  # type: ignore[misc,valid-type]
-        def __setitem__(self, key: object, value: object) -> None:
-            super().__setitem__(key, value)
-            self.view(np.ndarray)[7] |= 1
-
-    unit.external_ram = unit.external_ram.view(Stuck)
-    unit.command("TestSRAM")
-    assert unit.status() is TaskStatus.SRAM_TESTED
-    assert unit.telemetry("SRAMTestResults")["TestResult"] == 2
