@@ -20,6 +20,9 @@ from cubestack.emulator.sim.power import PowerModel, PowerTable
 from cubestack.emulator.sim.processor import Processor, Program
 from cubestack.emulator.sim.virtual_time import Kernel
 
+NODE_PROTOCOL = "node protocol"
+"""Title of a serial line that has it."""
+
 SILENCE_BYTES = 100
 """Byte times of silence after which a UART gives up half a message: assumed."""
 
@@ -58,6 +61,11 @@ class SerialLine:
     def baud(self) -> int:
         """Bits a second."""
         return self.uart.form.baud
+
+    @property
+    def has_node(self) -> bool:
+        """Whether the node protocol is spoken on it."""
+        return self.title == NODE_PROTOCOL
 
     @property
     def target(self) -> str:
@@ -176,7 +184,7 @@ class Board(ABC):
         baud: int,
         link: Callable[[], UartLink],
         name: str = "uart",
-        title: str = "node protocol",
+        title: str = NODE_PROTOCOL,
         suffix: str = "",
     ) -> Uart:
         """One more of ``lines``, which leads to what ``link`` finds in the program that runs."""

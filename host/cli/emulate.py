@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
             signal.signal(number, lambda _number, _frame: scheduler.stop())
         for one in opened:
             ports = [
-                f"{line.title + ' on ' if line.suffix else ''}{end.name} at {line.baud} baud"
+                f"{'' if line.has_node else line.title + ' on '}{end.name} at {line.baud} baud"
                 for owner, line, end in served
                 if owner is one
             ]

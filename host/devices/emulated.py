@@ -20,8 +20,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias
 
+from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
-from cubestack.host.clients.contract import Closable, DeviceClient
+from cubestack.host.clients.contract import Client, Closable, DeviceClient
+from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
 from cubestack.host.devices.registry import device as registered
@@ -57,10 +59,12 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 
     @property
     def client(self) -> ClientT_co:
-        """This project's client on the serial line; plugged in again after any other host."""
+        """This project's client on the serial line; plugged in again after any other host.
+
+        On I2C where that line has been given another protocol.
+        """
         if self._client is None:
-            node = NodeClient(self.board.serial(), self.device.interface)
-            self._client = self.device.client(node)
+            self._client = self.device.client(node_client(self.board, self.device.interface))
         return self._client
 
     @property
@@ -150,6 +154,14 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     def close(self) -> None:
         """Power down."""
         self.board.close()
+
+
+def node_client(board: Board, interface: Interface) -> Client:
+    """On the satellite's serial line; on I2C where that line has been given another protocol."""
+    if board.lines[0].has_node:
+        return NodeClient(board.serial(), interface)
+    bus = board.i2c()
+    return I2cClient(bus, interface, wait=bus.wait)
 
 
 #: A powered-up device, whichever it is.

@@ -29,7 +29,7 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.device import AnyDevice
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.devices.emulated import node_client, open_device
 from cubestack.host.devices.records import create_file, start_recorder
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.errors import PortOpenError, TargetError
@@ -166,12 +166,13 @@ def _open_emulated(
             controls.on_act = lambda words, said: recorder.control(board.kernel.now, words, said)
         lines = [board.serial(line.name) for line in board.lines]
         bus = board.i2c()
+        has_node = board.lines[0].has_node
         return Target(
             text,
             interface,
-            NodeClient(lines[0], interface),
+            NodeClient(lines[0], interface) if has_node else node_client(board, interface),
             lines[0],
-            registers=_registers(interface, bus, bus.wait),
+            registers=_registers(interface, bus if has_node else RegisterLine(lines[0]), bus.wait),
             service_port=lines[1] if interface.service_port and len(lines) > 1 else None,
             controls=controls,
             device=emulated.device,

@@ -115,6 +115,20 @@ def test_registers_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
     assert picture[5, 5] < 50
 
 
+def test_what_reaches_a_device_whose_uart_has_registers(ready: Open) -> None:
+    with ready(uart="registers") as opened:  # the client's node protocol is on I2C then
+        assert opened.client.capture_and_detect(Camera.SUN).detected
+    target = open_target("emulated:cubesense", options={"uart": "registers"})
+    assert target.registers is not None
+    assert target.line is not None
+    assert target.registers.read("SUN_THRESHOLD") == 225
+    target.node.command("DetectionThreshold1", Threshold=99)
+    target.node.pause(0.01)
+    target.line.write(b"\x39\x00")
+    assert target.line.read(9, 0.1) == b"\x63"
+    target.close()
+
+
 def test_pictures_over_the_bench_are_what_the_camera_sent(ready: Open) -> None:
     with ready() as opened:
         line = opened.board.serial("bench_uart")
