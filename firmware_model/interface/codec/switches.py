@@ -85,7 +85,8 @@ class Switches:
             name, equals, value = change.partition("=")
             if not equals or name not in declared:
                 known = ", ".join(declared) or "none"
-                raise ValueError(f"set: {change!r} is not SWITCH=VALUE; switches: {known}")
+                wrong = f"no switch {name!r}" if equals else f"{change!r} is not SWITCH=VALUE"
+                raise ValueError(f"set: {wrong}; switches: {known}")
             values[name] = value
         return cls(**values)
 

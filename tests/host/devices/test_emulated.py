@@ -131,7 +131,7 @@ def test_a_scene_file_chooses_the_profile_unless_something_else_is_said(tmp_path
         ("cubestar", "profile = 3", "profile must be text, not 3"),
         ("cubestar", 'set = "far"', "set: 'far' is not SWITCH=VALUE; switches: voting, weights"),
         ("cubestar", 'set = "voting=far"', "switch voting must be one of algorithm-2, rounds"),
-        ("aramis", 'set = "voting=rounds"', "set: 'voting=rounds' is not SWITCH=VALUE; s"),
+        ("aramis", 'set = "voting=rounds"', "set: no switch 'voting'; switches: belief"),
     ],
 )
 def test_what_a_scene_file_can_not_choose_is_named(

@@ -31,7 +31,7 @@ def test_they_know_which_profile_they_are() -> None:
     [
         (("best", ""), "profile must be one of published, extended, not 'best'"),
         (("published", "limit=61"), "switch limit must be one of 42, 57, 60, not '61'"),
-        (("published", "limt=60"), "set: 'limt=60' is not SWITCH=VALUE; switches: rounds, limit"),
+        (("published", "limt=60"), "set: no switch 'limt'; switches: rounds, limit"),
         (("published", "limit"), "set: 'limit' is not SWITCH=VALUE; switches: rounds, limit"),
     ],
 )
