@@ -106,6 +106,7 @@ def _mount(value: Any) -> bool:
     return bool(value == "earth")
 
 
+_ATTITUDE = {"quaternion", "ra_deg", "dec_deg", "roll_deg"}
 _SKY: file.Readers = _POSE | {
     "mount": _mount,
     "poses": lambda value: value,
@@ -143,13 +144,21 @@ def _sky(
     later = values.pop("poses", [])
     if not isinstance(later, list) or not all(isinstance(pose, dict) for pose in later):
         raise file.SceneError("poses must be tables, each under [[poses]]")
-    poses = tuple(_pose(file.read_table(pose, _POSE | {"start_s": file.number})) for pose in later)
     first = _pose({key: values.pop(key) for key in _POSE if key in values})
+    poses: list[Pose] = []
+    for table in later:
+        pose = file.read_table(table, _POSE | {"start_s": file.number})
+        if not _ATTITUDE & pose.keys():
+            # It goes on from where the one before has turned to.
+            pose["quaternion"] = (poses or [first])[-1].at(pose.get("start_s", 0.0))
+        poses.append(_pose(pose))
     if values.pop("mount", False):
         if poses or np.any(np.asarray(first.rate_deg_s)):
             raise file.SceneError('mount = "earth" needs one pose without rate_deg_s')
         first = replace(first, rate_deg_s=earth_rate_deg_s(first.quaternion))
-    scene = SkyScene(first.quaternion, first.rate_deg_s, poses, **file.values_for(SkyScene, values))
+    scene = SkyScene(
+        first.quaternion, first.rate_deg_s, tuple(poses), **file.values_for(SkyScene, values)
+    )
     return SkyView(scene, replace(condition, **file.values_for(condition, values)))
 
 

@@ -58,6 +58,16 @@ def _sensor(results: Sequence["SensorResult"]) -> Figures:
     return {name: float(value) for name, value in figures.items()}
 
 
+def _ball(opened: _Opener, frames: int) -> Figures:
+    """Mean offset in each direction, and the largest sigma, of ``frames`` pictures an angle."""
+    from cubestack.host.experiments.cubesense.ball import EXPERIMENT, BallOptions
+
+    step = 5.0 if frames > 1 else 30.0
+    results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=max(2, frames))))
+    figures = {result.direction: result.offset_deg or np.nan for result in results}
+    return {**figures, "sigma": max(result.sigma_deg or 0.0 for result in results)}
+
+
 def _power(_opened: _Opener, _frames: int) -> Figures:
     """mW of the eight states of table 7.1."""
     from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
@@ -140,6 +150,7 @@ def _memory(_opened: _Opener, _frames: int) -> Figures:
 FIDELITY = Fidelity(
     page="fidelity-cubesense.md",
     trials={
+        "ball": Trial(_ball, 10, 1, 30, "ball"),
         "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2),
         "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2),
         "sun-time": measured("cubesense", _sensor, 100, 3, 10, sensor="sun", sun_angle=5, seed=2),

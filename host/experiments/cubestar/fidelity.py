@@ -8,6 +8,7 @@ import numpy as np
 
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
+from cubestack.host.experiments.cubestar.night import night
 from cubestack.host.experiments.fidelity import mean, measured
 from cubestack.host.experiments.opener import Opener
 
@@ -249,6 +250,7 @@ FIDELITY = Fidelity(
         ),
         "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8, seed=1),
         "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5, seed=1),
+        "night": Trial(night, 100, 1, 120),
         "loop": Trial(_loop, 20, 2, 10),
         "power": Trial(_power, profiles=False),
         "rates": Trial(_rates, seconds=2, profiles=False),

@@ -11,10 +11,16 @@ from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s
-from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.attitude import (
+    matrix_from_quaternion,
+    pointing_from_matrix,
+    quaternion_from_pointing,
+)
 from cubestack.emulator.scene.sky import PictureScene, SceneError, SkyScene
 
 from ..files import check_refused, save
+
+EXAMPLES = Path(__file__).parents[4] / "examples/scenes"
 
 
 def load(path: Path) -> SkyView:
@@ -188,6 +194,23 @@ def test_a_night_on_the_ground(tmp_path: Path) -> None:
 )
 def test_nights_that_can_not_be(tmp_path: Path, old: str, new: str, wrong: str) -> None:
     check_refused(load, save(tmp_path, NIGHT.replace(old, new)), wrong)
+
+
+def test_a_pose_without_attitude_goes_on(tmp_path: Path) -> None:
+    turns = "".join(
+        f"[[poses]]\nstart_s = {start}\nrate_deg_s = {rate}\n"
+        for start, rate in ((2, [0, 5, 0]), (4, [0, 0, 0]), (6, [0, 0, 1]))
+    )
+    scene = load(save(tmp_path, f'kind = "sky"\nra_deg = 10\ndec_deg = 0\n{turns}')).scene
+    for time_s, ra_deg in ((1, 10), (3, 5), (5, 0), (9, 0)):
+        found = pointing_from_matrix(matrix_from_quaternion(scene.truth(time_s * 10**12)))
+        assert (found[0] + 1e-6) % 360 == pytest.approx(ra_deg, abs=1e-5)
+    assert found[2] == pytest.approx(-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_example_scenes_load(path: Path) -> None:
+    assert isinstance(load_scene(path, CONDITION, UNCERTAIN).scene, SkyScene)
 
 
 def test_a_lens_drawn_as_its_calibration_knows_it(tmp_path: Path) -> None:
