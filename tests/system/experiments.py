@@ -7,7 +7,6 @@ Each runs the whole stack, reads the serial line and prints what it found::
     .venv/bin/python tests/system/experiments.py pairs          two pair limits beside each other
     .venv/bin/python tests/system/experiments.py thresholds     the uncut sky
     .venv/bin/python tests/system/experiments.py times          figure 5.7
-    .venv/bin/python tests/system/experiments.py repeatability  table 6.1
     .venv/bin/python tests/system/experiments.py slew           section 6.2, lost in space
     .venv/bin/python tests/system/experiments.py loop           table 6.2
 """
@@ -27,11 +26,7 @@ from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
-from cubestack.emulator.scene.attitude import (
-    matrix_from_quaternion,
-    pointing_from_matrix,
-    random_quaternion,
-)
+from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode
@@ -46,7 +41,6 @@ from cubestack.host.experiments.opener import Opener
 
 PUBLISHED_PAIR_LIMIT_DEG = 42.1
 EXTENDED = CubeStarSwitches.of("extended")
-SIDEREAL_DEG_S = 360 / 86164.1
 
 #: The field of table 4.4: 54 x 28 degrees, no distortion.
 PX = 512 / math.tan(math.radians(27))
@@ -214,35 +208,6 @@ def thresholds(frames: int) -> None:
             stack.print_rates(frames, f"threshold {threshold:2} DN", LOST, ROUGH)
 
 
-def repeatability(frames: int) -> None:
-    """Table 6.1: scatter of the attitude on a mount that turns with the Earth."""
-    rng = np.random.default_rng(1)
-    with closing(Stack()) as stack:
-        for _ in range(5):
-            pose = random_quaternion(rng)
-            axis_in_camera = matrix_from_quaternion(pose)[:, 2]
-            scatter, counts = [], []
-            for number in range(frames):
-                turning = {"quaternion": pose, "rate_deg_s": SIDEREAL_DEG_S * axis_in_camera}
-                shot = stack.shoot(**turning, mag_limit=3.8, seed=number)
-                if shot.right:
-                    truth = stack.board.truth()
-                    assert truth is not None
-                    measured, true = (
-                        np.array(pointing_from_matrix(matrix_from_quaternion(q)))
-                        for q in (stack.cubestar.attitude().quaternion, truth)
-                    )
-                    scatter.append((measured - true + 180) % 360 - 180)
-                    counts.append(shot.matched)
-            ra, dec, roll = np.std(scatter, axis=0)
-            across = ra * math.cos(math.radians(true[1]))
-            print(
-                f"{len(scatter)} of {frames} right, {np.mean(counts):4.1f} stars: RA cos(Dec) "
-                f"{across:.4f}, Dec {dec:.4f}, roll {roll:.4f} deg (1 sigma)",
-                flush=True,
-            )
-
-
 def slew(frames: int) -> None:
     """Section 6.2, lost in space, body rates across the boresight."""
     for rate in (0.0, 0.1333, 0.3, 0.5, 1.0, 2.0, 4.0):
@@ -288,7 +253,7 @@ def loop(frames: int) -> None:
 
 EXPERIMENTS = {
     experiment.__name__: experiment
-    for experiment in (field, margins, pairs, thresholds, times, repeatability, slew, loop)
+    for experiment in (field, margins, pairs, thresholds, times, slew, loop)
 }
 
 

@@ -250,7 +250,7 @@ FIDELITY = Fidelity(
         ),
         "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8, seed=1),
         "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5, seed=1),
-        "night": Trial(night, 100, 1, 120),
+        "night": Trial(night, 100, 1, 250),
         "loop": Trial(_loop, 20, 2, 10),
         "power": Trial(_power, profiles=False),
         "rates": Trial(_rates, seconds=2, profiles=False),

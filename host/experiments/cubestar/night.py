@@ -9,9 +9,9 @@ a square arcsecond (a town's edge), 120 m of height. The lens is that of the pri
 the letter: coefficients that the toolbox fits from undistorted to distorted, used with inverted
 signs the other way round. It errs most along the picture's rows, and how the camera was turned is
 not published: chosen are rows along the declination, which in table 6.1 scatters more than the
-right ascension. What the sky shows depends on the sidereal time, which is not published:
-of every 30 deg those are taken at which lost in space finds the stars through this lens, in either
-profile; elsewhere the test can not take place.
+right ascension. What the sky shows depends on the sidereal time, which is not published: of every
+30 deg those are taken at which lost in space, as printed, finds the stars through this lens;
+elsewhere the test can not take place.
 """
 
 from dataclasses import replace
@@ -32,7 +32,7 @@ _Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 ROLL_DEG = 90.0  # chosen
 LATITUDE_DEG, HEIGHT_M, SEEING_ARCSEC, SKY_MAG = -33.93, 120.0, 2.0, 20.0
-SIDEREAL_DEG = (90.0, 120.0, 240.0)
+SIDEREAL_DEG = (90.0, 120.0, 210.0, 240.0, 270.0, 300.0)
 MOST_CENTROIDS = 16  # of figure 6.1, which has 8 to 16 of one field: the threshold is chosen by it
 INTERVAL_S = 3.0  # so that a hundred pictures are the published several minutes
 SETTLING = 3  # lines until the loop's first attitudes are out
