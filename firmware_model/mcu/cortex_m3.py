@@ -1,7 +1,8 @@
 """Cycle costs of CubeStar's EFM32GG: Cortex-M3, no floating point unit, 48 MHz.
 
 CubeStar thesis, section 3.2 (the part). The transfer loop is the only entry that was fitted to a
-published duration (Table 6.2), so every other duration is a prediction.
+published duration (table 6.2). Of that table capture and processing alone is a prediction: the
+discard delay is a setting, and idle is what is left of the second.
 """
 
 from cubestack.firmware_model.mcu.costs import Cost, CostTable

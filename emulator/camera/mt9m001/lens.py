@@ -23,7 +23,7 @@ from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
 PUBLISHED_FIELD_DEG = 21.53463888888889
-"""Of all published simulations and of the published catalogue."""
+"""Of all published simulations and of the published catalogue: chosen of the two."""
 
 LIKELY_FIELD_DEG = 18.0
 """Of the lens that the thesis expects to be built."""

@@ -28,8 +28,9 @@ from cubestack.emulator.scene.file import SceneError
 FIELD_DEG = 95.0
 """Largest angle from the boresight that the lens images, half of 190 deg (appendix A.3)."""
 
-NADIR_NODES_DEG = (20.0, 40.0, 60.0, 80.0)
-NADIR_SIGMA_DEG = 0.12
+NADIR_NODES_DEG = (20.0, 40.0, 60.0, 80.0)  # chosen
+NADIR_SIGMA_DEG = 0.12  # fitted to figure 7.1
+# Published; their places within the ranges are chosen, as are the share and the decentring.
 SUN_OFFSETS_DEG = ((40.0, 0.3), (60.0, 1.0), (75.0, 1.85), (90.0, 0.0))
 SUN_SHARE = (0.6, 1.0)
 DECENTRING_SIGMA_DEG = 0.04

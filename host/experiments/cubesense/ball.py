@@ -34,6 +34,8 @@ REACH_DEG = 30.0
 """The ball's edge reaches that of the field there (section 7.1)."""
 
 PUBLISHED = "offset 0.12, 0.16, 0.13, 0.15 deg in the four directions; sigma below 0.18 deg"
+"""Figures 7.1 and 7.2, shown beside ours; the drawn lenses are fitted to the first."""
+
 FRAME_S = 525 * 858 / 13.5e6
 """A camera's frame time: captures start at a random phase of it."""
 

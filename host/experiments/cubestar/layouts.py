@@ -38,7 +38,7 @@ SETTLING = 2
 PS_PER_MS, PS_PER_S = 10**9, 10**12
 MIDDLE_ROW = 255.5
 
-#: CubeStar thesis, sections 3.3, 5.3.6, 6.3 and 7.2.
+#: CubeStar thesis, sections 3.3, 5.3.6, 6.3 and 7.2; shown beside ours. Fitted are power and copy.
 PUBLISHED = {
     Layout.COPIED: "1 Hz, age 1.5 s, 396 mW; copy 404 ms",
     Layout.SHARED: "1 Hz, age below 1 s; no copy",
