@@ -414,7 +414,6 @@ def test_set_tracking_mode(unit: Harness) -> None:
 
 @pytest.mark.parametrize("profile", ["extended"])  # as printed, stars without votes have names
 @telecommand("setIDMargin")
-@pytest.mark.parametrize("profile", ["extended"])
 def test_set_id_margin(unit: Harness, sky: Sky) -> None:
     unit.command("setIDMargin", Margin=0.0001)
     unit.shown("IDMargin", Margin=0.0001)
