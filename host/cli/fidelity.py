@@ -32,7 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known = [device.name for device in devices() if device.fidelity is not None]
     parser.add_argument("device", nargs="?", choices=known, help="default: all")
     parser.add_argument(
-        "--rows", action="append", default=[], metavar="PATTERN", help="keys, as in 'sun-*'"
+        "--rows",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="keys of rows, as in 'sun-*'; can be given again",
     )
     parser.add_argument("--profile", choices=PROFILES, help="default: both")
     parser.add_argument("--quick", action="store_true", help="a few pictures of each kind")
