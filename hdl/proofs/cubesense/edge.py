@@ -158,41 +158,7 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-# As flown: what the listings of appendices D.3 and D.4 do.
-
-
-def _scans_early(m: Module, d: SimpleNamespace) -> None:
-    """Every clock but a preset's moves the address on as two counters would, one clock late."""
-    size = d.size
-    starts_in(m, d.EN)
-    sync = domain(m, "monitor", d.CLK, ~d.scan)
-    column = Signal(size.column_bits, init=size.scan_start)
-    row = Signal(size.row_bits, init=size.first_row)
-    shown = Signal(size.address_bits)
-    phase = Signal(2)  # rows, between, columns
-    row_ends, column_ends = column == size.columns - 1, row == size.rows - 1
-    rows_end = row_ends & (row == size.scan_rows[-1])
-    with m.If(phase != 1):
-        sync += shown.eq(Cat(column, row))
-    with m.If(phase == 0):
-        sync += [
-            column.eq(Mux(rows_end, size.first_column, Mux(row_ends, 0, column + 1))),
-            row.eq(Mux(rows_end, 0, Mux(row_ends, row + size.scan_step, row))),
-            phase.eq(rows_end),
-        ]
-    with m.Elif(phase == 1):
-        sync += phase.eq(2)
-    with m.Else():
-        sync += [
-            row.eq(Mux(column_ends, 0, row + 1)),
-            column.eq(Mux(column_ends, column + size.scan_step, column)),
-        ]
-    m.d.comb += [
-        Assert(~d.scan | (shown == d.SRAM_A)),
-        # What makes this inductive.
-        Assert((d.flown_column == column) & (d.flown_row == row)),
-        Assert((phase != 3) & (d.between == (phase == 1)) & (d.in_columns == (phase == 2))),
-    ]
+# As flown: what the listing of appendix D.4 does.
 
 
 def _keeps_coordinates(m: Module, d: SimpleNamespace) -> None:
@@ -239,19 +205,23 @@ def _wraps(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
+def _sends_only(m: Module, d: SimpleNamespace) -> None:
+    """While the Sun is looked for in a picture that is sent, the own memory rests."""
+    sending = ~d.EN & d.SHIFT & ~d.EDGE & ~d.RNW
+    m.d.comb += Assert(~sending | (d.SRAM_CE_N & d.SRAM_WE_N & ~d.SRAM_D_OE & ~d.ACK))
+
+
 def as_flown_proofs() -> dict[str, Proof]:
     """Of the sun's FPGA, which is the nadir's too but for the side of its camera."""
     make = fpga("sun", gateware="as-flown")
-    flown = {"flown_column": "reader.scan.column", "flown_row": "reader.scan.row"}
     at = {"at_column": "reader.window.column", "at_row": "reader.window.row"}
     window = {"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"}
     return {
-        "sun-scan-as-flown": Proof(
-            "As flown the nadir scan presents each pixel one clock early",
-            make,
-            _scans_early,
-            Fault("reader.scan.between", 0),
-            {"scan": "reader.scan", **wires_below("reader.scan", "between", "in_columns"), **flown},
+        "sun-sends-only-one-search": Proof(
+            "With one search the sun's FPGA writes nothing while it sends a picture",
+            fpga("sun", gateware="one-search"),
+            _sends_only,
+            Fault("dataflow.store", 1),
         ),
         "sun-keeps-coordinates-as-flown": Proof(
             "As flown the coordinates stay until a bright pixel is written",
