@@ -27,7 +27,7 @@ from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
-from cubestack.emulator.scene.attitude import random_quaternion
+from cubestack.emulator.scene.attitude import matrix_from_quaternion, random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.cubestar.matching.voting import identify
