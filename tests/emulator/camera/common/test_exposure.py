@@ -239,6 +239,9 @@ def test_the_glow_of_the_sky_fills_the_field_and_stars_shine_through_it() -> Non
     assert shaded[10, 10] == 0
     # Only refraction is left, and the light of stars 60 deg high.
     np.testing.assert_allclose(light(dark).sum(), light(ORION).sum(), rtol=0.02)
+    hazy = light(replace(ORION, atmosphere=replace(clear, extinction_mag=2.5)))
+    # A tenth at the zenith, less at 60 deg.
+    assert 0.08 < hazy.sum() / light(dark).sum() < 0.1
 
 
 def test_the_air_is_another_one_in_each_exposure_and_of_each_seed() -> None:

@@ -156,3 +156,13 @@ def test_phase_times_in_ms(node: FakeAramis, aramis: Aramis) -> None:
     node.values["PhaseTimes"] = {"Spikes": 355_388, "Total": 519_668}
     times = aramis.phase_times()
     assert (times["spikes"], times["total"], times["faces"]) == (355.388, 519.668, 0)
+
+
+def test_the_line_of_a_log(aramis: Aramis, node: Any) -> None:
+    node.values["Attitude"] = dict(SOLVED)
+    line = aramis.latest()
+    assert (line["valid"], line["q1"], line["matched"]) == (True, -0.5, 9)
+    assert (line["image_time_s"], line["julian_date"]) == (12.345, 2_461_366.25)
+    assert (line["outcome"], line["reason"]) == ("CONCLUSIVE", "CONFIRMED")
+    node.values["Attitude"]["Valid"] = 0
+    assert (aramis.latest()["q1"], list(aramis.latest())) == (None, list(line))

@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from cubestack.emulator.scene.attitude import pointing_from_matrix
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError, MatchMode, TaskStatus
 from cubestack.host.clients.cubestar.client import COLUMNS, ROWS, Attitude, CubeStar, Star
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, StepFailedError
 
 
@@ -28,6 +30,25 @@ def test_boresight_is_the_camera_axis_seen_from_the_sky(seed: int) -> None:
     direction = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
     np.testing.assert_allclose(direction, expected, atol=1e-9)
     assert 0.0 <= attitude.ra_deg <= 360.0
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_pointing_is_that_of_the_scenes(seed: int) -> None:
+    rotation = Rotation.random(rng=np.random.default_rng(seed))
+    expected = pointing_from_matrix(rotation.as_matrix())
+    np.testing.assert_allclose(pointing_deg(rotation.as_quat()), expected, atol=1e-6)
+
+
+def test_the_line_of_a_log(cubestar: CubeStar, node: Any) -> None:
+    values = {"Q0": 0.0, "Q1": 0.0, "Q2": 0.0, "Q3": 1.0, "ImageTime": 1500, "Matched": 9}
+    node.values["AttitudeQuaternion"] = {**values, "Mode": MatchMode.TRACKING, "Valid": 1}
+    line = cubestar.latest()
+    assert (line["q3"], line["dec_deg"], line["image_time_s"]) == (1.0, 90.0, 1.5)
+    assert (line["valid"], line["matched"], line["mode"]) == (True, 9, "TRACKING")
+    node.values["AttitudeQuaternion"]["Valid"] = 0
+    old = cubestar.latest()
+    assert list(old) == list(line)
+    assert (old["valid"], old["q3"], old["ra_deg"]) == (False, None, None)
 
 
 def test_attitude(cubestar: CubeStar, node: Any) -> None:
