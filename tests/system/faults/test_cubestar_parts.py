@@ -101,6 +101,7 @@ def test_registers_of_an_idle_fpga_do_not_flip(star: Star, good: np.ndarray) -> 
     np.testing.assert_array_equal(star.stored, good)
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("register-upsets")
 def test_register_upsets_cost_a_picture(star: Star, good: np.ndarray) -> None:
     status, flags = star.capture_with("register-upsets", rate=10)

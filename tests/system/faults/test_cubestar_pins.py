@@ -55,6 +55,7 @@ def test_without_acknowledge_the_capture_fails_in_time(
     assert star.measure() == "CALCULATED"
 
 
+@pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("ack-stuck")
 def test_with_an_acknowledge_that_is_always_there_noise_is_the_first_picture(
     star: Star, good: np.ndarray
