@@ -19,6 +19,7 @@ import numpy as np
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.experiment import Experiment, Result
+from cubestack.host.experiments.cubesense.measure import FRAME_S
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options, between, option, whole
 
@@ -35,9 +36,6 @@ REACH_DEG = 30.0
 
 PUBLISHED = "offset 0.12, 0.16, 0.13, 0.15 deg in the four directions; sigma below 0.18 deg"
 """Figures 7.1 and 7.2, shown beside ours; the drawn lenses are fitted to the first."""
-
-FRAME_S = 525 * 858 / 13.5e6
-"""A camera's frame time: captures start at a random phase of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
