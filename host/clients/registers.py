@@ -47,6 +47,11 @@ class RegisterClient:
         self._wait = wait
         self._retries = retries
 
+    @property
+    def on_line(self) -> bool:
+        """Whether the bus is a serial line, where no byte comes without a register."""
+        return isinstance(self._bus, RegisterLine)
+
     def read(self, name: str) -> Value:
         """The value of a register, in the map's unit; raises InterfaceError, NoAnswerError."""
         register = self._readable(name)

@@ -56,6 +56,12 @@ def test_report_for_a_reader(run):
     assert "0 failed" in out.splitlines()[-1]
 
 
+def test_registers_of_a_uart_are_silent_where_there_is_none(conformance):
+    code, lines = conformance("emulated:cubesense", "--uart", "registers")
+    (silent,) = (line for line in lines if "without a register" in line.get("check", ""))
+    assert (code, silent["outcome"], silent["detail"]) == (0, "passed", "no answer")
+
+
 def test_target_that_is_none(run):
     outcome = run("conformance", "emulated:mars")
     assert (outcome.code, "no device 'mars' can be emulated" in outcome.line) == (2, True)
