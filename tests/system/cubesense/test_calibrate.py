@@ -22,7 +22,7 @@ def calibrate(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
 
 
 def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[str]) -> None:
-    which = ("--sensor", "nadir", "--seed", 2, "--emulated", 30, "--check-poses", 10)
+    which = ("--sensor", "nadir", "--seed", 2, "--emulated", 20, "--check-poses", 8)
     found = calibrate(capsys, *which, "--profile", "extended", "--set", "lens=residuals")
     assert found["error_after_deg"] < 0.06 < 0.2 < found["error_before_deg"]
     centre = np.add((371, 236), drawn_lens(Target.NADIR, 2).centre_px)
@@ -32,11 +32,11 @@ def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[st
 def test_a_lens_of_a_scene_is_found(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     scene, out = tmp_path / "unit.toml", tmp_path / "unit.json"
     scene.write_text('kind = "earth-sun"\n' + LENS.format("sun"), encoding="utf-8")
-    which = ("--sensor", "sun", "--scene", scene, "--emulated", 24, "--check-poses", 8)
+    which = ("--sensor", "sun", "--scene", scene, "--emulated", 24, "--check-poses", 6)
     found = calibrate(capsys, *which, "--profile", "extended", "--out", out)
     np.testing.assert_allclose(found["boresight_px"], (369.8, 249.5), atol=0.1)
     assert found["error_after_deg"] < 0.5 * found["error_before_deg"]
-    assert json.loads(out.read_text(encoding="utf-8"))["sun"] == found
+    assert json.loads(out.read_text(encoding="utf-8"))["sun"].items() <= found.items()
 
 
 def test_pictures_of_a_light_give_the_lens(

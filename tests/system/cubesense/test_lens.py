@@ -56,12 +56,12 @@ def test_errors_of_published_lenses(measure: Measure) -> None:
         frame[f"{axis}_deg"] - frame[f"truth_{axis}_deg"]
         for seed in (0, 1)
         for frame in measure(
-            "--sensor", "nadir", "--frames", 8, "--seed", seed, "--profile", "published"
+            "--sensor", "nadir", "--frames", 6, "--seed", seed, "--profile", "published"
         )
         for axis in ("alpha", "beta")
     ]
     assert 0.06 < np.mean(np.abs(errors)) < 0.3
-    sun = measure("--sensor", "sun", "--frames", 18, "--seed", 1, "--profile", "published")
+    sun = measure("--sensor", "sun", "--frames", 16, "--seed", 1, "--profile", "published")
     true = np.array([np.hypot(f["truth_alpha_deg"], f["truth_beta_deg"]) for f in sun])
     outwards = np.array([np.hypot(f["alpha_deg"], f["beta_deg"]) for f in sun]) - true
     beyond = outwards[(true > 60) & (true < 80)]
