@@ -6,7 +6,7 @@ both profiles, and how ours comes about.
   chosen      a choice that the document leaves open makes it
   definition  the document's own formula or setting
 
-The numbers of pictures are such that all takes half an hour on two idle cores.
+All takes less than half an hour on two idle cores.
 
 examples:
   cubestack fidelity --quick

@@ -181,14 +181,24 @@ def measured(
     frames: int,
     quick: int = 2,
     seconds: float = 10.0,
+    seed: int = 1,
+    units: int = 1,
     **options: Any,
 ) -> Trial:
-    """A trial that is `cubestack measure`: ``summary`` makes figures of its results."""
+    """A trial that is `cubestack measure`: ``summary`` makes figures of its results.
+
+    ``units``: the frames are of so many devices, with seeds from ``seed`` on.
+    """
 
     def run(opened: Opener[Any, Any], count: int) -> Figures:
-        return summary(list(measure(device, frames=count, **opened.board, **options)))
+        results: list[Result] = []
+        used = min(units, max(1, count // units))
+        for number in range(seed, seed + used):
+            each: dict[str, Any] = {"frames": count // used, "seed": number}
+            results += measure(device, **each, **opened.board, **options)
+        return summary(results)
 
-    words = ["measure", device, "--frames", str(frames)]
+    words = ["measure", device, "--frames", str(frames // units), "--seed", str(seed)]
     for name, value in options.items():
         words += [flag(name)] if value is True else [flag(name), str(value)]
     return Trial(run, frames, quick, seconds, " ".join(words))

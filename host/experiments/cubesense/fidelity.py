@@ -1,6 +1,7 @@
 """CubeSense's published figures (thesis, Stellenbosch University, 2011) and what measures ours."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -9,6 +10,7 @@ import numpy as np
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
 from cubestack.host.experiments.fidelity import measured
+from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.opener import Opener
 
 if TYPE_CHECKING:
@@ -18,7 +20,14 @@ if TYPE_CHECKING:
 _Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 
 ALTITUDE_KM = 750.0  # of the text
-SUN_BANDS = {"40": (0, 40), "60": (40, 60), "90": (60, 90.1), "45": (0, 45), "rest": (45, 90.1)}
+SUN_BANDS = {
+    "30": (0, 30),
+    "40": (0, 40),
+    "60": (40, 60),
+    "90": (60, 90.1),
+    "45": (0, 45),
+    "rest": (45, 90.1),
+}
 
 
 def _sensor(results: Sequence["SensorResult"]) -> Figures:
@@ -53,6 +62,8 @@ def _sensor(results: Sequence["SensorResult"]) -> Figures:
         figures[f"worst_{name}"] = own.max() if own.size else np.nan
     phases = {name: np.array([r.phase_ms[name] for r in good]) for name in good[0].phase_ms}
     figures |= {f"{name}_ms": values.mean() for name, values in phases.items()}
+    inner = np.abs(axes[angle < 30])
+    figures["sum_30"] = (inner.mean(axis=0) + axes[angle < 30].std(axis=0)).max()
     figures["sigma_ms"] = phases["total"].std()
     figures["imaging_ms"] = (phases["wait"] + phases["store"]).mean()
     return {name: float(value) for name, value in figures.items()}
@@ -66,6 +77,27 @@ def _ball(opened: _Opener, frames: int) -> Figures:
     results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=max(2, frames))))
     figures = {result.direction: result.offset_deg or np.nan for result in results}
     return {**figures, "sigma": max(result.sigma_deg or 0.0 for result in results)}
+
+
+def _scatter(opened: _Opener, frames: int, sensor: str, angles_deg: Sequence[float]) -> Figures:
+    """Standard deviation of pictures of the same pose, the largest of some angles and both axes."""
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+
+    largest = 0.0
+    for angle in angles_deg:
+        if sensor == "sun":
+            scene = EarthSunScene.facing(sun_deg=(angle, 0.0), altitude_km=ALTITUDE_KM)
+            scene = replace(scene, nadir=-np.asarray(scene.sun))
+        else:
+            scene = EarthSunScene.facing(nadir_deg=(angle, 0.0), altitude_km=ALTITUDE_KM)
+            scene = replace(scene, sun=-np.asarray(scene.nadir))
+        each = max(2, frames // len(angles_deg))
+        results = measure(
+            "cubesense", frames=each, seed=2, sensor=sensor, scene=scene, **opened.board
+        )
+        found = np.array([(one.alpha_deg, one.beta_deg) for one in results])  # type: ignore[attr-defined]
+        largest = max(largest, float(found.std(axis=0).max()))
+    return {"sigma": largest}
 
 
 def _power(_opened: _Opener, _frames: int) -> Figures:
@@ -124,6 +156,8 @@ def _lens(_opened: _Opener, _frames: int) -> Figures:
         "focal_mm": board_px * 0.0076 * 103 / 10,
         "earth_deg": earth_deg,
         "earth_px": earth_px,
+        "sampling": 8 * earth_px / 16,
+        "edges_64": 8 * earth_px / 64,
         "ball_px": float(fisheye.distorted(182.0)),
         "ball_cm": ball_mm / 10,
         "span_angle": 100 * earth_deg / lens_error.FIELD_DEG,
@@ -131,6 +165,45 @@ def _lens(_opened: _Opener, _frames: int) -> Figures:
         "off_deg": float(np.degrees(np.arcsin(np.sin(np.radians(30)) / slant_mm))),
         "off_km": ALTITUDE_KM / slant_mm,
     }
+
+
+def _tiles(opened: _Opener, _frames: int) -> Figures:
+    """Tiles as they were last estimated: both FPGAs as built and with one search, and counters."""
+    from cubestack.hdl.cubesense.tops import AREA_FILE
+    from cubestack.hdl.flow.area_report import recorded_areas
+
+    designs = recorded_areas(AREA_FILE)
+    flown = "-as-flown" * (opened.board["profile"] == "published")
+    names = {
+        **{side: f"cubesense-{side}{flown}" for side in ("sun", "nadir")},
+        **{f"{side}_one": f"cubesense-{side}-one-search" for side in ("sun", "nadir")},
+        "matrix": "matrix counter 640 x 480",
+        "gray": "Gray counter of 307200",
+    }
+    return {name: float(designs[design]["tiles"]) for name, design in names.items()}
+
+
+def _light(_opened: _Opener, _frames: int) -> Figures:
+    """Grey value of the Earth at noon, its threshold, and the Sun's radius in px."""
+    from cubestack.emulator.camera.ov7620 import light
+    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+    from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+    from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
+
+    bloom_px, space = FisheyeCondition().bloom_px, 34
+    earth = EarthSunScene.facing(nadir_deg=(0.0, 0.0), altitude_km=ALTITUDE_KM)
+    earth = replace(earth, sun=-np.asarray(earth.nadir))
+    lines = light.USUAL_EXPOSURE[Target.NADIR] * EXPOSURE_LINES
+    grey = lines * light.scene_light(earth, Target.NADIR, bloom_px, 0)
+    level = float(grey[grey > grey.max() / 3].mean()) + space
+    figures = {"earth": level, "threshold": space + 0.3 * (level - space)}
+    lines = light.USUAL_EXPOSURE[Target.SUN] * EXPOSURE_LINES
+    for name, angle in (("centre", 0.0), ("edge", 90.0)):
+        scene = EarthSunScene.facing(sun_deg=(angle, 0.0), altitude_km=ALTITUDE_KM)
+        scene = replace(scene, nadir=-np.asarray(scene.sun))
+        spot = lines * light.scene_light(scene, Target.SUN, bloom_px, 0)
+        figures[f"sun_{name}"] = float(np.sqrt((spot > light.SUN_EDGE).sum() / np.pi))
+    return figures
 
 
 def _memory(_opened: _Opener, _frames: int) -> Figures:
@@ -151,11 +224,16 @@ FIDELITY = Fidelity(
     page="fidelity-cubesense.md",
     trials={
         "ball": Trial(_ball, 10, 1, 30, "ball"),
-        "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2),
-        "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2),
-        "sun-time": measured("cubesense", _sensor, 100, 3, 10, sensor="sun", sun_angle=5, seed=2),
+        "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2, units=10),
+        "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2, units=10),
+        "sun-time": measured(
+            "cubesense", _sensor, 100, 3, 10, sensor="sun", sun_angle=5, seed=2, units=10
+        ),
+        "sun-still": Trial(partial(_scatter, sensor="sun", angles_deg=(0.0, 40.0, 80.0)), 60, 6, 8),
         "power": Trial(_power, profiles=False),
         "lens": Trial(_lens, profiles=False),
+        "light": Trial(_light, profiles=False),
+        "tiles": Trial(_tiles, command="hdl area"),
         "memory": Trial(_memory, profiles=False),
     },
     tables=read_tables("cubestack.host.experiments.cubesense"),

@@ -72,6 +72,7 @@ def _attitudes(results: Sequence["AttitudeResult"]) -> Figures:
         "cross95": float(np.percentile(cross, 95)),
         "roll95": float(np.percentile(roll, 95)),
         "algorithms_ms": max(both),
+        "match_ms": max((phases["match"] for phases in full), default=np.nan),
         "quest_ms": max((phases["attitude"] for phases in full), default=np.nan),
     }
 
@@ -142,24 +143,33 @@ def _centroids(opened: _Opener, frames: int) -> Figures:
 
 
 def _loop(opened: _Opener, frames: int) -> Figures:
-    """Means of the 1 Hz loop's phases in ms, and its power in mW, over so many turns."""
-    from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+    """Phases of the 1 Hz loop's last turn in ms; over so many its power in mW, and ages in ms."""
+    from cubestack.host.experiments.cubestar.layouts import attitudes_of_loop
 
-    warm_up, turns = 3, []
     with opened(None, seed=0) as device:
-        client, power = device.client.client, device.board.power
-        client.command("Trigger")
-        for turn in range(frames + warm_up):
-            if turn == warm_up:
-                started_s, charge_mas = device.time_s, power.charge_mas()
-            due_s = device.time_s + 1
-            while device.time_s < due_s - 1e-9:
-                client.pause(due_s - device.time_s)
-            if turn >= warm_up:
-                turns.append(device.client.phase_times())
-        mw = CUBESTAR_POWER.volts * (power.charge_mas() - charge_mas) / (device.time_s - started_s)
-    figures = {name: mean(turn[name] for turn in turns) for name in turns[0]}
-    return {**figures, "mw": mw}
+        device.client.client.command("Trigger")
+        begun, *found = attitudes_of_loop(device.board, frames)
+        device.client.client.command("StopLoop")
+        phases, volts = device.client.phase_times(), device.board.power.table.volts
+    took_s = (found[-1].time_ps - begun.time_ps) / 1e12
+    mw = (found[-1].charge_mas - begun.charge_mas) * volts / took_s
+    age_ms = mean(one.age_ms for one in found)
+    return {**phases, "mw": mw, "age": age_ms, "oldest": age_ms + 1000 * took_s / len(found)}
+
+
+def _spots(opened: _Opener, frames: int) -> Figures:
+    """Pixels that stars of the list cover in pictures: 5th, 50th and 95th percentile."""
+    from cubestack.emulator.scene.attitude import random_quaternion
+    from cubestack.emulator.scene.sky import SkyScene
+
+    rng, pixels = np.random.default_rng(1), list[int]()
+    with opened(None, seed=1) as device:
+        for seed in range(frames):
+            device.scene = SkyScene(quaternion=random_quaternion(rng), mag_limit=3.8, seed=seed)
+            device.client.capture_and_process()
+            pixels += [star.pixels for star in device.client.stars()]
+    low, middle, high = np.percentile(pixels, (5, 50, 95))
+    return {"low": float(low), "middle": float(middle), "high": float(high)}
 
 
 def _power(_opened: _Opener, _frames: int) -> Figures:
@@ -188,7 +198,7 @@ def _power(_opened: _Opener, _frames: int) -> Figures:
 
 
 def _rates(opened: _Opener, _frames: int) -> Figures:
-    """Frames a second for each setting of the register, of captures one frame apart."""
+    """Frames a second for each setting of the register, of captures one frame apart; exposures."""
     figures = {}
     with opened(None, seed=0) as device:
         for register in REGISTERS:
@@ -201,16 +211,22 @@ def _rates(opened: _Opener, _frames: int) -> Figures:
                 phases = device.client.phase_times()
                 times.append(phases["discard"] + phases["capture"])
             figures[f"fps_{register}"] = 1000 / (times[1] - times[0])
+            stored = device.board.stored[-1]
+            assert stored is not None
+            figures[f"exposed_{register}"] = 1000 * stored.exposure_s
     return figures
 
 
 def _optics(_opened: _Opener, _frames: int) -> Figures:
     """Fields of view by equations 3.5.2 to 3.5.4, and what follows from the sensor's data."""
+    from cubestack.emulator.boards.cubestar.board import BOOT_US
     from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
     def angle(size_px: int, focal_mm: float) -> float:
         return float(np.degrees(2 * np.arctan(size_px * PIXEL_PITCH_MM / 2 / focal_mm)))
 
+    # Equation 3.4.2: lens of 1 cm radius, 0.6 let through, 3000 Angstrom.
+    brightest = np.pi * 0.6 * 3000 * 1000
     photons = 25e-9 * 535e-9 / (6.63e-34 * 3e8) * (PIXEL_PITCH_MM / 10) ** 2
     return {
         "wide": angle(COLUMNS, 6.0),
@@ -220,6 +236,10 @@ def _optics(_opened: _Opener, _frames: int) -> Figures:
         "high_fitted": angle(ROWS, 6.28),
         "photons": photons,
         "saturated_s": (1 << 12) / 1008,
+        "faintest": float(2.5 * np.log10(brightest / photons)),
+        "faintest_spread": float(2.5 * np.log10(brightest / 9 / photons)),
+        "expected_ms": 2 * 3.3e9 / 48e6,
+        "boot_ms": BOOT_US / 1000,
         "least_fps": 11e6 / 5_413_590,
     }
 
@@ -245,14 +265,13 @@ FIDELITY = Fidelity(
         "catalogue": Trial(_catalogue, seconds=2, profiles=False),
         "coverage": Trial(_coverage, 20_000, 500, 10, profiles=False),
         "centroids": Trial(_centroids, 20, 1, 30),
-        "noiseless": measured(
-            "cubestar", _attitudes, 100, 2, 10, mag_limit=3.8, no_noise=True, seed=1
-        ),
-        "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8, seed=1),
-        "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5, seed=1),
+        "noiseless": measured("cubestar", _attitudes, 100, 2, 10, mag_limit=3.8, no_noise=True),
+        "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8),
+        "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5),
         "night": Trial(night, 100, 1, 250),
         "loop": Trial(_loop, 20, 2, 10),
         "power": Trial(_power, profiles=False),
+        "spots": Trial(_spots, 20, 1, 3),
         "rates": Trial(_rates, seconds=2, profiles=False),
         "optics": Trial(_optics, profiles=False),
     },

@@ -138,7 +138,7 @@ def _measure(layout: Layout, opened: _Opener, options: LayoutOptions) -> LayoutR
 
     with opened(options.scene, seed=options.seed, layout=layout.value) as emulated:
         emulated.client.client.command("Trigger")
-        found = list(_attitudes(emulated.board, options.seconds))
+        found = list(attitudes_of_loop(emulated.board, options.seconds))
         emulated.client.client.command("StopLoop")
         phases = emulated.client.phase_times()
         violations = sum(emulated.board.engine.violation_counts.values())
@@ -174,7 +174,7 @@ def _known(value: float, digits: int = 1) -> float | None:
 
 
 @dataclass(frozen=True)
-class _Found:
+class Found:
     """An attitude at the instant at which it is available."""
 
     time_ps: int
@@ -183,7 +183,7 @@ class _Found:
     right: bool | None
 
 
-def _attitudes(board: "CubeStarBoard", seconds: int) -> Iterator[_Found]:
+def attitudes_of_loop(board: "CubeStarBoard", seconds: int) -> Iterator[Found]:
     """What the loop finds after ``SETTLING`` attitudes: one, and those of ``seconds`` after it.
 
     When the first one does not come, its place is told without it.
@@ -194,7 +194,7 @@ def _attitudes(board: "CubeStarBoard", seconds: int) -> Iterator[_Found]:
     begun = False
     while not begun or kernel.now < end_ps:
         if kernel.now >= end_ps:
-            yield _Found(kernel.now, 0.0, math.nan, right=None)
+            yield Found(kernel.now, 0.0, math.nan, right=None)
             return
         kernel.step()
         writes = board.flash.writes.get(ATTITUDE_PAGE, 0)
@@ -211,7 +211,7 @@ def _attitudes(board: "CubeStarBoard", seconds: int) -> Iterator[_Found]:
             right = is_right(*errors(Attitude.unpack(page).quaternion, truth))
         if not begun:
             begun, end_ps = True, kernel.now + seconds * PS_PER_S + PS_PER_MS
-        yield _Found(
+        yield Found(
             kernel.now,
             board.power.charge_mas(),
             (kernel.now - stored.mid_exposure_ps(MIDDLE_ROW)) / PS_PER_MS,
