@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if not any(chosen.values()):
         raise ValueError(f"no row is like {', '.join(args.rows)}; --quick --json lists all keys")
     profiles = [args.profile] if args.profile else PROFILES
+    pages = {name: _page(args.write, name) for name in names} if args.write else {}
     jobs = [
         job
         for name, rows in chosen.items()
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     told = _Rest(jobs, quiet=args.json)
     found = fidelity.run_jobs(jobs, workers, told)
     for name, rows in chosen.items():
-        _show(args, name, list(fidelity.filled(name, rows, found)))
+        _show(args, list(fidelity.filled(name, rows, found)), pages.get(name))
     return 0
 
 
@@ -103,11 +104,21 @@ class _Rest:
             )
 
 
-def _show(args: argparse.Namespace, name: str, rows: list[fidelity.Measured]) -> None:
-    if args.write:
-        path = args.write / fidelity.fidelity_of(name).page
-        path.write_text(fidelity.rewritten(path.read_text("utf-8"), rows), "utf-8")
-        say(f"wrote {len(rows)} rows to {path}")
+def _page(folder: Path, name: str) -> Path:
+    """A device's page, before anything is measured; ValueError where tables have no place."""
+    declared = fidelity.fidelity_of(name)
+    path: Path = folder / declared.page
+    text = path.read_text("utf-8") if path.is_file() else ""
+    for table in declared.tables:
+        if not all(mark in text for mark in fidelity.marks(table)):
+            raise ValueError(f"{path} has no {fidelity.marks(table)[0].strip()}, or is not there")
+    return path
+
+
+def _show(args: argparse.Namespace, rows: list[fidelity.Measured], page: Path | None) -> None:
+    if page is not None:
+        page.write_text(fidelity.rewritten(page.read_text("utf-8"), rows), "utf-8")
+        say(f"wrote {len(rows)} rows to {page}")
     elif args.json:
         for row in rows:
             print(json.dumps(row.as_dict()), flush=True)

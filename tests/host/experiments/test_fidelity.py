@@ -122,27 +122,41 @@ def test_a_table_with_another_word_is_refused(
         read_tables("anything")
 
 
-def test_only_the_tables_of_a_page_are_rewritten(monkeypatch: pytest.MonkeyPatch) -> None:
-    sensor = replace(
-        device("aramis"),
-        fidelity=lambda: Fidelity(
-            "page.md", {"walk": Trial(lambda _opened, _frames: {"v": 2.5})}, {"pace": (ROW,)}
-        ),
-    )
+PAGE = "above\n<!-- rows: pace -->\nold\n<!-- end of rows -->\nbelow\n"
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The page of a device with one row, which stands in for AraMiS."""
+    trials = {"walk": Trial(lambda opened, _frames: {"v": 2.5 + len(opened.board["profile"])})}
+    walking = Fidelity("page.md", trials, {"pace": (ROW,)})
+    sensor = replace(device("aramis"), fidelity=lambda: walking)
     monkeypatch.setattr(fidelity, "registered", lambda _name: sensor)
-    rows = fidelity.chosen_rows("aramis")
-    jobs = fidelity.jobs_of("aramis", [row for _, row in rows], ["published"])
-    found = fidelity.run_jobs(jobs, 1, lambda _job: None)
-    page = "above\n<!-- rows: pace -->\nold\n<!-- end of rows -->\nbelow\n"
-    once = fidelity.rewritten(page, list(fidelity.filled("aramis", rows, found)))
+    (tmp_path / "page.md").write_text(PAGE)
+    return tmp_path / "page.md"
+
+
+def test_only_the_tables_of_a_page_are_rewritten(run: Run, page: Path) -> None:
+    assert run("fidelity", "aramis", "--write", page.parent, "--workers", "1").code == 0
+    once = page.read_text()
     assert once.startswith("above\n")
     assert once.endswith("below\n")
     assert "old" not in once
-    line = "| speed | section 1 | 3 m/s | 2.5 m/s |  | fitted | `fidelity aramis --rows a` |\n"
-    assert line in once
-    assert fidelity.rewritten(once, list(fidelity.filled("aramis", rows, found))) == once
-    with pytest.raises(ValueError, match="no line '<!-- rows: pace -->'"):
-        fidelity.rewritten("", list(fidelity.filled("aramis", rows, found)))
+    cells = "speed | section 1 | 3 m/s | 11.5 m/s | 10.5 m/s | fitted | `fidelity aramis --rows a`"
+    assert f"| {cells} |\n" in once
+    run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
+    assert page.read_text() == once
+
+
+def test_a_page_without_a_place_is_refused_before_anything_is_measured(
+    run: Run, page: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fidelity, "perform", None)
+    page.write_text("nothing\n")
+    for folder in (page.parent, page.parent / "none"):
+        refused = run("fidelity", "aramis", "--write", folder)
+        assert refused.code == 2
+        assert "has no <!-- rows: pace -->" in refused.line
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
