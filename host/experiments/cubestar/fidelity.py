@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
 from cubestack.host.experiments.cubestar.night import night
@@ -172,6 +173,15 @@ def _spots(opened: _Opener, frames: int) -> Figures:
     return {"low": float(low), "middle": float(middle), "high": float(high)}
 
 
+def _calibration(opened: _Opener, frames: int) -> Figures:
+    """What pictures of a drawn unit, and of its star pairs, say of the lens; it has 6.28 mm."""
+    from cubestack.host.experiments.calibrate import CalibrateOptions
+    from cubestack.host.experiments.cubestar.calibrate import EXPERIMENT
+
+    (result,) = EXPERIMENT.run(opened, CalibrateOptions(emulated=frames, seed=0))
+    return {"residual": result.after_px, "pairs_mm": (result.pairs_f_px or np.nan) * PIXEL_PITCH_MM}
+
+
 def _power(_opened: _Opener, _frames: int) -> Figures:
     """Currents in mA of the four modes of table 6.2."""
     from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
@@ -220,7 +230,6 @@ def _rates(opened: _Opener, _frames: int) -> Figures:
 def _optics(_opened: _Opener, _frames: int) -> Figures:
     """Fields of view by equations 3.5.2 to 3.5.4, and what follows from the sensor's data."""
     from cubestack.emulator.boards.cubestar.board import BOOT_US
-    from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 
     def angle(size_px: int, focal_mm: float) -> float:
         return float(np.degrees(2 * np.arctan(size_px * PIXEL_PITCH_MM / 2 / focal_mm)))
@@ -270,6 +279,9 @@ FIDELITY = Fidelity(
         "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5),
         "night": Trial(night, 100, 1, 250),
         "loop": Trial(_loop, 20, 2, 10),
+        "calibration": Trial(
+            _calibration, 20, 6, 5, "calibrate cubestar --emulated 20 --seed 0", profiles=False
+        ),
         "power": Trial(_power, profiles=False),
         "spots": Trial(_spots, 20, 1, 3),
         "rates": Trial(_rates, seconds=2, profiles=False),
