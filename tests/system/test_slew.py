@@ -4,20 +4,27 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.devices.registry import device
-from cubestack.host.experiments.cubestar.slew import PICTURES, slewing
+from cubestack.host.experiments.cubestar.shots import PICTURES, Shot, slewing_shots
 from cubestack.host.experiments.opener import Opener
+
+
+def _turning(profile: str, frames: int, rate_deg_s: float) -> list[Shot]:
+    opened = Opener(device("cubestar"), board={"profile": profile})
+    return list(slewing_shots(opened, frames, rate_deg_s))
 
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("rate", [0.0635, 0.1333])
 def test_slow_turns_are_tracked_by_every_star(profile: str, rate: float) -> None:
-    taken = list(slewing(Opener(device("cubestar"), board={"profile": profile}), PICTURES, rate))
-    assert all(shot.right and shot.matched >= shot.detected - 1 for shot, _, _ in taken)
-    assert [tracked for _, tracked, _ in taken] == [False] + [True] * (PICTURES - 1)
+    taken = list(
+        slewing_shots(Opener(device("cubestar"), board={"profile": profile}), PICTURES, rate)
+    )
+    assert all(shot.right and shot.matched >= shot.detected - 1 for shot in taken)
+    assert [shot.tracked for shot in taken] == [False] + [True] * (PICTURES - 1)
 
 
 @pytest.mark.parametrize(("profile", "rate"), [("published", 2), ("published", 8), ("extended", 8)])
 def test_streaks_are_not_tracked(profile: str, rate: float) -> None:
-    taken = list(slewing(Opener(device("cubestar"), board={"profile": profile}), 6, rate))
-    assert not any(tracked for _, tracked, _ in taken)
-    assert sum(shot.right for shot, _, _ in taken) <= (2 if rate < 8 else 0)
+    taken = _turning(profile, 6, rate)
+    assert not any(shot.tracked for shot in taken)
+    assert sum(shot.right for shot in taken) <= (2 if rate < 8 else 0)

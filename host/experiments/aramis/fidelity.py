@@ -1,21 +1,13 @@
 """AraMiS' published figures (thesis, Politecnico di Torino, 2008) and what measures ours."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
-from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
+from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
 from cubestack.host.experiments.fidelity import mean, measured
-from cubestack.host.experiments.opener import Opener
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.aramis.board import AramisBoard
-    from cubestack.host.experiments.aramis.measure import AramisResult
-
-_Opener: TypeAlias = "Opener[AramisBoard, Aramis]"
 
 EPOCH = 2000.0  # of the thesis' catalogue
 LOOKUP_SEED = 1
@@ -23,7 +15,7 @@ STARS = 6
 """Of a field: the main triangle and three pivots (section 5.7)."""
 
 
-def _attitudes(results: Sequence["AramisResult"]) -> Figures:
+def _attitudes(results: Sequence[AramisResult]) -> Figures:
     """Rates in percent; errors of the right ones in arcsec; mean times in ms."""
     count = len(results)
     right = [result for result in results if result.right]
@@ -44,7 +36,7 @@ def _attitudes(results: Sequence["AramisResult"]) -> Figures:
     }
 
 
-def _catalogue(_opened: _Opener, _frames: int) -> Figures:
+def _catalogue(_opened: AramisOpener, _frames: int) -> Figures:
     """Stars and triangles of the published selection, and of its two variants."""
     from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, cached_database
 
@@ -60,7 +52,7 @@ def _catalogue(_opened: _Opener, _frames: int) -> Figures:
     return {**figures, "picture": IMAGE_BYTES / 2**20}
 
 
-def _lookups(_opened: _Opener, frames: int) -> Figures:
+def _lookups(_opened: AramisOpener, frames: int) -> Figures:
     """Triangles that a lookup by area and one by moment give, both, and after one pivot.
 
     Stars of random fields without noise, with the bounds of appendix E; means of main triangles.

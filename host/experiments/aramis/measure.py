@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
     from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 
-_Opener: TypeAlias = "Opener[AramisBoard, Aramis]"
+AramisOpener: TypeAlias = "Opener[AramisBoard, Aramis]"
 _Emulated: TypeAlias = "EmulatedDevice[AramisBoard, Aramis]"
 
 FIELD_DEG = 21.53463888888889
@@ -153,7 +153,7 @@ class AramisResult(attitudes.AttitudeResult):
         return {key: getattr(self, key) for key in _KEYS}
 
 
-class _Experiment(attitudes.AttitudeExperiment["_Opener", AramisOptions, AramisResult]):
+class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, AramisResult]):
     options = AramisOptions
     description = __doc__
 
@@ -163,7 +163,7 @@ class _Experiment(attitudes.AttitudeExperiment["_Opener", AramisOptions, AramisR
         far = 100 * sum(bool(result.far) for result in results) / max(1, len(results))
         yield f"wrong by appendix E's criterion, a triangle more than a field away: {far:.1f} %"
 
-    def run(self, opened: _Opener, options: AramisOptions) -> Iterator[AramisResult]:
+    def run(self, opened: AramisOpener, options: AramisOptions) -> Iterator[AramisResult]:
         from cubestack.emulator.boards.aramis.catalogue import onboard_database
         from cubestack.emulator.camera.common.view import SkyCondition
         from cubestack.emulator.camera.mt9m001.lens import double_gauss

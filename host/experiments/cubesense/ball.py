@@ -12,21 +12,13 @@ examples:
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera
-from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.experiment import Experiment, Result
-from cubestack.host.experiments.cubesense.measure import FRAME_S
-from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.cubesense.measure import FRAME_S, CubeSenseOpener
 from cubestack.host.options import Options, between, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
-
-_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 
 DIRECTIONS = {"right": (1, 0), "left": (-1, 0), "down": (0, 1), "up": (0, -1)}
 """Where the ball goes in the picture; figure 7.1 does not say which of its four parts is which."""
@@ -80,7 +72,7 @@ class BallResult(Result):
     sigma_deg: float | None
 
 
-class _Ball(Experiment[_Opener, BallOptions, BallResult]):
+class _Ball(Experiment[CubeSenseOpener, BallOptions, BallResult]):
     options = BallOptions
     description = __doc__
     title = "nadir sensor before the ball: offset from the stage's angle"
@@ -89,7 +81,7 @@ class _Ball(Experiment[_Opener, BallOptions, BallResult]):
     def count(self, options: BallOptions) -> int:
         return len(DIRECTIONS)
 
-    def run(self, opened: _Opener, options: BallOptions) -> Iterator[BallResult]:
+    def run(self, opened: CubeSenseOpener, options: BallOptions) -> Iterator[BallResult]:
         from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
         from cubestack.emulator.scene.ball import ball_scene
 

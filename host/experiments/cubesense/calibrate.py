@@ -17,7 +17,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,19 +27,16 @@ from cubestack.host.calibration.fisheye import Fisheye, FisheyeFit, Points, fit_
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.cubesense.measure import (
+    CubeSenseOpener,
     CubeSenseOptions,
     measure_once,
     random_view,
     view_of,
 )
-from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import PATH, Options, option, whole
 
 if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
     from cubestack.emulator.camera.ov7620.view import EarthSunView
-
-_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 
 FIELD = (PIXELS_PER_DEGREE, 95.0)
 """Pixels for a degree, undistorted, and the largest field angle, deg."""
@@ -115,12 +112,12 @@ class CalibrateResult(Result):
     error_after_deg: float | None
 
 
-class _Experiment(Experiment["_Opener", CalibrateOptions, CalibrateResult]):
+class _Experiment(Experiment["CubeSenseOpener", CalibrateOptions, CalibrateResult]):
     options = CalibrateOptions
     description = __doc__
     label = ""
 
-    def run(self, opened: _Opener, options: CalibrateOptions) -> Iterator[CalibrateResult]:
+    def run(self, opened: CubeSenseOpener, options: CalibrateOptions) -> Iterator[CalibrateResult]:
         results = []
         for camera in [camera for camera in Camera if options.sensor in ("both", _name(camera))]:
             reset = opened.device.interface.telecommand(f"Boresight{camera + 1}").reset_values()
@@ -163,7 +160,7 @@ def _name(camera: Camera) -> str:
 
 
 def _bench(
-    opened: _Opener, options: CalibrateOptions, camera: Camera, tables: Fisheye
+    opened: CubeSenseOpener, options: CalibrateOptions, camera: Camera, tables: Fisheye
 ) -> FisheyeFit:
     """Fit to known poses, spread evenly over the field."""
     from cubestack.emulator.camera.ov7620.view import FisheyeCondition
@@ -210,7 +207,7 @@ def _places(cubesense: CubeSense, camera: Camera, tables: Fisheye) -> Points:
 
 
 def _checked(
-    opened: _Opener, options: CalibrateOptions, camera: Camera, lens: Fisheye
+    opened: CubeSenseOpener, options: CalibrateOptions, camera: Camera, lens: Fisheye
 ) -> tuple[float, float]:
     """Mean error at random poses, deg, with the tables and with ``lens`` loaded."""
     rng, unit = np.random.default_rng(options.seed), _unit(options)

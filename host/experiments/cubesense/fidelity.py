@@ -1,23 +1,19 @@
 """CubeSense's published figures (thesis, Stellenbosch University, 2011) and what measures ours."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
+from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
 from cubestack.host.experiments.fidelity import measured
 from cubestack.host.experiments.measure import measure
-from cubestack.host.experiments.opener import Opener
 
 if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
-    from cubestack.host.experiments.cubesense.measure import SensorResult
-
-_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
 
 ALTITUDE_KM = 750.0  # of the text
 SUN_BANDS = {
@@ -30,7 +26,7 @@ SUN_BANDS = {
 }
 
 
-def _sensor(results: Sequence["SensorResult"]) -> Figures:
+def _sensor(results: Sequence[SensorResult]) -> Figures:
     """Errors along rows (alpha) and columns (beta), in all, and by angle to the boresight; times.
 
     ``sum`` is section 8's accuracy, mean absolute error plus sigma.
@@ -69,7 +65,7 @@ def _sensor(results: Sequence["SensorResult"]) -> Figures:
     return {name: float(value) for name, value in figures.items()}
 
 
-def _ball(opened: _Opener, frames: int) -> Figures:
+def _ball(opened: CubeSenseOpener, frames: int) -> Figures:
     """Mean offset in each direction, and the largest sigma, of ``frames`` pictures an angle."""
     from cubestack.host.experiments.cubesense.ball import EXPERIMENT, BallOptions
 
@@ -79,19 +75,20 @@ def _ball(opened: _Opener, frames: int) -> Figures:
     return {**figures, "sigma": max(result.sigma_deg or 0.0 for result in results)}
 
 
-def _scatter(opened: _Opener, frames: int, sensor: str, angles_deg: Sequence[float]) -> Figures:
-    """Standard deviation of pictures of the same pose, the largest of some angles and both axes."""
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
+def _scene(sensor: Camera, angle_deg: float) -> "EarthSunScene":
+    """Its target at an angle along the picture's rows."""
+    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 
-    largest = 0.0
+    return view_of(sensor, (angle_deg, 0.0), FisheyeCondition(), ALTITUDE_KM).scene
+
+
+def _scatter(
+    opened: CubeSenseOpener, frames: int, sensor: str, angles_deg: Sequence[float]
+) -> Figures:
+    """Standard deviation of pictures of the same pose, the largest of some angles and both axes."""
+    largest, each = 0.0, max(2, frames // len(angles_deg))
     for angle in angles_deg:
-        if sensor == "sun":
-            scene = EarthSunScene.facing(sun_deg=(angle, 0.0), altitude_km=ALTITUDE_KM)
-            scene = replace(scene, nadir=-np.asarray(scene.sun))
-        else:
-            scene = EarthSunScene.facing(nadir_deg=(angle, 0.0), altitude_km=ALTITUDE_KM)
-            scene = replace(scene, sun=-np.asarray(scene.nadir))
-        each = max(2, frames // len(angles_deg))
+        scene = _scene(Camera[sensor.upper()], angle)
         results = measure(
             "cubesense", frames=each, seed=2, sensor=sensor, scene=scene, **opened.board
         )
@@ -100,7 +97,7 @@ def _scatter(opened: _Opener, frames: int, sensor: str, angles_deg: Sequence[flo
     return {"sigma": largest}
 
 
-def _power(_opened: _Opener, _frames: int) -> Figures:
+def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """mW of the eight states of table 7.1."""
     from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
     from cubestack.emulator.sim.power import PowerModel
@@ -130,7 +127,7 @@ def _power(_opened: _Opener, _frames: int) -> Figures:
     return found
 
 
-def _lens(_opened: _Opener, _frames: int) -> Figures:
+def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """What follows from the measured polynomial, the Earth's size and the pixels."""
     from cubestack.emulator.camera.ov7620 import fisheye, lens_error
     from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
@@ -167,7 +164,7 @@ def _lens(_opened: _Opener, _frames: int) -> Figures:
     }
 
 
-def _tiles(opened: _Opener, _frames: int) -> Figures:
+def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
     """Tiles as they were last estimated: both FPGAs as built and with one search, and counters."""
     from cubestack.hdl.cubesense.tops import AREA_FILE
     from cubestack.hdl.flow.area_report import recorded_areas
@@ -183,30 +180,26 @@ def _tiles(opened: _Opener, _frames: int) -> Figures:
     return {name: float(designs[design]["tiles"]) for name, design in names.items()}
 
 
-def _light(_opened: _Opener, _frames: int) -> Figures:
+def _light(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """Grey value of the Earth at noon, its threshold, and the Sun's radius in px."""
     from cubestack.emulator.camera.ov7620 import light
     from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-    from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+    from cubestack.emulator.scene.earth_sun import Target
     from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
 
     bloom_px, space = FisheyeCondition().bloom_px, 34
-    earth = EarthSunScene.facing(nadir_deg=(0.0, 0.0), altitude_km=ALTITUDE_KM)
-    earth = replace(earth, sun=-np.asarray(earth.nadir))
     lines = light.USUAL_EXPOSURE[Target.NADIR] * EXPOSURE_LINES
-    grey = lines * light.scene_light(earth, Target.NADIR, bloom_px, 0)
+    grey = lines * light.scene_light(_scene(Camera.NADIR, 0.0), Target.NADIR, bloom_px, 0)
     level = float(grey[grey > grey.max() / 3].mean()) + space
     figures = {"earth": level, "threshold": space + 0.3 * (level - space)}
     lines = light.USUAL_EXPOSURE[Target.SUN] * EXPOSURE_LINES
     for name, angle in (("centre", 0.0), ("edge", 90.0)):
-        scene = EarthSunScene.facing(sun_deg=(angle, 0.0), altitude_km=ALTITUDE_KM)
-        scene = replace(scene, nadir=-np.asarray(scene.sun))
-        spot = lines * light.scene_light(scene, Target.SUN, bloom_px, 0)
+        spot = lines * light.scene_light(_scene(Camera.SUN, angle), Target.SUN, bloom_px, 0)
         figures[f"sun_{name}"] = float(np.sqrt((spot > light.SUN_EDGE).sum() / np.pi))
     return figures
 
 
-def _memory(_opened: _Opener, _frames: int) -> Figures:
+def _memory(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """Share of the memory that pictures leave free, and that beyond their last address."""
     from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
     from cubestack.emulator.scene.earth_sun import SensorTruth
 
-_Opener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
+CubeSenseOpener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 
 #: Names of --search.
 SEARCHES = {
@@ -149,7 +149,7 @@ def _told(results: Sequence[SensorResult]) -> str:
     )
 
 
-class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
+class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult]):
     options = CubeSenseOptions
     description = __doc__
     title = "directions over the serial line, beside the truth; degrees"
@@ -159,7 +159,7 @@ class _Experiment(Experiment["_Opener", CubeSenseOptions, SensorResult]):
     def count(self, options: CubeSenseOptions) -> int:
         return options.frames * len(options.sensors)
 
-    def run(self, opened: _Opener, options: CubeSenseOptions) -> Iterator[SensorResult]:
+    def run(self, opened: CubeSenseOpener, options: CubeSenseOptions) -> Iterator[SensorResult]:
         rng = np.random.default_rng(options.seed)
         search = SEARCHES[options.search]
         sampling = search is not NadirSearch.LINES

@@ -2,22 +2,17 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
-from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.devices.fidelity import Fidelity, Figures, Trial, read_tables
+from cubestack.host.experiments.attitude import AttitudeResult
+from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.experiments.cubestar.night import night
+from cubestack.host.experiments.cubestar.shots import PICTURES, field_shots, slewing_shots
 from cubestack.host.experiments.fidelity import mean, measured
-from cubestack.host.experiments.opener import Opener
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-    from cubestack.host.experiments.attitude import AttitudeResult
-
-_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 RATES = (0.0635, 0.1333, 0.3, 2.0, 8.0)
 """Of section 6.2, in deg/s."""
@@ -29,11 +24,9 @@ COVERAGE_DEG = 42.33  # diameter; the caption of table 3.6 calls it a radius
 STARS_DRAWN = 18
 
 
-def _field(opened: _Opener, frames: int, **how: Any) -> Figures:
+def _field(opened: CubeStarOpener, frames: int, **how: Any) -> Figures:
     """Rates in percent on the published field."""
-    from cubestack.host.experiments.cubestar.published_field import shots
-
-    taken = list(shots(opened, frames, **how))
+    taken = list(field_shots(opened, frames, **how))
     return {
         "three": 100 * mean(shot.matched - shot.wrong > 2 for shot in taken),
         "right": 100 * mean(shot.right for shot in taken),
@@ -43,22 +36,20 @@ def _field(opened: _Opener, frames: int, **how: Any) -> Figures:
     }
 
 
-def _slew(opened: _Opener, frames: int, rate_deg_s: float) -> Figures:
+def _slew(opened: CubeStarOpener, frames: int, rate_deg_s: float) -> Figures:
     """Rates in percent of pictures a second apart, and the median error in degrees."""
-    from cubestack.host.experiments.cubestar.slew import PICTURES, slewing
-
-    shots, tracked, cross = zip(*slewing(opened, frames, rate_deg_s), strict=True)
-    later = [way for number, way in enumerate(tracked) if number % PICTURES]
+    shots = list(slewing_shots(opened, frames, rate_deg_s))
+    cross = [shot.cross_deg for shot in shots if shot.right]
     return {
         "right": 100 * mean(shot.right for shot in shots),
-        "tracked": 100 * mean(later) if later else np.nan,
+        "tracked": 100 * mean(one.tracked for at, one in enumerate(shots) if at % PICTURES),
         "off": 100 * mean(shot.valid and not shot.right for shot in shots),
         "share": 100 * sum(s.matched for s in shots) / max(1, sum(s.detected for s in shots)),
-        "cross": float(np.nanmedian(cross)) if np.isfinite(cross).any() else np.nan,
+        "cross": float(np.median(cross)) if cross else np.nan,
     }
 
 
-def _attitudes(results: Sequence["AttitudeResult"]) -> Figures:
+def _attitudes(results: Sequence[AttitudeResult]) -> Figures:
     """Rates in percent, errors of the right ones in degrees, times in ms."""
     right = [result for result in results if result.right]
     cross = [result.error_cross_deg or 0.0 for result in right] or [np.nan]
@@ -78,7 +69,7 @@ def _attitudes(results: Sequence["AttitudeResult"]) -> Figures:
     }
 
 
-def _catalogue(_opened: _Opener, _frames: int) -> Figures:
+def _catalogue(_opened: CubeStarOpener, _frames: int) -> Figures:
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
     from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH
 
@@ -101,7 +92,7 @@ def _catalogue(_opened: _Opener, _frames: int) -> Figures:
     }
 
 
-def _coverage(_opened: _Opener, frames: int) -> Figures:
+def _coverage(_opened: CubeStarOpener, frames: int) -> Figures:
     """Fields with three stars and five, and their mean number, by the faintest magnitude."""
     from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH, load_sky
 
@@ -121,7 +112,7 @@ def _coverage(_opened: _Opener, frames: int) -> Figures:
     return figures
 
 
-def _centroids(opened: _Opener, frames: int) -> Figures:
+def _centroids(opened: CubeStarOpener, frames: int) -> Figures:
     """Mean errors in px of stars drawn into uploaded pictures, 5 x 5 Gaussians of sigma 1 px."""
     rng, errors = np.random.default_rng(1), []
     with opened(None, seed=0) as emulated:
@@ -143,7 +134,7 @@ def _centroids(opened: _Opener, frames: int) -> Figures:
     return {"x": float(x), "y": float(y)}
 
 
-def _loop(opened: _Opener, frames: int) -> Figures:
+def _loop(opened: CubeStarOpener, frames: int) -> Figures:
     """Phases of the 1 Hz loop's last turn in ms; over so many its power in mW, and ages in ms."""
     from cubestack.host.experiments.cubestar.layouts import attitudes_of_loop
 
@@ -158,7 +149,7 @@ def _loop(opened: _Opener, frames: int) -> Figures:
     return {**phases, "mw": mw, "age": age_ms, "oldest": age_ms + 1000 * took_s / len(found)}
 
 
-def _spots(opened: _Opener, frames: int) -> Figures:
+def _spots(opened: CubeStarOpener, frames: int) -> Figures:
     """Pixels that stars of the list cover in pictures: 5th, 50th and 95th percentile."""
     from cubestack.emulator.scene.attitude import random_quaternion
     from cubestack.emulator.scene.sky import SkyScene
@@ -173,7 +164,7 @@ def _spots(opened: _Opener, frames: int) -> Figures:
     return {"low": float(low), "middle": float(middle), "high": float(high)}
 
 
-def _calibration(opened: _Opener, frames: int) -> Figures:
+def _calibration(opened: CubeStarOpener, frames: int) -> Figures:
     """What pictures of a drawn unit, and of its star pairs, say of the lens; it has 6.28 mm."""
     from cubestack.host.experiments.calibrate import CalibrateOptions
     from cubestack.host.experiments.cubestar.calibrate import EXPERIMENT
@@ -182,7 +173,7 @@ def _calibration(opened: _Opener, frames: int) -> Figures:
     return {"residual": result.after_px, "pairs_mm": (result.pairs_f_px or np.nan) * PIXEL_PITCH_MM}
 
 
-def _power(_opened: _Opener, _frames: int) -> Figures:
+def _power(_opened: CubeStarOpener, _frames: int) -> Figures:
     """Currents in mA of the four modes of table 6.2."""
     from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
     from cubestack.emulator.sim.power import PowerModel
@@ -207,7 +198,7 @@ def _power(_opened: _Opener, _frames: int) -> Figures:
     }
 
 
-def _rates(opened: _Opener, _frames: int) -> Figures:
+def _rates(opened: CubeStarOpener, _frames: int) -> Figures:
     """Frames a second for each setting of the register, of captures one frame apart; exposures."""
     figures = {}
     with opened(None, seed=0) as device:
@@ -227,7 +218,7 @@ def _rates(opened: _Opener, _frames: int) -> Figures:
     return figures
 
 
-def _optics(_opened: _Opener, _frames: int) -> Figures:
+def _optics(_opened: CubeStarOpener, _frames: int) -> Figures:
     """Fields of view by equations 3.5.2 to 3.5.4, and what follows from the sensor's data."""
     from cubestack.emulator.boards.cubestar.board import BOOT_US
 

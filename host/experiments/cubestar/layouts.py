@@ -18,19 +18,16 @@ examples:
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.attitude import errors, is_right
-from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.options import SCENE, Options, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-
-_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 
 SETTLING = 2
 """Attitudes before the measurement."""
@@ -88,7 +85,7 @@ class LayoutOptions(Options):
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
 
 
-class _Layouts(Experiment["_Opener", LayoutOptions, LayoutResult]):
+class _Layouts(Experiment["CubeStarOpener", LayoutOptions, LayoutResult]):
     options = LayoutOptions
     description = __doc__
     title = "CubeStar's memory layouts in their loops"
@@ -99,7 +96,7 @@ class _Layouts(Experiment["_Opener", LayoutOptions, LayoutResult]):
     def count(self, options: LayoutOptions) -> int:
         return len(Layout)
 
-    def run(self, opened: _Opener, options: LayoutOptions) -> Iterator[LayoutResult]:
+    def run(self, opened: CubeStarOpener, options: LayoutOptions) -> Iterator[LayoutResult]:
         for layout in Layout:
             yield _measure(layout, opened, options)
 
@@ -132,7 +129,7 @@ def _shown(value: float | None, digits: int = 0) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _measure(layout: Layout, opened: _Opener, options: LayoutOptions) -> LayoutResult:
+def _measure(layout: Layout, opened: CubeStarOpener, options: LayoutOptions) -> LayoutResult:
     """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
     from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
 

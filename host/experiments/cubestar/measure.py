@@ -43,8 +43,8 @@ from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
-_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
-_Emulated: TypeAlias = "EmulatedDevice[CubeStarBoard, CubeStar]"
+CubeStarOpener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
+CubeStarEmulated: TypeAlias = "EmulatedDevice[CubeStarBoard, CubeStar]"
 
 #: Names of --mode for the firmware's modes.
 MODE_NAMES = {
@@ -129,11 +129,11 @@ class CubeStarResult(attitudes.AttitudeResult):
     searched: bool
 
 
-class _Experiment(attitudes.AttitudeExperiment["_Opener", CubeStarOptions, CubeStarResult]):
+class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions, CubeStarResult]):
     options = CubeStarOptions
     description = __doc__
 
-    def run(self, opened: _Opener, options: CubeStarOptions) -> Iterator[CubeStarResult]:
+    def run(self, opened: CubeStarOpener, options: CubeStarOptions) -> Iterator[CubeStarResult]:
         from cubestack.emulator.camera.mlx75412.lens import CONDITION
         from cubestack.emulator.scene.sky import PictureScene
 
@@ -173,7 +173,7 @@ class _Experiment(attitudes.AttitudeExperiment["_Opener", CubeStarOptions, CubeS
         return "--mode assisted --hint-error 5 or --profile extended solve more"
 
 
-def _threshold(emulated: _Emulated, options: CubeStarOptions) -> int:
+def _threshold(emulated: CubeStarEmulated, options: CubeStarOptions) -> int:
     """Search or set the detection threshold as the options say; the one that holds."""
     command, name = "setDetectionThresholds", "DetectionThreshold"
     found = options.threshold
@@ -184,7 +184,7 @@ def _threshold(emulated: _Emulated, options: CubeStarOptions) -> int:
     return int(found or INTERFACE.telecommand(command).reset_values()[name])
 
 
-def _views(emulated: _Emulated, options: CubeStarOptions) -> Iterator[None]:
+def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[None]:
     """What a threshold is searched with: some random skies, or what the camera looks at."""
     from cubestack.emulator.camera.mlx75412.lens import CONDITION
 
@@ -214,7 +214,7 @@ def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | No
 
 
 def _measure(
-    emulated: _Emulated,
+    emulated: CubeStarEmulated,
     options: CubeStarOptions,
     picture_truth: NDArray[np.float64] | None,
     rng: np.random.Generator,
@@ -273,7 +273,9 @@ def give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
     )
 
 
-def _prime_tracking(emulated: _Emulated, offset_deg: float, rng: np.random.Generator) -> None:
+def _prime_tracking(
+    emulated: CubeStarEmulated, offset_deg: float, rng: np.random.Generator
+) -> None:
     """Let the device find an attitude at most ``offset_deg`` from the one it will track from."""
     from cubestack.emulator.scene.sky import SkyScene
 

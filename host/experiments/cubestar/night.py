@@ -16,19 +16,13 @@ elsewhere the test can not take place.
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import LADDER
 from cubestack.host.devices.log import log_lines, scatter
-from cubestack.host.experiments.opener import Opener
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-
-_Opener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
+from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 
 ROLL_DEG = 90.0  # chosen
 LATITUDE_DEG, HEIGHT_M, SEEING_ARCSEC, SKY_MAG = -33.93, 120.0, 2.0, 20.0
@@ -38,7 +32,7 @@ INTERVAL_S = 3.0  # so that a hundred pictures are the published several minutes
 SETTLING = 3  # lines until the loop's first attitudes are out
 
 
-def night(opened: _Opener, frames: int) -> dict[str, float]:
+def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
     """Means over the fields; a few frames are of one field, a second apart.
 
     Scatter in degrees of ``ra``, ``dec``, ``roll`` and ``across``: root of the sum of squares of

@@ -1,0 +1,133 @@
+"""Pictures of random skies as the host sees them: the published field's, and while turning."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
+from cubestack.host.calibration.camera import Camera
+from cubestack.host.clients.cubestar.calibration import calibrate
+from cubestack.host.experiments import attitude as attitudes
+from cubestack.host.experiments.cubestar.measure import (
+    CubeStarEmulated,
+    CubeStarOpener,
+    count_wrong,
+    give_hint,
+)
+
+if TYPE_CHECKING:
+    from cubestack.emulator.camera.common.optics import Optics
+
+WIDTH_DEG = 54.0
+DEFAULT_MARGIN_RAD = 0.001  # about a pixel (section 4.3.5)
+SEED = 1
+
+PICTURES = 10
+"""Of one sky, a second apart: the first one lost in space, the others as the node's flag has it."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One picture.
+
+    Attributes:
+        valid: it gave an attitude.
+        right: the attitude is right.
+        tracked: it is right, and was found by tracking.
+        cross_deg: error across; NaN unless it is right.
+        detected, matched, wrong: stars found, identified, and identified wrongly.
+    """
+
+    valid: bool
+    right: bool
+    tracked: bool
+    cross_deg: float
+    detected: int
+    matched: int
+    wrong: int = 0
+
+
+def _shot(device: CubeStarEmulated, *, judged: bool = False) -> Shot:
+    """Take one; if ``judged``, stars count whether or not they gave an attitude, and wrong ones."""
+    cubestar, client = device.client, device.client.client
+    status = cubestar.capture_and_process()
+    attitude, truth = cubestar.attitude(), device.board.truth()
+    assert truth is not None  # a sky has one
+    detected = int(client.telemetry("DetectionSummary")["NumStarsDetected"])
+    cross_deg, roll_deg = attitudes.errors(attitude.quaternion, truth)
+    valid = attitude.valid
+    right = valid and attitudes.is_right(cross_deg, roll_deg)
+    tracked = right and attitude.mode is MatchMode.TRACKING
+    matched, wrong = attitude.matched if valid else 0, 0
+    if judged and (valid or status is TaskStatus.CALCULATION_FAILED):
+        matched = int(client.telemetry("NumIdStars")["numIdStars"])
+        wrong = count_wrong(cubestar, truth) or 0
+    return Shot(valid, right, tracked, cross_deg if right else math.nan, detected, matched, wrong)
+
+
+def published_optics() -> "Optics":
+    """The field of table 4.4 in front of CubeStar's sensor: 54 x 28 degrees, no distortion."""
+    from cubestack.emulator.camera.mlx75412.lens import LENS
+
+    focal_px = LENS.columns / 2 / math.tan(math.radians(WIDTH_DEG / 2))
+    focal_mm = focal_px * LENS.pixel_pitch_um / 1000
+    middle = replace(LENS, cx=LENS.columns / 2 - 0.5, cy=LENS.rows / 2 - 0.5)
+    return replace(
+        middle, focal_length_mm=focal_mm, fx=focal_px, fy=focal_px, k1=0, k2=0, p1=0, p2=0
+    )
+
+
+def field_shots(
+    opened: CubeStarOpener,
+    frames: int,
+    hint_deg: float | None = None,
+    margin_rad: float = DEFAULT_MARGIN_RAD,
+    **sky: Any,
+) -> Iterator[Shot]:
+    """Of the published field, lost in space, or at most ``hint_deg`` from a rough boresight.
+
+    ``margin_rad``: search tolerance. ``sky``: of a ``SkyScene``, as mag_limit and false_stars.
+    """
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
+    from cubestack.emulator.scene.attitude import random_quaternion
+    from cubestack.emulator.scene.sky import SkyScene
+
+    rng, optics = np.random.default_rng(SEED), published_optics()
+    with opened(None, seed=SEED) as device:
+        cubestar, client = device.client, device.client.client
+        cubestar.configure(calibrate(Camera(optics.fx, optics.cx, optics.cy)).settings)
+        client.command("setIDMargin", Margin=margin_rad)
+        for number in range(frames):
+            scene = SkyScene(quaternion=random_quaternion(rng), seed=number, **sky)
+            device.scene = SkyView(scene, replace(CONDITION, optics=optics, seed=number))
+            lost = hint_deg is None
+            client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE if lost else IdMode.TRACKING)
+            if hint_deg is not None:
+                give_hint(cubestar, attitudes.rough_boresight(scene.truth(0), hint_deg, rng))
+            yield _shot(device, judged=True)
+
+
+def slewing_shots(opened: CubeStarOpener, frames: int, rate_deg_s: float) -> Iterator[Shot]:
+    """While turning across the boresight: section 6.2, on a mount that does not shake."""
+    from cubestack.emulator.scene.attitude import random_quaternion
+    from cubestack.emulator.scene.sky import SkyScene
+
+    rng = np.random.default_rng(SEED)
+    with opened(None, seed=SEED) as device:
+        for number in range(frames):
+            first = number % PICTURES == 0
+            if first:
+                side = rng.uniform(0, 2 * math.pi)
+                turning = (rate_deg_s * math.cos(side), rate_deg_s * math.sin(side), 0.0)
+                device.scene = SkyScene(
+                    random_quaternion(rng), rate_deg_s=turning, mag_limit=3.8, seed=number
+                )
+            mode = IdMode.LOST_IN_SPACE if first else IdMode.TRACKING
+            device.client.client.command("setIDMode", IdMode=mode)
+            due_s = device.time_s + 1
+            yield _shot(device)
+            device.client.client.pause(max(0.0, due_s - device.time_s))
