@@ -40,16 +40,20 @@ def run(tmp_path: Path) -> Run:
 
 
 def test_a_failed_test_tells_what_the_faults_did(run: Run, tmp_path: Path) -> None:
+    """And beside it, one with the profile that is the default."""
     (tmp_path / "plan.toml").write_text('seed = 2\n[[fault]]\nkind = "latch-up"\n')
     done = run(
         "pytestmark = pytest.mark.cubestack(seed=3)\n"
         "@pytest.mark.cubestack(faults='plan.toml')\n"
         "def test_it(cubestar):\n"
         "    cubestar.wait(0.01)\n"
-        "    assert (cubestar.seed, cubestar.faults.seed) == (0, 0)\n",
+        "    assert (cubestar.seed, cubestar.faults.seed) == (0, 0)\n"
+        "def test_profile(cubestar, aramis):\n"
+        f"    assert cubestar.chosen == aramis.chosen == {{'profile': '{DEFAULT_PROFILE}'}}\n",
         "--junitxml=report.xml",
     )
     assert done.returncode == 1
+    assert "1 failed, 1 passed" in done.stdout
     assert "assert (3, 2) == (0, 0)" in done.stdout
     assert "virtual time 0.010000000 s, seed 3\n0.000000000 s latch-up memory: 300" in done.stdout
     report = (tmp_path / "report.xml").read_text()
@@ -57,23 +61,17 @@ def test_a_failed_test_tells_what_the_faults_did(run: Run, tmp_path: Path) -> No
     assert 'name="cubestack.cubestar.fault_events" value="1"' in report
 
 
-def test_seeds_come_from_the_command_line(run: Run) -> None:
-    text = "def test_it(cubestar):\n    assert cubestar.seed == 8\n"
-    assert run(text, "--cubestack-seed=8").returncode == 0
-
-
-def test_the_profile_is_the_marker_s_the_command_line_s_or_the_default(run: Run) -> None:
+def test_seed_and_profile_are_the_marker_s_or_the_command_line_s(run: Run) -> None:
     text = (
         "def test_it(cubestar, aramis):\n"
-        "    assert cubestar.chosen == aramis.chosen == {'profile': '{}'}\n"
+        "    assert cubestar.seed == 8\n"
+        "    assert cubestar.chosen == aramis.chosen == {'profile': 'extended'}\n"
         "@pytest.mark.cubestack(profile='published', set='weights=grey-level')\n"
         "def test_own(aramis):\n"
         "    assert aramis.chosen == {'profile': 'published', 'set': 'weights=grey-level'}\n"
     )
-    for options in ((), ("--cubestack-profile=extended",)):
-        profile = options[0].split("=")[1] if options else DEFAULT_PROFILE
-        done = run(text.replace("{}", profile), *options)
-        assert done.returncode == 0, done.stdout
+    done = run(text, "--cubestack-seed=8", "--cubestack-profile=extended")
+    assert done.returncode == 0, done.stdout
 
 
 WRONG_MARKERS = {
