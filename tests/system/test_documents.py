@@ -117,8 +117,11 @@ def test_examples_of_scenes_load(tmp_path: Path) -> None:
 def test_links_lead_somewhere() -> None:
     documents = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
     for document in documents:
-        for target in re.findall(r"\]\(([^)#:]+)\)", document.read_text(encoding="utf-8")):
+        text = document.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)#:]+)\)", text):
             assert (document.parent / target).exists(), f"{document.name}: {target}"
+        for file in re.findall(r"`(tests/[\w/]+\.py)\b", text):
+            assert (ROOT / file).is_file(), f"{document.name}: {file}"
 
 
 def test_make_has_the_targets_that_are_promised() -> None:
@@ -158,13 +161,6 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
     ]
     for file in files:
         assert (ROOT / file).is_file(), file
-
-
-def test_experiments_of_the_pages_are_those_there_are() -> None:
-    pages = text_of("docs/fidelity.md") + text_of("docs/profiles.md")
-    named = re.findall(r"experiments\.py (\w+)", pages)
-    there = re.findall(r"experiments\.py (\w+) ", text_of("tests/system/experiments.py"))
-    assert {*named} == {*there}
 
 
 def test_reads_that_act_are_those_of_the_tables() -> None:

