@@ -4,16 +4,9 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-from cubestack.emulator.faults import table
+from cubestack.emulator.faults import parts, table
 from cubestack.emulator.faults.declaration import Fault, FaultError, Site
 from cubestack.emulator.faults.injection import FaultEvent, Injection, Mechanism
-from cubestack.emulator.faults.parts import (
-    CameraFaults,
-    MemoryFaults,
-    ProcessorFaults,
-    RegisterFaults,
-    SupplyFaults,
-)
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.plan import Plan
 from cubestack.emulator.faults.sites import Sites
@@ -199,18 +192,20 @@ class Faults:
             case Site.I2C:
                 return BusFaults(*who, sites.buses[target])
             case Site.SUPPLY:
-                return SupplyFaults(*who, sites.supplies)
+                return parts.SupplyFaults(*who, sites.supplies)
             case Site.PROCESSOR:
-                return ProcessorFaults(*who, sites.resets[target])
+                return parts.ProcessorFaults(*who, sites.resets[target])
             case Site.MEMORY:
                 pins = None if engine is None else self._pins
-                return MemoryFaults(*who, sites.all_memories()[target], engine, pins)
+                return parts.MemoryFaults(*who, sites.all_memories()[target], engine, pins)
         assert engine is not None
         match site:
             case Site.CAMERA:
-                return CameraFaults(*who, engine, target, sites.cameras[target], sites.supplies)
+                return parts.CameraFaults(
+                    *who, engine, target, sites.cameras[target], sites.supplies
+                )
             case Site.FPGA:
-                return RegisterFaults(*who, engine)
+                return parts.RegisterFaults(*who, engine)
             case _:
                 return self._pins
 

@@ -10,19 +10,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeVar
 
+from cubestack.firmware_model.aramis import pipeline
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.field import FOV_DEG, Field
-from cubestack.firmware_model.aramis.pipeline import (
-    PUBLISHED,
-    VERIFIED,
-    Configuration,
-    Detection,
-    solve,
-)
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.state import Measurement, State
 from cubestack.firmware_model.attitude.quest import dcm
@@ -43,12 +37,12 @@ def _lens(fov_deg: float, only_round: bool) -> Field:
 
 def configuration(
     settings: StoredSettings, switches: AramisSwitches = DEFAULT_SWITCHES
-) -> Configuration:
+) -> pipeline.Configuration:
     """Settings of the processing; what a switch has as printed, no setting changes."""
     search, matching = settings.all("SetDetection"), settings.all("SetIdentification")
     field = settings.all("SetField")
     lens = _lens(float(field["FieldOfView"]), bool(field["Round"]))
-    detection = Detection(
+    detection = pipeline.Detection(
         sigmas=float(search["Sigmas"]),
         spikes=SpikeRemoval(search["Spikes"]),
         needed=int(search["Needed"]),
@@ -59,9 +53,9 @@ def configuration(
     )
     sigma_rad = float(matching["Noise"]) * lens.scale[1]
     if switches.noise == "appendix-e":
-        sigma_rad = PUBLISHED.profile.sigma_rad * lens.fov_deg / FOV_DEG
+        sigma_rad = pipeline.PUBLISHED.profile.sigma_rad * lens.fov_deg / FOV_DEG
     profile = replace(
-        VERIFIED.profile,
+        pipeline.VERIFIED.profile,
         sigma_rad=sigma_rad,
         pivots=int(matching["Pivots"]),
         always_pivot=switches.pivots == "always",
@@ -70,7 +64,7 @@ def configuration(
         verify=bool(matching["Verify"]) and switches.belief == "confirmed",
         hint_tolerance_deg=float(matching["HintTolerance"]),
     )
-    return Configuration(lens, detection, profile)
+    return pipeline.Configuration(lens, detection, profile)
 
 
 @dataclass
@@ -165,7 +159,9 @@ class Measuring:
             settings = configuration(self._state.settings, self._state.switches.now)
             exposure = int(self._state.settings.get("SetExposure", "Rows"))
             picture, past = self._camera.picture(place), self._background
-            solution = solve(picture, past, settings, database, self._meter, hint, exposure)
+            solution = pipeline.solve(
+                picture, past, settings, database, self._meter, hint, exposure
+            )
             result.mean = past.mean(self._meter)
             result.threshold = past.threshold(settings.detection.sigmas, self._meter)
             result.pictures = len(past.sums)

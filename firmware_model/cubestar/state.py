@@ -19,11 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.interface.codec.switch_messages import (
-    SHOWN,
-    shown_values,
-    switches_shown,
-)
+from cubestack.firmware_model.interface.codec import switch_messages
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
@@ -65,7 +61,7 @@ FLASH_ENDURANCE = 20_000
 """Erasures that a page stands: chosen, the data sheet of the EFM32GG280."""
 
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
-_SWITCHES = INTERFACE.telemetry(SHOWN)
+_SWITCHES = INTERFACE.telemetry(switch_messages.SHOWN)
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF
 
@@ -196,7 +192,7 @@ class State(NodeState):
             data = BytesIO(hardware.retention[magic : self.RETENTION_SIZE])
             self.settings.unpack(data.read(_SETTINGS_BYTES))
             values = _SWITCHES.unpack(data.read(_SWITCHES.length))
-            self.switches.now = switches_shown(CubeStarSwitches, values)
+            self.switches.now = switch_messages.switches_shown(CubeStarSwitches, values)
             flags = _FLAGS.unpack(data.read(_FLAGS.length))
             self.flags = {name for name, raised in flags.items() if raised}
             self.retained = Retained(*self._COUNTERS.unpack(data.read()))
@@ -213,7 +209,7 @@ class State(NodeState):
         self.hardware.retention[: self.RETENTION_SIZE] = (
             self._MAGIC
             + self.settings.pack()
-            + _SWITCHES.pack(**shown_values(self.switches.now))
+            + _SWITCHES.pack(**switch_messages.shown_values(self.switches.now))
             + _FLAGS.pack(**self.flag_values())
             + self._COUNTERS.pack(*counters)
         )

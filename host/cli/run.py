@@ -21,13 +21,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.device_options import (
-    add_board_arguments,
-    add_start_arguments,
-    chosen_options,
-    inject_plan,
-)
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.terminal import say
@@ -73,8 +68,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
     )
-    add_start_arguments(parser)
-    add_board_arguments(parser)
+    device_options.add_start_arguments(parser)
+    device_options.add_board_arguments(parser)
     parser.add_argument(
         "--hz", type=whole(1), default=STANDARD_HZ, help="bits a second (default 100000)"
     )
@@ -137,7 +132,7 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
     opened: list[AnyEmulated] = []
     for name in names:
         beside = opened[0] if opened else None
-        options = chosen_options(args, device(name))
+        options = device_options.chosen_options(args, device(name))
         opened.append(
             open_device(
                 name, args.scene, seed=args.seed, engine=args.engine, beside=beside, **options
@@ -145,7 +140,7 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
         )
         stack.callback(opened[-1].close)
     board = opened[0].board
-    inject_plan(opened[0].faults, args.faults, None if args.quiet else say)
+    device_options.inject_plan(opened[0].faults, args.faults, None if args.quiet else say)
     kernel, bus = board.kernel, board.i2c_bus
     bus.bit_ps = PS_PER_S // args.hz
     for old, new in args.i2c_addr:

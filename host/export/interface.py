@@ -4,14 +4,8 @@ import json
 from collections.abc import Callable
 
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.host.export import field_text
 from cubestack.host.export.c_header import c_header
-from cubestack.host.export.field_text import (
-    choice_rows,
-    field_details,
-    field_json,
-    field_type,
-    picked,
-)
 from cubestack.host.export.side_protocols import side_json, side_markdown, side_table
 
 
@@ -23,8 +17,8 @@ def _table(interface: Interface) -> str:
         for message in (m for m in interface.messages if m.kind is kind):
             lines.append(f"{message.id:4d} {message.name}, {message.length} B: {_meaning(message)}")
             lines += [
-                f"     {field.bit_offset:5d} {field_type(field):<13} {field.name:<31} "
-                f"{field_details(field)}"
+                f"     {field.bit_offset:5d} {field_text.field_type(field):<13} {field.name:<31} "
+                f"{field_text.field_details(field)}"
                 for field in message.fields
             ]
     return "\n".join([*lines, *side_table(interface)]) + "\n"
@@ -47,11 +41,11 @@ def _markdown(interface: Interface) -> str:
         "",
         "## Error codes of an acknowledge",
         "",
-        *choice_rows(interface.ack_errors),
+        *field_text.choice_rows(interface.ack_errors),
     ]
     for choices in interface.choices:
         parts += ["", f"## {choices.__name__}", "", f"{choices.__doc__}", ""]
-        parts += choice_rows(choices)
+        parts += field_text.choice_rows(choices)
     for message in interface.messages:
         title = f"{message.kind.value.capitalize()} {message.id}: {message.name}"
         meaning = _meaning(message)
@@ -60,8 +54,8 @@ def _markdown(interface: Interface) -> str:
         if message.fields:
             parts += ["", "| offset | type | field | meaning |", "|-|-|-|-|"]
             parts += [
-                f"| {field.bit_offset} | {field_type(field)} | {field.name} "
-                f"| {field_details(field)} |"
+                f"| {field.bit_offset} | {field_text.field_type(field)} | {field.name} "
+                f"| {field_text.field_details(field)} |"
                 for field in message.fields
             ]
     return "\n".join([*parts, *side_markdown(interface)]) + "\n"
@@ -70,17 +64,17 @@ def _markdown(interface: Interface) -> str:
 def _json(interface: Interface) -> str:
     """One JSON object, for other programs."""
     content = {
-        **picked(interface, "name", "version", "i2c_address", "baud"),
+        **field_text.picked(interface, "name", "version", "i2c_address", "baud"),
         "ack_errors": {error.name: int(error) for error in interface.ack_errors},
         "messages": [
             {
                 "id": message.id,
                 "kind": message.kind.value,
-                **picked(message, "name", "length", "meaning"),
+                **field_text.picked(message, "name", "length", "meaning"),
                 "extension": message.extension,
-                **picked(message, "steps", "supported", "ordered"),
+                **field_text.picked(message, "steps", "supported", "ordered"),
                 "confidence": message.confidence and message.confidence.name,
-                "fields": [field_json(field) for field in message.fields],
+                "fields": [field_text.field_json(field) for field in message.fields],
             }
             for message in interface.messages
         ],

@@ -7,11 +7,7 @@ modelled, or not declared at all, is stored and logged when accessed.
 import logging
 from logging import INFO, WARNING
 
-from cubestack.firmware_model.interface.cameras.registers import (
-    CameraRegister,
-    CameraRegisterMap,
-    RegisterAccess,
-)
+from cubestack.firmware_model.interface.cameras import registers
 
 logger = logging.getLogger(__name__)
 
@@ -23,7 +19,7 @@ class RegisterFile:
     and the state at the last sync for the others.
     """
 
-    def __init__(self, table: CameraRegisterMap) -> None:
+    def __init__(self, table: registers.CameraRegisterMap) -> None:
         """Make a file with the reset values of ``table``."""
         self._table = table
         self._written: dict[int, int] = {}
@@ -40,12 +36,12 @@ class RegisterFile:
         """Set the address of the next byte read or written."""
         self._pointer = address
 
-    def write(self, byte: int) -> CameraRegister | None:
+    def write(self, byte: int) -> registers.CameraRegister | None:
         """Write the next byte; returns the register that it belongs to, None if there is none."""
         address, register = self._step()
         if register is None:
             self._log(WARNING, "wrote %#04x to %#06x, where no register is known", byte, address)
-        elif register.access is RegisterAccess.READ_ONLY:
+        elif register.access is registers.RegisterAccess.READ_ONLY:
             self._log(WARNING, "wrote to %s, which is read-only", register.name)
         else:
             self._log_unmodelled(register, address, byte)
@@ -81,13 +77,13 @@ class RegisterFile:
         for address, byte in zip(register.addresses, register.units(value), strict=True):
             self._written[address] = self._active[address] = byte
 
-    def _step(self) -> tuple[int, CameraRegister | None]:
+    def _step(self) -> tuple[int, registers.CameraRegister | None]:
         """The pointer's address and register; the pointer moves on."""
         address = self._pointer
         self._pointer = (address + 1) % (1 << (8 * self._table.address_bytes))
         return address, self._table.at(address)
 
-    def _log_unmodelled(self, register: CameraRegister, address: int, byte: int) -> None:
+    def _log_unmodelled(self, register: registers.CameraRegister, address: int, byte: int) -> None:
         if not register.modelled:
             self._log(INFO, "wrote %s, which is not modelled", register.name)
             return

@@ -12,17 +12,7 @@ from collections.abc import Iterator
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import Field, i16, u8
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
-from cubestack.firmware_model.interface.cubesense.codes import (
-    IMAGE_BYTES,
-    PIXELS_PER_DEGREE,
-    Camera,
-    CaptureResult,
-    DetectResult,
-    Measurement,
-    NadirSearch,
-    Sram,
-    SramSelection,
-)
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
 
 _RW = RegisterAccess.READ_WRITE
@@ -32,7 +22,7 @@ _WO = RegisterAccess.WRITE_ONLY
 _RESETS = {message.name: message.reset_values() for message in TELECOMMANDS}
 
 
-def _camera(camera: Camera) -> Iterator[PointerRegister]:
+def _camera(camera: codes.Camera) -> Iterator[PointerRegister]:
     """Registers of a camera; those of the nadir one are 8 behind those of the Sun's."""
     number, name = camera + 1, camera.name
     resets = _RESETS[f"CameraSettings{number}"] | _RESETS[f"DetectionThreshold{number}"]
@@ -48,8 +38,8 @@ def _camera(camera: Camera) -> Iterator[PointerRegister]:
         for address, (register, parameter, meaning) in enumerate(settings)
     } | {
         0x05: u8(f"{name}_AUTO", "1: the camera adjusts itself", maximum=1),
-        0x20: u8(f"{name}_CAPTURE", "what became of the capture", choices=CaptureResult),
-        0x21: u8(f"{name}_DETECT", "what became of the detection", choices=DetectResult),
+        0x20: u8(f"{name}_CAPTURE", "what became of the capture", choices=codes.CaptureResult),
+        0x21: u8(f"{name}_DETECT", "what became of the detection", choices=codes.DetectResult),
         0x22: u8(f"{name}_POINTS", "edges of the fit, or Sun pixels of the mean"),
         0x40: _centre(f"{name}_X", "column"),
         0x41: _centre(f"{name}_Y", "row"),
@@ -59,37 +49,41 @@ def _camera(camera: Camera) -> Iterator[PointerRegister]:
 
 
 def _centre(name: str, line: str) -> Field:
-    meaning = f"centre from the boresight, undistorted {line}; {PIXELS_PER_DEGREE} px a degree"
+    meaning = (
+        f"centre from the boresight, undistorted {line}; {codes.PIXELS_PER_DEGREE} px a degree"
+    )
     return i16(name, meaning, "px", 100)
 
 
 _COMMON = (
     PointerRegister(
-        0x10, _WO, u8("MEASURE", "take a picture and measure in it", choices=Measurement)
+        0x10, _WO, u8("MEASURE", "take a picture and measure in it", choices=codes.Measurement)
     ),
-    PointerRegister(0x11, _WO, u8("CAPTURE", "take a picture only", choices=Measurement)),
-    PointerRegister(0x12, _RW, u8("IMAGE_SRAM", "memory that IMAGE streams", choices=Sram)),
+    PointerRegister(0x11, _WO, u8("CAPTURE", "take a picture only", choices=codes.Measurement)),
+    PointerRegister(0x12, _RW, u8("IMAGE_SRAM", "memory that IMAGE streams", choices=codes.Sram)),
     PointerRegister(
         0x13,
         _WO,
         u8(
             "CLEAR_OVER_CURRENT",
             "clear over-current flags, and switch the memories on again",
-            choices=SramSelection,
+            choices=codes.SramSelection,
         ),
     ),
-    PointerRegister(0x14, _RW, u8("NADIR_SEARCH", "how edges are looked for", choices=NadirSearch)),
+    PointerRegister(
+        0x14, _RW, u8("NADIR_SEARCH", "how edges are looked for", choices=codes.NadirSearch)
+    ),
     PointerRegister(
         0x30, _RO, u8("OVER_CURRENT", "bit 0: SRAM1 drew too much, bit 1: SRAM2", maximum=3)
     ),
     PointerRegister(
-        0x60, _RO, Field(f"bytes{IMAGE_BYTES}", "IMAGE", "640 x 480 pixels, row after row")
+        0x60, _RO, Field(f"bytes{codes.IMAGE_BYTES}", "IMAGE", "640 x 480 pixels, row after row")
     ),
 )
 
 REGISTERS = PointerMap(
     i2c_address=0x1C,
     baud=115_200,  # that of appendix E: the part has one UART
-    registers=(*_camera(Camera.SUN), *_camera(Camera.NADIR), *_COMMON),
+    registers=(*_camera(codes.Camera.SUN), *_camera(codes.Camera.NADIR), *_COMMON),
     note="The protocol is published; which registers there are, and their addresses, are assumed.",
 )

@@ -11,12 +11,7 @@ from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskS
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.experiments import attitude as attitudes
-from cubestack.host.experiments.cubestar.measure import (
-    CubeStarEmulated,
-    CubeStarOpener,
-    count_wrong,
-    give_hint,
-)
+from cubestack.host.experiments.cubestar import measure
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.optics import Optics
@@ -50,7 +45,7 @@ class Shot:
     wrong: int = 0
 
 
-def _shot(device: CubeStarEmulated, *, judged: bool = False) -> Shot:
+def _shot(device: measure.CubeStarEmulated, *, judged: bool = False) -> Shot:
     """Take one; if ``judged``, stars count whether or not they gave an attitude, and wrong ones."""
     cubestar, client = device.client, device.client.client
     status = cubestar.capture_and_process()
@@ -64,7 +59,7 @@ def _shot(device: CubeStarEmulated, *, judged: bool = False) -> Shot:
     matched, wrong = attitude.matched if valid else 0, 0
     if judged and (valid or status is TaskStatus.CALCULATION_FAILED):
         matched = int(client.telemetry("NumIdStars")["numIdStars"])
-        wrong = count_wrong(cubestar, truth) or 0
+        wrong = measure.count_wrong(cubestar, truth) or 0
     return Shot(valid, right, tracked, cross_deg if right else math.nan, detected, matched, wrong)
 
 
@@ -81,7 +76,7 @@ def published_optics() -> "Optics":
 
 
 def field_shots(
-    opened: CubeStarOpener,
+    opened: measure.CubeStarOpener,
     frames: int,
     hint_deg: float | None = None,
     margin_rad: float = DEFAULT_MARGIN_RAD,
@@ -107,11 +102,13 @@ def field_shots(
             lost = hint_deg is None
             client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE if lost else IdMode.TRACKING)
             if hint_deg is not None:
-                give_hint(cubestar, attitudes.rough_boresight(scene.truth(0), hint_deg, rng))
+                measure.give_hint(
+                    cubestar, attitudes.rough_boresight(scene.truth(0), hint_deg, rng)
+                )
             yield _shot(device, judged=True)
 
 
-def slewing_shots(opened: CubeStarOpener, frames: int, rate_deg_s: float) -> Iterator[Shot]:
+def slewing_shots(opened: measure.CubeStarOpener, frames: int, rate_deg_s: float) -> Iterator[Shot]:
     """While turning across the boresight: section 6.2, on a mount that does not shake."""
     from cubestack.emulator.scene.attitude import random_quaternion
     from cubestack.emulator.scene.sky import SkyScene
