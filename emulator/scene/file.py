@@ -120,6 +120,17 @@ text = _exactly(str, "text")
 moment = _exactly(datetime, "a date and time, as 2013-06-01T20:00:00Z")
 
 
+def one_of(values: Mapping[str, V]) -> Callable[[Any], V]:
+    """A reader of a name, which stands for one of ``values``."""
+
+    def read(value: Any) -> V:
+        if not isinstance(value, str) or value not in values:
+            raise SceneError(f"must be one of {list(values)}, not {value!r}")
+        return values[value]
+
+    return read
+
+
 def several(count: int, of: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]:
     """A reader of ``count`` values, each of them read by ``of``."""
 

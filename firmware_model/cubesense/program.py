@@ -63,7 +63,7 @@ class CubeSenseProgram:
         reader, download = self.commands.reader, self.commands.download
         self.node = NodeLink(jobs, Telemetry(hardware, meter, state, self._supply, download))
         self.registers = RegisterLink(hardware, meter, state, jobs, reader)
-        self.backup = BackupUart(hardware, meter, state, jobs, reader)
+        self.backup = BackupUart(self.registers)
         self.bench = BenchLink(hardware, meter, state, jobs, reader, measurement)
 
     def main(self) -> Routine[None]:

@@ -24,6 +24,7 @@ from cubestack.host.cli.shell import split_commands
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.clients.contract import Columns
 from cubestack.host.devices.log import log_lines, scatter
+from cubestack.host.devices.records import create_file
 from cubestack.host.errors import TargetError
 from cubestack.host.options import between
 from cubestack.host.shell.language import Shell
@@ -40,14 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--interval", type=typed(SECONDS), default=1.0, metavar="S", help="of the lines (default 1)"
     )
-    for option, when in (("-c", "the first line"), ("--each", "every line")):
-        parser.add_argument(
-            option,
-            dest="first" if option == "-c" else "each",
-            default="",
-            metavar="COMMANDS",
-            help=f"shell commands before {when}, separated by semicolons",
-        )
+    for option, name, when in (("-c", "first", "the first line"), ("--each", "each", "every line")):
+        text = f"shell commands before {when}, separated by semicolons"
+        parser.add_argument(option, dest=name, default="", metavar="COMMANDS", help=text)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,10 +62,7 @@ def run(args: argparse.Namespace) -> int:
                 shell.execute(command)
 
         perform(args.first)
-        try:
-            stream = stack.enter_context(args.out.open("w", newline="")) if args.out else sys.stdout
-        except OSError as error:
-            raise ValueError(f"can not write {args.out}: {error.strerror}") from None
+        stream = create_file(args.out, stack) if args.out else sys.stdout
         writer: csv.DictWriter[str] | None = None
         try:
             for line in log_lines(

@@ -45,6 +45,6 @@ def start_trace(emulated: AnyEmulated, stream: IO[str]) -> "VcdTrace":
 def create_file(path: Path, stack: ExitStack) -> IO[str]:
     """``path`` for writing, closed by ``stack``; ValueError when it can not be written."""
     try:
-        return stack.enter_context(path.open("w", encoding="utf-8"))
+        return stack.enter_context(path.open("w", encoding="utf-8", newline=""))
     except OSError as error:
         raise ValueError(f"can not write {path}: {error.strerror}") from None

@@ -19,6 +19,7 @@ from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import PATH, Options, option, whole
+from cubestack.host.pictures.images import Star
 from cubestack.host.pictures.residuals import save_residuals
 
 if TYPE_CHECKING:
@@ -156,8 +157,8 @@ class StarCalibration(
         """Tell the device its camera, and what else it needs for a picture, if it is one."""
 
     @abstractmethod
-    def identify(self, client: ClientT) -> Mapping[int, tuple[float, float]]:
-        """Take a picture; places of the stars that the device names, by Hipparcos number."""
+    def identify(self, client: ClientT) -> Sequence[Star]:
+        """Take a picture; the stars that the device finds, where it has an attitude."""
 
     def board(self, camera: Camera) -> Mapping[str, Any]:
         """Options of the board that go with a camera."""
@@ -232,7 +233,9 @@ class StarCalibration(
             for look in looks:
                 emulated.scene = look.scene
                 self.load(emulated.client, camera.cropped(*look.corner), look.picture)
-                named = self.identify(emulated.client)
+                stars = self.identify(emulated.client)
+                named = {star.hipparcos: (star.x_px, star.y_px) for star in stars}
+                named.pop(None, None)
                 places = np.array([*named.values()], np.float64).reshape(-1, 2) + look.corner
                 rows = np.searchsorted(sky.hip, np.array([*named], np.int64))
                 yield Sight(places, sky.vectors[rows])

@@ -53,18 +53,9 @@ def load_scene(
     return file.read_scene_file(path, kinds, '"sky" or "picture"')
 
 
-def _distortion(value: Any) -> Distortion:
-    try:
-        return Distortion(value)
-    except ValueError:
-        raise file.SceneError(
-            f"must be one of {[d.value for d in Distortion]}, not {value!r}"
-        ) from None
-
-
 #: Keys of the table "optics"; the sensor's size is the device's.
 _OPTICS: file.Readers = {
-    f.name: _distortion if f.name == "distortion" else file.number
+    f.name: file.one_of({d.value: d for d in Distortion}) if f.name == "distortion" else file.number
     for f in fields(Optics)
     if f.name not in ("columns", "rows")
 }

@@ -80,13 +80,6 @@ def _radial(value: Any) -> tuple[tuple[float, float], ...]:
     return tuple(file.several(2, file.number)(pair) for pair in value)
 
 
-def _camera(value: Any) -> Target:
-    names = {camera.name.lower(): camera for camera in Target}
-    if value not in names:
-        raise file.SceneError(f"must be one of {list(names)}, not {value!r}")
-    return names[value]
-
-
 def _reflections(value: Any) -> tuple[Reflection, ...]:
     if not isinstance(value, list):
         raise file.SceneError("must be tables, each under [[reflections]]")
@@ -102,7 +95,7 @@ def _reflection(values: dict[str, Any]) -> Reflection:
 
 
 _REFLECTION: file.Readers = {
-    "camera": _camera,
+    "camera": file.one_of({camera.name.lower(): camera for camera in Target}),
     "at_deg": file.several(2, file.number),
     "radius_px": file.number,
     "level": file.number,

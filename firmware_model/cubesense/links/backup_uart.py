@@ -7,39 +7,37 @@ start. Assumed: bytes before the slave's address are ignored; a long silence end
 where I2C reads as nothing, no answer comes; a message that begins while a picture is sent ends it.
 """
 
-from cubestack.firmware_model.cubesense.download import PictureReader
-from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
-from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
+from dataclasses import dataclass
+
+from cubestack.firmware_model.cubesense.hardware import Port
+from cubestack.firmware_model.cubesense.jobs import Background
 from cubestack.firmware_model.cubesense.links.picture_sender import PictureSender
 from cubestack.firmware_model.cubesense.links.registers import RegisterLink
-from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
-from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Routine
 
 
+@dataclass(eq=False)
 class BackupUart:
-    """Messages on the node's UART, in place of the node protocol's."""
+    """Messages on the node's UART, in place of the node protocol's; no pointer stays.
 
-    def __init__(
-        self,
-        hardware: CubeSenseHardware,
-        meter: Meter,
-        state: State,
-        queue: JobQueue,
-        reader: PictureReader,
-    ) -> None:
-        """Share the registers with I2C, but not its pointer."""
-        self._hardware, self._meter, self._state, self._queue = hardware, meter, state, queue
-        self._registers = RegisterLink(hardware, meter, state, queue, reader)
-        self._picture = PictureSender(hardware, meter, reader, Port.NODE)
+    Attributes:
+        registers: what they read and write.
+    """
+
+    registers: RegisterLink
+
+    def __post_init__(self) -> None:
+        """No message has begun."""
+        link = self.registers
+        self._picture = PictureSender(link.hardware, link.meter, link.reader, Port.NODE)
         self._work = Background(self._send)
         self._sending = False
         self._message = bytearray()
 
     def uart_byte(self, byte: int) -> None:
         """Interrupt: a byte came."""
-        self._meter.charge(uart_interrupt=1)
+        self.registers.meter.charge(uart_interrupt=1)
         if not self._message and byte >> 1 != REGISTERS.i2c_address:
             return
         self._sending = False
@@ -52,7 +50,7 @@ class BackupUart:
         if reads:
             self._answer(address)
         else:
-            self._registers.write(address, *data)
+            self.registers.write(address, *data)
 
     def uart_silence(self) -> None:
         """Interrupt: nothing came for a while; half a message is void."""
@@ -63,16 +61,17 @@ class BackupUart:
         if register is None or not register.readable:
             return
         if not register.streams:
-            self._picture.send(self._registers.read(register))
+            self._picture.send(self.registers.read(register))
             return
         self._sending = True
         self._picture.begin()
-        if self._queue.request(self._work):
-            self._hardware.wake()
+        if self.registers.queue.request(self._work):
+            self.registers.hardware.wake()
 
     def _send(self) -> Routine[None]:
         """Main loop: a piece of the picture, and a turn for the next one."""
-        done = not self._sending or (yield from self._picture.send_some(self._state.image_sram))
+        sram = self.registers.state.image_sram
+        done = not self._sending or (yield from self._picture.send_some(sram))
         if self._sending and not done:
-            self._queue.request(self._work)
+            self.registers.queue.request(self._work)
         self._sending = self._sending and not done

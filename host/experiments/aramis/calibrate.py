@@ -9,7 +9,7 @@ examples:
   cubestack calibrate aramis --images night/ --camera rough.json --out camera.json
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.experiments.calibrate import CalibrateOptions, StarCalibration
+from cubestack.host.pictures.images import Star
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.optics import Optics
@@ -40,9 +41,8 @@ class _Experiment(StarCalibration[Aramis]):
         from cubestack.emulator.camera.common.scene_file import load_scene
         from cubestack.emulator.camera.mt9m001.lens import CONDITION
 
-        return (
-            CONDITION if options.scene is None else load_scene(options.scene, CONDITION).condition
-        )
+        own = options.scene
+        return CONDITION if own is None else load_scene(own, CONDITION).condition
 
     def board(self, camera: Camera) -> Mapping[str, Any]:
         from cubestack.emulator.boards.aramis.catalogue import onboard_database
@@ -57,11 +57,8 @@ class _Experiment(StarCalibration[Aramis]):
         client.client.wait_processed(1.0)
         client.activate()
 
-    def identify(self, client: Aramis) -> Mapping[int, tuple[float, float]]:
-        stars = client.stars() if client.measure().valid else []
-        return {
-            star.hipparcos: (star.x_px, star.y_px) for star in stars if star.hipparcos is not None
-        }
+    def identify(self, client: Aramis) -> Sequence[Star]:
+        return client.stars() if client.measure().valid else []
 
 
 EXPERIMENT = _Experiment()

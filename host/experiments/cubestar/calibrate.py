@@ -10,7 +10,7 @@ examples:
   cubestack measure cubestar --image night/1.jpg --camera camera.json
 """
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +22,7 @@ from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.experiments.calibrate import CalibrateOptions, StarCalibration
+from cubestack.host.pictures.images import Star
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.optics import Optics
@@ -51,13 +52,10 @@ class _Experiment(StarCalibration[CubeStar]):
         if light is not None:
             find_threshold(client)
 
-    def identify(self, client: CubeStar) -> Mapping[int, tuple[float, float]]:
+    def identify(self, client: CubeStar) -> Sequence[Star]:
         client.client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
         client.capture_and_process()
-        stars = client.stars() if client.attitude().valid else []
-        return {
-            star.hipparcos: (star.x_px, star.y_px) for star in stars if star.hipparcos is not None
-        }
+        return client.stars() if client.attitude().valid else []
 
 
 EXPERIMENT = _Experiment()

@@ -7,11 +7,13 @@ examples:
   cubestack catalogue cubestar --c catalogue.c         star list and pair list as C arrays
 """
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cubestack.host.devices.device import Shown
+from cubestack.host.devices.records import create_file
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.export.c_arrays import c_arrays
 from cubestack.host.options import NUMBER, PATH, Options, option
@@ -42,11 +44,9 @@ class _Catalogue(Lookup[CatalogueOptions]):
                 f"CubeStar's catalogue: V < {mag_limit:g}, pairs closer than {pair_limit:g} deg,"
                 f" epoch {options.epoch:g}; SHA-256 of the arrays {catalogue.sha256()}"
             )
-            text = c_arrays("catalogue", catalogue.arrays(), about)
-            try:
-                options.c.write_text(text, encoding="ascii")
-            except OSError as error:
-                raise ValueError(f"can not write {options.c}: {error.strerror}") from None
+            with ExitStack() as stack:
+                stream = create_file(options.c, stack)
+                stream.write(c_arrays("catalogue", catalogue.arrays(), about))
         return {
             "mag_limit": mag_limit,
             "pair_limit_deg": pair_limit,
