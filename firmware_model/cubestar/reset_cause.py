@@ -9,16 +9,10 @@ from collections.abc import Collection
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
 
 _SUPPLY = (ResetCause.POWER_ON, ResetCause.BROWN_OUT_UNREGULATED, ResetCause.BROWN_OUT_REGULATED)
-_OTHERS = (
-    ResetCause.EXTERNAL_PIN,
-    ResetCause.WATCHDOG,
-    ResetCause.LOCKUP,
-    ResetCause.SYSTEM_REQUEST,
-)
 _MEANINGS: dict[frozenset[int], ResetCause] = {
+    **{frozenset({one}): one for one in ResetCause},
     frozenset({ResetCause.EXTERNAL_PIN, ResetCause.WATCHDOG}): ResetCause.EXTERNAL_OR_WATCHDOG,
     frozenset({ResetCause.LOCKUP, ResetCause.SYSTEM_REQUEST}): ResetCause.LOCKUP_OR_SYSTEM_REQUEST,
-    **{frozenset({one}): one for one in _OTHERS},
 }
 
 

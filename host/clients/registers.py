@@ -8,6 +8,7 @@ what the map forbids is refused here, before it is sent.
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from smbus2 import i2c_msg
 
@@ -118,18 +119,18 @@ class RegisterClient:
         return acknowledged(transfer, attempts, self._wait, what)
 
 
+@dataclass(eq=False)
 class RegisterLine:
     """A serial line as the bus of a ``RegisterClient``.
 
     A message is the slave's address with the direction in its lowest bit, the register's address
-    and, to write, one data byte (CubeSense thesis, section 6.4.3).
+    and, to write, one data byte (CubeSense thesis, section 6.4.3). The line stays its owner's;
+    ``timeout_s`` is the longest silence.
     """
 
-    def __init__(self, line: Transport, timeout_s: float = 1.0) -> None:
-        """Speak on ``line``, which stays its owner's; ``timeout_s`` is the longest silence."""
-        self._line = line
-        self._timeout_s = timeout_s
-        self._ahead = bytearray()  # of a read that goes on
+    line: Transport
+    timeout_s: float = 1.0
+    _ahead: bytearray = field(default_factory=bytearray, init=False)  # of a read that goes on
 
     def i2c_rdwr(self, *i2c_msgs: i2c_msg) -> None:
         """A write, a read behind one, or a read that goes on; TimeoutError without an answer."""
@@ -137,13 +138,13 @@ class RegisterLine:
         reads = bool(last.flags & I2C_READ)
         if len(i2c_msgs) > reads:
             self._ahead.clear()
-            while self._line.read(READ_BYTES, 0.0):  # what came late is no answer
+            while self.line.read(READ_BYTES, 0.0):  # what came late is no answer
                 pass
-            self._line.write(bytes([last.addr << 1 | reads]) + bytes(i2c_msgs[0]))
+            self.line.write(bytes([last.addr << 1 | reads]) + bytes(i2c_msgs[0]))
         if not reads:
             return
         while len(self._ahead) < last.len:
-            data = self._line.read(READ_BYTES, self._timeout_s)
+            data = self.line.read(READ_BYTES, self.timeout_s)
             if not data:
                 raise TimeoutError(f"{len(self._ahead)} of {last.len} bytes came")
             self._ahead += data

@@ -171,7 +171,7 @@ def _bench(
     radius = REACH_DEG[camera] * np.sqrt((np.arange(count) + 0.5) / count)
     angles = np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
     unit = _unit(options)
-    pixels, known = [], []
+    pixels, known = [np.empty((0, 2))], [np.empty((0, 2))]
     views = [
         unit(view_of(camera, (float(alpha), float(beta)), FisheyeCondition(seed=number)))
         for number, (alpha, beta) in enumerate(angles)
@@ -188,8 +188,7 @@ def _bench(
                 found = _places(cubesense, camera, tables)
                 pixels.append(found)
                 known.append(np.broadcast_to(at, found.shape))
-    centres = np.concatenate(known) if known else np.empty((0, 2))
-    places = np.concatenate(pixels) if pixels else np.empty((0, 2))
+    centres, places = np.concatenate(known), np.concatenate(pixels)
     if camera is Camera.SUN:
         return fit_fisheye(places, lambda _: centres, tables, outline=False)
     limb_deg = angular_radius_deg(views[0].scene.altitude_km)

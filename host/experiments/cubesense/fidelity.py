@@ -1,8 +1,8 @@
 """CubeSense's published figures (thesis, Stellenbosch University, 2011) and what measures ours."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -107,22 +107,20 @@ def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
     for channel in CUBESENSE_POWER.channels:
         power.switch(channel, False)
     found = {}
-    steps: list[tuple[str, Any]] = [
-        ("reset", partial(power.set_state, "processor", "reset")),
-        ("standby", partial(power.set_state, "processor", "on")),
-        ("memory", partial(power.switch, "SRAM1", True)),
-        ("memories", partial(power.switch, "SRAM2", True)),
-        ("camera", partial(power.switch, "sun_camera", True)),
-        ("cameras", partial(power.switch, "nadir_camera", True)),
-    ]
-    for number, side in enumerate(("sun", "nadir"), 1):
-        image = partial(power.set_state, f"{side}_fpga", "imaging")
-        steps += [
-            ("", image),
-            (f"imaging{number}", partial(power.set_state, f"sram{number}", "active")),
-        ]
-    for name, step in steps:
-        step()
+    steps: tuple[tuple[str, Callable[..., None], str, str | bool], ...] = (
+        ("reset", power.set_state, "processor", "reset"),
+        ("standby", power.set_state, "processor", "on"),
+        ("memory", power.switch, "SRAM1", True),
+        ("memories", power.switch, "SRAM2", True),
+        ("camera", power.switch, "sun_camera", True),
+        ("cameras", power.switch, "nadir_camera", True),
+        ("", power.set_state, "sun_fpga", "imaging"),
+        ("imaging1", power.set_state, "sram1", "active"),
+        ("", power.set_state, "nadir_fpga", "imaging"),
+        ("imaging2", power.set_state, "sram2", "active"),
+    )
+    for name, change, part, state in steps:
+        change(part, state)
         found[name] = power.current_ma() * CUBESENSE_POWER.volts
     return found
 
