@@ -238,7 +238,9 @@ def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -
     """Twice the rate with two memories; no layout without a copy is older than 500 ms."""
     assert main(["layouts", "--seconds", "2", "--json", "--profile", "extended"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    results = [LayoutResult(**json.loads(line)) for line in lines]
+    rows = [json.loads(line) for line in lines]
+    assert {row.pop("profile") for row in rows} == {"extended"}
+    results = [LayoutResult(**row) for row in rows]
     assert [result.layout for result in results] == [layout.value for layout in Layout]
     for result in results:
         hz = 2 if result.layout in ("3", "two-boards") else 1
