@@ -41,16 +41,13 @@ def log_lines(
     start = clock()
     for number in range(count) if count is not None else counted():
         client.client.pause(max(0.0, start + number * interval_s - clock()))
-        begun: Columns = {"time_s": round(clock() - start, 6), "utc": _utc()}
+        utc = datetime.now(UTC).isoformat(timespec="milliseconds")
+        begun: Columns = {"time_s": round(clock() - start, 6), "utc": utc}
         try:
             before_each()
             yield {**begun, "error": None, **client.latest()}
         except NodeError as error:
             yield {**begun, "error": str(error)}
-
-
-def _utc() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def scatter(lines: Sequence[Columns]) -> dict[str, tuple[float, float, int]]:
