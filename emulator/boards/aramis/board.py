@@ -92,7 +92,7 @@ class AramisBoard(Board):
         if engine != "auto":
             raise ValueError(f"AraMiS has no FPGA: its engine must be 'auto', not {engine!r}")
         super().__init__(ARAMIS_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
-        self.sdram = np.frombuffer(self._rng.bytes(SDRAM_BYTES), np.uint8).copy()
+        self.sdram = self._rng.integers(1 << 32, size=SDRAM_BYTES // 4, dtype="<u4").view(np.uint8)
         self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
         if catalogue is not None:
             coded = flash_image(catalogue.pack())

@@ -8,7 +8,7 @@ layouts than the published one are in :mod:`cubestack.emulator.boards.cubestar.l
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
 from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import Kernel
@@ -47,6 +48,12 @@ CAMERA_BUS_HZ = 100_000
 
 EBI_READ_CYCLES = CORTEX_M3.operations["ebi_read"].cycles
 """Of the processor, for a byte that an interrupt reads over its external bus."""
+
+
+@lru_cache(maxsize=len(BOARDS))
+def _wiring(layout: Layout) -> Wiring:
+    """Kept, as an engine knows its library by the design's text, a slow thing."""
+    return BOARDS[layout].wiring()
 
 
 class CubeStarBoard(Board):
@@ -89,7 +96,7 @@ class CubeStarBoard(Board):
         """
         self._layout = BOARDS[layout]
         super().__init__(self._layout.power, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
-        self.engine = make_engine(self._layout.wiring(), kind=engine)
+        self.engine = make_engine(_wiring(layout), kind=engine)
         self.camera = Mlx75412(scene, seed=seed)
         self._node_link(lambda: self.program.link, baud, i2c_address)
         self._hardware = _Efm32gg(self)

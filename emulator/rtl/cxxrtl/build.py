@@ -46,6 +46,13 @@ class Compiler:
     identity: str
 
 
+@lru_cache(maxsize=8)
+def _version_of(command: tuple[str, ...], _changed_ns: int) -> str | None:
+    """What a program says of itself, None when it fails; asked once until it changes."""
+    answer = subprocess.run([*command, "--version"], capture_output=True, text=True)
+    return answer.stdout if answer.returncode == 0 else None
+
+
 def find_compiler() -> Compiler | None:
     """Take ``$CXX``, else one on the PATH, else the one of the ziglang wheel, else None."""
     for candidate in (shlex.split(os.environ.get("CXX", "")), ["c++"], ["g++"], ["clang++"]):
@@ -53,9 +60,9 @@ def find_compiler() -> Compiler | None:
         if program is None:
             continue
         command = (program, *candidate[1:])
-        answer = subprocess.run([*command, "--version"], capture_output=True, text=True)
-        if answer.returncode == 0:
-            return Compiler(command, f"{shlex.join(command)}\n{answer.stdout}")
+        version_text = _version_of(command, os.stat(program).st_mtime_ns)
+        if version_text is not None:
+            return Compiler(command, f"{shlex.join(command)}\n{version_text}")
     if importlib.util.find_spec("ziglang") is not None:
         return Compiler((sys.executable, "-m", "ziglang", "c++"), f"ziglang {version('ziglang')}")
     return None

@@ -1,6 +1,5 @@
 """`cubestack picture`: the sky at a known attitude, for the uploads of a device."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +9,7 @@ from PIL import Image
 import cubestack
 from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.attitude import attitude_error_deg
-
-Run = Callable[..., tuple[int, str, str]]
+from tests.conftest import Run
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

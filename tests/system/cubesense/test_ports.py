@@ -18,20 +18,21 @@ from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.targets import open_target
-from tests.system.conftest import ROOT, Emulate, Open
+from tests.system.conftest import ROOT, Emulate, Open, Served
 
 from .conftest import NADIR_DEG, SUN_DEG, check_right, sent
 
 
-@pytest.fixture
-def served(emulate: Emulate, tmp_path: Path) -> Iterator[Path]:
-    """An emulator process of its own; the path of its node port."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """An emulator process; the path of its node port. Its settings stay as tests leave them."""
+    folder = tmp_path_factory.mktemp("served")
+    (folder / "scene.toml").write_text(
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
     )
-    with emulate("--scene", "scene.toml", "--pty", "ttyCUBESENSE", "--pace", "fast") as emulator:
-        yield tmp_path / "ttyCUBESENSE"
+    options = ["--scene", "scene.toml", "--pty", "ttyCUBESENSE", "--pace", "fast"]
+    with Served(["cubesense", *options], folder) as emulator:
+        yield folder / "ttyCUBESENSE"
     assert emulator.process.returncode == 0
 
 
@@ -53,7 +54,8 @@ def test_the_bench_client_of_the_document_gets_the_nadir_picture(
     assert picture[5, 5] < 50
 
 
-def test_node_protocol_on_the_same_device(served: Path) -> None:
+def test_node_protocol_on_the_same_device_and_its_escapes(served: Path) -> None:
+    """The escapes: an exposure of 0x1F1F, and a frame number that the selected size lacks."""
     with serial.Serial(str(served), 57_600, timeout=60) as port:
         port.write(bytes.fromhex("1F7F 80 1FFF"))
         answer = port.read_until(b"\x1f\xff")
@@ -68,11 +70,6 @@ def test_node_protocol_on_the_same_device(served: Path) -> None:
             detect = result[-3]
         assert detect == 7
         assert np.frombuffer(result[2:-4], "<i2") / 100 == pytest.approx(SUN_DEG, abs=0.1)
-
-
-def test_examples_of_escapes_are_answered(served: Path) -> None:
-    """An exposure of 0x1F1F, and a frame number that the selected size lacks."""
-    with serial.Serial(str(served), 57_600, timeout=60) as port:
         port.write(bytes.fromhex("1F7F 2D 1F1F 1F1F 1F1F 8080 1FFF"))
         assert port.read(5) == bytes.fromhex("1F7F 00 1FFF")
         # Threshold 225 and 70, sun: auto 0, exposure 1, gain 0, blue, red; nadir as it was sent.
