@@ -109,21 +109,18 @@ def lit(*places: tuple[int, int]) -> list[list[int]]:
     return [[LIT if (x, y) in places else DARK for x in range(21)] for y in range(13)]
 
 
-def test_first_of_three_bright_pixels_stays() -> None:
-    assert found(lit((4, 2), (5, 2), (6, 2), (1, 7), (2, 7), (3, 7))) == (4, 2)
-
-
-def test_a_lone_bright_pixel_is_noted_and_the_last_one_stays() -> None:
-    assert found(lit((4, 2), (9, 9), (10, 9))) == (9, 9)
-
-
-def test_three_count_across_the_end_of_a_row() -> None:
-    assert found(lit((20, 3), (0, 4), (1, 4), (7, 8))) == (20, 3)
-
-
-def test_without_a_bright_pixel_nothing_changes() -> None:
-    assert found(lit()) == (0, 0)
-    assert found(lit(), lit((9, 9))) == (9, 9)
+@pytest.mark.parametrize(
+    ("pictures", "place"),
+    [
+        ([lit((4, 2), (5, 2), (6, 2), (1, 7), (2, 7), (3, 7))], (4, 2)),  # the first of three stays
+        ([lit((4, 2), (9, 9), (10, 9))], (9, 9)),  # a lone one is noted, and the last one stays
+        ([lit((20, 3), (0, 4), (1, 4), (7, 8))], (20, 3)),  # three across the end of a row
+        ([lit()], (0, 0)),
+        ([lit(), lit((9, 9))], (9, 9)),  # nothing changes without a bright pixel
+    ],
+)
+def test_bright_pixels(pictures: list[list[list[int]]], place: tuple[int, int]) -> None:
+    assert found(*pictures) == place
 
 
 def window(x: int, y: int) -> list[int]:
