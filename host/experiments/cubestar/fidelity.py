@@ -268,7 +268,7 @@ FIDELITY = Fidelity(
         "noiseless": measured("cubestar", _attitudes, 100, 2, 10, mag_limit=3.8, no_noise=True),
         "built": measured("cubestar", _attitudes, 300, 2, 30, mag_limit=3.8),
         "full": measured("cubestar", _attitudes, 60, 2, 6, mag_limit=4.5),
-        "night": Trial(night, 100, 1, 250),
+        "night": Trial(night, 100, 1, 180),
         "loop": Trial(_loop, 20, 2, 10),
         "calibration": Trial(
             _calibration, 20, 6, 5, "calibrate cubestar --emulated 20 --seed 0", profiles=False
