@@ -69,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
     if len(args.devices) > 1:
-        for name in ("scene", "faults", "record", "trace"):
-            if getattr(args, name) is not None:
+        for name in ("scene", "faults", "record", "trace", "set"):
+            if getattr(args, name):
                 raise ValueError(f"--{name} belongs to one device, and there are several")
     with ExitStack() as stack:
         opened: list[AnyEmulated] = []

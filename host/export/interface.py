@@ -111,7 +111,7 @@ def _meaning(message: Message) -> str:
     notes = [
         text
         for applies, text in (
-            (message.extension, "our extension"),
+            (message.extension, "an extension"),
             (message.steps, "steps to the next record at each read and wraps"),
             (not message.supported, "not supported"),
         )

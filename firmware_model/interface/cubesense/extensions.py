@@ -1,4 +1,4 @@
-"""CubeSense's telemetry of our own, IDs from 220 on: what a measurement rests on, its times.
+"""CubeSense's telemetry beside the published, IDs from 220 on: what a measurement rests on, times.
 
 Also the telecommands that change the switches, and the telemetry that shows them.
 """

@@ -173,7 +173,7 @@ def test_table_tells_ranges_resets_and_flags() -> None:
         "declination of the boresight [rad]; -1.5708 to 1.5708; else DeclinationSetError",
         "focal length [mm]; 5 to 7; reset 6.28 mm; else FocalLengthRangeError",
         "at most, by BlockSize, 16383 for 0, 8191 for 1, 4095 for 2, 2047 for 3",
-        "our extension",
+        "an extension",
     ):
         assert text in render(INTERFACE, "table")
 
