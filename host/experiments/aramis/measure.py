@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras import mt9m001
-from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.aramis.client import Aramis, Star
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.opener import Opener
@@ -243,14 +243,16 @@ def _measure(
     summary = client.telemetry("IdentificationSummary")
     catalogue = client.telemetry("CatalogueStatus")
     flags = client.telemetry("ErrorFlags")
+    stars = aramis.stars() if found.valid and truth is not None else []
+    named = [star for star in stars if star.hipparcos is not None]
     return AramisResult(
         **attitudes.compare(found.quaternion if found.valid else None, truth),
         outcome=found.outcome.name.lower(),
         reason=found.reason.name.lower(),
         centroids=found.detected,
         matched=found.matched if found.valid else 0,
-        wrong=_count_wrong(emulated, truth) if found.valid else 0,
-        far=_is_far(aramis, options.field, truth) if found.valid else None,
+        wrong=_count_wrong(emulated, named, truth) if found.valid else 0,
+        far=_is_far(named, options.field, truth),
         candidates=int(summary["Candidates"]),
         pivots=int(summary["Pivots"]),
         triples=int(summary["Triples"]),
@@ -265,29 +267,32 @@ def _measure(
     )
 
 
-def _count_wrong(emulated: _Emulated, truth: NDArray[np.float64] | None) -> int | None:
+def _count_wrong(
+    emulated: _Emulated, named: Sequence[Star], truth: NDArray[np.float64] | None
+) -> int | None:
     """Identified stars that the truth puts elsewhere; None without a truth."""
     from cubestack.emulator.scene.sky import SkyScene
 
     camera = emulated.board.camera
     if truth is None or not isinstance(camera.scene, SkyScene):
         return None
-    named = [star for star in emulated.client.stars() if star.hipparcos is not None]
     places = np.array([[star.x_px, star.y_px] for star in named]).reshape(-1, 2)
     hipparcos = [star.hipparcos or 0 for star in named]
     return attitudes.count_wrong(hipparcos, camera.condition.optics.unproject(places), truth)
 
 
-def _is_far(aramis: Aramis, field_deg: float, truth: NDArray[np.float64] | None) -> bool | None:
+def _is_far(
+    named: Sequence[Star], field_deg: float, truth: NDArray[np.float64] | None
+) -> bool | None:
     """Appendix E's criterion of a wrong result; None where it can not be told."""
     from cubestack.emulator.scene.attitude import matrix_from_quaternion
     from cubestack.emulator.scene.hipparcos import load_sky
 
-    named = [star.hipparcos for star in aramis.stars() if star.hipparcos is not None][:3]
-    if truth is None or len(named) < 3:
+    triangle = [star.hipparcos or 0 for star in named[:3]]
+    if truth is None or len(triangle) < 3:
         return None
     sky = load_sky()
-    middle = sky.vectors[np.searchsorted(sky.hip, named)].mean(axis=0)
+    middle = sky.vectors[np.searchsorted(sky.hip, triangle)].mean(axis=0)
     cosine = middle @ matrix_from_quaternion(truth)[2] / np.linalg.norm(middle)
     return bool(cosine < np.cos(np.radians(field_deg)))
 

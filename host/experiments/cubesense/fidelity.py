@@ -121,7 +121,8 @@ def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
     )
     for name, change, part, state in steps:
         change(part, state)
-        found[name] = power.current_ma() * CUBESENSE_POWER.volts
+        if name:
+            found[name] = power.current_ma() * CUBESENSE_POWER.volts
     return found
 
 
