@@ -3,7 +3,6 @@
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_fro
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+from cubestack.host.clients.aramis.client import Star
 from cubestack.host.experiments.aramis.measure import (
     EXPERIMENT,
     FIELD_DEG,
@@ -137,16 +137,15 @@ def test_options_that_make_no_sense_are_refused(options: dict[str, Any], complai
 
 @pytest.mark.parametrize(
     ("third", "turned_deg", "far"),
-    [(25930, 0, False), (25930, 20, False), (25930, 24, True), (None, 0, None)],
+    [((25930,), 0, False), ((25930,), 20, False), ((25930,), 24, True), ((), 0, None)],
 )
 def test_a_triangle_more_than_a_field_away_is_wrong_as_the_thesis_counts(
-    third: int | None, turned_deg: float, far: bool | None
+    third: tuple[int, ...], turned_deg: float, far: bool | None
 ) -> None:
-    named = [SimpleNamespace(hipparcos=one) for one in (26311, 26727, third)]
-    belt = SimpleNamespace(stars=lambda: named)
+    belt = [Star(0, 0.0, 0.0, 100.0, one) for one in (26311, 26727, *third)]
     truth = quaternion_from_pointing(84.05, -1.2 + turned_deg, 0.0)
-    assert _is_far(belt, FIELD_DEG, truth) == far  # type: ignore[arg-type]
-    assert _is_far(belt, FIELD_DEG, None) is None  # type: ignore[arg-type]
+    assert _is_far(belt, FIELD_DEG, truth) == far
+    assert _is_far(belt, FIELD_DEG, None) is None
 
 
 def test_what_is_far_is_told_beside_what_is_wrong() -> None:
