@@ -1,0 +1,22 @@
+/* Functions of single precision in single operations, the same on every machine.
+ *
+ * The order of operations is that of firmware_model/attitude/float_functions.py, bit for bit.
+ *
+ * SPDX-License-Identifier: BSD-2-Clause
+ */
+#ifndef FLOAT_FUNCTIONS_H
+#define FLOAT_FUNCTIONS_H
+
+/* Correctly rounded. */
+float square_root(float x);
+
+/* Of -1 to 1; 0 to pi. */
+float arc_cosine(float x);
+
+/* -pi to pi. */
+float arc_tangent(float y, float x);
+
+float sine(float x);
+float cosine(float x);
+
+#endif
