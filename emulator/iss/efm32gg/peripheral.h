@@ -1,0 +1,80 @@
+// Base of all peripherals: a register file that behaves as its table says.
+#pragma once
+
+#include "rate.h"
+#include "registers.h"  // made of firmware_model/interface/efm32gg/
+
+#include <memory>
+
+namespace efm32gg {
+
+class Part;
+
+// A field's value out of a register's, and back; the mask says where it is.
+constexpr uint32_t take(uint32_t value, uint32_t mask) { return (value & mask) / (mask & -mask); }
+constexpr uint32_t give(uint32_t field, uint32_t mask) { return field * (mask & -mask) & mask; }
+
+class Peripheral {
+public:
+    Peripheral(Part &part, const Instance &instance);
+    virtual ~Peripheral() = default;
+    Peripheral(const Peripheral &) = delete;
+
+    // All registers to their reset values, and interrupts off. Derived classes call it first.
+    virtual void reset();
+
+    // Word accesses of the bus, with side effects. Offsets are multiples of 4. What is not
+    // overridden is the register file; IFS, IFC and IEN are done here.
+    virtual uint32_t read(uint32_t offset);
+    virtual void write(uint32_t offset, uint32_t value);
+
+    // What a read would give, without side effects: for debuggers.
+    virtual uint32_t peek(uint32_t offset) const;
+
+    // The part's clocks are about to change (bring counters up to now()), and have changed
+    // (schedule anew). Sleep, wake-up and enable bits come this way, too.
+    virtual void clocks_changing() {}
+    virtual void clocks_changed() {}
+
+    // The energy mode is now `mode`, 0 to 3.
+    virtual void energy_mode(int mode) { (void)mode; }
+
+    // A pin's level changed; a reflex channel's did; the analog inputs did.
+    virtual void pin_changed(int port, int bit, bool level) { (void)port, (void)bit, (void)level; }
+    virtual void prs_changed(int channel, bool level) { (void)channel, (void)level; }
+    virtual void analog_changed() {}
+
+    uint32_t &reg(uint32_t offset) { return file[offset / 4]; }
+    uint32_t reg(uint32_t offset) const { return file[offset / 4]; }
+
+    const Instance &instance;
+    const Layout &layout;
+
+    // Whether its registers can be accessed; the CMU keeps it up to date.
+    bool clocked = true;
+
+    // Whether a write without clock, or to what is not modelled, was reported.
+    bool reported = false;
+
+protected:
+    Part &part;
+
+    // Sets bits of IF, and the interrupt lines after it.
+    void raise(uint32_t flags);
+    // Interrupt lines follow IF and IEN; overridden where there is more than one line.
+    virtual void update_interrupts();
+    // The instance's line number `index` in the order of its table.
+    void line(int index, bool level);
+
+private:
+    std::unique_ptr<uint32_t[]> file;
+};
+
+// A peripheral whose registers are declared, but that does nothing. Reported at its first write.
+class Unmodelled : public Peripheral {
+public:
+    using Peripheral::Peripheral;
+    void write(uint32_t offset, uint32_t value) override;
+};
+
+}  // namespace efm32gg

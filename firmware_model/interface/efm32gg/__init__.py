@@ -1,0 +1,17 @@
+"""The EFM32GG280F1024's registers, once: simulator, C header and traces derive from them."""
+
+from cubestack.firmware_model.interface.efm32gg.system import SYSTEM
+from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
+
+#: Every kind of peripheral of the part.
+LAYOUTS: tuple[Layout, ...] = (*SYSTEM,)
+
+
+def register_at(address: int) -> tuple[Instance, Register] | None:
+    """The register that has ``address``, and whose it is; None when there is none."""
+    for layout in LAYOUTS:
+        for instance in layout.instances:
+            for register in layout.registers:
+                if instance.base + register.offset == address & ~3:
+                    return instance, register
+    return None

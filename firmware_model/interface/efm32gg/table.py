@@ -1,0 +1,176 @@
+"""Register tables: a peripheral is lines of text, and everything else derives from them.
+
+A line is ``offset NAME access reset field ...``; numbers are hexadecimal where they are addresses
+or values, decimal where they count::
+
+    000 CTRL    rw 0000000C  MODE:0:2 BOOST:2:2 EN:4
+    004 STATUS  r  00000000  BUSY:0
+    008 CMD     w  00000000  START:0 STOP:1
+    010 DATA    rw 00000000  *
+
+- ``rw``, ``r`` or ``w``; a field of another access says so: ``EN:4:1:r``. A ``r`` after which
+  something happens (data that is taken) is ``ra``.
+- ``NAME:lsb:width``; width 1 need not stand there. ``*`` is the whole register.
+- ``CH{0-11}:0`` stands for twelve fields, each beside the one before. In a register's name,
+  with ``offset/step``, it stands for registers: ``030/10 CC{0-2}_CTRL``; ``{ABC}`` are letters.
+- A line that begins with ``+`` goes on with the fields of the one before.
+- ``- note`` at the end of a line says that the emulator keeps the value and does nothing with it.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+
+class RegisterTableError(ValueError):
+    """A line of a table can not be read, or contradicts another."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """Adjacent bits of a register."""
+
+    name: str
+    lsb: int
+    width: int
+    readable: bool
+    writable: bool
+
+    @property
+    def mask(self) -> int:
+        """Its bits within the register."""
+        return ((1 << self.width) - 1) << self.lsb
+
+
+@dataclass(frozen=True)
+class Register:
+    """One word; ``modelled`` is False where the emulator keeps the value and that is all."""
+
+    offset: int
+    name: str
+    reset: int
+    fields: tuple[Field, ...]
+    action: bool = False
+    modelled: bool = True
+
+    @property
+    def readable(self) -> int:
+        """Bits that read as something else than 0."""
+        return sum(field.mask for field in self.fields if field.readable)
+
+    @property
+    def writable(self) -> int:
+        """Bits that a write reaches."""
+        return sum(field.mask for field in self.fields if field.writable)
+
+
+@dataclass(frozen=True)
+class Instance:
+    """One peripheral of the part: where it is, and its interrupt lines, numbers by name."""
+
+    name: str
+    base: int
+    interrupts: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The registers that all instances of a kind of peripheral have.
+
+    Attributes:
+        name: of the kind; an only instance has the same.
+        title: what it is, and the chapter of the reference manual.
+        registers: in the order of their offsets.
+        instances: of the part.
+        modelled: False for a peripheral of which nothing but the table is there.
+    """
+
+    name: str
+    title: str
+    registers: tuple[Register, ...]
+    instances: tuple[Instance, ...]
+    modelled: bool = True
+
+    @property
+    def size(self) -> int:
+        """Bytes up to the end of the last register."""
+        return max(register.offset for register in self.registers) + 4
+
+    def __getitem__(self, name: str) -> Register:
+        """The register ``name``; KeyError when there is none."""
+        for register in self.registers:
+            if register.name == name:
+                return register
+        raise KeyError(f"{self.name} has no register {name!r}")
+
+
+def peripheral(
+    name: str, title: str, registers: str, *instances: Instance, modelled: bool = True
+) -> Layout:
+    """The layout that ``registers`` declares; RegisterTableError names the line that is wrong."""
+    found: dict[int, Register] = {}
+    names: set[str] = set()
+    for line in re.sub(r"\n\s*\+", "", registers).splitlines():
+        for register in _registers(name, line):
+            if register.offset in found or register.name in names:
+                raise RegisterTableError(f"{name}: declared twice: {line.strip()!r}")
+            found[register.offset] = register
+            names.add(register.name)
+    return Layout(name, title, tuple(found[at] for at in sorted(found)), instances, modelled)
+
+
+def _registers(layout: str, line: str) -> Iterator[Register]:
+    text, dash, _note = line.partition(" - ")
+    words = text.split()
+    if not words:
+        return
+    if len(words) < 5:
+        raise RegisterTableError(f"{layout}: no 'offset NAME access reset field': {line.strip()!r}")
+    where, name, access, reset, *fields = words
+    offset, _, step = where.partition("/")
+    try:
+        for index, one in enumerate(_names(name)):
+            at = int(offset, 16) + index * int(step or "0", 16)
+            bits = tuple(field for word in fields for field in _fields(word, access))
+            register = Register(at, one, int(reset, 16), bits, "a" in access, not dash)
+            _check(register)
+            yield register
+    except ValueError as error:
+        raise RegisterTableError(f"{layout}: {error}: {line.strip()!r}") from None
+
+
+def _fields(word: str, access: str) -> Iterator[Field]:
+    if word == "*":
+        yield Field("", 0, 32, "r" in access, "w" in access)
+        return
+    name, lsb, *rest = word.split(":")
+    width = int(rest[0]) if rest and rest[0] else 1
+    own = rest[1] if len(rest) > 1 else access
+    for index, one in enumerate(_names(name)):
+        yield Field(one, int(lsb) + index * width, width, "r" in own, "w" in own)
+
+
+def _names(name: str) -> Iterator[str]:
+    """``CH{0-2}X`` is CH0X, CH1X, CH2X; ``P{AC}`` is PA, PC."""
+    match = re.fullmatch(r"(\w*)\{(\w+)(?:-(\w+))?\}(\w*)", name)
+    if not match:
+        if not name.isidentifier():
+            raise ValueError(f"{name!r} is no name")
+        yield name
+        return
+    before, first, last, after = match.groups()
+    parts = map(str, range(int(first), int(last) + 1)) if last else first
+    for part in parts:
+        yield before + part + after
+
+
+def _check(register: Register) -> None:
+    taken = 0
+    if register.offset % 4:
+        raise ValueError(f"{register.offset:#x} is no word's offset")
+    for bits in register.fields:
+        if bits.lsb + bits.width > 32 or bits.mask & taken:
+            raise ValueError(f"bits of {bits.name} are another's, or not there")
+        taken |= bits.mask
+    if register.reset & ~taken:
+        raise ValueError(f"reset value {register.reset:#x} has bits that no field has")
