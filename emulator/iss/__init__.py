@@ -1,0 +1,1 @@
+"""Instruction-set simulator: runs an unmodified image of a microcontroller on the board."""
