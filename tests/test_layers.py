@@ -26,7 +26,15 @@ LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
-    "emulator": ("sim", "bus rtl scene", "camera ports", "i2cdev recording faults", "boards"),
+    "emulator": (
+        "native",
+        "iss",
+        "sim",
+        "bus rtl scene",
+        "camera ports",
+        "i2cdev recording faults",
+        "boards",
+    ),
     "hdl": ("blocks", "flow", "cubestar cubesense", "proofs"),
     "firmware_model": ("interface", "formats mcu", "attitude node", "cubestar cubesense aramis"),
     "host": (

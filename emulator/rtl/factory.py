@@ -3,8 +3,8 @@
 import warnings
 from typing import Literal
 
+from cubestack.emulator.native.compiler import NoCompilerError
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.cxxrtl.build import NoCompilerError
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.sram import SramTiming

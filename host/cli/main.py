@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return FAILED
     except RuntimeError as error:
-        from cubestack.emulator.rtl.cxxrtl.build import CompilerError
+        from cubestack.emulator.native.compiler import CompilerError
 
         if not isinstance(error, CompilerError):
             raise

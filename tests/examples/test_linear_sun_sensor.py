@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import cubestack as library
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import device
 
 from ..conftest import Run

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.registry import device_names
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import main
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 

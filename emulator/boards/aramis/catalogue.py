@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.rtl.cxxrtl.build import cache_folder
+from cubestack.emulator.native.cache import cache_folder
 from cubestack.emulator.scene.hipparcos import CATALOGUE_SHA256, DEFAULT_EPOCH, Sky, load_sky
 from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue import database, geodesic, kvector
@@ -165,7 +165,7 @@ def cached_database(
 ) -> Database:
     """The database from the user's cache folder, or built now and put there.
 
-    ``folder`` replaces :func:`cubestack.emulator.rtl.cxxrtl.build.cache_folder`. A damaged file is
+    ``folder`` replaces :func:`cubestack.emulator.native.cache.cache_folder`. A damaged file is
     built anew; a folder that can not be written to costs the time of building, nothing else.
     """
     parameters = parameters or CatalogueParameters()

@@ -14,7 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from cubestack.emulator.i2cdev.device_node import DeviceNode
-from cubestack.emulator.rtl.cxxrtl.build import CompilerError, NoCompilerError, cache_folder
+from cubestack.emulator.native.cache import cache_folder
+from cubestack.emulator.native.compiler import CompilerError, NoCompilerError
 from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_DATA_BYTES, Call
 
 SOURCE = Path(__file__).with_name("shim.c")

@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from rich.box import SIMPLE
 from rich.table import Table
 
-from cubestack.emulator.rtl.cxxrtl.build import CompilerError
+from cubestack.emulator.native.compiler import CompilerError
 from cubestack.host.terminal import console, progress_bar, say
 from tests.benchmarks.engines import speeds
 from tests.benchmarks.engines.icarus import CocotbError

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from typing import NamedTuple
 
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from tests.benchmarks.engines.icarus import missing_for_cocotb, run_cocotb

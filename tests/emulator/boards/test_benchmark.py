@@ -9,8 +9,8 @@ import pytest
 from cubestack.emulator.boards.cubesense import benchmark as pair
 from cubestack.emulator.boards.cubestar import benchmark as star
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.benchmark import cold_build_s
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.interface.cameras.mlx75412 import LINE_CLOCKS
 from cubestack.firmware_model.interface.cameras.ov7620 import PIXEL_CLOCK_HZ
 

@@ -12,8 +12,8 @@ from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.ports.line import HostLine
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel

@@ -13,8 +13,8 @@ from cubestack.emulator.boards.cubestar.wiring import (
     cubestar_two_boards_wiring,
     cubestar_wiring,
 )
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring

@@ -6,7 +6,7 @@ import pytest
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring

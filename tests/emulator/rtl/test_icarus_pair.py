@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl import build
+from cubestack.emulator.native import compiler
+from cubestack.emulator.rtl import sram
 from cubestack.emulator.rtl.sram import RULES, Sram, SramPins, SramTiming, Violation
 
 SIZE = 16
-COMPILER = build.find_compiler()
+COMPILER = compiler.find_compiler()
 TIMEOUT_S = 300
 
 
@@ -21,9 +22,9 @@ def library(tmp_path_factory) -> ctypes.CDLL:
     if COMPILER is None:
         pytest.skip("no C++ compiler")
     target = tmp_path_factory.mktemp("sram") / "sram.so"
-    include = f"-I{Path(build.__file__).parent}"
+    include = f"-I{Path(sram.__file__).parent / 'cxxrtl'}"
     source = Path(__file__).with_name("sram_harness.cpp")
-    command = [*COMPILER.command, *build.FLAGS, include, str(source), "-o", str(target)]
+    command = [*COMPILER.command, *compiler.FLAGS, include, str(source), "-o", str(target)]
     subprocess.run(command, check=True, timeout=TIMEOUT_S)
     library = ctypes.CDLL(str(target))
     long, flag = ctypes.c_int64, ctypes.c_bool

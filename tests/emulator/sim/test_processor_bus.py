@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_double_wiring
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.requests import AwaitPin, BusAccess, Pay, SetPin

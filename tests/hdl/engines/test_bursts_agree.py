@@ -6,8 +6,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps
 from cubestack.emulator.rtl.cxxrtl.variants import members, variant_text
 from cubestack.emulator.rtl.factory import make_engine

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

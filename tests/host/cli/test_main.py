@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import COMMANDS
 from cubestack.host.cli.measure import _are_right
 from cubestack.host.cli.reports import reports
@@ -168,7 +168,7 @@ def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, image
 
 
 def test_no_compiler(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cubestack.emulator.rtl.cxxrtl.build.find_compiler", lambda: None)
+    monkeypatch.setattr("cubestack.emulator.native.compiler.find_compiler", lambda: None)
     outcome = run("measure", "cubestar", "--engine", "compiled")
     assert outcome.code == FAILED
     assert "no C++ compiler" in outcome.line

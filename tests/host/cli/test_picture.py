@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import cubestack
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from tests.conftest import Run
 

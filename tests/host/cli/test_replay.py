@@ -6,7 +6,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.host.cli import replay
 from cubestack.host.cli.device_options import inject_plan, record

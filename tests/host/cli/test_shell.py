@@ -10,7 +10,7 @@ from functools import partial
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.cubesense.codes import ImageSize
 from cubestack.host.cli.shell import split_commands
 from cubestack.host.clients.cubesense import client

@@ -9,11 +9,11 @@ import pytest
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.tcp import TcpEndpoint
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.main import main

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.codec.switches import Switches
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches

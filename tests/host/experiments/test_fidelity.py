@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices import fidelity as declared
 from cubestack.host.devices.fidelity import Fidelity, Row, Trial, read_tables
 from cubestack.host.devices.registry import BUILT_IN, device

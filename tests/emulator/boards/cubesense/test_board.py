@@ -11,7 +11,7 @@ import pytest
 from cubestack.emulator.boards.cubesense.board import BOOT_US, CubeSenseBoard
 from cubestack.emulator.boards.cubesense.gpio import CHANNELS, GpioPins
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
 from cubestack.firmware_model.cubesense.hardware import Port

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar import board as cubestar
-from cubestack.emulator.rtl.cxxrtl.build import find_compiler
+from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S

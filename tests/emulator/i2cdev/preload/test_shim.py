@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cubestack.emulator.i2cdev.preload import shim
-from cubestack.emulator.rtl.cxxrtl.build import CompilerError, NoCompilerError
+from cubestack.emulator.native.compiler import CompilerError, NoCompilerError
 
 needs_c = pytest.mark.skipif(shim.find_c_compiler() is None, reason="no C compiler here")
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.native import cache as caches
+from cubestack.emulator.native import compiler
 from cubestack.emulator.rtl.cxxrtl import build
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.factory import make_engine
@@ -17,14 +19,14 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 
 TIMEOUT_S = 300
 
-needs_compiler = pytest.mark.skipif(build.find_compiler() is None, reason="no C++ compiler")
+needs_compiler = pytest.mark.skipif(compiler.find_compiler() is None, reason="no C++ compiler")
 
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch) -> Path:
     # Not by XDG_CACHE_HOME: Yosys would have to fill its own cache anew, which takes seconds.
     folder = tmp_path / "cache"
-    monkeypatch.setattr(build, "cache_folder", lambda: folder)
+    monkeypatch.setattr(caches, "cache_folder", lambda: folder)
     return folder
 
 
@@ -32,7 +34,7 @@ def cache(tmp_path, monkeypatch) -> Path:
 def without_compiler(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CXX", raising=False)
-    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
 
 
 def make_compiler(folder: Path, name: str, on_compile: str, version: str = "1.0") -> Path:
@@ -76,7 +78,7 @@ def test_damaged_library_is_built_again(quick_compiler, cache, damage):
 
 def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypatch):
     libraries = [build.library_for(wiring()), build.library_for(cubestar_wiring(CubeStarTop(2, 3)))]
-    monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-g"))
+    monkeypatch.setattr(compiler, "FLAGS", (*compiler.FLAGS, "-g"))
     libraries.append(build.library_for(wiring()))
     monkeypatch.setattr(build, "SOURCES", ("driver.cpp",))
     libraries.append(build.library_for(wiring()))
@@ -88,8 +90,8 @@ def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypa
 def test_two_processes_may_build_at_once(cache):
     program = (
         "from pathlib import Path\n"
-        "from cubestack.emulator.rtl.cxxrtl import build\n"
-        f"build.cache_folder = lambda: Path({str(cache)!r})\n"
+        "from cubestack.emulator.native import cache\n"
+        f"cache.cache_folder = lambda: Path({str(cache)!r})\n"
         "from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring\n"
         "from cubestack.emulator.rtl.factory import make_engine\n"
         "from cubestack.hdl.cubestar.top import CubeStarTop\n"
@@ -114,7 +116,7 @@ def test_compiled_where_there_is_a_compiler_and_nothing_printed(cache, capfd, re
 def test_compiler_that_fails_is_one_line_with_its_log(cache, tmp_path, monkeypatch, capfd):
     program = make_compiler(tmp_path, "badcc", "echo no such thing >&2; exit 3")
     monkeypatch.setenv("CXX", f"{program} -m64")
-    with pytest.raises(build.CompilerError) as caught:
+    with pytest.raises(compiler.CompilerError) as caught:
         make_engine(wiring())
     (log,) = cache.glob("*.log")
     assert str(caught.value) == f"{program} -m64 failed; its log is {log}"
@@ -123,52 +125,18 @@ def test_compiler_that_fails_is_one_line_with_its_log(cache, tmp_path, monkeypat
     assert capfd.readouterr() == ("", "")
 
 
-def test_cxx_comes_first_and_version_tells_compilers_apart(tmp_path, monkeypatch):
-    monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1", "one")))
-    first = build.find_compiler()
-    assert first is not None
-    assert first.command == (str(tmp_path / "mycc"),)
-    make_compiler(tmp_path, "mycc", "exit 1", "two")
-    assert build.find_compiler() != first
-
-
-def test_broken_compiler_is_passed_over(without_compiler, tmp_path):
-    (tmp_path / "c++").write_text("#!/bin/sh\nexit 1\n")
-    (tmp_path / "c++").chmod(0o755)
-    assert build.find_compiler() is None
-    make_compiler(tmp_path, "clang++", "exit 1")
-    found = build.find_compiler()
-    assert found is not None
-    assert found.command == (str(tmp_path / "clang++"),)
-
-
-def test_ziglang_wheel_is_the_last_resort(without_compiler, monkeypatch):
-    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: name == "ziglang" or None)
-    monkeypatch.setattr(build, "version", lambda name: f"7.8 of {name}")
-    assert build.find_compiler() == build.Compiler(
-        (sys.executable, "-m", "ziglang", "c++"), "ziglang 7.8 of ziglang"
-    )
-
-
 def test_simulator_with_a_warning_where_there_is_no_compiler(without_compiler, cache):
     with pytest.warns(UserWarning, match=r"^no C\+\+ compiler .* found; using the Amaranth"):
         engine = make_engine(wiring())
     assert isinstance(engine, SimulatedEngine)
-    with pytest.raises(build.NoCompilerError, match="ziglang wheel"):
+    with pytest.raises(compiler.NoCompilerError, match="ziglang wheel"):
         make_engine(wiring(), "compiled")
     assert not cache.exists()
 
 
 def test_cache_that_can_not_be_used(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(build, "cache_folder", lambda: tmp_path / "file" / "cubestack")
+    monkeypatch.setattr(caches, "cache_folder", lambda: tmp_path / "file" / "cubestack")
     monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "mycc", "exit 1")))
-    with pytest.raises(build.CompilerError, match="XDG_CACHE_HOME names another one"):
+    with pytest.raises(compiler.CompilerError, match="XDG_CACHE_HOME names another one"):
         make_engine(wiring())
-
-
-def test_cache_is_where_the_user_wants_it(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert build.cache_folder() == tmp_path / "cubestack"
-    monkeypatch.setenv("XDG_CACHE_HOME", "")
-    assert build.cache_folder() == Path.home() / ".cache" / "cubestack"

@@ -1,0 +1,95 @@
+// The C face of a machine: what machine.py calls. Nothing here throws; times are picoseconds.
+//
+// A machine is a core with a part around it. Made bare, it has memories only, for tests of the core.
+
+#pragma once
+
+#include "efm32gg/outbox.h"
+
+#include <cstdint>
+
+extern "C" {
+
+// Why a run ended; StopReason in machine.py has the same order.
+enum StopReason : int32_t {
+    STOP_TIME,        // the wanted time is reached
+    STOP_OUTBOX,      // something for the outside is in the outbox
+    STOP_ASLEEP,      // the core fell asleep
+    STOP_AWAKE,       // the core awoke
+    STOP_BREAKPOINT,  // before the instruction at a breakpoint
+    STOP_WATCHPOINT,  // after the instruction that made the access
+    STOP_STEPPED,     // after one instruction
+    STOP_HALTED,      // BKPT with a debugger, at that instruction
+    STOP_LOCKED_UP,   // the core is locked up
+    STOP_BUFFER_FULL, // the trace buffer is to be emptied
+};
+
+// Functions of the FPGA's driver, and which of its pins lead to which port pins.
+struct IssFpga {
+    void *driver;
+    void (*set)(void *driver, int32_t pin, uint32_t value, int64_t now);
+    uint32_t (*get)(const void *driver, int32_t pin);
+    int32_t (*burst)(void *driver, int64_t until, uint32_t running, int64_t *reached,
+                     int32_t *camera);
+    int64_t (*access)(void *driver, const void *wanted, int64_t event, uint32_t running,
+                      int32_t *over);
+};
+
+struct IssMachine;
+
+// Memories are the caller's and outlive the machine; sizes in bytes, powers of two. `analog` are
+// volts by channel. `bare`: no part, flash at 0 and RAM at 0x20000000, one cycle of `hz` each.
+IssMachine *iss_new(uint8_t *flash, int64_t flash_bytes, uint8_t *ram, int64_t ram_bytes,
+                    uint8_t *external, int64_t external_bytes, const double *analog,
+                    int32_t bare, int64_t hz);
+void iss_delete(IssMachine *machine);
+
+// Time and running.
+void iss_reset(IssMachine *machine, int32_t cause, int64_t now_ps);
+int32_t iss_run(IssMachine *machine, int64_t until_ps);
+int32_t iss_step(IssMachine *machine, int64_t until_ps);
+int64_t iss_now(const IssMachine *machine);
+int64_t iss_cycles(const IssMachine *machine);
+int64_t iss_next_event(const IssMachine *machine);  // INT64_MAX for none
+int32_t iss_asleep(const IssMachine *machine);      // 0 awake, else 1 + energy mode
+int64_t iss_instructions(const IssMachine *machine);
+int64_t iss_hz(const IssMachine *machine);          // of the core now
+
+// The outbox: moves up to `count` records to `out`, returns how many.
+int64_t iss_take(IssMachine *machine, efm32gg::Outgoing *out, int64_t count);
+
+// Registers by number: r0..r15, then xpsr, msp, psp, primask, basepri, faultmask, control.
+uint32_t iss_register(const IssMachine *machine, int32_t number);
+void iss_set_register(IssMachine *machine, int32_t number, uint32_t value);
+
+// Memory: `peek` and `poke` as a debugger does, without side effects on reads; the others are
+// accesses of the bus, 1, 2 or 4 bytes wide. Return how many bytes were done.
+int64_t iss_peek(IssMachine *machine, uint32_t address, uint8_t *out, int64_t count);
+int64_t iss_poke(IssMachine *machine, uint32_t address, const uint8_t *data, int64_t count);
+int32_t iss_load(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t *value);
+int32_t iss_store(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t value);
+void iss_invalidate(IssMachine *machine, uint32_t address, int64_t count);
+
+// Inputs; see machine.py.
+void iss_pin(IssMachine *machine, int32_t port, int32_t bit, int32_t level);
+int32_t iss_pin_level(const IssMachine *machine, int32_t port, int32_t bit);
+void iss_uart_receive(IssMachine *machine, int32_t unit, uint32_t data, uint32_t flags);
+int32_t iss_i2c_slave(IssMachine *machine, int32_t unit, int32_t what, int32_t byte);
+void iss_i2c_answer(IssMachine *machine, int32_t unit, int32_t acknowledged, int32_t data);
+void iss_analog_changed(IssMachine *machine);
+
+// Debugging.
+void iss_breakpoint(IssMachine *machine, uint32_t address, int32_t on);
+void iss_watchpoint(IssMachine *machine, uint32_t address, uint32_t count, int32_t kind,
+                    int32_t on);
+uint32_t iss_watch_hit(const IssMachine *machine);  // address of the access that stopped the run
+void iss_debugger(IssMachine *machine, int32_t attached);
+
+// Profile: cycles and executions by halfword of flash then RAM; null ends it. Trace: records of
+// calls, returns and exceptions.
+void iss_profile(IssMachine *machine, uint64_t *cycles, uint64_t *counts);
+
+// The FPGA: `map` has a driver's pin and bit (pin << 8 | bit) or -1 for each port pin.
+typedef uint32_t (*IssAttend)(int64_t reached, int32_t outcome, int32_t camera, int64_t now);
+void iss_fpga(IssMachine *machine, const IssFpga *fpga, const int32_t *map, IssAttend attend);
+}

@@ -1,0 +1,92 @@
+"""The functions of api.h as ctypes knows them."""
+
+import ctypes
+from typing import Any
+
+from cubestack.emulator.iss.build import simulator_library
+
+
+class OutgoingRecord(ctypes.Structure):
+    """``Outgoing`` of outbox.h."""
+
+    _fields_ = (
+        ("kind", ctypes.c_int32),
+        ("unit", ctypes.c_int32),
+        ("value", ctypes.c_int64),
+        ("extra", ctypes.c_int64),
+        ("time_ps", ctypes.c_int64),
+        ("text", ctypes.c_char * 96),
+    )
+
+
+class FpgaRecord(ctypes.Structure):
+    """``IssFpga``: a driver and the addresses of its functions."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_void_p) for name in ("driver", "set", "get", "burst", "access")
+    )
+
+
+ATTEND = ctypes.CFUNCTYPE(
+    ctypes.c_uint32, ctypes.c_int64, ctypes.c_int32, ctypes.c_int32, ctypes.c_int64
+)
+"""``IssAttend``."""
+
+_P, _I, _U, _L = ctypes.c_void_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int64
+_FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "iss_new": (_P, (_P, _L, _P, _L, _P, _L, _P, _I, _L)),
+    "iss_delete": (None, (_P,)),
+    "iss_reset": (None, (_P, _I, _L)),
+    "iss_run": (_I, (_P, _L)),
+    "iss_step": (_I, (_P, _L)),
+    "iss_now": (_L, (_P,)),
+    "iss_cycles": (_L, (_P,)),
+    "iss_next_event": (_L, (_P,)),
+    "iss_asleep": (_I, (_P,)),
+    "iss_instructions": (_L, (_P,)),
+    "iss_hz": (_L, (_P,)),
+    "iss_take": (_L, (_P, ctypes.POINTER(OutgoingRecord), _L)),
+    "iss_register": (_U, (_P, _I)),
+    "iss_set_register": (None, (_P, _I, _U)),
+    "iss_peek": (_L, (_P, _U, ctypes.POINTER(ctypes.c_uint8), _L)),
+    "iss_poke": (_L, (_P, _U, ctypes.POINTER(ctypes.c_uint8), _L)),
+    "iss_load": (_I, (_P, _U, _I, ctypes.POINTER(_U))),
+    "iss_store": (_I, (_P, _U, _I, _U)),
+    "iss_invalidate": (None, (_P, _U, _L)),
+    "iss_pin": (None, (_P, _I, _I, _I)),
+    "iss_pin_level": (_I, (_P, _I, _I)),
+    "iss_uart_receive": (None, (_P, _I, _U, _U)),
+    "iss_i2c_slave": (_I, (_P, _I, _I, _I)),
+    "iss_i2c_answer": (None, (_P, _I, _I, _I)),
+    "iss_analog_changed": (None, (_P,)),
+    "iss_breakpoint": (None, (_P, _U, _I)),
+    "iss_watchpoint": (None, (_P, _U, _U, _I, _I)),
+    "iss_watch_hit": (_U, (_P,)),
+    "iss_debugger": (None, (_P, _I)),
+    "iss_profile": (None, (_P, _P, _P)),
+    "iss_fpga": (None, (_P, ctypes.POINTER(FpgaRecord), ctypes.POINTER(_I), ATTEND)),
+}
+
+Library = Any
+"""The loaded library; its functions are those of api.h."""
+
+
+class _Loader:
+    """Loads the library when the first machine is made."""
+
+    def __init__(self) -> None:
+        self._loaded: Library | None = None
+
+    def get(self) -> Library:
+        """The library; CompilerError when it can not be built."""
+        if self._loaded is None:
+            library = ctypes.CDLL(str(simulator_library()))
+            for name, (result, arguments) in _FUNCTIONS.items():
+                function = getattr(library, name)
+                function.restype, function.argtypes = result, arguments
+            self._loaded = library
+        return self._loaded
+
+
+LIBRARY = _Loader()
+"""The one library of this process."""

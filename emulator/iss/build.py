@@ -1,0 +1,39 @@
+"""Builds the simulator's library: all its C++ files in one call of the compiler."""
+
+from collections.abc import Iterable
+from functools import lru_cache, partial
+from pathlib import Path
+
+from cubestack.emulator.native import cache
+from cubestack.emulator.native.compiler import Compiler, compile_library
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from cubestack.firmware_model.interface.efm32gg.cxx import cxx_header
+
+FOLDER = Path(__file__).parent
+
+
+def sources() -> list[Path]:
+    """Every C++ file and header of the core, the part and what goes with them."""
+    return sorted([*FOLDER.rglob("*.cpp"), *FOLDER.rglob("*.h")])
+
+
+@lru_cache(maxsize=4)
+def simulator_library(folder: Path | None = None) -> Path:
+    """The library, from the cache or built now.
+
+    ``folder`` and errors: see :func:`cubestack.emulator.native.cache.cached_library`.
+    """
+    header = cxx_header(LAYOUTS)
+    build = partial(_compile, header, sources())
+    return cache.cached_library(f"simulator {header}", sources(), build, folder)
+
+
+def _compile(
+    header: str, files: Iterable[Path], compiler: Compiler, scratch: Path, log: Path
+) -> Path:
+    (scratch / "registers.h").write_text(header)
+    unity = scratch / "simulator.cpp"
+    unity.write_text("".join(f'#include "{file}"\n' for file in files if file.suffix == ".cpp"))
+    return compile_library(
+        compiler, scratch / "library.so", log, [f"-I{FOLDER}", f"-I{scratch}", unity]
+    )

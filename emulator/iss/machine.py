@@ -1,0 +1,404 @@
+"""A machine: core, part and memories in C++, through ctypes. Times are integer picoseconds.
+
+It runs by itself up to a time, and returns sooner when something is for the outside: that is in
+the outbox then. Inputs come between two runs. A machine never calls Python while it runs, but for
+an FPGA without compiled driver.
+"""
+
+import ctypes
+from collections.abc import Iterator, MutableSet
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.iss.binding import LIBRARY, Library, OutgoingRecord
+from cubestack.emulator.iss.image import Image
+
+FLASH_BASE = 0x0000_0000
+RAM_BASE = 0x2000_0000
+EXTERNAL_BASE = 0x8000_0000
+"""Of the external bus' first bank, in which code can not run."""
+
+FLASH_BYTES = 1 << 20
+RAM_BYTES = 128 << 10
+ANALOG_INPUTS = 32
+"""Volts by channel; the part says which is which."""
+
+NEVER = (1 << 63) - 1
+"""A time that does not come."""
+
+_SPECIAL = ("xpsr", "msp", "psp", "primask", "basepri", "faultmask", "control")
+
+REGISTERS = (*(f"r{n}" for n in range(13)), "sp", "lr", "pc", *_SPECIAL)
+"""Names of the core's registers, in the order of their numbers."""
+
+
+class StopReason(IntEnum):
+    """Why a run ended; the order is that of api.h."""
+
+    TIME = 0
+    OUTBOX = 1
+    ASLEEP = 2
+    AWAKE = 3
+    BREAKPOINT = 4
+    WATCHPOINT = 5
+    STEPPED = 6
+    HALTED = 7
+    LOCKED_UP = 8
+    BUFFER_FULL = 9
+
+
+class Stop(NamedTuple):
+    """End of a run.
+
+    Attributes:
+        reason: of it.
+        now_ps: time that the machine has reached.
+    """
+
+    reason: StopReason
+    now_ps: int
+
+
+class Kind(IntEnum):
+    """What leaves a machine; the order, and what the values mean, are those of outbox.h."""
+
+    PIN = 0
+    UART = 1
+    I2C_START = 2
+    I2C_WRITE = 3
+    I2C_READ = 4
+    I2C_STOP = 5
+    I2C_SLAVE = 6
+    ITM = 7
+    SEMIHOSTING = 8
+    LOG = 9
+    RESET = 10
+    SLEEP = 11
+    FLASH = 12
+    SUPPLY = 13
+    SPI = 14
+    FAULT = 15
+
+
+class Outgoing(NamedTuple):
+    """Something for the outside.
+
+    Attributes:
+        kind: of it.
+        unit: which port pin, peripheral or stimulus port.
+        value: level, byte or address.
+        extra: what else there is to know, by kind.
+        time_ps: when it happened.
+        text: of the kinds that are text.
+    """
+
+    kind: Kind
+    unit: int
+    value: int
+    extra: int
+    time_ps: int
+    text: str = ""
+
+
+class Watch(NamedTuple):
+    """A range of memory whose accesses stop a run; ``kind`` is "r", "w" or "a" for both."""
+
+    address: int
+    length: int
+    kind: str
+
+
+class Machine:
+    """One microcontroller.
+
+    Attributes:
+        flash, ram, external: its memories, live; after a change of code, call ``invalidate``.
+        analog: volts at each analog input, live; after a change, call ``analog_changed``.
+        image: what was loaded last.
+        breakpoints: addresses; a run stops before the instruction there.
+    """
+
+    def __init__(
+        self,
+        *,
+        flash_bytes: int = FLASH_BYTES,
+        ram_bytes: int = RAM_BYTES,
+        external_bytes: int = 0,
+        bare_hz: int | None = None,
+        library: Library | None = None,
+    ) -> None:
+        """Make a machine in reset; sizes are powers of two.
+
+        ``bare_hz`` makes one without a part: memories and a core at that clock.
+
+        Raises:
+            CompilerError: the library is not there and can not be built.
+        """
+        self._library = library if library is not None else LIBRARY.get()
+        self.flash = np.full(flash_bytes, 0xFF, np.uint8)
+        self.ram = np.zeros(ram_bytes, np.uint8)
+        self.external = np.zeros(external_bytes, np.uint8)
+        self.analog = np.zeros(ANALOG_INPUTS, np.float64)
+        self.image: Image | None = None
+        self._outgoing = (OutgoingRecord * 256)()
+        self._handle: int | None = self._library.iss_new(
+            *(item for memory in (self.flash, self.ram, self.external)
+              for item in (memory.ctypes.data, memory.size)),
+            self.analog.ctypes.data,
+            bare_hz is not None,
+            bare_hz or 0,
+        )  # fmt: skip
+        self.breakpoints: MutableSet[int] = Breakpoints(self)
+        self._watches: set[Watch] = set()
+
+    def close(self) -> None:
+        """Release the machine."""
+        if self._handle is not None:
+            self._library.iss_delete(self._handle)
+            self._handle = None
+
+    def __del__(self) -> None:
+        """Release the machine."""
+        if getattr(self, "_handle", None) is not None:
+            self.close()
+
+    @property
+    def handle(self) -> int:
+        """Of the C++ machine; without this check a closed one would end the process."""
+        if self._handle is None:
+            raise RuntimeError("the machine is closed: make a new one")
+        return self._handle
+
+    # Programs and running
+
+    def load(self, image: Image) -> None:
+        """Put a program into the flash, which is erased before; ``reset`` starts it."""
+        self.flash[:] = 0xFF
+        for address, data in image.segments:
+            start = address - FLASH_BASE
+            self.flash[start : start + len(data)] = np.frombuffer(data, np.uint8)
+        self.image = image
+        self.invalidate(FLASH_BASE, self.flash.size)
+
+    def reset(self, cause: int = 1, now_ps: int | None = None) -> None:
+        """Reset at a time, by default now; ``cause`` are the bits of the part's register for it."""
+        self._library.iss_reset(self.handle, cause, self.now_ps if now_ps is None else now_ps)
+
+    def run(self, until_ps: int) -> Stop:
+        """Run up to a time, or to what the outside must know of.
+
+        An asleep machine stands at the next thing that happens, or at ``until_ps``.
+        """
+        reason = self._library.iss_run(self.handle, until_ps)
+        return Stop(StopReason(reason), self.now_ps)
+
+    def step(self, until_ps: int = NEVER) -> Stop:
+        """Execute one instruction, breakpoints or not; none where the machine sleeps that long."""
+        reason = self._library.iss_step(self.handle, until_ps)
+        return Stop(StopReason(reason), self.now_ps)
+
+    @property
+    def now_ps(self) -> int:
+        """Its time."""
+        return int(self._library.iss_now(self.handle))
+
+    @property
+    def cycles(self) -> int:
+        """Core cycles since the start."""
+        return int(self._library.iss_cycles(self.handle))
+
+    @property
+    def instructions(self) -> int:
+        """Instructions executed since the start."""
+        return int(self._library.iss_instructions(self.handle))
+
+    @property
+    def hz(self) -> int:
+        """Clock of the core now."""
+        return int(self._library.iss_hz(self.handle))
+
+    @property
+    def next_event_ps(self) -> int:
+        """When something happens in a machine that sleeps; ``NEVER`` for nothing."""
+        return int(self._library.iss_next_event(self.handle))
+
+    @property
+    def energy_mode(self) -> int | None:
+        """0 awake, else the part's energy mode plus 1 while asleep: EM1 is 2; None is not used."""
+        return int(self._library.iss_asleep(self.handle))
+
+    @property
+    def asleep(self) -> bool:
+        """Whether the core sleeps."""
+        return bool(self._library.iss_asleep(self.handle))
+
+    def outbox(self) -> Iterator[Outgoing]:
+        """Take what is for the outside, in the order of time."""
+        while count := self._library.iss_take(self.handle, self._outgoing, len(self._outgoing)):
+            for one in self._outgoing[:count]:
+                text = one.text.decode("utf-8", "replace")
+                yield Outgoing(Kind(one.kind), one.unit, one.value, one.extra, one.time_ps, text)
+
+    # Registers and memory
+
+    def register(self, name: str) -> int:
+        """A register of the core, by one of ``REGISTERS``; KeyError for none."""
+        return int(self._library.iss_register(self.handle, _NUMBERS[name]))
+
+    def set_register(self, name: str, value: int) -> None:
+        """Change a register of the core; "pc" goes on there."""
+        self._library.iss_set_register(self.handle, _NUMBERS[name], value & 0xFFFF_FFFF)
+
+    def registers(self) -> dict[str, int]:
+        """All of them."""
+        return {name: self.register(name) for name in REGISTERS}
+
+    def peek(self, address: int, count: int) -> bytes:
+        """Bytes as a debugger sees them, with no side effect; fewer where there is no memory."""
+        buffer = (ctypes.c_uint8 * count)()
+        done = self._library.iss_peek(self.handle, address, buffer, count)
+        return bytes(buffer[:done])
+
+    def poke(self, address: int, data: bytes) -> int:
+        """Write bytes as a debugger does, into flash too; returns how many there was room for."""
+        buffer = (ctypes.c_uint8 * len(data)).from_buffer_copy(data)
+        return int(self._library.iss_poke(self.handle, address, buffer, len(data)))
+
+    def read(self, address: int, size: int = 4) -> int | None:
+        """Access of the bus with its side effects; None for a bus fault."""
+        value = ctypes.c_uint32()
+        if not self._library.iss_load(self.handle, address, size, value):
+            return None
+        return value.value
+
+    def write(self, address: int, value: int, size: int = 4) -> bool:
+        """Access of the bus with its side effects; False for a bus fault."""
+        return bool(self._library.iss_store(self.handle, address, size, value))
+
+    def invalidate(self, address: int, count: int) -> None:
+        """Bytes of memory were changed from outside: forget what was decoded of them."""
+        self._library.iss_invalidate(self.handle, address, count)
+
+    # Inputs
+
+    def pin(self, port: int, bit: int, level: int) -> None:
+        """Drive a port pin from outside, from now on."""
+        self._library.iss_pin(self.handle, port, bit, level)
+
+    def pin_level(self, port: int, bit: int) -> int:
+        """Level of a port pin now."""
+        return int(self._library.iss_pin_level(self.handle, port, bit))
+
+    def uart_receive(self, unit: int, data: int, flags: int = 0) -> None:
+        """A character's stop bit is over; ``flags``: 1 framing error, 2 parity error."""
+        self._library.iss_uart_receive(self.handle, unit, data, flags)
+
+    def i2c_slave_start(self, unit: int, address_byte: int) -> int | None:
+        """A (repeated) start with that address byte.
+
+        1 acknowledged, 0 not; None: the clock is stretched, run on and ask ``i2c_slave_poll``.
+        """
+        return self._slave(unit, 0, address_byte)
+
+    def i2c_slave_write(self, unit: int, byte: int) -> int | None:
+        """A byte for the slave; answers as ``i2c_slave_start``."""
+        return self._slave(unit, 1, byte)
+
+    def i2c_slave_read(self, unit: int, acknowledge: bool = True) -> int | None:
+        """The next byte of the slave; None as above. ``acknowledge``: of the byte before it."""
+        return self._slave(unit, 2, int(acknowledge))
+
+    def i2c_slave_stop(self, unit: int) -> None:
+        """The transfer is over."""
+        self._slave(unit, 3, 0)
+
+    def i2c_slave_poll(self, unit: int) -> int | None:
+        """Answer to the latest call above that was None."""
+        return self._slave(unit, 4, 0)
+
+    def i2c_answer(self, unit: int, acknowledged: bool, data: int = 0) -> None:
+        """What the bus made of the master's start, byte or read that was in the outbox."""
+        self._library.iss_i2c_answer(self.handle, unit, acknowledged, data)
+
+    def analog_changed(self) -> None:
+        """Voltages in ``analog`` are others now: comparators look at them."""
+        self._library.iss_analog_changed(self.handle)
+
+    # Debugging
+
+    @property
+    def watchpoints(self) -> frozenset[Watch]:
+        """Ranges whose accesses stop a run."""
+        return frozenset(self._watches)
+
+    def watch(self, watch: Watch, on: bool = True) -> None:
+        """Add a watchpoint, or take it away."""
+        kind = {"r": 1, "w": 2, "a": 3}[watch.kind]
+        if on != (watch in self._watches):
+            self._library.iss_watchpoint(self.handle, watch.address, watch.length, kind, on)
+            (self._watches.add if on else self._watches.discard)(watch)
+
+    @property
+    def watch_hit(self) -> int:
+        """Address of the access that ended the last run."""
+        return int(self._library.iss_watch_hit(self.handle))
+
+    def attach_debugger(self, attached: bool) -> None:
+        """Whether BKPT stops a run; otherwise it is a fault."""
+        self._library.iss_debugger(self.handle, attached)
+
+    def profile(self, cycles: NDArray[np.uint64] | None, counts: NDArray[np.uint64] | None) -> None:
+        """Count cycles and executions by halfword of flash, then RAM; None ends it."""
+        if cycles is None or counts is None:
+            self._profile = None
+            self._library.iss_profile(self.handle, None, None)
+        else:
+            self._profile = cycles, counts  # kept alive
+            self._library.iss_profile(self.handle, cycles.ctypes.data, counts.ctypes.data)
+
+    def _slave(self, unit: int, what: int, byte: int) -> int | None:
+        answer = int(self._library.iss_i2c_slave(self.handle, unit, what, byte))
+        return None if answer < 0 else answer
+
+
+class Breakpoints(MutableSet[int]):
+    """Addresses at which a machine stops."""
+
+    def __init__(self, machine: Machine) -> None:
+        """None at first."""
+        self._machine = machine
+        self._addresses: set[int] = set()
+
+    def __contains__(self, address: object) -> bool:
+        """Whether there is one."""
+        return address in self._addresses
+
+    def __iter__(self) -> Iterator[int]:
+        """All of them."""
+        return iter(sorted(self._addresses))
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self._addresses)
+
+    def add(self, value: int) -> None:
+        """Stop before the instruction there."""
+        self._set(value & ~1, True)
+
+    def discard(self, value: int) -> None:
+        """Stop there no longer."""
+        self._set(value & ~1, False)
+
+    def _set(self, address: int, on: bool) -> None:
+        if on != (address in self._addresses):
+            library = self._machine._library
+            library.iss_breakpoint(self._machine.handle, address, on)
+            (self._addresses.add if on else self._addresses.discard)(address)
+
+
+_NUMBERS = {name: number for number, name in enumerate(REGISTERS)} | {
+    f"r{n}": n for n in range(16)
+}  # fmt: skip

@@ -1,0 +1,1 @@
+"""Native code: a C++ compiler, and libraries that are built once and kept."""
