@@ -1,10 +1,14 @@
 """The EFM32GG280F1024's registers, once: simulator, C header and traces derive from them."""
 
+from cubestack.firmware_model.interface.efm32gg.analog import ANALOG
+from cubestack.firmware_model.interface.efm32gg.dma import DMA
+from cubestack.firmware_model.interface.efm32gg.serial import SERIAL
 from cubestack.firmware_model.interface.efm32gg.system import SYSTEM
 from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
+from cubestack.firmware_model.interface.efm32gg.timers import TIMERS
 
 #: Every kind of peripheral of the part.
-LAYOUTS: tuple[Layout, ...] = (*SYSTEM,)
+LAYOUTS: tuple[Layout, ...] = (*SYSTEM, *SERIAL, *TIMERS, *ANALOG, DMA)
 
 
 def register_at(address: int) -> tuple[Instance, Register] | None:

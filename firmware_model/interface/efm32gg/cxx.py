@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
+from cubestack.firmware_model.interface.efm32gg.pins import LOCATIONS, ROUTES
 from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
 
 _TYPES = """\
@@ -44,6 +45,7 @@ def cxx_header(layouts: Iterable[Layout]) -> str:
     for layout in layouts:
         parts.append("\n".join(_namespace(layout)))
     parts.append("\n".join(_tables(layouts)))
+    parts.append("\n".join(_routes()))
     parts.append("}  // namespace efm32gg\n")
     return "\n".join(parts)
 
@@ -87,6 +89,18 @@ def _tables(layouts: list[Layout]) -> Iterator[str]:
     yield "inline const Instance *const INSTANCES[] = {"
     for layout in layouts:
         yield from (f"    &instance::{instance.name}," for instance in layout.instances)
+    yield "};"
+
+
+def _routes() -> Iterator[str]:
+    yield "// Pins of the signals by location, port * 16 + bit; -1: none."
+    yield f"constexpr int32_t LOCATIONS = {LOCATIONS};"
+    yield "namespace route {"
+    yield f"enum Signal : int32_t {{ {', '.join(ROUTES)}, COUNT }};"
+    yield "}  // namespace route"
+    yield "inline const int8_t ROUTES[][LOCATIONS] = {"
+    for pins in ROUTES.values():
+        yield f"    {{{', '.join(map(str, [*pins, *[-1] * LOCATIONS][:LOCATIONS]))}}},"
     yield "};"
 
 

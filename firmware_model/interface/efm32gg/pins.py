@@ -1,0 +1,80 @@
+"""Which pin a peripheral's signal has at which location: alternate functions of the EFM32GG280.
+
+EFM32GG280 data sheet, table of alternate functionality; a ROUTE register's LOCATION chooses.
+"""
+
+import re
+
+#: A row is a signal and its pins, location 0 first.
+_TABLE = """
+    USART0_TX     PE10 PE7  PC11 PE13 PB7  PC0
+    USART0_RX     PE11 PE6  PC10 PE12 PB8  PC1
+    USART0_CLK    PE12 PE5  PC9  PC15 PB13 PB13
+    USART0_CS     PE13 PE4  PC8  PC14 PB14 PB14
+    USART1_TX     PC0  PD0  PD7
+    USART1_RX     PC1  PD1  PD6
+    USART1_CLK    PB7  PD2  PF0
+    USART1_CS     PB8  PD3  PF1
+    USART2_TX     PC2  PB3
+    USART2_RX     PC3  PB4
+    USART2_CLK    PC4  PB5
+    USART2_CS     PC5  PB6
+    UART0_TX      PF6  PE0  PA3  PC14
+    UART0_RX      PF7  PE1  PA4  PC15
+    UART1_TX      PC12 PF10 PB9  PE2
+    UART1_RX      PC13 PF11 PB10 PE3
+    LEUART0_TX    PD4  PB13 PE14 PF0  PF2
+    LEUART0_RX    PD5  PB14 PE15 PF1  PA0
+    LEUART1_TX    PC6  PA5
+    LEUART1_RX    PC7  PA6
+    I2C0_SDA      PA0  PD6  PC6  PD14 PC0  PF0  PE12
+    I2C0_SCL      PA1  PD7  PC7  PD15 PC1  PF1  PE13
+    I2C1_SDA      PC4  PB11 PE0
+    I2C1_SCL      PC5  PB12 PE1
+    TIMER0_CC0    PA0  PA0  PF6  PD1  PA0  PF0
+    TIMER0_CC1    PA1  PA1  PF7  PD2  PC0  PF1
+    TIMER0_CC2    PA2  PA2  PF8  PD3  PC1  PF2
+    TIMER1_CC0    PC13 PE10 PB0  PB7  PD6
+    TIMER1_CC1    PC14 PE11 PB1  PB8  PD7
+    TIMER1_CC2    PC15 PE12 PB2  PB11 PC13
+    TIMER2_CC0    PA8  PA12 PC8
+    TIMER2_CC1    PA9  PA13 PC9
+    TIMER2_CC2    PA10 PA14 PC10
+    TIMER3_CC0    PE14 PE0
+    TIMER3_CC1    PE15 PE1
+    TIMER3_CC2    PA15 PE2
+    LETIMER0_OUT0 PD6  PB11 PF0  PC4
+    LETIMER0_OUT1 PD7  PB12 PF1  PC5
+    PCNT0_S0IN    PC13 PE0  PC0  PD6
+    PCNT0_S1IN    PC14 PE1  PC1  PD7
+    PCNT1_S0IN    PC4  PB3
+    PCNT1_S1IN    PC5  PB4
+    PCNT2_S0IN    PD0  PE8
+    PCNT2_S1IN    PD1  PE9
+    ACMP0_OUT     PE13 PE2  PD6
+    ACMP1_OUT     PF2  PE3  PD7
+    PRS_CH0       PA0  PF3
+    PRS_CH1       PA1  PF4
+    PRS_CH2       PC0  PF5
+    PRS_CH3       PC1  PE8
+    CMU_CLK0      PA2  PC12 PD7
+    CMU_CLK1      PA1  PD8  PE12
+    DBG_SWO       PF2  PC15 PD1  PD2
+"""
+
+LOCATIONS = 7  #: the most that any signal has
+
+
+def pin_number(name: str) -> int:
+    """``PE10`` is 74: port times 16 plus bit. ValueError when it is no pin's name."""
+    match = re.fullmatch(r"P([A-F])(\d|1[0-5])", name)
+    if not match:
+        raise ValueError(f"{name!r} is no pin, as PA0 or PE10 are")
+    return (ord(match[1]) - ord("A")) * 16 + int(match[2])
+
+
+#: Pins of each signal by location, as ``port * 16 + bit``.
+ROUTES: dict[str, tuple[int, ...]] = {
+    signal: tuple(map(pin_number, pins))
+    for signal, *pins in (line.split() for line in _TABLE.split("\n") if line.strip())
+}
