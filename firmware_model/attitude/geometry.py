@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.attitude.float_functions import arc_tangent, cosine, sine
 from cubestack.firmware_model.interface.cameras.mlx75412 import PIXEL_PITCH_MM
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -90,17 +91,17 @@ def unit_vectors(
 
 def direction_of(right_ascension: float, declination: float, meter: Meter) -> NDArray[np.float32]:
     """Unit vector (3,) of a right ascension and a declination in rad."""
-    ra, dec = np.float32(right_ascension), np.float32(declination)
-    along = np.cos(dec)
+    angles = np.array([right_ascension, declination], np.float32)
+    (cos_ra, along), (sin_ra, sin_dec) = cosine(angles), sine(angles)
     meter.charge(f32_sin=4, f32_mul=2)
-    return np.array([along * np.cos(ra), along * np.sin(ra), np.sin(dec)], dtype=np.float32)
+    return np.array([along * cos_ra, along * sin_ra, sin_dec], dtype=np.float32)
 
 
 def angles_of(direction: NDArray[np.float32], meter: Meter) -> tuple[float, float]:
     """Right ascension in rad, -pi to pi, and declination in rad of a unit vector (3,)."""
     x, y, z = direction.astype(np.float32)
     meter.charge(f32_atan2=2, f32_mul=2, f32_add=1, f32_sqrt=1)
-    return float(np.arctan2(y, x)), float(np.arctan2(z, np.sqrt(x * x + y * y)))
+    return float(arc_tangent(y, x)), float(arc_tangent(z, np.sqrt(x * x + y * y)))
 
 
 def turned(vectors: NDArray[np.float32], dcm: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -31,6 +31,9 @@ _SMALLEST_DETERMINANT = np.float32(2e-6)
 _TURNS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float32)
 
 
+_DIAGONAL = np.diag_indices(3)
+
+
 class AttitudeError(ValueError):
     """The vectors do not determine an attitude."""
 
@@ -125,7 +128,8 @@ def _system(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Matrix (3, 3) and right side (3,) of equation 4.4.9, for weights that add up to 1."""
     sigma = profile[0, 0] + profile[1, 1] + profile[2, 2]
-    matrix = (eigenvalue + sigma) * np.eye(3, dtype=np.float32) - (profile + profile.T)
+    matrix = -(profile + profile.T)
+    matrix[_DIAGONAL] += eigenvalue + sigma
     right = np.array(
         [
             profile[1, 2] - profile[2, 1],

@@ -166,10 +166,16 @@ class StarCatalogue:
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter
     ) -> NDArray[np.uint16]:
         """Indices of the stars within `radius_deg` of a unit vector (3,), rising."""
+        return self.within(boresight, np.float32(np.cos(np.radians(radius_deg))), meter)
+
+    def within(
+        self, boresight: NDArray[np.float32], least: np.float32, meter: Meter
+    ) -> NDArray[np.uint16]:
+        """Indices, rising, of the stars whose cosine with a unit vector (3,) is ``least`` or more."""
         direction = boresight.astype(np.float32)
         x, y, z = self.vectors.T
         cosine = x * direction[0] + y * direction[1] + z * direction[2]
-        inside = cosine >= np.float32(np.cos(np.radians(radius_deg)))
+        inside = cosine >= least
         count = len(self)
         meter.charge(
             flash_read=3 * count,

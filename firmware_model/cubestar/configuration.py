@@ -1,6 +1,6 @@
 """What the algorithms are configured with, taken from the settings of telecommands 8 to 23."""
 
-import math
+import numpy as np
 
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
@@ -49,7 +49,9 @@ def camera_parameters(settings: Settings) -> CameraParameters:
     )
 
 
-def field_radius_deg(camera: CameraParameters) -> float:
-    """Angle between the boresight and the picture's farthest corner, distortion left out."""
-    x, y = max(camera.cx, COLUMNS - camera.cx), max(camera.cy, ROWS - camera.cy)
-    return math.degrees(math.atan(math.hypot(x, y) * camera.pitch_mm / camera.focal_length_mm))
+def field_cosine(camera: CameraParameters) -> np.float32:
+    """Cosine of the boresight's angle to the picture's farthest corner, distortion left out."""
+    one, cx, cy = np.float32(1), np.float32(camera.cx), np.float32(camera.cy)
+    scale = np.float32(camera.pitch_mm) / np.float32(camera.focal_length_mm)
+    x, y = max(cx, COLUMNS - cx) * scale, max(cy, ROWS - cy) * scale
+    return np.float32(one / np.sqrt(one + x * x + y * y))

@@ -249,10 +249,8 @@ class Processing:
         if mode is MatchMode.TRACKING and too_few:
             self.state.raise_flag("RateExceeded")
         boresight = self._expected_boresight()
-        radius_deg = configuration.field_radius_deg(
-            configuration.camera_parameters(self.state.settings)
-        )
-        in_field = self.catalogue.near(boresight, radius_deg, self.meter)
+        edge = configuration.field_cosine(configuration.camera_parameters(self.state.settings))
+        in_field = self.catalogue.within(boresight, edge, self.meter)
         if len(in_field) < FEWEST_STARS:
             self.state.raise_flag("LessThanThreeStarsInFoV")
         if not len(self.catalogue.near(boresight, self._radius_deg(mode), self.meter)):

@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.attitude.float_functions import arc_cosine
 from cubestack.firmware_model.mcu.costs import Meter
 
 #: Mark of a centroid without identity.
@@ -73,8 +74,7 @@ def angles_between(
     cosine = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
     count = len(a)
     meter.charge(f32_mul=3 * count, f32_add=2 * count, f32_compare=count, f32_acos=count)
-    angles: NDArray[np.float32] = np.arccos(np.clip(cosine, np.float32(-1), np.float32(1)))
-    return angles
+    return arc_cosine(np.clip(cosine, np.float32(-1), np.float32(1)))
 
 
 @dataclass(frozen=True, eq=False)

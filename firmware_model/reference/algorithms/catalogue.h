@@ -10,7 +10,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "catalogue_tables.h" /* generated: STAR_COUNT, PAIR_COUNT and the constants below */
+#include "catalogue_tables.h" /* generated: sizes, and cosines of the published radii */
+
+/* CUT_COSINE: 35 deg, assisted matching (section 4.3.4). TRACKING_COSINE: 30.3 deg (5.3.4). */
 
 /* Stars by rising Hipparcos number: inertial unit vectors. */
 extern const float star_x[STAR_COUNT], star_y[STAR_COUNT], star_z[STAR_COUNT];
@@ -40,9 +42,5 @@ struct pair_list reduced_pairs(const bool near[STAR_COUNT]);
 
 /* The whole list. */
 struct pair_list all_pairs(void);
-
-/* Cosines of the published radii; generated. */
-extern const float cut_cosine;       /* 35 deg: assisted matching (section 4.3.4) */
-extern const float tracking_cosine;  /* 30.3 deg: tracking (section 5.3.4) */
 
 #endif

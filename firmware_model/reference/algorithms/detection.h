@@ -41,9 +41,11 @@ struct detection {
     enum search_end end;
 };
 
-/* Words that the list of visited pixels needs at any setting: areas that are stars or invalid,
- * and areas that are noise, at the settings' limits. */
-#define VISITED_WORDS ((MOST_STARS + 256) * MOST_PIXELS + 256 * (MOST_PIXELS - 1))
+/* Words that the list of visited pixels needs at the settings' limits: areas that are stars or
+ * invalid, and areas that are noise. */
+#define VISITED_WORDS                                    \
+    ((MOST_STARS + MOST_INVALID + 1) * MOST_PIXELS +     \
+     (MOST_NOISE + 1) * (MOST_PIXELS - 1))
 
 /* Whether the region lies in the picture and the limits in their ranges. */
 bool detection_valid(const struct detection_config *config);

@@ -1,4 +1,4 @@
-/* Functions of single precision in single operations, the same on every machine.
+/* Functions in plain single-precision operations, the same on every machine.
  *
  * The order of operations is that of firmware_model/attitude/float_functions.py, bit for bit.
  *
@@ -6,9 +6,6 @@
  */
 #ifndef FLOAT_FUNCTIONS_H
 #define FLOAT_FUNCTIONS_H
-
-/* Correctly rounded. */
-float square_root(float x);
 
 /* Of -1 to 1; 0 to pi. */
 float arc_cosine(float x);

@@ -12,7 +12,9 @@
 #define MOST_STARS 20
 #define MOST_STAR_PAIRS (MOST_STARS * (MOST_STARS - 1) / 2)
 
-/* Pixels of an area: the largest value of setStarPixels' MaxPixels. */
-#define MOST_PIXELS 255
+/* Largest values of setStarPixels' MaxPixels and setDetectionVariables' MaxInvalidStars, MaxNoise. */
+#define MOST_PIXELS 100
+#define MOST_INVALID 50
+#define MOST_NOISE 255
 
 #endif

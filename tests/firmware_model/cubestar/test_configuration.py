@@ -5,7 +5,7 @@ from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.configuration import (
     camera_parameters,
     detection_config,
-    field_radius_deg,
+    field_cosine,
 )
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS
@@ -64,8 +64,8 @@ def test_the_field_reaches_to_the_farthest_corner(cx: float, cy: float) -> None:
     settings.put("setPrincipalPoint", {"Cx": cx, "Cy": cy})
     x, y = np.meshgrid([0, 1024], [0, 512])
     farthest = np.hypot(x - cx, y - cy).max()
-    expected = np.degrees(np.arctan(farthest * 0.0056 / 6.28))
-    assert field_radius_deg(camera_parameters(settings)) == pytest.approx(expected, rel=1e-6)
+    expected = np.cos(np.arctan(farthest * 0.0056 / 6.28))
+    assert field_cosine(camera_parameters(settings)) == pytest.approx(expected, rel=2e-7)
 
 
 def test_settings_that_the_hardware_can_not_follow_act_as_the_nearest() -> None:
