@@ -96,10 +96,11 @@ class I2cScheduler(Endpoint):
         """
         if not self._begun:
             self._origin_ns = time.monotonic_ns() - self._kernel.now // PS_PER_NS - self._behind_ns
-        return self._now_ns() - self._behind_ns
+        return time.monotonic_ns() - self._origin_ns - self._behind_ns
 
     def _now_ns(self) -> int:
-        return time.monotonic_ns() - self._origin_ns
+        """Likewise, less what the kernel was paused."""
+        return time.monotonic_ns() - self._origin_ns - self._kernel.held_ns
 
     def watched(self) -> list[tuple[int, int]]:
         """Those of all its ports."""
@@ -117,6 +118,8 @@ class I2cScheduler(Endpoint):
     def exchange(self, now_ps: int) -> None:
         """Serve calls; goes on as long as they come one after the other, up to ``VISIT_NS``."""
         self._begun = True
+        if self._kernel.paused:
+            return
         came = bool(self._watch.wait(0))
         self._serve(self._ports, came=came)
         leave_ns = self._now_ns() + VISIT_NS
@@ -160,17 +163,18 @@ class I2cScheduler(Endpoint):
         if self._fast:
 
             def goes_on() -> bool:
-                return clock() < end_ns
+                return clock() < end_ns and not kernel.paused
         else:
             if adapter.beginning:
                 kernel.advance_to(self._start_ns() * PS_PER_NS)
             limit_ps = self._now_ns() * PS_PER_NS + AHEAD_PS
 
             def goes_on() -> bool:
-                return clock() < end_ns and (kernel.horizon() or 0) <= limit_ps
+                ahead = (kernel.horizon() or 0) > limit_ps
+                return clock() < end_ns and not ahead and not kernel.paused
 
         adapter.drive(goes_on)
-        while kernel.horizon() == kernel.now:  # what is left of it
+        while kernel.horizon() == kernel.now and not kernel.paused:  # what is left of it
             kernel.step()
 
     def _start_ns(self) -> int:
@@ -182,7 +186,7 @@ class I2cScheduler(Endpoint):
 
     def _release(self, due_ns: int) -> bool:
         """Give the answer that is due next, unless that is too far away."""
-        clock, origin_ns = time.monotonic_ns, self._origin_ns
+        clock, origin_ns = time.monotonic_ns, self._origin_ns + self._kernel.held_ns
         left_ns = due_ns - (clock() - origin_ns)
         if left_ns > SPIN_NS:
             return False

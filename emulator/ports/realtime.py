@@ -3,6 +3,9 @@
 Paced "real", virtual time follows wall time; when the machine can not keep up, the scheduler says
 by how much. Paced "fast", virtual time runs ahead as long as the device has work or bytes are on a
 wire, and follows wall time while everything waits for the host, or a client reads too slowly.
+
+While the kernel is paused, virtual time stands and the ports stay open; that wall time does not
+count, so nothing catches up afterwards.
 """
 
 import select
@@ -84,7 +87,7 @@ class RealtimeScheduler:
             ahead = self.pace == "fast" and self._run_ahead()
             if ahead:
                 self._align()
-            else:
+            elif not self.env.paused:
                 self._follow()
             for endpoint in self.endpoints:
                 endpoint.exchange(self.env.now)
@@ -94,10 +97,11 @@ class RealtimeScheduler:
 
     def _wall_ps(self) -> int:
         """Wall time on the scale of virtual time."""
-        return self.clock_ns() * PS_PER_NS + self._offset_ps
+        return (self.clock_ns() - self.env.held_ns) * PS_PER_NS + self._offset_ps
 
     def _align(self) -> None:
-        self._offset_ps = self.env.now - self.clock_ns() * PS_PER_NS
+        self._offset_ps = 0
+        self._offset_ps = self.env.now - self._wall_ps()
 
     def _slice_end_ns(self) -> int:
         return self.clock_ns() + int(SLICE_S * NS_PER_S)
@@ -111,7 +115,7 @@ class RealtimeScheduler:
             return False
         progress = False
         end_ns = self._slice_end_ns()
-        while self.clock_ns() < end_ns:
+        while self.clock_ns() < end_ns and not self.env.paused:
             horizon, release = self.env.horizon(), self._release_ps(BURST_BYTES)
             if release is None and not self.busy():
                 break
@@ -137,7 +141,7 @@ class RealtimeScheduler:
         end_ns = self._slice_end_ns()
         while (horizon := self.env.horizon()) is not None and horizon <= target_ps:
             self.env.step()
-            if self.clock_ns() >= end_ns:
+            if self.clock_ns() >= end_ns or self.env.paused:
                 break
         else:
             self.env.advance_to(target_ps)
@@ -152,6 +156,8 @@ class RealtimeScheduler:
 
     def _until_next_s(self) -> float:
         """Wall time until something is due, at most ``IDLE_S``."""
+        if self.env.paused:
+            return IDLE_S
         times = [ps for ps in (self._release_ps(1), self.env.horizon()) if ps is not None]
         if not times:
             return IDLE_S

@@ -8,7 +8,15 @@ PS_PER_US = 10**6
 
 
 class Kernel(simpy.Environment):
-    """SimPy's environment with an integer clock in ps."""
+    """SimPy's environment with an integer clock in ps.
+
+    Attributes:
+        paused: whether a debugger has halted a processor: nothing may happen then.
+        held_ns: wall time of all pauses that are over.
+    """
+
+    paused: bool = False
+    held_ns: int = 0
 
     @property
     def now(self) -> int:

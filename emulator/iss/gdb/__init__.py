@@ -1,0 +1,1 @@
+"""GDB's remote serial protocol: packets, and a session that acts on a target. Knows no socket."""
