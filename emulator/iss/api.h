@@ -5,6 +5,7 @@
 #pragma once
 
 #include "efm32gg/outbox.h"
+#include "fpga_link.h"
 
 #include <cstdint>
 
@@ -20,34 +21,33 @@ enum StopReason : int32_t {
     STOP_WATCHPOINT,  // after the instruction that made the access
     STOP_STEPPED,     // after one instruction
     STOP_HALTED,      // BKPT with a debugger, at that instruction
-    STOP_LOCKED_UP,   // the core is locked up
-    STOP_BUFFER_FULL, // the trace buffer is to be emptied
+    STOP_LOCKED_UP,   // the core is locked up, until a reset
+    STOP_FAULT,       // vector catch: at the first instruction of a handler
 };
 
-// Functions of the FPGA's driver, and which of its pins lead to which port pins.
-struct IssFpga {
-    void *driver;
-    void (*set)(void *driver, int32_t pin, uint32_t value, int64_t now);
-    uint32_t (*get)(const void *driver, int32_t pin);
-    int32_t (*burst)(void *driver, int64_t until, uint32_t running, int64_t *reached,
-                     int32_t *camera);
-    int64_t (*access)(void *driver, const void *wanted, int64_t event, uint32_t running,
-                      int32_t *over);
-};
+namespace armv7m {
+class Cpu;
+class System;
+}
+
+namespace efm32gg {
+class Part;
+}
 
 struct IssMachine;
 
 // Memories are the caller's and outlive the machine; sizes in bytes, powers of two. `analog` are
 // volts by channel. `bare`: no part, flash at 0 and RAM at 0x20000000, one cycle of `hz` each.
 IssMachine *iss_new(uint8_t *flash, int64_t flash_bytes, uint8_t *ram, int64_t ram_bytes,
-                    uint8_t *external, int64_t external_bytes, const double *analog,
-                    int32_t bare, int64_t hz);
+                    uint8_t *external, int64_t external_bytes, uint8_t *information,
+                    const double *analog, int32_t bare, int64_t hz);
 void iss_delete(IssMachine *machine);
 
 // Time and running.
-void iss_reset(IssMachine *machine, int32_t cause, int64_t now_ps);
+void iss_reset(IssMachine *machine, int32_t cause);
 int32_t iss_run(IssMachine *machine, int64_t until_ps);
-int32_t iss_step(IssMachine *machine, int64_t until_ps);
+// One instruction, or more while the next one lies in [low, high).
+int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high);
 int64_t iss_now(const IssMachine *machine);
 int64_t iss_cycles(const IssMachine *machine);
 int64_t iss_next_event(const IssMachine *machine);  // INT64_MAX for none
@@ -82,14 +82,16 @@ void iss_analog_changed(IssMachine *machine);
 void iss_breakpoint(IssMachine *machine, uint32_t address, int32_t on);
 void iss_watchpoint(IssMachine *machine, uint32_t address, uint32_t count, int32_t kind,
                     int32_t on);
-uint32_t iss_watch_hit(const IssMachine *machine);  // address of the access that stopped the run
-void iss_debugger(IssMachine *machine, int32_t attached);
+void iss_watch_hit(const IssMachine *machine, uint32_t *hit);  // pc, address, size, value, write
+// From another call within a run: it ends after the running instruction.
+void iss_stop(IssMachine *machine);
 
-// Profile: cycles and executions by halfword of flash then RAM; null ends it. Trace: records of
-// calls, returns and exceptions.
-void iss_profile(IssMachine *machine, uint64_t *cycles, uint64_t *counts);
+// What other C++ of this library builds on; null for a bare machine's part.
+armv7m::System *iss_system(IssMachine *machine);
+armv7m::Cpu *iss_cpu(IssMachine *machine);
+efm32gg::Part *iss_part(IssMachine *machine);
 
-// The FPGA: `map` has a driver's pin and bit (pin << 8 | bit) or -1 for each port pin.
-typedef uint32_t (*IssAttend)(int64_t reached, int32_t outcome, int32_t camera, int64_t now);
-void iss_fpga(IssMachine *machine, const IssFpga *fpga, const int32_t *map, IssAttend attend);
+// The FPGA; see fpga_link.h.
+void iss_fpga(IssMachine *machine, const FpgaDriver *driver, const FpgaWire *wires, int32_t count);
+void iss_fpga_running(IssMachine *machine, uint32_t running);
 }

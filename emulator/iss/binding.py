@@ -19,26 +19,46 @@ class OutgoingRecord(ctypes.Structure):
     )
 
 
-class FpgaRecord(ctypes.Structure):
-    """``IssFpga``: a driver and the addresses of its functions."""
-
-    _fields_ = tuple(
-        (name, ctypes.c_void_p) for name in ("driver", "set", "get", "burst", "access")
-    )
-
-
 ATTEND = ctypes.CFUNCTYPE(
     ctypes.c_uint32, ctypes.c_int64, ctypes.c_int32, ctypes.c_int32, ctypes.c_int64
 )
-"""``IssAttend``."""
+SLOW_GET = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_int32, ctypes.c_int64)
+SLOW_SET = ctypes.CFUNCTYPE(None, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int64)
+SLOW_EXTERNAL = ctypes.CFUNCTYPE(
+    ctypes.c_int32, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int32, ctypes.c_int64
+)
+
+
+class FpgaDriverRecord(ctypes.Structure):
+    """``FpgaDriver`` of fpga_link.h."""
+
+    _fields_ = (
+        ("driver", ctypes.c_void_p),
+        ("set", ctypes.c_void_p),
+        ("get", ctypes.c_void_p),
+        ("burst", ctypes.c_void_p),
+        ("attend", ATTEND),
+        ("slow_get", SLOW_GET),
+        ("slow_set", SLOW_SET),
+        ("slow_external", SLOW_EXTERNAL),
+    )
+
+
+class FpgaWireRecord(ctypes.Structure):
+    """``FpgaWire`` of fpga_link.h."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_int32) for name in ("port", "bit", "width", "pin", "input", "alert")
+    )
+
 
 _P, _I, _U, _L = ctypes.c_void_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int64
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "iss_new": (_P, (_P, _L, _P, _L, _P, _L, _P, _I, _L)),
+    "iss_new": (_P, (_P, _L, _P, _L, _P, _L, _P, _P, _I, _L)),
     "iss_delete": (None, (_P,)),
-    "iss_reset": (None, (_P, _I, _L)),
+    "iss_reset": (None, (_P, _I)),
     "iss_run": (_I, (_P, _L)),
-    "iss_step": (_I, (_P, _L)),
+    "iss_step": (_I, (_P, _L, _U, _U)),
     "iss_now": (_L, (_P,)),
     "iss_cycles": (_L, (_P,)),
     "iss_next_event": (_L, (_P,)),
@@ -61,10 +81,12 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_analog_changed": (None, (_P,)),
     "iss_breakpoint": (None, (_P, _U, _I)),
     "iss_watchpoint": (None, (_P, _U, _U, _I, _I)),
-    "iss_watch_hit": (_U, (_P,)),
-    "iss_debugger": (None, (_P, _I)),
-    "iss_profile": (None, (_P, _P, _P)),
-    "iss_fpga": (None, (_P, ctypes.POINTER(FpgaRecord), ctypes.POINTER(_I), ATTEND)),
+    "iss_watch_hit": (None, (_P, ctypes.POINTER(_U))),
+    "iss_stop": (None, (_P,)),
+    "iss_fpga": (None, (_P, ctypes.POINTER(FpgaDriverRecord), ctypes.POINTER(FpgaWireRecord), _I)),
+    "iss_fpga_running": (None, (_P, _U)),
+    "iss_cpu": (_P, (_P,)),
+    "iss_part": (_P, (_P,)),
 }
 
 Library = Any

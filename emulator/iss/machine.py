@@ -11,7 +11,6 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cubestack.emulator.iss.binding import LIBRARY, Library, OutgoingRecord
 from cubestack.emulator.iss.image import Image
@@ -23,6 +22,9 @@ EXTERNAL_BASE = 0x8000_0000
 
 FLASH_BYTES = 1 << 20
 RAM_BYTES = 128 << 10
+INFORMATION_BYTES = 64 << 10
+"""Of the information block."""
+
 ANALOG_INPUTS = 32
 """Volts by channel; the part says which is which."""
 
@@ -47,7 +49,7 @@ class StopReason(IntEnum):
     STEPPED = 6
     HALTED = 7
     LOCKED_UP = 8
-    BUFFER_FULL = 9
+    FAULT = 9
 
 
 class Stop(NamedTuple):
@@ -111,6 +113,16 @@ class Watch(NamedTuple):
     kind: str
 
 
+class WatchHit(NamedTuple):
+    """An access that a watchpoint saw, and the instruction that made it."""
+
+    pc: int
+    address: int
+    size: int
+    value: int
+    write: bool
+
+
 class Machine:
     """One microcontroller.
 
@@ -141,12 +153,14 @@ class Machine:
         self.flash = np.full(flash_bytes, 0xFF, np.uint8)
         self.ram = np.zeros(ram_bytes, np.uint8)
         self.external = np.zeros(external_bytes, np.uint8)
+        self.information = np.full(INFORMATION_BYTES, 0xFF, np.uint8)
         self.analog = np.zeros(ANALOG_INPUTS, np.float64)
         self.image: Image | None = None
         self._outgoing = (OutgoingRecord * 256)()
         self._handle: int | None = self._library.iss_new(
             *(item for memory in (self.flash, self.ram, self.external)
               for item in (memory.ctypes.data, memory.size)),
+            self.information.ctypes.data,
             self.analog.ctypes.data,
             bare_hz is not None,
             bare_hz or 0,
@@ -183,9 +197,9 @@ class Machine:
         self.image = image
         self.invalidate(FLASH_BASE, self.flash.size)
 
-    def reset(self, cause: int = 1, now_ps: int | None = None) -> None:
-        """Reset at a time, by default now; ``cause`` are the bits of the part's register for it."""
-        self._library.iss_reset(self.handle, cause, self.now_ps if now_ps is None else now_ps)
+    def reset(self, cause: int = 1) -> None:
+        """Reset now; ``cause`` are the bits of the part's register for it, 1 is power-on."""
+        self._library.iss_reset(self.handle, cause)
 
     def run(self, until_ps: int) -> Stop:
         """Run up to a time, or to what the outside must know of.
@@ -195,10 +209,14 @@ class Machine:
         reason = self._library.iss_run(self.handle, until_ps)
         return Stop(StopReason(reason), self.now_ps)
 
-    def step(self, until_ps: int = NEVER) -> Stop:
-        """Execute one instruction, breakpoints or not; none where the machine sleeps that long."""
-        reason = self._library.iss_step(self.handle, until_ps)
+    def step(self, until_ps: int = NEVER, within: tuple[int, int] = (0, 0)) -> Stop:
+        """Execute one instruction, or more while the next one is ``within`` [low, high)."""
+        reason = self._library.iss_step(self.handle, until_ps, *within)
         return Stop(StopReason(reason), self.now_ps)
+
+    def stop(self) -> None:
+        """Called while it runs, from a callback: the run ends after this instruction."""
+        self._library.iss_stop(self.handle)
 
     @property
     def now_ps(self) -> int:
@@ -226,9 +244,9 @@ class Machine:
         return int(self._library.iss_next_event(self.handle))
 
     @property
-    def energy_mode(self) -> int | None:
-        """0 awake, else the part's energy mode plus 1 while asleep: EM1 is 2; None is not used."""
-        return int(self._library.iss_asleep(self.handle))
+    def energy_mode(self) -> int:
+        """The part's, 0 to 4."""
+        return max(0, int(self._library.iss_asleep(self.handle)) - 1)
 
     @property
     def asleep(self) -> bool:
@@ -307,9 +325,9 @@ class Machine:
         """A byte for the slave; answers as ``i2c_slave_start``."""
         return self._slave(unit, 1, byte)
 
-    def i2c_slave_read(self, unit: int, acknowledge: bool = True) -> int | None:
-        """The next byte of the slave; None as above. ``acknowledge``: of the byte before it."""
-        return self._slave(unit, 2, int(acknowledge))
+    def i2c_slave_read(self, unit: int) -> int | None:
+        """The next byte of the slave; None as above."""
+        return self._slave(unit, 2, 0)
 
     def i2c_slave_stop(self, unit: int) -> None:
         """The transfer is over."""
@@ -342,22 +360,11 @@ class Machine:
             (self._watches.add if on else self._watches.discard)(watch)
 
     @property
-    def watch_hit(self) -> int:
-        """Address of the access that ended the last run."""
-        return int(self._library.iss_watch_hit(self.handle))
-
-    def attach_debugger(self, attached: bool) -> None:
-        """Whether BKPT stops a run; otherwise it is a fault."""
-        self._library.iss_debugger(self.handle, attached)
-
-    def profile(self, cycles: NDArray[np.uint64] | None, counts: NDArray[np.uint64] | None) -> None:
-        """Count cycles and executions by halfword of flash, then RAM; None ends it."""
-        if cycles is None or counts is None:
-            self._profile = None
-            self._library.iss_profile(self.handle, None, None)
-        else:
-            self._profile = cycles, counts  # kept alive
-            self._library.iss_profile(self.handle, cycles.ctypes.data, counts.ctypes.data)
+    def watch_hit(self) -> WatchHit:
+        """The access that ended the last run at a watchpoint."""
+        found = (ctypes.c_uint32 * 5)()
+        self._library.iss_watch_hit(self.handle, found)
+        return WatchHit(found[0], found[1], found[2], found[3], bool(found[4]))
 
     def _slave(self, unit: int, what: int, byte: int) -> int | None:
         answer = int(self._library.iss_i2c_slave(self.handle, unit, what, byte))

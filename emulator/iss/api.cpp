@@ -1,0 +1,326 @@
+#include "api.h"
+
+#include "armv7m/cpu.h"
+#include "armv7m/system.h"
+#if __has_include("efm32gg/part.cpp")
+#include "efm32gg/part.h"
+#else
+#include "part_stub.h"
+#endif
+
+#include <algorithm>
+#include <memory>
+#include <new>
+
+using armv7m::Cpu;
+using armv7m::System;
+using efm32gg::Part;
+
+namespace {
+
+constexpr uint32_t RAM_ADDRESS = 0x20000000;
+
+// What a machine without a part has around its core: nothing, and a console.
+class BareBus : public armv7m::Bus, public armv7m::SystemListener {
+public:
+    bool read(uint32_t, uint32_t, uint32_t &) override { return false; }
+    bool write(uint32_t, uint32_t, uint32_t) override { return false; }
+};
+
+}  // namespace
+
+struct IssMachine {
+    // The order of making: the core knows bus and listener by reference, the part uses the core.
+    IssMachine(const efm32gg::Memories &memories, bool bare, int64_t hz)
+        : hz(hz), bus(bare ? new BareBus : nullptr),
+          part(bare ? nullptr : (Part *)::operator new(sizeof(Part))),
+          cpu(bare ? static_cast<armv7m::Bus &>(*bus) : static_cast<armv7m::Bus &>(*part)),
+          system(cpu, bare ? armv7m::SystemParameters{} : Part::system_parameters(),
+                 bare ? static_cast<armv7m::SystemListener &>(*bus)
+                      : static_cast<armv7m::SystemListener &>(*part)) {
+        cpu.system = &system;
+        if (part) {
+            new (part) Part(cpu, memories);
+            return;
+        }
+        armv7m::Region flash, ram;
+        flash.size = memories.flash_size, flash.host = memories.flash, flash.writable = false;
+        ram.base = RAM_ADDRESS, ram.size = memories.ram_size, ram.host = memories.ram;
+        cpu.add_region(flash);
+        cpu.add_region(ram);
+    }
+    ~IssMachine() {
+        link.reset();
+        if (part) {
+            part->~Part();
+            ::operator delete(part);
+        }
+    }
+
+    int64_t now() const {
+        return part ? part->now() : (int64_t)((__int128)cpu.cycles * efm32gg::SECOND / hz);
+    }
+
+    uint32_t run(int64_t until) {
+        if (part) {
+            part->run(until);
+            return part->exits;
+        }
+        // The first cycle that begins at `until` or later.
+        const __int128 cycle = ((__int128)until * hz + efm32gg::SECOND - 1) / efm32gg::SECOND;
+        cpu.set_deadline((int64_t)std::min<__int128>(cycle, INT64_MAX));
+        return cpu.run();
+    }
+
+    int64_t hz;
+    std::unique_ptr<BareBus> bus;
+    Part *part;
+    Cpu cpu;
+    System system;
+    std::unique_ptr<FpgaLink> link;
+    std::vector<armv7m::Watch> watches;
+    bool was_asleep = false;
+};
+
+namespace {
+
+StopReason reason_of(IssMachine &machine, uint32_t exits) {
+    const bool asleep = machine.system.sleep() != armv7m::Sleep::Awake;
+    const bool changed = asleep != machine.was_asleep;
+    machine.was_asleep = asleep;
+    if (exits & armv7m::ExitBreakpoint)
+        return STOP_BREAKPOINT;
+    if (exits & armv7m::ExitWatchpoint)
+        return STOP_WATCHPOINT;
+    if (exits & armv7m::ExitStep)
+        return STOP_STEPPED;
+    if (machine.part && machine.part->outbox.count)
+        return STOP_OUTBOX;
+    if (exits & armv7m::ExitLockup)
+        return STOP_LOCKED_UP;
+    if (changed)
+        return asleep ? STOP_ASLEEP : STOP_AWAKE;
+    return STOP_TIME;
+}
+
+}  // namespace
+
+extern "C" {
+
+IssMachine *iss_new(uint8_t *flash, int64_t flash_bytes, uint8_t *ram, int64_t ram_bytes,
+                    uint8_t *external, int64_t external_bytes, uint8_t *information,
+                    const double *analog, int32_t bare, int64_t hz) {
+    efm32gg::Memories memories{};
+    memories.flash = flash, memories.flash_size = (uint32_t)flash_bytes;
+    memories.ram = ram, memories.ram_size = (uint32_t)ram_bytes;
+    memories.external = external, memories.external_size = (uint32_t)external_bytes;
+    memories.information = information;
+    memories.analog = analog;
+    return new IssMachine(memories, bare != 0, hz);
+}
+
+void iss_delete(IssMachine *machine) { delete machine; }
+
+void iss_reset(IssMachine *machine, int32_t cause) {
+    if (machine->part) {
+        machine->part->reset((uint32_t)cause);
+        return;
+    }
+    machine->cpu.reset();
+    machine->system.reset(cause & 1);
+}
+
+int32_t iss_run(IssMachine *machine, int64_t until_ps) {
+    return reason_of(*machine, machine->run(until_ps));
+}
+
+int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high) {
+    machine->cpu.steps(1, low, high);
+    const int32_t reason = iss_run(machine, until_ps);
+    machine->cpu.steps(0);
+    return reason;
+}
+
+int64_t iss_now(const IssMachine *machine) { return machine->now(); }
+int64_t iss_cycles(const IssMachine *machine) { return machine->cpu.cycles; }
+int64_t iss_instructions(const IssMachine *machine) { return (int64_t)machine->cpu.instructions; }
+
+int64_t iss_next_event(const IssMachine *machine) {
+    return machine->part ? machine->part->next_event() : efm32gg::NEVER;
+}
+
+int32_t iss_asleep(const IssMachine *machine) {
+    if (machine->system.sleep() == armv7m::Sleep::Awake)
+        return 0;
+    return machine->part ? 1 + machine->part->mode : 1;
+}
+
+int64_t iss_hz(const IssMachine *machine) {
+    return machine->part ? machine->part->hertz(efm32gg::Clock::HFCORE) : machine->hz;
+}
+
+int64_t iss_take(IssMachine *machine, efm32gg::Outgoing *out, int64_t count) {
+    if (!machine->part)
+        return 0;
+    efm32gg::Outbox &box = machine->part->outbox;
+    const int32_t taken = (int32_t)std::min<int64_t>(count, box.count);
+    std::copy(box.items, box.items + taken, out);
+    std::copy(box.items + taken, box.items + box.count, box.items);
+    box.count -= taken;
+    return taken;
+}
+
+uint32_t iss_register(const IssMachine *machine, int32_t number) {
+    const Cpu &cpu = machine->cpu;
+    switch (number) {
+    case 16: return cpu.xpsr();
+    case 17: return cpu.main_sp();
+    case 18: return cpu.process_sp();
+    case 19: return cpu.primask;
+    case 20: return cpu.basepri;
+    case 21: return cpu.faultmask;
+    case 22: return cpu.control;
+    default: return number >= 0 && number < 16 ? cpu.r[number] : 0;
+    }
+}
+
+void iss_set_register(IssMachine *machine, int32_t number, uint32_t value) {
+    Cpu &cpu = machine->cpu;
+    switch (number) {
+    case 13: cpu.r[13] = value & ~3u; break;
+    case 15: cpu.r[15] = value & ~1u; break;
+    case 16: cpu.set_xpsr(value); break;
+    case 17: cpu.set_main_sp(value); break;
+    case 18: cpu.set_process_sp(value); break;
+    case 19: cpu.primask = value & 1, machine->system.boost_changed(); break;
+    case 20: cpu.basepri = (uint8_t)value, machine->system.boost_changed(); break;
+    case 21: cpu.faultmask = value & 1, machine->system.boost_changed(); break;
+    case 22: cpu.set_control(value & 3); break;
+    default:
+        if (number >= 0 && number < 16)
+            cpu.r[number] = value;
+    }
+}
+
+int64_t iss_peek(IssMachine *machine, uint32_t address, uint8_t *out, int64_t count) {
+    for (int64_t n = 0; n < count; n++) {
+        // Registers can be read by words only.
+        const uint32_t at = address + (uint32_t)n;
+        uint32_t value;
+        if (!machine->cpu.peek(at & ~3u, 4, value))
+            return n;
+        out[n] = (uint8_t)(value >> 8 * (at & 3));
+    }
+    return count;
+}
+
+int64_t iss_poke(IssMachine *machine, uint32_t address, const uint8_t *data, int64_t count) {
+    int64_t n = 0;
+    while (n < count) {
+        const uint32_t at = address + (uint32_t)n;
+        const int size = at % 4 == 0 && count - n >= 4 ? 4 : 1;
+        uint32_t value = 0;
+        std::memcpy(&value, data + n, (size_t)size);
+        if (!machine->cpu.poke(at, (uint32_t)size, value))
+            break;
+        n += size;
+    }
+    return n;
+}
+
+int32_t iss_load(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t *value) {
+    return machine->cpu.load(address, (uint32_t)bytes, *value) == armv7m::Result::Done;
+}
+
+int32_t iss_store(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t value) {
+    return machine->cpu.store(address, (uint32_t)bytes, value) == armv7m::Result::Done;
+}
+
+void iss_invalidate(IssMachine *machine, uint32_t address, int64_t count) {
+    machine->cpu.invalidate(address, (uint32_t)count);
+}
+
+void iss_pin(IssMachine *machine, int32_t port, int32_t bit, int32_t level) {
+    if (machine->part)
+        machine->part->pin(port, bit, level);
+}
+
+int32_t iss_pin_level(const IssMachine *machine, int32_t port, int32_t bit) {
+    return machine->part ? machine->part->pin_level(port, bit) : 0;
+}
+
+void iss_uart_receive(IssMachine *machine, int32_t unit, uint32_t data, uint32_t flags) {
+    if (machine->part)
+        machine->part->uart_receive(unit, data, flags);
+}
+
+int32_t iss_i2c_slave(IssMachine *machine, int32_t unit, int32_t what, int32_t byte) {
+    Part *part = machine->part;
+    if (!part)
+        return 0;
+    switch (what) {
+    case 0: return part->i2c_slave_start(unit, byte);
+    case 1: return part->i2c_slave_write(unit, byte);
+    case 2: return part->i2c_slave_read(unit);
+    case 3: return part->i2c_slave_stop(unit), 0;
+    default: return part->i2c_slave_poll(unit);
+    }
+}
+
+void iss_i2c_answer(IssMachine *machine, int32_t unit, int32_t acknowledged, int32_t data) {
+    if (machine->part)
+        machine->part->i2c_answer(unit, acknowledged != 0, data);
+}
+
+void iss_analog_changed(IssMachine *machine) {
+    if (machine->part)
+        machine->part->analog_changed();
+}
+
+void iss_breakpoint(IssMachine *machine, uint32_t address, int32_t on) {
+    if (on)
+        machine->cpu.set_breakpoint(address);
+    else
+        machine->cpu.clear_breakpoint(address);
+}
+
+void iss_watchpoint(IssMachine *machine, uint32_t address, uint32_t count, int32_t kind,
+                    int32_t on) {
+    const armv7m::Watch watch{address, count, (kind & 1) != 0, (kind & 2) != 0};
+    auto &all = machine->watches;
+    const auto found = std::find_if(all.begin(), all.end(), [&](const armv7m::Watch &other) {
+        return other.address == watch.address && other.size == watch.size &&
+               other.on_read == watch.on_read && other.on_write == watch.on_write;
+    });
+    if (on && found == all.end())
+        all.push_back(watch);
+    else if (!on && found != all.end())
+        all.erase(found);
+    machine->cpu.set_watches(all);
+}
+
+void iss_watch_hit(const IssMachine *machine, uint32_t *hit) {
+    const auto &found = machine->cpu.watch_hit;
+    hit[0] = found.pc, hit[1] = found.address, hit[2] = found.size, hit[3] = found.value;
+    hit[4] = found.write;
+}
+
+void iss_stop(IssMachine *machine) { machine->cpu.stop(); }
+
+Cpu *iss_cpu(IssMachine *machine) { return &machine->cpu; }
+System *iss_system(IssMachine *machine) { return &machine->system; }
+Part *iss_part(IssMachine *machine) { return machine->part; }
+
+void iss_fpga(IssMachine *machine, const FpgaDriver *driver, const FpgaWire *wires,
+              int32_t count) {
+    if (!machine->part)
+        return;
+    machine->link = std::make_unique<FpgaLink>(*machine->part, *driver, wires, count);
+    machine->part->outside = machine->link.get();
+}
+
+void iss_fpga_running(IssMachine *machine, uint32_t running) {
+    if (machine->link)
+        machine->link->set_running(running);
+}
+}
