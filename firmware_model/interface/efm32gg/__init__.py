@@ -1,14 +1,22 @@
 """The EFM32GG280F1024's registers, once: simulator, C header and traces derive from them."""
 
 from cubestack.firmware_model.interface.efm32gg.analog import ANALOG
+from cubestack.firmware_model.interface.efm32gg.clocks import CLOCKS
 from cubestack.firmware_model.interface.efm32gg.dma import DMA
+from cubestack.firmware_model.interface.efm32gg.external_bus import EXTERNAL_BUS
+from cubestack.firmware_model.interface.efm32gg.ports import PORTS
 from cubestack.firmware_model.interface.efm32gg.serial import SERIAL
 from cubestack.firmware_model.interface.efm32gg.system import SYSTEM
 from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
 from cubestack.firmware_model.interface.efm32gg.timers import TIMERS
+from cubestack.firmware_model.interface.efm32gg.unmodelled import UNMODELLED
 
 #: Every kind of peripheral of the part.
-LAYOUTS: tuple[Layout, ...] = (*SYSTEM, *SERIAL, *TIMERS, *ANALOG, DMA)
+LAYOUTS: tuple[Layout, ...] = (
+    *(*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS),
+    *(*SERIAL, *TIMERS, *ANALOG, DMA),
+    *UNMODELLED,
+)
 
 
 def register_at(address: int) -> tuple[Instance, Register] | None:

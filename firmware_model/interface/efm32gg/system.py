@@ -1,20 +1,112 @@
-"""Registers of reset, energy and watchdog: RMU, EMU, WDOG.
+"""Registers of reset, energy, watchdog and flash: RMU, EMU, WDOG, MSC; the device information.
 
-EFM32GG Reference Manual, chapters 9, 10 and 12.
+EFM32GG Reference Manual, chapters 5.6 (device information), 7 (MSC), 9, 10 and 12.
 """
 
 from cubestack.firmware_model.interface.efm32gg.table import Instance, peripheral
+
+MSC = peripheral(
+    "MSC",
+    "Memory system controller; chapter 7",
+    """
+    000 CTRL        rw 00000001  BUSFAULT:0
+    004 READCTRL    rw 00000001  MODE:0:3 IFCDIS:3 AIDIS:4 ICCDIS:5 EBICDIS:6 RAMCEN:7 PREFETCH:8
+    +                            BUSSTRATEGY:16:2
+    008 WRITECTRL   rw 00000000  WREN:0 IRQERASEABORT:1 WDOUBLE:2 LPWRITE:3 LPERASE:4 RWWEN:5
+    00C WRITECMD    w  00000000  LADDRIM:0 ERASEPAGE:1 WRITEEND:2 WRITEONCE:3 WRITETRIG:4
+    +                            ERASEABORT:5 ERASEMAIN0:8 ERASEMAIN1:9 CLEARWDATA:12
+    010 ADDRB       rw 00000000  *
+    018 WDATA       rw 00000000  *
+    01C STATUS      r  00000008  BUSY:0 LOCKED:1 INVADDR:2 WDATAREADY:3 WORDTIMEOUT:4
+    +                            ERASEABORTED:5 PCRUNNING:6
+    02C IF          r  00000000  ERASE:0 WRITE:1 CHOF:2 CMOF:3
+    030 IFS         w  00000000  ERASE:0 WRITE:1 CHOF:2 CMOF:3
+    034 IFC         w  00000000  ERASE:0 WRITE:1 CHOF:2 CMOF:3
+    038 IEN         rw 00000000  ERASE:0 WRITE:1 CHOF:2 CMOF:3
+    03C LOCK        rw 00000000  LOCKKEY:0:16
+    040 CMD         w  00000000  INVCACHE:0 STARTPC:1 STOPPC:2
+    044 CACHEHITS   r  00000000  CACHEHITS:0:20
+    048 CACHEMISSES r  00000000  CACHEMISSES:0:20
+    050 TIMEBASE    rw 00000010  BASE:0:6 PERIOD:16
+    054 MASSLOCK    rw 00000001  LOCKKEY:0:16
+    """,
+    Instance("MSC", 0x400C0000, {"MSC": 35}),
+)
+
+EMU = peripheral(
+    "EMU",
+    "Energy management unit; chapter 10",
+    """
+    000 CTRL          rw 00000000  EMVREG:0 EM2BLOCK:1 EM4CTRL:2:2
+    004 MEMCTRL       rw 00000000  POWERDOWN:0:3
+    008 LOCK          rw 00000000  LOCKKEY:0:16
+    024 AUXCTRL       rw 00000000  HRCCLR:0 REDLFXOBOOST:8
+    02C EM4CONF       rw 00000000  VREGEN:0 BURTCWU:1 OSC:2:2 BUBODRSTDIS:4 LOCKCONF:16
+    030 BUCTRL        rw 00000000  EN:0 STATEN:1 BODCAL:2 BUMODEBODEN:3 PROBE:5:2 - no backup supply
+    034 PWRCONF       rw 00000000  VOUTWEAK:0 VOUTMED:1 VOUTSTRONG:2 PWRRES:3:2 - no backup supply
+    038 BUINACT       rw 0000000B  BUENTHRES:0:3 BUENRANGE:3:2 PWRCON:5:2 - no backup supply
+    03C BUACT         rw 0000000B  BUEXTHRES:0:3 BUEXRANGE:3:2 PWRCON:5:2 - no backup supply
+    040 STATUS        r  00000000  BURDY:0
+    044 ROUTE         rw 00000001  BUVINPEN:0 - no backup supply
+    048 IF            r  00000000  BURDY:0
+    04C IFS           w  00000000  BURDY:0
+    050 IFC           w  00000000  BURDY:0
+    054 IEN           rw 00000000  BURDY:0
+    058 BUBODBUVINCAL rw 0000000B  THRES:0:3 RANGE:3:2 - no backup supply
+    05C BUBODUNREGCAL rw 0000000B  THRES:0:3 RANGE:3:2 - no backup supply
+    """,
+    Instance("EMU", 0x400C6000, {"EMU": 38}),
+)
+
+RMU = peripheral(
+    "RMU",
+    "Reset management unit; chapter 9",
+    """
+    000 CTRL      rw 00000002  LOCKUPRDIS:0 BURSTEN:1
+    004 RSTCAUSE  r  00000000  PORST:0 BODUNREGRST:1 BODREGRST:2 EXTRST:3 WDOGRST:4 LOCKUPRST:5
+    +                          SYSREQRST:6 EM4RST:7 EM4WURST:8 BODAVDD0:9 BODAVDD1:10
+    +                          BUBODVDDDREG:11 BUBODBUVIN:12 BUBODUNREG:13 BUBODREG:14 BUMODERST:15
+    008 CMD       w  00000000  RCCLR:0
+    """,
+    Instance("RMU", 0x400CA000),
+)
 
 WDOG = peripheral(
     "WDOG",
     "Watchdog timer; chapter 12",
     """
     000 CTRL      rw 00000F00  EN:0 DEBUGRUN:1 EM2RUN:2 EM3RUN:3 LOCK:4 EM4BLOCK:5 SWOSCBLOCK:6
-    +   PERSEL:8:4 CLKSEL:12:2
+    +                          PERSEL:8:4 CLKSEL:12:2
     004 CMD       w  00000000  CLEAR:0
     008 SYNCBUSY  r  00000000  CTRL:0 CMD:1
     """,
     Instance("WDOG", 0x40088000),
 )
 
-SYSTEM = (WDOG,)
+#: Read-only memory; the reset values are those of one part, calibrated at 25 degrees Celsius with
+#: nominal oscillators. A tuning of 0x80 is a band's nominal frequency here.
+DEVINFO = peripheral(
+    "DEVINFO",
+    "Device information page; chapter 5.6",
+    """
+    000 CAL          r 00190000  CRC:0:16 TEMP:16:8
+    004 ADC0CAL0     r 3F003F00  OFFSET1V25:0:7 GAIN1V25:8:7 OFFSET2V5:16:7 GAIN2V5:24:7
+    008 ADC0CAL1     r 3F003F00  OFFSETVDD:0:7 GAINVDD:8:7 OFFSET5VDIFF:16:7 GAIN5VDIFF:24:7
+    00C ADC0CAL2     r 8DD00000  OFFSET2XVDD:0:7 TEMP1V25:20:12
+    018 DAC0CAL0     r 00400000  CH0OFFSET:0:6 CH1OFFSET:8:6 GAIN:16:7
+    01C DAC0CAL1     r 00400000  CH0OFFSET:0:6 CH1OFFSET:8:6 GAIN:16:7
+    020 DAC0CAL2     r 00400000  CH0OFFSET:0:6 CH1OFFSET:8:6 GAIN:16:7
+    024 AUXHFRCOCAL0 r 80808080  BAND1:0:8 BAND7:8:8 BAND11:16:8 BAND14:24:8
+    028 AUXHFRCOCAL1 r 00008080  BAND21:0:8 BAND28:8:8
+    02C HFRCOCAL0    r 80808080  BAND1:0:8 BAND7:8:8 BAND11:16:8 BAND14:24:8
+    030 HFRCOCAL1    r 00008080  BAND21:0:8 BAND28:8:8
+    034 MEMINFO      r 02000000  PAGESIZE:24:8
+    040 UNIQUEL      r 43554245  *
+    044 UNIQUEH      r 53544152  *
+    048 MSIZE        r 00800400  FLASH:0:16 SRAM:16:16
+    04C PART         r 24480118  NUMBER:0:16 FAMILY:16:8 REVISION:24:8
+    """,
+    Instance("DEVINFO", 0x0FE081B0),
+)
+
+SYSTEM = (MSC, EMU, RMU, WDOG, DEVINFO)

@@ -1,0 +1,58 @@
+"""Registers of the external bus interface. EFM32GG Reference Manual, chapter 14."""
+
+from cubestack.firmware_model.interface.efm32gg.table import Instance, peripheral
+
+_TIMINGS = "\n".join(
+    f"""
+    {at:03X} ADDRTIMING{n} rw 00000303  ADDRSETUP:0:2 ADDRHOLD:8:2 HALFALE:28
+    {at + 4:03X} RDTIMING{n}   rw 00033F03  RDSETUP:0:2 RDSTRB:8:6 RDHOLD:16:2 HALFRE:28
+    +                               PREFETCH:29 PAGEMODE:30
+    {at + 8:03X} WRTIMING{n}   rw 00033F03  WRSETUP:0:2 WRSTRB:8:6 WRHOLD:16:2 HALFWE:28 WBUFDIS:29
+    {at + 12:03X} POLARITY{n}   rw 00000000  CSPOL:0 REPOL:1 WEPOL:2 ALEPOL:3 ARDYPOL:4 BLPOL:5
+    """
+    for n, at in (("", 0x04), ("1", 0x18), ("2", 0x28), ("3", 0x38))
+)
+
+EBI = peripheral(
+    "EBI",
+    "External bus interface; chapter 14",
+    f"""
+    000 CTRL         rw 00000000  MODE:0:2 MODE1:2:2 MODE2:4:2 MODE3:6:2 BANK{{0-3}}EN:8
+    +                             NOIDLE:12 NOIDLE{{1-3}}:13 ARDYEN:16 ARDYTODIS:17 ARDY1EN:18
+    +                             ARDYTO1DIS:19 ARDY2EN:20 ARDYTO2DIS:21 ARDY3EN:22
+    +                             ARDYTO3DIS:23 BL:24 BL{{1-3}}:25 ITS:30 ALTMAP:31
+    {_TIMINGS}
+    014 ROUTE        rw 00000000  EBIPEN:0 CS{{0-3}}PEN:1 ALEPEN:5 ARDYPEN:6 BLPEN:7 NANDPEN:12
+    +                             ALB:16:2 APEN:18:5 TFTPEN:24 DATAENPEN:25 CSTFTPEN:26
+    +                             LOCATION:28:3
+    048 PAGECTRL     rw 00000700  PAGELEN:0:2 INCHIT:4 RDPA:8:3 KEEPOPEN:20:7 - no page mode
+    04C NANDCTRL     rw 00000000  EN:0 BANKSEL:4:2 - no NAND flash
+    050 CMD          w  00000000  ECCSTART:0 ECCSTOP:1 ECCCLEAR:2 - no NAND flash
+    054 STATUS       r  00000000  AHBACT:0 ECCACT:4 TFTPIXEL0EMPTY:8 TFTPIXEL1EMPTY:9
+    +                             TFTPIXELFULL:10 DDACT:12 TFTDDEMPTY:13
+    058 ECCPARITY    r  00000000  *
+    05C TFTCTRL      rw 00000000  DD:0:2 MASKBLEND:2:3 SHIFTDCLKEN:8 FBCTRIG:9 INTERLEAVE:10:2
+    +                             COLOR1SRC:12 WIDTH:16 BANKSEL:20:2 RGBMODE:24 - no display
+    060 TFTSTATUS    r  00000000  HCNT:0:11 VCNT:16:11
+    064 TFTFRAMEBASE rw 00000000  FRAMEBASE:0:28 - no display
+    068 TFTSTRIDE    rw 00000000  HSTRIDE:0:12 - no display
+    06C TFTSIZE      rw 00000000  HSZ:0:10 VSZ:16:10 - no display
+    070 TFTHPORCH    rw 00000000  HSYNC:0:7 HFPORCH:8:8 HBPORCH:18:8 HSYNCSTART:28:2 - no display
+    074 TFTVPORCH    rw 00000000  VSYNC:0:7 VFPORCH:8:8 VBPORCH:18:8 - no display
+    078 TFTTIMING    rw 00000000  DCLKPERIOD:0:11 TFTSTART:12:11 TFTSETUP:24:2 TFTHOLD:28:2 - none
+    07C TFTPOLARITY  rw 00000000  CSPOL:0 DCLKPOL:1 DATAENPOL:2 HSYNCPOL:3 VSYNCPOL:4 - no display
+    080 TFTDD        rw 00000000  DATA:0:16 - no display
+    084 TFTALPHA     rw 00000000  ALPHA:0:9 - no display
+    088 TFTPIXEL0    rw 00000000  DATA:0:16 - no display
+    08C TFTPIXEL1    rw 00000000  DATA:0:16 - no display
+    090 TFTPIXEL     r  00000000  DATA:0:16
+    094 TFTMASK      rw 00000000  TFTMASK:0:16 - no display
+    098 IF           r  00000000  VSYNC:0 HSYNC:1 VBPORCH:2 VFPORCH:3 DDEMPTY:4 DDJIT:5
+    09C IFS          w  00000000  VSYNC:0 HSYNC:1 VBPORCH:2 VFPORCH:3 DDEMPTY:4 DDJIT:5
+    0A0 IFC          w  00000000  VSYNC:0 HSYNC:1 VBPORCH:2 VFPORCH:3 DDEMPTY:4 DDJIT:5
+    0A4 IEN          rw 00000000  VSYNC:0 HSYNC:1 VBPORCH:2 VFPORCH:3 DDEMPTY:4 DDJIT:5
+    """,
+    Instance("EBI", 0x40008000, {"EBI": 37}),
+)
+
+EXTERNAL_BUS = (EBI,)
