@@ -171,7 +171,7 @@ class StarCatalogue:
     def within(
         self, boresight: NDArray[np.float32], least: np.float32, meter: Meter
     ) -> NDArray[np.uint16]:
-        """Indices, rising, of stars whose cosine with a unit vector (3,) is ``least`` or more."""
+        """Indices, rising, of the stars whose cosine with a unit vector is ``least`` or more."""
         direction = boresight.astype(np.float32)
         x, y, z = self.vectors.T
         cosine = x * direction[0] + y * direction[1] + z * direction[2]

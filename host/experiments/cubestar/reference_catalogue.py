@@ -26,11 +26,11 @@ def catalogue_tables(epoch: float | None = None) -> dict[str, str]:
     from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
     from cubestack.firmware_model.cubestar.matching import tracking, voting
     from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
-    from cubestack.host.sensors.cubestar import WIDEST_PAIR_DEG
 
     published = CubeStarSwitches()
     epoch = DEFAULT_EPOCH if epoch is None else epoch
-    flown = onboard_catalogue(pair_limit_deg=WIDEST_PAIR_DEG, epoch=epoch)
+    widest = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))
+    flown = onboard_catalogue(pair_limit_deg=widest, epoch=epoch)
     catalogue = flown.limited(float(published.pair_limit))
     cut_deg, tracked_deg = voting.CUT_RADIUS_DEG, float(published.reduction)
     about = (
