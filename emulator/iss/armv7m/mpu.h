@@ -15,21 +15,44 @@ public:
     explicit Mpu(int regions) : regions(regions) {}
     void reset();
 
-    // Whether anything is to be asked; test this first.
-    bool enabled() const { return (control & 1) != 0; }
+    // Whether anything is to be asked now; test this first. Off at a negative execution priority
+    // unless HFNMIENA is set.
+    bool enabled() const { return active; }
 
-    // `unboosted`: the execution priority is not negative (HFNMIENA).
-    bool allows(uint32_t address, Access access, bool privileged, bool unboosted) const;
+    // The private peripheral bus is not protected by it and must not be asked for.
+    bool allows(uint32_t address, Access access, bool privileged) const;
 
+    // Execute-never by the default memory map, with or without an MPU (B3.1): peripherals,
+    // devices, system. A fetch there is a Fault::FetchViolation.
+    static bool execute_never(uint32_t address) {
+        return address >= 0xA0000000u || (address >> 29) == 2;
+    }
+
+    // True if the answer of enabled() or allows() may have changed.
+    bool set_negative_priority(bool negative);
     uint32_t read(uint32_t offset) const;    // offset from 0xE000ED90
-    void write(uint32_t offset, uint32_t value);
+    bool write(uint32_t offset, uint32_t value);
 
 private:
+    enum : uint32_t { TYPE = 0x0, CTRL = 0x4, RNR = 0x8, RBAR = 0xC, RASR = 0x10,
+                      ALIASES_END = 0x2C };
+    enum : uint32_t { ENABLE = 1, HFNMIENA = 2, PRIVDEFENA = 4 };    // CTRL
+
     struct Region { uint32_t base, attributes; };
+
+    // Rights of the 32 bytes at an address, as bits (access + 3 * privileged).
+    uint8_t rights(uint32_t address) const;
+    void forget();
+
+    // Answers found before, by 32 bytes, the smallest region or subregion there is.
+    static constexpr uint32_t LINES = 256;
+    struct Line { uint32_t tag; uint8_t rights; };
 
     int regions;
     uint32_t control = 0, number = 0;
+    bool active = false, negative = false;
     Region region[MAX_REGIONS] = {};
+    mutable Line lines[LINES];
 };
 
 }  // namespace armv7m

@@ -19,6 +19,7 @@
 #include "dwt.h"
 #include "itm.h"
 #include "mpu.h"
+#include "nvic.h"
 #include "systick.h"
 
 #include <cstdint>
@@ -33,10 +34,12 @@ struct SystemParameters {
     int priority_bits = 3;               // implemented bits of a priority
     int mpu_regions = 8;                 // 0: no MPU
     int comparators = 4;                 // of the DWT
-    uint32_t systick_calibration = 0;    // SYST_CALIB as it reads
-    int64_t reference_cycles = 0;        // core cycles in one tick of SysTick's reference clock;
-                                         // 0: no reference, CLKSOURCE reads 1
+    uint32_t systick_calibration = 0xC0000000u;    // SYST_CALIB as it reads: NOREF, SKEW
+    // So many core cycles are so many ticks of SysTick's reference clock. 0: there is no
+    // reference, CLKSOURCE reads 1.
+    int64_t reference_cycles = 0, reference_ticks = 1;
     bool semihosting = false;            // BKPT 0xAB is a call, not a fault
+    bool trace_probe = true;             // the ITM is on after reset, as a probe would leave it
 };
 
 // What stops an instruction. B1.5.14.
@@ -64,6 +67,10 @@ public:
     virtual ~SystemListener() = default;
     virtual void reset_requested() {}                              // AIRCR.SYSRESETREQ, VECTRESET
     virtual void locked_up() {}                                    // until a reset (or an NMI)
+    // In the middle of an exception's entry or return: whatever is due up to cpu.cycles happens
+    // now, so that a late interrupt is seen.
+    virtual void catch_up() {}
+    virtual int64_t time_ps() { return 0; }
     virtual void itm(int port, uint32_t value, int bytes) { (void)port, (void)value, (void)bytes; }
     virtual void semihosting_write(int handle, const uint8_t *text, int length) {
         (void)handle, (void)text, (void)length;
@@ -79,22 +86,20 @@ struct ExceptionState {
     bool enabled, pending, active;
 };
 
-// What a fault report needs, beside the registers. `frame` is where the last fault's stack frame
-// begins, 0 if there was none or stacking failed.
+// The last fault (or lock-up, then `exception` is 0), for a report. `pc` is the instruction it is
+// laid to; `frame` is where the stack frame begins, 0 if stacking failed: r0-r3, r12, lr, pc, xPSR.
 struct FaultRecord {
-    uint32_t exception, cfsr, hfsr, dfsr, mmfar, bfar, frame, exc_return;
+    uint32_t exception, cfsr, hfsr, dfsr, mmfar, bfar, pc, frame, exc_return;
+    uint32_t count;    // of all since reset
     int64_t cycle;
-    uint32_t count;
 };
 
 class System {
 public:
-    static constexpr int MAX_EXCEPTIONS = 16 + 240;
-
     System(Cpu &cpu, const SystemParameters &parameters, SystemListener &listener);
 
-    // Power-on (also debug and reset status) or system reset: registers only. The core then
-    // loads SP and PC from the vector table.
+    // The core and the system as after a reset; SP and PC come from the vector table at 0. A
+    // power-on reset also clears the debug registers.
     void reset(bool power_on);
 
     // --- for the instruction loop -------------------------------------------------------------
@@ -116,7 +121,7 @@ public:
     void exception_return(uint32_t exc_return);    // written to PC in Handler mode
     void wfi();
     void wfe();
-    void sev() { event = true; }
+    void sev();
     void boost_changed();                          // PRIMASK, FAULTMASK or BASEPRI written
 
     bool divide_trap() const { return (ccr & CCR_DIV_0_TRP) != 0; }
@@ -126,7 +131,7 @@ public:
     // for this access, which is a bus fault. The caller has checked nothing.
     bool read(uint32_t address, int size, uint32_t &value);
     bool write(uint32_t address, int size, uint32_t value);
-    uint32_t peek(uint32_t address) const;         // the debugger's read: no side effect
+    uint32_t peek(uint32_t address);               // the debugger's read of a word: no effect
 
     // --- for the part -------------------------------------------------------------------------
 
@@ -135,31 +140,84 @@ public:
     void pend_nmi();
     Sleep sleep() const { return sleeping; }
     bool deep_sleep() const { return (scr & SCR_SLEEPDEEP) != 0; }
+    bool wakes() const;                            // asleep, but service() will wake it
     bool locked_up() const { return lockup; }
+    void set_systick_reference(int64_t cycles, int64_t ticks);
 
     // --- for debuggers and reports ------------------------------------------------------------
 
-    int execution_priority() const;                       // lower is more urgent; 256: Thread
+    // A halting debugger is there: DHCSR.C_DEBUGEN reads 1, BKPT and the exceptions chosen in
+    // `catches` (as DEMCR.VC_*) stop the core and leave the reason in stopped_by().
+    void set_debugger(bool attached, uint32_t catches = 0);
+    enum class DebugStop : uint8_t { None, Breakpoint, VectorCatch };
+    DebugStop stopped_by() const { return debug_stop; }
+    void clear_debug_stop() { debug_stop = DebugStop::None; }
+
+    int execution_priority() const;                // lower is more urgent; 256: Thread
     ExceptionState exception(int number) const;
     const FaultRecord &last_fault() const { return record; }
     uint32_t vector_table() const { return vtor; }
 
     const SystemParameters parameters;
+    Nvic nvic;
     SysTick systick;
     Mpu mpu;
     Dwt dwt;
     Itm itm;
 
 private:
-    static constexpr uint32_t CCR_DIV_0_TRP = 1u << 4;
-    static constexpr uint32_t CCR_UNALIGN_TRP = 1u << 3;
-    static constexpr uint32_t SCR_SLEEPDEEP = 1u << 2;
+    enum : uint32_t {
+        CCR_NONBASETHRDENA = 1, CCR_USERSETMPEND = 2, CCR_UNALIGN_TRP = 8, CCR_DIV_0_TRP = 16,
+        CCR_BFHFNMIGN = 256, CCR_STKALIGN = 512,
+        SCR_SLEEPONEXIT = 2, SCR_SLEEPDEEP = 4, SCR_SEVONPEND = 16,
+        ACTLR_DISDEFWBUF = 2,
+        DEMCR_MON_EN = 1u << 16, DEMCR_TRCENA = 1u << 24,
+    };
+
+    // exceptions.cpp
+    void pend(int number);                         // asynchronous
+    void pend_synchronous(int number, bool derived = false);
+    bool escalates(int number) const;
+    bool takeable() const;
+    int boosted_priority(bool with_primask) const;
+    void enter();
+    bool push_frame(uint32_t &exc_return);
+    void take(uint32_t exc_return);
+    void chain(uint32_t exc_return);
+    void deactivate(int number);
+    bool pop_frame(uint32_t exc_return, uint32_t (&words)[8]);
+    bool fetch_vector(int number, uint32_t &vector);
+    void lock_up();
+    void priority_changed();
+    void note_fault(int number, uint32_t exc_return);
+    void fall_asleep(Sleep how);
+
+    // scs.cpp
+    bool read_word(uint32_t address, bool look, uint32_t &value);
+    bool write_word(uint32_t address, uint32_t value, uint32_t lanes);
+    uint32_t read_scb(uint32_t offset) const;
+    void write_scb(uint32_t offset, uint32_t value, uint32_t lanes);
+    uint32_t icsr() const;
+    void write_icsr(uint32_t value);
+    uint32_t shcsr() const;
+    void write_shcsr(uint32_t value);
+    void write_demcr(uint32_t value);
+    bool user_may(uint32_t address, bool write) const;
+
+    // semihosting.cpp
+    void semihost();
 
     Cpu &cpu;
     SystemListener &listener;
     Sleep sleeping = Sleep::Awake;
-    bool event = false, lockup = false;
-    uint32_t ccr = 0, scr = 0, vtor = 0;
+    int64_t asleep_since = 0;
+    bool event = false, lockup = false, debugger = false, frame_stacked = false;
+    DebugStop debug_stop = DebugStop::None;
+    uint32_t catch_mask = 0;
+    uint32_t actlr = 0, vtor = 0, prigroup = 0, scr = 0, ccr = CCR_STKALIGN;
+    uint32_t cfsr = 0, hfsr = 0, dfsr = 0, mmfar = 0, bfar = 0, demcr = 0, dcrdr = 0;
+    uint32_t patch_control = 0, patch_remap = 0, patch[8] = {};    // FPB, plain registers
+    uint32_t fault_pc = 0;
     FaultRecord record{};
 };
 
