@@ -1,8 +1,20 @@
-"""Programs for a machine: ELF, Intel HEX, or bytes with a base address."""
+"""Programs for a machine: ELF, Intel HEX, or bytes with a base address.
 
+ELF for the Arm architecture (IHI 0044); Intel Hexadecimal Object File Format, revision A.
+"""
+
+import re
 from dataclasses import dataclass, field
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
+
+from elftools.elf.elffile import ELFFile
+
+VECTORS = 8
+"""Bytes of the vector table that a start needs: stack pointer and reset vector."""
+
+_BASE = re.compile(r"(.+)@(0[xX][0-9a-fA-F]+|\d+)")
 
 
 class ImageError(ValueError):
@@ -10,19 +22,34 @@ class ImageError(ValueError):
 
 
 @dataclass(frozen=True)
+class Memory:
+    """Where a program has to be, and where its stack may be."""
+
+    flash_base: int = 0
+    flash_bytes: int = 1 << 20
+    ram_base: int = 0x2000_0000
+    ram_bytes: int = 128 << 10
+
+    def holds(self, address: int, count: int) -> bool:
+        """Whether the flash has all these bytes."""
+        start = address - self.flash_base
+        return start >= 0 and start + count <= self.flash_bytes
+
+
+@dataclass(frozen=True)
 class Image:
     """A program.
 
     Attributes:
-        segments: (address, bytes) that go into memory, by address.
+        segments: (address, bytes) that go into the flash, by address.
         path: of the file; None for one that was made here.
         elf: the file's bytes where it is an ELF file, for symbols.
-        hash: SHA-256 of what goes into memory, in hexadecimal.
+        hash: SHA-256 of what goes into the flash, in hexadecimal.
     """
 
     segments: tuple[tuple[int, bytes], ...]
     path: Path | None = None
-    elf: bytes | None = None
+    elf: bytes | None = field(default=None, repr=False)
     hash: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -31,3 +58,139 @@ class Image:
         for address, data in self.segments:
             digest.update(address.to_bytes(8, "little") + len(data).to_bytes(8, "little") + data)
         object.__setattr__(self, "hash", digest.hexdigest())
+
+    @property
+    def size(self) -> int:
+        """Bytes of it."""
+        return sum(len(data) for _, data in self.segments)
+
+
+def load_image(name: str | Path, memory: Memory | None = None) -> Image:
+    """Read a program: ELF, Intel HEX (``.hex``, ``.ihx``), or any other file as plain bytes.
+
+    Args:
+        name: of the file; ``FILE@0xADDRESS`` says where plain bytes belong, by default the flash's
+            start.
+        memory: of the machine.
+
+    Raises:
+        ImageError: it can not be read, or is no program for the machine.
+    """
+    memory = memory or Memory()
+    path, base = _split(str(name), memory)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ImageError(f"{path}: {error.strerror}") from None
+    if not data:
+        raise ImageError(f"{path} is empty")
+    if data.startswith(b"\x7fELF"):
+        image = Image(_elf_segments(path, data), path, data)
+    elif data.lstrip().startswith(b":") and path.suffix.lower() in (".hex", ".ihx", ".ihex"):
+        image = Image(_hex_segments(path, data), path)
+    elif path.suffix.lower() in (".elf", ".axf", ".out"):
+        raise ImageError(f"{path} is no ELF file: it begins with {data[:4]!r}")
+    elif path.suffix.lower() in (".hex", ".ihx", ".ihex"):
+        raise ImageError(f"{path} is no Intel HEX file: its first record has no colon")
+    else:
+        image = Image(((base, data),), path)
+    check_image(image, memory)
+    return image
+
+
+def check_image(image: Image, memory: Memory) -> None:
+    """Refuse a program that does not fit or can not start: ImageError."""
+    name = image.path or "the image"
+    for address, data in image.segments:
+        if not memory.holds(address, len(data)):
+            last, end = address + len(data) - 1, memory.flash_base + memory.flash_bytes - 1
+            raise ImageError(
+                f"{name} has bytes at {address:#010x}..{last:#010x}, beyond the flash "
+                f"{memory.flash_base:#010x}..{end:#010x}"
+            )
+    vectors = _bytes_at(image, memory.flash_base, VECTORS)
+    if vectors is None:
+        raise ImageError(f"{name} has no vector table at {memory.flash_base:#010x}")
+    stack, start = (int.from_bytes(vectors[n : n + 4], "little") for n in (0, 4))
+    if stack in (0, 0xFFFF_FFFF) and start in (0, 0xFFFF_FFFF):
+        raise ImageError(
+            f"{name} has no vector table: stack pointer {stack:#010x}, reset vector {start:#010x}"
+        )
+
+
+def _bytes_at(image: Image, address: int, count: int) -> bytes | None:
+    """What the image has there; None where it does not begin, what it leaves out is erased."""
+    found = bytearray(b"\xff" * count)
+    any_there = False
+    for start, data in image.segments:
+        for at in range(max(start, address), min(start + len(data), address + count)):
+            found[at - address] = data[at - start]
+            any_there = True
+    return bytes(found) if any_there else None
+
+
+def _split(name: str, memory: Memory) -> tuple[Path, int]:
+    match = _BASE.fullmatch(name)
+    if match is None or Path(name).exists():
+        return Path(name), memory.flash_base
+    return Path(match[1]), int(match[2], 0)
+
+
+def _elf_segments(path: Path, data: bytes) -> tuple[tuple[int, bytes], ...]:
+    try:
+        file = ELFFile(BytesIO(data))
+        header = file.header
+        if file.get_machine_arch() != "ARM" or file.elfclass != 32:
+            raise ImageError(
+                f"{path} is for {file.get_machine_arch()} with {file.elfclass} bits, "
+                "not for ARM with 32"
+            )
+        if not file.little_endian:
+            raise ImageError(f"{path} is big-endian: this core is little-endian")
+        if header["e_type"] != "ET_EXEC":
+            raise ImageError(f"{path} is not linked to an executable: {header['e_type']}")
+        segments = [
+            (int(segment["p_paddr"]), bytes(segment.data()))
+            for segment in file.iter_segments("PT_LOAD")
+            if segment["p_filesz"]
+        ]
+    except ImageError:
+        raise
+    except Exception as error:  # the reader's parser raises what it likes on damaged files
+        raise ImageError(f"{path} is a damaged ELF file: {error or type(error).__name__}") from None
+    if not segments:
+        raise ImageError(f"{path} has nothing to load: no segment with bytes")
+    return tuple(sorted(segments))
+
+
+def _hex_segments(path: Path, text: bytes) -> tuple[tuple[int, bytes], ...]:
+    segments: list[tuple[int, bytearray]] = []
+    base = 0
+    for number, line in enumerate(text.decode("latin-1").splitlines(), 1):
+        line = line.strip()
+        if not line:
+            continue
+        try:
+            record = bytes.fromhex(line[1:])
+        except ValueError:
+            record = b""
+        if line[0] != ":" or len(record) < 5 or len(record) != 5 + record[0]:
+            raise ImageError(f"{path}, line {number}: no Intel HEX record")
+        if sum(record) & 0xFF:
+            raise ImageError(f"{path}, line {number}: wrong checksum")
+        offset, kind, data = int.from_bytes(record[1:3], "big"), record[3], record[4:-1]
+        if kind == 0:
+            address = base + offset
+            if segments and segments[-1][0] + len(segments[-1][1]) == address:
+                segments[-1][1].extend(data)
+            else:
+                segments.append((address, bytearray(data)))
+        elif kind == 1:
+            break
+        elif kind in (2, 4):
+            base = int.from_bytes(data, "big") << (4 if kind == 2 else 16)
+        elif kind not in (3, 5):  # those two say where to start: a core does so by its vectors
+            raise ImageError(f"{path}, line {number}: record type {kind:02X} is not known")
+    if not segments:
+        raise ImageError(f"{path} has no data records")
+    return tuple(sorted((address, bytes(data)) for address, data in segments))
