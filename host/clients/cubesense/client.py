@@ -24,8 +24,8 @@ from cubestack.host.errors import BadAnswerError, NoAnswerError
 #: Time between two polls of a result.
 POLL_PERIOD_S = 0.04
 
-#: What hosts give a capture.
-CAPTURE_TIMEOUT_S = 1.0
+#: What a capture is given; a lens that was set before it is worked out first, in about 1 s.
+CAPTURE_TIMEOUT_S = 3.0
 
 #: What a detection is given after its capture; assumed: the longest takes 14 s, where a nadir
 #: picture crosses the link of FPGAs with one search each.

@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 SUN_DEG = (20.0, 10.0)
 NADIR_DEG = (-8.0, 12.0)
 PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}
-"""CubeSense thesis, section 7.4: from imaging to centroid, mean of 100; shown beside ours.
-
-The Sun's is what costs are fitted to (`firmware_model/mcu/pic18.py`), the other is not."""
+"""CubeSense thesis, section 7.4: from imaging to centroid, mean of 100; shown beside ours."""
 
 
 def show(

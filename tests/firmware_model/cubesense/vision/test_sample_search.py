@@ -70,4 +70,4 @@ def test_the_searches_cost_less_in_the_order_expected(meter: Meter) -> None:
 
         answered(around_samples(EdgeConfig(), meter, between), read)
         cycles.append(meter.take())
-    assert cycles[0] > 2 * cycles[1] > 3 * cycles[2]
+    assert cycles[0] > 1.5 * cycles[1] > 1.9 * cycles[2]

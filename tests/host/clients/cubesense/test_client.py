@@ -99,9 +99,9 @@ def test_a_capture_alone(cubesense: CubeSense, node: Any) -> None:
 def test_what_stays_pending_is_told(uart: Any, node: Any) -> None:
     cubesense = CubeSense(NodeClient(uart, INTERFACE))
     node.outcomes[Camera.SUN] = {"Capture": 1, "Detect": 2}
-    with pytest.raises(NoAnswerError, match="capture of the SUN camera still pending after 1 s"):
+    with pytest.raises(NoAnswerError, match="capture of the SUN camera still pending after 3 s"):
         cubesense.capture_and_detect(Camera.SUN)
-    assert uart.silences.count(0.04) == 25
+    assert uart.silences.count(0.04) == 75
     uart.silences.clear()
     node.outcomes[Camera.SUN] = {"Capture": 2, "Detect": 2}
     with pytest.raises(NoAnswerError, match="detection of the SUN camera still pending after 20 s"):
