@@ -1,0 +1,89 @@
+"""Which pin of CubeStar's EFM32GG280F1024 (LQFP100) leads where, for firmware of one's own.
+
+The thesis prints no schematic of the processor's pins: this wiring is ours. It keeps to the part's
+alternate functions (see ``efm32gg.pins``), leaves the external bus (PE8..PE15, PA15, PA0..PA6,
+PD9..PD12, PF3..PF5), the crystals (PB7, PB8, PB13, PB14) and the debug pins (PF0..PF2) alone, and
+puts the eight data pins of the FPGA side by side, so that a byte is one read of a port.
+"""
+
+from dataclasses import dataclass
+
+from cubestack.firmware_model.interface.cubestar import pins
+from cubestack.firmware_model.interface.efm32gg.pins import ROUTES, pin_number
+
+#: Pins to the FPGA board of the published layout, by the FPGA's names; DATA from its bit 0 on.
+FPGA = {
+    pins.ENABLE: "PA8",
+    pins.RNW: "PA9",
+    pins.DCLK: "PA10",
+    pins.BANK: "PA11",
+    pins.ACK: "PA12",
+    pins.DATA: "PE0",
+}
+
+CAMERA_RESET = "PA7"
+"""Reset of the image sensor, low active, pulled up."""
+
+#: Load switches by supply channel: high is on, pulled up.
+SWITCHES = {"memory": "PC6", "imager": "PC7"}
+
+LEDS = ("PB3", "PB4")
+"""High is on. Their current is not switched: the published figures have both on all the time."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A peripheral of the part that leads outside.
+
+    Attributes:
+        name: of it.
+        location: that its ROUTE register has to choose.
+        signals: that it needs, without its name.
+    """
+
+    name: str
+    location: int
+    signals: tuple[str, ...]
+
+    def pin(self, signal: str) -> int:
+        """Port times 16 plus bit of a signal's pin."""
+        return ROUTES[f"{self.name}_{signal}"][self.location]
+
+
+SATELLITE_UART = Unit("USART1", 1, ("TX", "RX"))  # PD0, PD1
+SATELLITE_I2C = Unit("I2C0", 1, ("SDA", "SCL"))  # PD6, PD7; slave
+CAMERA_I2C = Unit("I2C1", 1, ("SDA", "SCL"))  # PB11, PB12; master
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """A current monitor of a supply channel: its output is at an ADC and a comparator input.
+
+    Attributes:
+        adc_channel: of ADC0, which has them at PD0..PD7.
+        comparator: number of the ACMP.
+        comparator_channel: of it; ACMP0 has them at PC0..PC7, ACMP1 at PC8..PC15.
+        volts_per_a: output over current; it ends at ``SUPPLY_VOLTS``.
+    """
+
+    adc_channel: int
+    comparator: int
+    comparator_channel: int
+    volts_per_a: float
+
+
+#: By supply channel.
+MONITORS = {"memory": Monitor(4, 0, 4, 50.0), "imager": Monitor(5, 1, 0, 5.0)}
+
+SUPPLY_VOLTS = 3.3
+
+EXTERNAL_RAM = 0x8000_0000
+"""Where the external bus' first bank is: the SRAM of the published layout, at chip select EBI_CS0.
+
+Bus mode D8A24ALE, address latch and strobes at location 0. The other layouts have the FPGA there.
+"""
+
+
+def port_pin(name: str) -> tuple[int, int]:
+    """Number of the port and bit of a pin, by its name."""
+    return divmod(pin_number(name), 16)
