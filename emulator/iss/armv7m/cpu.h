@@ -26,8 +26,10 @@ namespace armv7m {
 class System;
 class Cpu;
 
+enum class Fault : uint8_t;    // system.h
+
 // How an access ended.
-enum class Result : uint8_t { Done, BusError, Violation };
+enum class Result : uint8_t { Done, BusError, Violation, Unaligned };
 
 // Why run() returned, as bits: several can come together.
 enum Exit : uint32_t {
@@ -156,6 +158,7 @@ public:
     void clear_breakpoint(uint32_t address);
     void set_watches(const std::vector<Watch> &list) { watches = list, regions_changed(); }
     bool breakpoint_at(uint32_t address) const;
+    void skip_breakpoint() { stopped_at = r[15]; }    // of the first instruction of the next run()
     void set_tracer(Tracer *listener) { tracer = listener; }
     Tracer *tracer = nullptr;
     struct {
@@ -165,23 +168,53 @@ public:
     uint64_t instructions = 0;         // executed since reset
 
 private:
+    static constexpr uint32_t NOWHERE = 1;    // an address that no instruction has
+
     // One megabyte of the address space. A limit of 0 leads to the slow way.
     struct Page {
         uint8_t *host = nullptr;
         uint8_t *marks = nullptr;      // one for 64 bytes: code was decoded there
         uint32_t read_limit = 0, write_limit = 0;    // bytes from the page's start
         uint8_t read_wait = 0, write_wait = 0;
-        int16_t region = -1;
+    };
+    struct FreeCode {
+        void operator()(Operation *operations) const;
     };
     // The decoded operations of one piece of host memory.
     struct Code {
         uint8_t *host;
         uint32_t size;
-        std::unique_ptr<Operation[]> operations;
+        std::unique_ptr<Operation[], FreeCode> operations;
         std::unique_ptr<uint8_t[]> marks;
     };
 
-    template <bool Watched> void loop();
+    // Memory (memory.cpp).
+    Code *code_of(const Region &region);
+    const Region *find_region(uint32_t address, uint32_t size) const;
+    void written(const uint8_t *host, uint32_t size);
+    void note_watch(uint32_t address, uint32_t size, uint32_t value, bool write);
+    Result access(uint32_t address, uint32_t size, uint32_t &value, bool write, bool privileged);
+    Result access_bit(uint32_t address, uint32_t size, uint32_t &value, bool write);
+    Result load_unwatched(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged);
+
+    // Code (fetch.cpp).
+    bool find_code(uint32_t pc);
+    bool fetch_half(uint32_t address, uint32_t &value);
+    void fetch_failed();
+    bool decode_at(uint32_t pc, Operation *op);
+    bool run_aside(uint32_t pc);
+    bool fetch_cost(uint32_t pc, uint32_t halves);
+    void charge_odd_target();
+
+    // Execution (execute.cpp, special.cpp).
+    template <int Mode> void loop();
+    bool condition(uint32_t number) const;
+    bool abandon(const Operation *op, Fault kind, uint32_t address);
+    bool abandon(const Operation *op, Result result, bool write);
+    uint32_t read_special(uint32_t number) const;
+    void write_special(uint32_t number, uint32_t mask, uint32_t value);
+    void change_masks(uint32_t value);
+    bool stepped(uint32_t next);
     void update_limit();
 
     std::vector<Page> pages;
@@ -191,8 +224,30 @@ private:
     int64_t limit = 0;                 // the loop runs while cycles < limit
     bool stop_requested = false, attention_requested = false;
     uint32_t exits = 0;
+    uint32_t fault_address = 0;        // of the last access
+    uint32_t stopped_at = NOWHERE, resume_at = NOWHERE;
+    int64_t steps_left = 0;
+    uint32_t step_low = 0, step_high = 0;
 
-    friend struct Executor;
+    // Where the loop is: operations[0] is at code_base.
+    Operation *operations = nullptr;
+    uint32_t code_base = 0, code_size = 0;
+    Operation aside[3] = {};           // an instruction outside of all regions, or with a breakpoint
+    const FetchLines *lines = nullptr;
+    bool guarded = false;              // the MPU is asked about fetches
+    bool fetch_costs = false;          // either of both
+    uint32_t fetched = NOWHERE;        // the line, or block, of the last fetch
+    Fault fetch_fault = {};            // why find_code found nothing
+    bool aside_ready = false;          // aside[0] is to run next
+    bool odd_target = false;           // a branch led to a half-word that is not at a word
+
+    // Pipeline (timing.h).
+    int64_t load_end = -1, bus_free = 0;
+    uint32_t loaded = 0;
+
+    // The last instruction that ran under IT, and the state before it.
+    const Operation *it_operation = nullptr;
+    uint8_t it_before = 0;
 };
 
 }  // namespace armv7m

@@ -6,17 +6,17 @@
 
 namespace armv7m {
 
-// What the fields mean depends on the code; see codes.h.
+// codes.h says what the fields mean; all zero is "not decoded yet".
 struct Operation {
-    uint16_t code = 0;       // index of the handler; 0: not decoded yet
-    uint16_t in_it = 0;      // handler within an IT block (no flags set by 16-bit instructions)
-    uint8_t d = 0, n = 0, m = 0, a = 0;
-    uint32_t value = 0;
-    uint8_t size = 0;        // bytes: 2 or 4
-    uint8_t shift = 0;
-    uint16_t list = 0;
+    uint16_t code;          // its handler
+    uint16_t in_it;         // its handler in an IT block, where most 16-bit instructions set no flags
+    uint8_t d, n, m, a;
+    uint32_t value;
+    uint8_t halves;         // its length in half-words
+    uint8_t shift;
+    uint16_t list;
 };
 
-static_assert(sizeof(Operation) == 16);
+static_assert(sizeof(Operation) == 16, "the loop finds the address by it");
 
 }  // namespace armv7m
