@@ -229,9 +229,9 @@ in_it:
         goto far;
     }
 
-#include "execute_data.inc"
-#include "execute_memory.inc"
-#include "execute_control.inc"
+#include "execute_data.h"
+#include "execute_memory.h"
+#include "execute_control.h"
 
 aside_here:    // one instruction that can not run in place
     SYNC();
@@ -261,6 +261,40 @@ leave:
     SYNC();
     instructions += count;
 }
+
+// All files of the simulator are compiled as one.
+#undef ARITHMETIC
+#undef BRANCH_IF
+#undef COMPARE
+#undef CONSTANT_CARRY
+#undef DISPATCH
+#undef FAIL
+#undef GO
+#undef HANDLE
+#undef HAND_OVER
+#undef KEEP_SP
+#undef LAST_LOAD_FEEDS
+#undef LIKELY
+#undef LOAD
+#undef LOGIC
+#undef NEXT
+#undef NO_REGISTER
+#undef PC
+#undef READ
+#undef REPORT
+#undef RESULT
+#undef RESULT_NZ
+#undef SATURATION_OPERAND
+#undef SHIFT
+#undef SHIFTED_M
+#undef STORE
+#undef SUM_FLAGS
+#undef SYNC
+#undef TEST
+#undef TEST_NZ
+#undef UNLIKELY
+#undef WAIT_FOR_BUS
+#undef WRITE
 
 template void Cpu::loop<0>();
 template void Cpu::loop<1>();

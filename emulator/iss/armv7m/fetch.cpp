@@ -9,22 +9,13 @@
 
 namespace armv7m {
 
-// Peripherals, devices and the system space are execute-never (B3.1).
-static bool execute_never(uint32_t address) {
-    return address >> 29 == 2 || address >= 0xA0000000u;
-}
-
-static constexpr uint32_t GUARD_SHIFT = 5;    // the smallest MPU region has 32 bytes
-
 // Prepares the loop for code at `pc`. False: fetch_failed() tells why there is none.
 bool Cpu::find_code(uint32_t pc) {
     lines = nullptr;
     guarded = system->mpu.enabled();
     fetch_fault = Fault::FetchViolation;
-    if (execute_never(pc)) return false;
-    if (guarded && !system->mpu.allows(pc, Access::Fetch, privileged(),
-                                       system->execution_priority() >= 0))
-        return false;
+    if (Mpu::execute_never(pc)) return false;
+    if (guarded && !system->mpu.allows(pc, Access::Fetch, privileged())) return false;
     const Region *region = find_region(pc, 2);
     if (region == nullptr || !region->readable) {
         fetch_costs = guarded;
@@ -94,9 +85,8 @@ void Cpu::charge_odd_target() {
 bool Cpu::fetch_cost(uint32_t pc, uint32_t halves) {
     const uint32_t last = pc + 2 * halves - 2;
     if (guarded) {
-        const bool unboosted = system->execution_priority() >= 0;
         for (uint32_t address = pc; address <= last; address += 2)
-            if (!system->mpu.allows(address, Access::Fetch, privileged(), unboosted)) {
+            if (!system->mpu.allows(address, Access::Fetch, privileged())) {
                 fetch_fault = Fault::FetchViolation;
                 return false;
             }

@@ -124,8 +124,7 @@ Result Cpu::access(uint32_t address, uint32_t size, uint32_t &value, bool write,
         return done ? Result::Done : Result::BusError;
     }
     if (system->mpu.enabled() &&
-        !system->mpu.allows(address, write ? Access::Write : Access::Read, privileged,
-                            system->execution_priority() >= 0))
+        !system->mpu.allows(address, write ? Access::Write : Access::Read, privileged))
         return Result::Violation;
     if (in_bit_band(address)) return access_bit(address, size, value, write);
     const Region *region = find_region(address, size);

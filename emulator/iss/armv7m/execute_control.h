@@ -48,7 +48,7 @@ HANDLE(BX) {
     const uint32_t to = r[op->m];
     if (UNLIKELY(to >= 0xF0000000u && handler_mode())) {
         target = to;
-        now += 1 + REFILL_REGISTER;
+        now += 1;    // System charges the return
         goto leave_exception;
     }
     thumb = to & 1;
@@ -58,7 +58,7 @@ HANDLE(BX) {
 // `target` was loaded into the PC; everything but 1 + REFILL_LOADED is in `now`.
 jump_loaded:
     if (UNLIKELY(target >= 0xF0000000u && handler_mode())) {
-        now += 1 + REFILL_LOADED;
+        now += 1;
         goto leave_exception;
     }
     thumb = target & 1;
