@@ -1,0 +1,213 @@
+"""The core and its system with plain memory, driven from Python (system_bench.cpp)."""
+
+import ctypes
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import NamedTuple
+
+from cubestack.emulator.iss.build import FOLDER
+from cubestack.emulator.native import cache
+from cubestack.emulator.native.compiler import Compiler, compile_library
+
+from .thumb import Program
+
+LOG = 0x4000_1000
+LINES = 0x4000_2000
+RAM = 0x2000_0000
+
+LINE_HIGH, LINE_LOW, PULSE, NMI = range(4)
+"""Kinds of events."""
+
+REGISTERS = {
+    **{f"r{n}": n for n in range(13)},
+    "sp": 13, "lr": 14, "pc": 15, "xpsr": 16, "msp": 17, "psp": 18, "control": 19, "primask": 20,
+    "faultmask": 21, "basepri": 22, "sleep": 23, "locked": 24, "priority": 25, "resets": 26,
+    "exit_code": 27, "debug_stop": 28,
+}  # fmt: skip
+
+STOP, SLEEP, LOCKUP = 2, 4, 8
+"""Bits of what a run returns."""
+
+ICSR, VTOR, AIRCR, SCR, CCR = (0xE000ED00 + 4 * n for n in range(1, 6))
+SHPR1, SHPR2, SHPR3, SHCSR, CFSR, HFSR, DFSR, MMFAR, BFAR = (0xE000ED18 + 4 * n for n in range(9))
+ACTLR, SYSTICK, DEMCR, STIR = 0xE000E008, 0xE000E010, 0xE000EDFC, 0xE000EF00
+ISER, ICER, ISPR, ICPR, IABR = (0xE000E100 + 0x80 * n for n in range(5))
+IPR = 0xE000E400
+MPU = 0xE000ED90
+DWT = 0xE0001000
+ITM = 0xE0000000
+
+
+class Entry(NamedTuple):
+    """Something a program wrote to the log."""
+
+    cycle: int
+    value: int
+    exception: int
+
+
+class Fault(NamedTuple):
+    """The last fault as the system recorded it."""
+
+    exception: int
+    cfsr: int
+    hfsr: int
+    dfsr: int
+    mmfar: int
+    bfar: int
+    pc: int
+    frame: int
+    exc_return: int
+    count: int
+
+
+class _LogEntry(ctypes.Structure):
+    _fields_ = (("cycle", ctypes.c_int64), ("value", ctypes.c_uint32), ("ipsr", ctypes.c_uint32))
+
+
+@lru_cache(maxsize=1)
+def _library() -> ctypes.CDLL:
+    here = Path(__file__).parent / "system_bench.cpp"
+    core = sorted((FOLDER / "armv7m").glob("*.cpp"))
+    files = [here, *core, *sorted((FOLDER / "armv7m").glob("*.h"))]
+
+    def build(sources: list[Path], compiler: Compiler, scratch: Path, log: Path) -> Path:
+        unity = scratch / "bench.cpp"
+        unity.write_text("".join(f'#include "{file}"\n' for file in sources))
+        return compile_library(
+            compiler, scratch / "bench.so", log, [f"-I{FOLDER}", f"-I{FOLDER / 'armv7m'}", unity]
+        )
+
+    library = ctypes.CDLL(str(cache.cached_library("bench", files, partial(build, [*core, here]))))
+    library.bench_new.restype = ctypes.c_void_p
+    library.bench_code.restype = library.bench_ram.restype = ctypes.c_void_p
+    library.bench_get.restype = library.bench_peek.restype = ctypes.c_uint32
+    library.bench_run.restype = ctypes.c_uint32
+    library.bench_cycles.restype = library.bench_next_cycle.restype = ctypes.c_int64
+    return library
+
+
+class Bench:
+    """A processor. Memory by slices of ``code`` and ``ram``; registers by name."""
+
+    def __init__(
+        self,
+        image: bytes = b"",
+        interrupts: int = 39,
+        priority_bits: int = 3,
+        semihosting: bool = False,
+        reference: tuple[int, int] = (0, 1),
+    ) -> None:
+        self._library = _library()
+        self._bench = ctypes.c_void_p(
+            self._library.bench_new(
+                interrupts, priority_bits, semihosting, *map(ctypes.c_int64, reference)
+            )
+        )
+        memory = ctypes.c_uint8 * (1 << 16)
+        self.code = memory.from_address(self._library.bench_code(self._bench))
+        self.ram = memory.from_address(self._library.bench_ram(self._bench))
+        image = image or Program().finish()
+        self.code[: len(image)] = list(image)
+        self.reset()
+
+    def __del__(self) -> None:
+        self._library.bench_delete(self._bench)
+
+    def __getitem__(self, name: str) -> int:
+        return self._library.bench_get(self._bench, REGISTERS[name])
+
+    def __setitem__(self, name: str, value: int) -> None:
+        self._library.bench_set(self._bench, REGISTERS[name], ctypes.c_uint32(value))
+
+    @property
+    def ipsr(self) -> int:
+        """Number of the exception being handled."""
+        return self["xpsr"] & 0x1FF
+
+    @property
+    def cycles(self) -> int:
+        """Processor cycles since the beginning."""
+        return self._library.bench_cycles(self._bench)
+
+    @cycles.setter
+    def cycles(self, value: int) -> None:
+        self._library.bench_set_cycles(self._bench, ctypes.c_int64(value))
+
+    @property
+    def log(self) -> list[Entry]:
+        """What the program wrote to ``LOG``."""
+        entries = (_LogEntry * 4096)()
+        count = self._library.bench_log(self._bench, entries, 4096)
+        return [Entry(each.cycle, each.value, each.ipsr) for each in entries[:count]]
+
+    @property
+    def text(self) -> str:
+        """What came by semihosting, and by the ITM as ``<port:value/bytes>``."""
+        buffer = ctypes.create_string_buffer(8192)
+        return buffer.raw[: self._library.bench_text(self._bench, buffer, 8192)].decode()
+
+    @property
+    def fault(self) -> Fault:
+        """The last fault."""
+        words = (ctypes.c_uint32 * 10)()
+        self._library.bench_fault(self._bench, words)
+        return Fault(*words)
+
+    def reset(self, power_on: bool = True) -> None:
+        """Start from the vector table; also forgets decoded code."""
+        self._library.bench_reset(self._bench, power_on)
+
+    def run(self, cycles: int) -> int:
+        """Run for so many cycles, or until something stops it; why, as bits."""
+        return self._library.bench_run(self._bench, ctypes.c_int64(self.cycles + cycles))
+
+    def at(self, cycle: int, kind: int, number: int = 0) -> None:
+        """An event at a cycle."""
+        self._library.bench_at(self._bench, ctypes.c_int64(cycle), kind, number)
+
+    def line(self, number: int, level: bool) -> None:
+        """Set an interrupt's line now."""
+        self._library.bench_line(self._bench, number, level)
+
+    def service(self) -> None:
+        """What the instruction loop does between two instructions."""
+        self._library.bench_service(self._bench)
+
+    def exception_return(self, value: int) -> None:
+        """A branch to an EXC_RETURN value."""
+        self._library.bench_return(self._bench, ctypes.c_uint32(value))
+
+    def debugger(self, catches: int) -> None:
+        """Attach a halting debugger."""
+        self._library.bench_debugger(self._bench, 1, ctypes.c_uint32(catches))
+
+    @property
+    def next_cycle(self) -> int:
+        """When SysTick pends its exception."""
+        return self._library.bench_next_cycle(self._bench)
+
+    def read(self, address: int, size: int = 4) -> int | None:
+        """Read a register of the private peripheral bus; None is a bus error."""
+        value = ctypes.c_uint32()
+        done = self._library.bench_read(
+            self._bench, ctypes.c_uint32(address), size, ctypes.byref(value)
+        )
+        return value.value if done else None
+
+    def write(self, address: int, value: int, size: int = 4) -> bool:
+        """Write one; False is a bus error."""
+        return bool(
+            self._library.bench_write(
+                self._bench, ctypes.c_uint32(address), size, ctypes.c_uint32(value)
+            )
+        )
+
+    def peek(self, address: int) -> int:
+        """Read one as a debugger does."""
+        return self._library.bench_peek(self._bench, ctypes.c_uint32(address))
+
+    def word(self, address: int) -> int:
+        """A word of RAM."""
+        offset = address - RAM
+        return int.from_bytes(bytes(self.ram[offset : offset + 4]), "little")
