@@ -14,12 +14,13 @@ SIMULATOR ?= icarus
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run test test-hdl mutants lint bench bench-engines clean
+.PHONY: help venv run test test-hdl firmware mutants lint bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test      set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
+	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make lint      ruff and mypy"
 	@echo "make bench     measure the cost of the hot paths"
@@ -41,6 +42,12 @@ run: .venv/ready-run
 
 test: .venv/ready-dev
 	@$(BIN)/pytest -n auto
+
+firmware: .venv/ready-run
+	@command -v arm-none-eabi-gcc >/dev/null 2>&1 || { \
+		echo "make firmware needs a compiler: sudo apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi" >&2; \
+		exit 1; }
+	@$(MAKE) --no-print-directory -C firmware_model/reference
 
 mutants: .venv/ready-dev
 	@$(BIN)/python -m tests.hdl.mutants $(MUTANTS)

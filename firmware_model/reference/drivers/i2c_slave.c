@@ -1,0 +1,57 @@
+/* The satellite's I2C bus. EFM32GG Reference Manual, chapter 16.
+ *
+ * The clock is held low from each address, byte and acknowledge until the handler has answered.
+ *
+ * SPDX-License-Identifier: BSD-2-Clause
+ */
+#include "i2c_slave.h"
+
+#include <stdint.h>
+
+#include "core.h"
+#include "cubestar.h"
+#include "efm32gg.h"
+#include "gpio.h"
+#include "link.h"
+#include "pins.h"
+
+#define READ_BIT 1u
+#define WHOLE_ADDRESS 0x7Fu
+
+void i2c_slave_start(void)
+{
+    pin_set_up(SATELLITE_I2C_SDA_PIN, PIN_OPEN_DRAIN, 1);
+    pin_set_up(SATELLITE_I2C_SCL_PIN, PIN_OPEN_DRAIN, 1);
+    SATELLITE_I2C->ROUTE = I2C_ROUTE_SDAPEN | I2C_ROUTE_SCLPEN |
+                      SATELLITE_I2C_LOCATION << I2C_ROUTE_LOCATION_SHIFT;
+    SATELLITE_I2C->SADDR = CUBESTAR_I2C_ADDRESS << I2C_SADDR_ADDR_SHIFT;
+    SATELLITE_I2C->SADDRMASK = WHOLE_ADDRESS << I2C_SADDRMASK_MASK_SHIFT;
+    SATELLITE_I2C->CTRL = I2C_CTRL_EN | I2C_CTRL_SLAVE;
+    SATELLITE_I2C->CMD = I2C_CMD_ABORT; /* the bus counts as idle, whatever it did before */
+    SATELLITE_I2C->IEN = I2C_IEN_ADDR | I2C_IEN_RXDATAV | I2C_IEN_ACK | I2C_IEN_SSTOP;
+    interrupt_enable(SATELLITE_I2C_IRQ);
+}
+
+static void addressed(void)
+{
+    uint32_t address = SATELLITE_I2C->RXDATA;
+    SATELLITE_I2C->CMD = I2C_CMD_CLEARTX;
+    link_i2c_start(address & READ_BIT);
+    SATELLITE_I2C->CMD = I2C_CMD_ACK;
+    if (address & READ_BIT)
+        SATELLITE_I2C->TXDATA = link_i2c_read();
+}
+
+void SATELLITE_I2C_handler(void)
+{
+    uint32_t flags = SATELLITE_I2C->IF;
+    SATELLITE_I2C->IFC = flags & (I2C_IF_ADDR | I2C_IF_ACK | I2C_IF_SSTOP);
+    if (flags & I2C_IF_SSTOP)
+        link_i2c_stop();
+    if (flags & I2C_IF_ADDR)
+        addressed();
+    else if (flags & I2C_IF_RXDATAV)
+        SATELLITE_I2C->CMD = link_i2c_write((uint8_t)SATELLITE_I2C->RXDATA) ? I2C_CMD_ACK : I2C_CMD_NACK;
+    else if (flags & I2C_IF_ACK)
+        SATELLITE_I2C->TXDATA = link_i2c_read();
+}

@@ -1,0 +1,22 @@
+/* Watchdog, by the 1 kHz oscillator that always runs.
+ *
+ * SPDX-License-Identifier: BSD-2-Clause
+ */
+#include "watchdog.h"
+
+#include "efm32gg.h"
+
+#define PERIOD_2049 8u
+
+void watchdog_start(void)
+{
+    while (WDOG->SYNCBUSY)
+        ;
+    WDOG->CTRL = WDOG_CTRL_EN | PERIOD_2049 << WDOG_CTRL_PERSEL_SHIFT;
+}
+
+void watchdog_feed(void)
+{
+    if (!(WDOG->SYNCBUSY & WDOG_SYNCBUSY_CMD)) /* the last one is still on its way */
+        WDOG->CMD = WDOG_CMD_CLEAR;
+}

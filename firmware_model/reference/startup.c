@@ -1,0 +1,54 @@
+/* Vectors, and what runs before main. ARMv7-M Architecture Reference Manual, section B1.5.
+ *
+ * SPDX-License-Identifier: BSD-2-Clause
+ */
+#include <stdint.h>
+
+#include "efm32gg.h"
+#include "pins.h"
+
+extern uint32_t stack_top, data_from[], data_start[], data_end[], bss_start[], bss_end[];
+
+int main(void);
+
+/* A fault, or an interrupt that nobody enabled: the watchdog ends it. */
+void unexpected_handler(void)
+{
+    for (;;)
+        ;
+}
+
+void reset_handler(void)
+{
+    const uint32_t *from = data_from;
+    for (uint32_t *to = data_start; to != data_end; to++)
+        *to = *from++;
+    for (uint32_t *to = bss_start; to != bss_end; to++)
+        *to = 0;
+    main();
+    unexpected_handler();
+}
+
+void TIMER2_handler(void);
+void TIMER3_handler(void);
+void ACMP0_handler(void);
+void SATELLITE_UART_RX_handler(void);
+void SATELLITE_UART_TX_handler(void);
+void SATELLITE_I2C_handler(void);
+
+#define EXCEPTIONS 16
+#define INTERRUPTS 39
+
+typedef void (*vector)(void);
+
+__attribute__((section(".vectors"), used)) static const vector vectors[EXCEPTIONS + INTERRUPTS] = {
+    [0] = (vector)&stack_top,
+    [1] = reset_handler,
+    [2 ... EXCEPTIONS + INTERRUPTS - 1] = unexpected_handler,
+    [EXCEPTIONS + TIMER2_IRQ] = TIMER2_handler,
+    [EXCEPTIONS + TIMER3_IRQ] = TIMER3_handler,
+    [EXCEPTIONS + ACMP0_IRQ] = ACMP0_handler,
+    [EXCEPTIONS + SATELLITE_UART_RX_IRQ] = SATELLITE_UART_RX_handler,
+    [EXCEPTIONS + SATELLITE_UART_TX_IRQ] = SATELLITE_UART_TX_handler,
+    [EXCEPTIONS + SATELLITE_I2C_IRQ] = SATELLITE_I2C_handler,
+};
