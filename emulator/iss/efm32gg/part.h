@@ -3,20 +3,25 @@
 // EFM32GG Reference Manual, chapters 5 (memory and bus system), 9-11 (RMU, EMU, CMU).
 //
 // Time is in picoseconds. The core counts cycles of HFCORECLK; `cycle_time` maps one to the other,
-// exactly, and starts anew whenever that clock changes.
+// exactly, and starts anew whenever that clock changes or stands.
 #pragma once
 
+#include "../armv7m/bus.h"
+#include "../armv7m/system.h"
 #include "outbox.h"
+#include "outside.h"
 #include "peripheral.h"
 #include "schedule.h"
 
-namespace armv7m {
-struct Cpu;
-}
+#include <memory>
+#include <string>
+#include <unordered_set>
+#include <vector>
 
 namespace efm32gg {
 
 class Cmu;
+class Dma;
 class Emu;
 class Rmu;
 class Msc;
@@ -24,55 +29,87 @@ class Gpio;
 class Ebi;
 class Prs;
 
-enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, AUXHFRCO, LFXO, LFRCO, ULFRCO, COUNT };
+enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFXO, LFRCO, ULFRCO };
+constexpr int CLOCKS = 11;
+using Rates = Rate[CLOCKS];
 
-// What the supply of the part and its outside hand in. Buffers belong to the caller.
+// Buffers belong to the caller. `information` is three pages: user data, lock bits, and the device
+// information, which the part fills in; the part has its own when it is null.
 struct Memories {
     uint8_t *flash, *ram, *information, *external;
     uint32_t flash_size, ram_size, external_size;
     const double *analog;  // volts and degrees; indices as in analog.h
 };
 
-class Part {
+class Part : public armv7m::Bus, public armv7m::SystemListener {
 public:
-    static constexpr uint32_t FLASH_SIZE = 1 << 20, RAM_SIZE = 128 << 10, PAGE_SIZE = 4096;
+    static constexpr uint32_t PAGE_SIZE = 4096;
+    static constexpr uint32_t RAM = 0x20000000, RAM_CODE = 0x10000000, PERIPHERALS = 0x40000000;
+    static constexpr uint32_t USER_PAGE = 0x0FE00000, LOCK_PAGE = 0x0FE04000,
+                              INFORMATION = 0x0FE08000;
 
+    // Bits of `exits` beside armv7m::Exit.
+    enum : uint32_t { ExitAsleep = 1u << 16, ExitAwake = 1u << 17, ExitOutbox = 1u << 18 };
+
+    // The core's system must be set by then.
     Part(armv7m::Cpu &cpu, const Memories &memories);
-    ~Part();
+    ~Part() override;
+    static armv7m::SystemParameters system_parameters();
 
     armv7m::Cpu &cpu;
-    Memories memories;
+    const Memories memories;
     Outbox outbox;
+    Outside *outside = nullptr;
 
     // -- time --
     int64_t now() const;
     void schedule(Event &event, int64_t time);  // the core's deadline follows
     void cancel(Event &event) { events.remove(event); }
-    int64_t next_event() const { return events.next_time(); }
+    int64_t next_event() const;
 
-    // Runs up to `until` or to the next thing that the outside has to see; returns now().
+    // Runs up to `until`, or until the core falls asleep, awakes, stops, or something is in the
+    // outbox that asks for it; `exits` says which.
     int64_t run(int64_t until);
+    uint32_t exits = 0;
 
     // -- clocks --
     const Rate &rate(Clock clock) const { return rates[(int)clock]; }
     int64_t hertz(Clock clock) const { return rate(clock).whole_hertz(); }
-    // Of HFPERCLK with the instance's enable bit; LFA and LFB clocks behind the unit's prescaler
-    // come of cmu().
+    // The clock that counts in a unit: HFPERCLK with its enable bit, LFA or LFB behind its
+    // prescaler, HFCORECLK; it stands when the unit is not enabled.
+    Rate unit_rate(const Instance &instance) const;
+    // Whether the unit's registers can be reached.
     bool enabled(const Instance &instance) const;
-    // The CMU's: every rate at once; tells all peripherals before and after.
-    void change_clocks(const Rate (&wanted)[(int)Clock::COUNT]);
+    // `set` changes what rates derive from; everybody is told before and after.
+    template <class Set> void change_clocks(Set set) {
+        each([](Peripheral &one) { one.clocks_changing(); });
+        set();
+        clocks_set();
+        each([](Peripheral &one) { one.clocks_changed(); });
+    }
+    // The core's clock stands until then (start-up of its oscillator), or the core waits for the
+    // flash.
+    void stop_clock(int64_t until);
+    void stall(int64_t until);
 
     // -- interrupts, resets, sleep --
     void irq(int number, bool level);
-    void reset(uint32_t cause);  // one of rmu::RSTCAUSE's bits
-    void sleep(bool deep);       // the core: WFI or WFE stays
-    void wake();                 // the core: it goes on
-    int mode = 0;                // energy mode
+    void reset(uint32_t cause);          // from outside: bits of rmu::RSTCAUSE
+    void request_reset(uint32_t cause);  // from within: after the running instruction
+    uint32_t reset_cause = 0;            // of the reset that is being made
+    int mode = 0;                        // energy mode: 0 awake
+    void enter_em4();
 
-    // -- the bus, also for DMA: false is a bus fault. `wait` adds bus wait states --
+    // -- the bus, also for DMA: false is a bus fault; `wait` grows by wait states --
     bool load(uint32_t address, int size, uint32_t &value, int64_t &wait);
     bool store(uint32_t address, int size, uint32_t value, int64_t &wait);
-    bool peek(uint32_t address, int size, uint32_t &value) const;
+    bool read(uint32_t address, uint32_t size, uint32_t &value) override;
+    bool write(uint32_t address, uint32_t size, uint32_t value) override;
+    uint32_t fetch(uint32_t address, bool sequential) override;
+    bool fetch_halfword(uint32_t address, uint32_t &value) override;
+    bool peek(uint32_t address, uint32_t size, uint32_t &value) override;
+    // Flash, RAM or information at `address`, and how many bytes are left there.
+    uint8_t *memory_at(uint32_t address, uint32_t &left);
     Peripheral *peripheral_at(uint32_t address) const;
     Peripheral *find(const char *name) const;
 
@@ -80,28 +117,80 @@ public:
     Outgoing &send(Kind kind, int unit, int64_t value, int64_t extra = 0, bool stop = true);
     // Each text once.
     void log_once(const char *format, ...) __attribute__((format(printf, 2, 3)));
+    void pin(int port, int bit, int level);  // driven from outside; -1: no longer
+    bool pin_level(int port, int bit) const;
+    void analog_changed();
+    void uart_receive(int unit, uint32_t data, uint32_t flags);
+    int i2c_slave_start(int unit, int address_byte);
+    int i2c_slave_write(int unit, int byte);
+    int i2c_slave_read(int unit);
+    int i2c_slave_stop(int unit);
+    int i2c_slave_poll(int unit);
+    void i2c_answer(int unit, bool acknowledged, int data);
+
+    // What the core's system says.
+    void reset_requested() override;
+    void locked_up() override;
+    void itm(int port, uint32_t value, int bytes) override;
+    void semihosting_write(int handle, const uint8_t *text, int length) override;
+    void semihosting_exit(uint32_t code) override;
+    void unmodelled(const char *what) override { log_once("%s is not modelled", what); }
 
     // -- peripherals others talk to --
-    Cmu &cmu();
-    Emu &emu();
-    Rmu &rmu();
-    Msc &msc();
-    Gpio &gpio();
-    Ebi &ebi();
-    Prs &prs();
+    Cmu *cmu = nullptr;
+    Dma *dma = nullptr;
+    Emu *emu = nullptr;
+    Rmu *rmu = nullptr;
+    Msc *msc = nullptr;
+    Gpio *gpio = nullptr;
+    Ebi *ebi = nullptr;
+    Prs *prs = nullptr;
 
+    // Takes ownership of a peripheral.
+    template <class Unit> Unit *add(Unit *unit) {
+        place(*unit);
+        owned.emplace_back(unit);
+        return unit;
+    }
     template <class Act> void each(Act act) {
-        for (int n = 0; n < peripheral_count; n++)
-            act(*peripherals[n]);
+        for (auto &one : owned)
+            act(*one);
     }
 
 private:
+    static constexpr uint32_t SLOT = 0x400, SLOTS = 0xE4000 / SLOT;
+
     Schedule events;
-    Rate rates[(int)Clock::COUNT];
+    Rates rates;
     Rate cycle_time;
-    int64_t base_cycle = 0, asleep_at = 0;
-    Peripheral *peripherals[96] = {};
-    int peripheral_count = 0;
+    int64_t base_cycle = 0;
+    int64_t standing_until = 0;    // the core's clock stands; NEVER: until it awakes
+    int64_t stalled_until = 0;     // the core waits for the flash
+    int64_t standing_now = 0;      // time while the clock stands
+    int64_t owed_cycles = 0;       // made while it stood, to be spent when it runs
+    bool standing = false, stop_wanted = false, asleep = false, locked = false;
+    uint32_t wanted_reset = 0;
+    std::vector<std::unique_ptr<Peripheral>> owned;
+    Peripheral *slots[SLOTS] = {};
+    std::vector<uint8_t> own_information;
+    std::unordered_set<std::string> logged;
+    uint8_t *information;
+
+    void place(Peripheral &unit);
+    void clocks_set();
+    void rebase(int64_t time);
+    void advance(int64_t time);
+    void perform_due();
+    int64_t cycle_at(int64_t time) const;
+    bool fall_asleep();
+    void wake(int64_t before);
+    bool wait_for_wake(int64_t until);
+    void perform_reset();
+    bool access_allowed(const Peripheral &unit);
+    int64_t bus_wait(const Peripheral &unit, bool write) const;
 };
+
+// Makes the units of interfaces.cpp: serial, counting, analog, DMA.
+void add_interfaces(Part &part);
 
 }  // namespace efm32gg

@@ -4,7 +4,7 @@
 #include "rate.h"
 #include "registers.h"  // made of firmware_model/interface/efm32gg/
 
-#include <memory>
+#include <vector>
 
 namespace efm32gg {
 
@@ -23,8 +23,8 @@ public:
     // All registers to their reset values, and interrupts off. Derived classes call it first.
     virtual void reset();
 
-    // Word accesses of the bus, with side effects. Offsets are multiples of 4. What is not
-    // overridden is the register file; IFS, IFC and IEN are done here.
+    // Word accesses of the bus, with side effects. Offsets are multiples of 4, below the layout's
+    // size. What is not overridden is the register file; IFS, IFC and IEN are done here.
     virtual uint32_t read(uint32_t offset);
     virtual void write(uint32_t offset, uint32_t value);
 
@@ -50,15 +50,11 @@ public:
     const Instance &instance;
     const Layout &layout;
 
-    // Whether its registers can be accessed; the CMU keeps it up to date.
-    bool clocked = true;
-
-    // Whether a write without clock, or to what is not modelled, was reported.
-    bool reported = false;
-
 protected:
     Part &part;
 
+    // The register file's part of a write: writable bits change, the others stay.
+    void store(uint32_t offset, uint32_t value);
     // Sets bits of IF, and the interrupt lines after it.
     void raise(uint32_t flags);
     // Interrupt lines follow IF and IEN; overridden where there is more than one line.
@@ -67,14 +63,18 @@ protected:
     void line(int index, bool level);
 
 private:
-    std::unique_ptr<uint32_t[]> file;
+    std::vector<uint32_t> file;
+    std::vector<const Register *> described;
 };
 
-// A peripheral whose registers are declared, but that does nothing. Reported at its first write.
+// A peripheral whose registers are declared, but that does nothing: it reads 0. The first access
+// is reported.
 class Unmodelled : public Peripheral {
 public:
     using Peripheral::Peripheral;
+    uint32_t read(uint32_t offset) override;
     void write(uint32_t offset, uint32_t value) override;
+    uint32_t peek(uint32_t) const override { return 0; }
 };
 
 }  // namespace efm32gg
