@@ -32,8 +32,11 @@ def _compile(
     header: str, files: Iterable[Path], compiler: Compiler, scratch: Path, log: Path
 ) -> Path:
     (scratch / "registers.h").write_text(header)
+    units = [file for file in files if file.suffix == ".cpp"]
+    # A peripheral's file has the names of its own registers, so each is compiled by itself.
+    apart = [file for file in units if file.parent.name == "efm32gg"]
     unity = scratch / "simulator.cpp"
-    unity.write_text("".join(f'#include "{file}"\n' for file in files if file.suffix == ".cpp"))
+    unity.write_text("".join(f'#include "{file}"\n' for file in units if file not in apart))
     return compile_library(
-        compiler, scratch / "library.so", log, [f"-I{FOLDER}", f"-I{scratch}", unity]
+        compiler, scratch / "library.so", log, [f"-I{FOLDER}", f"-I{scratch}", unity, *apart]
     )

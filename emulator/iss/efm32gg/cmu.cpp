@@ -113,7 +113,7 @@ uint32_t Cmu::status() const {
     uint32_t bits = SELECTED[selected];
     for (const Oscillator &one : oscillators)
         bits |= ((uint32_t)one.enabled | (uint32_t)one.ready << 1) << 2 * one.number;
-    return bits | (calibrated.pending() ? STATUS_CALBSY : 0) |
+    return bits | (calibrated.pending() ? (uint32_t)STATUS_CALBSY : 0) |
            (reg(STATUS) & (STATUS_USBCHFCLKSEL | STATUS_USBCLFXOSEL | STATUS_USBCLFRCOSEL));
 }
 

@@ -19,7 +19,7 @@ void Ebi::reset() {
 
 uint32_t Ebi::peek(uint32_t offset) const {
     if (offset == STATUS)
-        return part.cpu.cycles < busy_until ? STATUS_AHBACT : 0;
+        return part.cpu.cycles < busy_until ? (uint32_t)STATUS_AHBACT : 0;
     return Peripheral::peek(offset);
 }
 

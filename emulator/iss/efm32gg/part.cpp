@@ -7,6 +7,7 @@
 #include "gpio.h"
 #include "msc.h"
 #include "prs.h"
+#include "rmu.h"
 #include "wdog.h"
 
 #include <algorithm>
@@ -104,7 +105,7 @@ void Part::reset(uint32_t cause) {
     perform_reset();
 }
 
-// What a reset costs before the first instruction: data sheet, 3.9, t_RESET and t_EM4.
+// What a reset costs before the first instruction: data sheet, 3.6, t_RESET.
 static constexpr int64_t START_UP = 163 * MICROSECOND;
 
 void Part::perform_reset() {
@@ -112,7 +113,7 @@ void Part::perform_reset() {
     const uint32_t cold = rmu::RSTCAUSE_PORST | rmu::RSTCAUSE_BODUNREGRST | rmu::RSTCAUSE_BODREGRST;
     const int64_t time = now();
     each([](Peripheral &one) { one.clocks_changing(); });
-    asleep = locked = false;
+    asleep = locked = hung = false;
     mode = 0;
     stalled_until = owed_cycles = 0;
     rmu->caused(reset_cause);
@@ -127,8 +128,7 @@ void Part::perform_reset() {
     each([](Peripheral &one) { one.clocks_changed(); });
     cpu.reset();
     cpu.system->reset((reset_cause & cold) != 0);
-    if (reset_cause & (cold | rmu::RSTCAUSE_EM4RST))
-        stop_clock(time + START_UP);
+    stop_clock(time + START_UP);
     send(Kind::RESET, 0, reset_cause);
 }
 

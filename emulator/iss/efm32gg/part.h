@@ -99,6 +99,7 @@ public:
     uint32_t reset_cause = 0;            // of the reset that is being made
     int mode = 0;                        // energy mode: 0 awake
     void enter_em4();
+    bool hung = false;                   // a fault: no instructions until a reset; time passes
 
     // -- the bus, also for DMA: false is a bus fault; `wait` grows by wait states --
     bool load(uint32_t address, int size, uint32_t &value, int64_t &wait);
@@ -168,7 +169,7 @@ private:
     int64_t stalled_until = 0;     // the core waits for the flash
     int64_t standing_now = 0;      // time while the clock stands
     int64_t owed_cycles = 0;       // made while it stood, to be spent when it runs
-    bool standing = false, stop_wanted = false, asleep = false, locked = false;
+    bool standing = true, stop_wanted = false, asleep = false, locked = false;
     uint32_t wanted_reset = 0;
     std::vector<std::unique_ptr<Peripheral>> owned;
     Peripheral *slots[SLOTS] = {};

@@ -95,6 +95,8 @@ int64_t Part::run(int64_t until) {
                 break;
         } else if (standing) {
             advance(std::min(next, standing_until));
+        } else if (hung) {
+            advance(next);
         } else if (stalled_until > now()) {
             advance(std::min(next, stalled_until));
         } else {
