@@ -211,7 +211,7 @@ void Gpio::set_levels(int port, uint32_t now_levels) {
 
 void Gpio::edge(int port, int bit, bool level) {
     check_em4(port, bit, level);
-    if (!readable(port, bit))
+    if (mode(port, bit) == DISABLED)
         return;
     const uint32_t select = reg(bit < 8 ? EXTIPSELL : EXTIPSELH) >> 4 * (bit % 8) & 7;
     if ((int)select == port) {
@@ -220,7 +220,8 @@ void Gpio::edge(int port, int bit, bool level) {
         if (reg(INSENSE) & INSENSE_PRS)
             part.prs->set(PRS_SOURCE + bit / 8, bit % 8, level);
     }
-    part.each([=](Peripheral &one) { one.pin_changed(port, bit, level); });
+    for (Peripheral *one : listeners)
+        one->pin_changed(port, bit, level);
 }
 
 void Gpio::update_interrupts() {

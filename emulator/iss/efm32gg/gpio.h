@@ -23,6 +23,12 @@ public:
     // The level at a pin now, whoever drives it.
     bool level(int port, int bit) const { return levels[port] >> bit & 1; }
     bool input(int pin) const { return pin >= 0 && level(pin / PINS, pin % PINS); }
+    // Whether a pin's mode lets it be read, or driven.
+    bool senses(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) != 0; }
+    bool drives(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) >= 4; }
+
+    // Tells `unit` of every change of a pin, by Peripheral::pin_changed.
+    void listen(Peripheral &unit) { listeners.push_back(&unit); }
 
     // From outside the part; -1 lets go.
     void outside_drives(int port, int bit, int level);
@@ -40,10 +46,10 @@ private:
     Port ports[PORTS];
     uint32_t levels[PORTS] = {};
     const Peripheral *owners[PORTS * PINS] = {};
+    std::vector<Peripheral *> listeners;
 
     static uint32_t at(int port, uint32_t offset) { return offset + 0x24 * (uint32_t)port; }
     uint32_t mode(int port, int bit) const;
-    bool readable(int port, int bit) const { return mode(port, bit) != 0; }
     bool locked(uint32_t offset) const;
     void write_port(int port, uint32_t offset, uint32_t value);
     void refresh(int port, uint32_t pins);

@@ -39,7 +39,8 @@ public:
     // The energy mode is now `mode`, 0 to 3.
     virtual void energy_mode(int mode) { (void)mode; }
 
-    // A pin's level changed; a reflex channel's did; the analog inputs did.
+    // A pin's level changed (Gpio::listen asks for that); a reflex channel's did; the analog
+    // inputs did.
     virtual void pin_changed(int port, int bit, bool level) { (void)port, (void)bit, (void)level; }
     virtual void prs_changed(int channel, bool level) { (void)channel, (void)level; }
     virtual void analog_changed() {}
