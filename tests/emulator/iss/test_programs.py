@@ -1,0 +1,171 @@
+"""Programs as a vendor's customer writes them, with start-up and device header of their own."""
+
+import shutil
+import subprocess
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.iss.image import load_image
+from cubestack.emulator.iss.machine import Kind, Machine, Stop, StopReason
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US
+
+PROGRAMS = Path(__file__).parent / "programs"
+COMPILER = shutil.which("arm-none-eabi-gcc")
+UART0 = 3
+BYTE_PS = 10 * 10**12 // 115200
+
+pytestmark = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-none-eabi")
+
+
+class Bench:
+    """A machine with a program, and somebody at its UART."""
+
+    def __init__(self, elf: Path) -> None:
+        self.machine = Machine()
+        self.machine.load(load_image(elf))
+        self.machine.reset()
+        self.text = ""
+        self.times_ps: list[int] = []
+
+    def run(self, until_ps: int) -> Stop:
+        """Run on, through all stops but a lock-up; resets that the program asks for are made."""
+        while True:
+            stop = self.machine.run(until_ps)
+            for out in self.machine.outbox():
+                if out.kind is Kind.UART and out.unit & 0xFF == UART0:
+                    self.text += chr(out.value & 0xFF)
+                    self.times_ps.append(out.time_ps)
+                elif out.kind is Kind.RESET:
+                    self.machine.reset(out.value)
+            if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP:
+                return stop
+
+    def send(self, data: bytes) -> None:
+        """Send characters one after the other."""
+        for byte in data:
+            self.run(self.machine.now_ps + BYTE_PS)
+            self.machine.uart_receive(UART0, byte)
+
+
+Start = Callable[[str], Bench]
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with all programs, each compiled for size and for speed."""
+    folder = tmp_path_factory.mktemp("programs")
+    sources = [source for source in PROGRAMS.glob("*.c") if source.stem != "startup"]
+    for source in sources:
+        for option in ("-O0", "-Os", "-O2"):
+            flags = ["-mcpu=cortex-m3", "-mthumb", option, "-ffreestanding", "-nostdlib"]
+            inputs = [PROGRAMS / "startup.c", source, "-T", PROGRAMS / "device.ld", "-lgcc"]
+            target = folder / f"{source.stem}{option}.elf"
+            subprocess.run([COMPILER or "", *flags, *inputs, "-o", target], check=True)
+    return folder
+
+
+@pytest.fixture(params=["-O0", "-Os", "-O2"])
+def start(request: pytest.FixtureRequest, built: Path) -> Start:
+    """Starts a program by its name."""
+    return lambda name: Bench(built / f"{name}{request.param}.elf")
+
+
+def test_characters_received_by_dma_in_ping_pong_are_echoed(start: Start) -> None:
+    bench = start("echo_dma")
+    bench.run(5 * PS_PER_MS)
+    assert bench.text == "ready\n"
+    bench.send(b"quick brown fox jumps ov")
+    bench.run(bench.machine.now_ps + 5 * PS_PER_MS)
+    assert bench.text == "ready\nQUICK BROWN FOX JUMPS OV"
+
+
+def test_low_energy_timers_wake_from_deep_sleep(start: Start) -> None:
+    bench = start("low_energy")
+    deepest = 0
+    while bench.machine.now_ps < 2000 * PS_PER_MS:
+        bench.run(bench.machine.now_ps + 37 * PS_PER_MS)
+        deepest = max(deepest, bench.machine.energy_mode)
+    assert deepest == 2
+    assert bench.text in ("rtc 0000000a letimer 00000004\n", "rtc 0000000a letimer 00000005\n")
+    # The crystal starts up, then ten times a tenth of a second.
+    assert bench.times_ps[0] / PS_PER_MS == pytest.approx(1000, abs=600)
+
+
+def test_a_boot_counter_is_kept_in_flash_by_code_in_ram(start: Start) -> None:
+    bench = start("flash_log")
+    bench.run(200 * PS_PER_MS)
+    assert bench.text == "boot 00000001\nboot 00000002\nboot 00000003\n"
+    words = bench.machine.flash[0xFF000 : 0xFF000 + 32].view("<u4")
+    assert [int(word) for word in words] == [3 + i * 0x01010101 for i in range(8)]
+    again = [time for time, c in zip(bench.times_ps, bench.text, strict=True) if c == "b"]
+    assert min(b - a for a, b in pairwise(again)) > 20 * PS_PER_MS  # an erase
+
+
+def test_each_fault_is_told_and_stepped_over(start: Start) -> None:
+    bench = start("faults")
+    bench.run(50 * PS_PER_MS)
+    assert bench.text.splitlines() == [
+        "UsageFault 02000000 00000000",
+        "UsageFault 01000000 00000000",
+        "UsageFault 00010000 00000000",
+        "BusFault 00008200 00000000",
+        "HardFault 00010000 40000000",
+        "done",
+    ]
+
+
+def test_tasks_are_switched_by_systick_and_pendsv(start: Start) -> None:
+    bench = start("rtos")
+    bench.run(900 * PS_PER_MS)
+    total = sum(n * n for n in range(1, 101))
+    assert bench.text == f"sum {total:08x}\n"
+
+
+def test_the_watchdog_bites_again_and_again(start: Start) -> None:
+    bench = start("watchdog")
+    bench.run(450 * PS_PER_MS)
+    lines = bench.text.splitlines()
+    assert len(lines) >= 3
+    assert int(lines[0].split()[1], 16) & 1  # power-on
+    assert set(lines[1:]) == {"cause 00000010"}
+
+
+def test_registers_behind_an_i2c_slave(start: Start) -> None:
+    bench = start("i2c_slave")
+    bench.run(5 * PS_PER_MS)
+    machine = bench.machine
+
+    def wait(answer: int | None) -> int:
+        for _ in range(1000):
+            if answer is not None:
+                return answer
+            bench.run(machine.now_ps + 5 * PS_PER_US)
+            answer = machine.i2c_slave_poll(0)
+        raise AssertionError("the clock is stretched for ever")
+
+    def transfer(*data: int, read: int = 0) -> list[int]:
+        acknowledged = [wait(machine.i2c_slave_start(0, 0x84))]
+        for byte in data:
+            bench.run(machine.now_ps + 90 * PS_PER_US)
+            acknowledged.append(wait(machine.i2c_slave_write(0, byte)))
+        assert all(acknowledged)
+        found = []
+        if read:
+            bench.run(machine.now_ps + 100 * PS_PER_US)
+            assert wait(machine.i2c_slave_start(0, 0x85))
+            for _ in range(read):
+                bench.run(machine.now_ps + 90 * PS_PER_US)
+                found.append(wait(machine.i2c_slave_read(0)))
+        bench.run(machine.now_ps + 10 * PS_PER_US)
+        machine.i2c_slave_stop(0)
+        bench.run(machine.now_ps + 100 * PS_PER_US)
+        return found
+
+    assert transfer(0, read=3) == [0xC0, 0xFF, 0xEE]
+    transfer(5, 0x12, 0x34)
+    assert transfer(5, read=2) == [0x12, 0x34]
+    assert transfer(0, read=1) == [0xC0]
+    assert not wait(machine.i2c_slave_start(0, 0x86))  # another's address
