@@ -6,12 +6,14 @@ examples:
   cubestack registers {first} --format c > {first}.h
   cubestack registers {first} --format json
   cubestack registers {first} --switches
+  cubestack registers {first} --processor --format c > processor.h
 """
 
 import argparse
 
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.export.interface import FORMATS, render
+from cubestack.host.export.processor import render_processor
 from cubestack.host.export.switches import render_switches
 
 
@@ -19,6 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("device", choices=device_names(), help="device whose interface is listed")
     parser.add_argument("--format", choices=FORMATS, default="table", help="default: table")
+    parser.add_argument(
+        "--processor",
+        action="store_true",
+        help="registers of its processor and what its pins lead to, for firmware of your own",
+    )
     parser.add_argument(
         "--switches",
         action="store_true",
@@ -29,7 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the listing."""
     found = device(args.device)
-    if args.switches:
+    if args.processor:
+        if found.processor is None:
+            raise ValueError(f"the processor of {found.name} runs no firmware of your own")
+        print(render_processor(found.processor(), args.format), end="")
+    elif args.switches:
         print(render_switches(found.title, found.switches, args.format), end="")
     else:
         print(render(found.interface, args.format), end="")

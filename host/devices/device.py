@@ -16,6 +16,7 @@ from cubestack.host.clients.contract import Client, DeviceClient
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
+    from cubestack.firmware_model.interface.efm32gg.table import Processor
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
     from cubestack.host.devices.experiment import AnyExperiment
@@ -164,6 +165,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
+        processor: its processor as firmware of one's own sees it; None where that can not run.
     """
 
     name: str
@@ -187,6 +189,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
+    processor: "Callable[[], Processor] | None" = None
 
     def __post_init__(self) -> None:
         """Refuse a name that can not be everywhere: ValueError."""

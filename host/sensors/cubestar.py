@@ -113,6 +113,7 @@ DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
             notice=_layout_notice,
         ),
     ),
+    processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     conformance=ConformanceNotes(

@@ -18,7 +18,7 @@ or values, decimal where they count::
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 
@@ -102,6 +102,21 @@ class Layout:
             if register.name == name:
                 return register
         raise KeyError(f"{self.name} has no register {name!r}")
+
+
+@dataclass(frozen=True)
+class Processor:
+    """A processor on its board, as firmware sees it.
+
+    Attributes:
+        name: of the part.
+        layouts: its registers.
+        pins_header: what its pins lead to on the board, as C.
+    """
+
+    name: str
+    layouts: Sequence[Layout]
+    pins_header: Callable[[], str]
 
 
 def peripheral(
