@@ -202,7 +202,7 @@ bool System::bkpt(uint32_t immediate) {
     if (debugger) {
         debug_stop = DebugStop::Breakpoint;
         cpu.stop();
-    } else if ((demcr & DEMCR_MON_EN) && !escalates(DEBUG_MONITOR)) {
+    } else if (!escalates(DEBUG_MONITOR)) {
         dfsr |= DFSR_BKPT;
         pend(DEBUG_MONITOR);
     } else {
