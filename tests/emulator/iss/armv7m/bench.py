@@ -145,7 +145,8 @@ class Bench:
     def text(self) -> str:
         """What came by semihosting, and by the ITM as ``<port:value/bytes>``."""
         buffer = ctypes.create_string_buffer(8192)
-        return buffer.raw[: self._library.bench_text(self._bench, buffer, 8192)].decode()
+        length = self._library.bench_text(self._bench, buffer, 8192)
+        return buffer.raw[:length].decode()
 
     @property
     def fault(self) -> Fault:

@@ -1,0 +1,188 @@
+"""The memory protection unit: which region decides, what it allows, what a violation sets."""
+
+import pytest
+
+from .bench import CFSR, ICSR, ISER, MMFAR, MPU, PULSE, RAM, SHCSR, Bench
+from .thumb import Program
+
+TYPE, CTRL, RNR, RBAR, RASR = (MPU + 4 * n for n in range(5))
+ENABLE, HFNMIENA, PRIVDEFENA = 1, 2, 4
+NONE, PRIVILEGED, USER_READS, FULL, _, READ_PRIVILEGED, READ_ONLY, READ_ONLY_TOO = range(8)
+XN = 1 << 28
+DACCVIOL_VALID, IACCVIOL, MSTKERR, MUNSTKERR = 0x82, 1, 16, 8
+
+USER = 0x2000_2000
+"""Where the access under test goes."""
+
+
+def attributes(size_log2: int, access: int, disabled_parts: int = 0, never: bool = False) -> int:
+    """RASR's value."""
+    return never * XN | access << 24 | disabled_parts << 8 | (size_log2 - 1) << 1 | 1
+
+
+def region(bench: Bench, number: int, base: int, value: int) -> None:
+    """Set one region."""
+    bench.write(RBAR, base | 0x10 | number)
+    bench.write(RASR, value)
+
+
+def accessing(address: int, store: bool, privileged: bool) -> Program:
+    """One access, then r2 is 1."""
+    code = Program()
+    code.load(1, address)
+    if not privileged:
+        code.movs(0, 1)
+        code.msr("control", 0)
+    if store:
+        code.str(0, 1)
+    else:
+        code.ldr(0, 1)
+    code.movs(2, 1)
+    code.forever()
+    code.handler(4)
+    code.forever()
+    return code
+
+
+def guarded(code: Program, control: int = ENABLE) -> Bench:
+    """Region 0 is the code, for everyone; region 1 the stack."""
+    bench = Bench(code.finish())
+    region(bench, 0, 0, attributes(16, READ_ONLY))
+    region(bench, 1, 0x2000_4000, attributes(14, FULL))
+    bench.write(CTRL, control)
+    bench.write(SHCSR, 1 << 16)
+    return bench
+
+
+ALLOWED = {  # by AP: (privileged reads, writes, user reads, writes)
+    NONE: (0, 0, 0, 0),
+    PRIVILEGED: (1, 1, 0, 0),
+    USER_READS: (1, 1, 1, 0),
+    FULL: (1, 1, 1, 1),
+    READ_PRIVILEGED: (1, 0, 0, 0),
+    READ_ONLY: (1, 0, 1, 0),
+    READ_ONLY_TOO: (1, 0, 1, 0),
+}
+
+
+@pytest.mark.parametrize("access", ALLOWED)
+@pytest.mark.parametrize("case", range(4))
+def test_access_permissions(access, case):
+    bench = guarded(accessing(USER, store=bool(case & 1), privileged=case < 2))
+    region(bench, 2, USER, attributes(5, access))
+    bench.run(100)
+    allowed = bool(ALLOWED[access][case])
+    assert (bench["r2"], bench.ipsr) == ((1, 0) if allowed else (0, 4))
+    if not allowed:
+        assert (bench.read(CFSR), bench.read(MMFAR)) == (DACCVIOL_VALID, USER)
+
+
+@pytest.mark.parametrize(
+    ("control", "privileged", "allowed"),
+    [
+        (ENABLE, True, False),
+        (ENABLE | PRIVDEFENA, True, True),
+        (ENABLE | PRIVDEFENA, False, False),
+        (0, False, True),
+    ],
+)
+def test_background(control, privileged, allowed):
+    bench = guarded(accessing(USER, False, privileged), control)
+    bench.run(100)
+    assert (bench.ipsr == 0) == allowed
+
+
+def test_the_highest_numbered_region_decides_and_its_disabled_parts_do_not():
+    bench = guarded(accessing(USER, False, True))
+    region(bench, 2, 0x2000_2000, attributes(13, FULL))
+    region(bench, 3, 0x2000_2000, attributes(8, NONE))
+    bench.run(100)
+    assert bench.ipsr == 4
+    bench = guarded(accessing(USER, False, True))
+    region(bench, 2, 0x2000_2000, attributes(13, FULL))
+    region(bench, 3, 0x2000_2000, attributes(8, NONE, disabled_parts=1))  # the first 32 bytes
+    bench.run(100)
+    assert bench.ipsr == 0
+    bench = guarded(accessing(USER + 32, False, True))
+    region(bench, 2, 0x2000_2000, attributes(13, FULL))
+    region(bench, 3, 0x2000_2000, attributes(8, NONE, disabled_parts=1))
+    bench.run(100)
+    assert bench.ipsr == 4
+
+
+def test_execute_never():
+    code = Program()
+    code.load(0, RAM + 0x2001)
+    code.bx(0)
+    code.handler(4)
+    code.forever()
+    for never in (False, True):
+        bench = guarded(code)
+        bench.ram[0x2000:0x2002] = [0xFE, 0xE7]
+        region(bench, 2, USER, attributes(5, FULL, never=never))
+        bench.run(100)
+        assert bench.ipsr == (4 if never else 0)
+        assert bench.read(CFSR) == (IACCVIOL if never else 0)
+
+
+def test_running_off_a_region_faults_at_its_end():
+    code = Program()
+    code.load(0, RAM + 0x2001)
+    code.bx(0)
+    code.handler(4)
+    code.forever()
+    bench = guarded(code)
+    bench.ram[0x2000:0x2100] = [0x00, 0xBF] * 128
+    region(bench, 2, USER, attributes(5, FULL))
+    bench.run(200)
+    assert (bench.ipsr, bench.read(CFSR)) == (4, IACCVIOL)
+    assert bench.word(0x2000_8000 - 32 + 24) == USER + 32
+
+
+def test_stacking_is_checked_with_the_rights_of_the_code():
+    code = Program()
+    code.nop(60)
+    code.handler(4)
+    code.forever()
+    bench = guarded(code)
+    bench["psp"] = 0x2000_3000
+    bench["control"] = 3
+    bench.write(0xE000EF14, 0)  # nothing there
+    bench["control"] = 2
+    bench.write(ISER, 1)
+    bench["control"] = 3
+    bench.at(5, PULSE, 0)
+    bench.run(60)
+    assert bench.ipsr == 4
+    bench["control"] = 0
+    assert bench.read(CFSR) == MSTKERR
+    assert bench["psp"] == 0x2000_3000 - 32
+
+
+@pytest.mark.parametrize("on", [False, True])
+def test_it_is_off_in_the_hard_fault_handler_unless_hfnmiena(on):
+    code = Program()
+    code.half(0xDE00)
+    code.handler(3)
+    code.load(1, USER)
+    code.ldr(0, 1)
+    code.forever()
+    bench = guarded(code, ENABLE | HFNMIENA * on)
+    bench.run(100)
+    assert bench["locked"] == on
+
+
+def test_registers():
+    bench = Bench()
+    assert bench.read(TYPE) == 8 << 8
+    bench.write(RNR, 5)
+    bench.write(RNR, 8)  # there is none
+    assert bench.read(RNR) == 5
+    bench.write(RBAR, 0x2000_0010 | 3)
+    assert (bench.read(RNR), bench.read(RBAR)) == (3, 0x2000_0003)
+    bench.write(RASR + 8, 0xFFFF_FFFF)  # an alias
+    assert bench.read(RASR) == 0x173F_FF3F
+    assert bench.read(RBAR + 8) == 0x2000_0003
+    bench.reset()
+    assert (bench.read(CTRL), bench.read(RASR)) == (0, 0)
+    assert bench.read(ICSR) == 1 << 11
