@@ -14,7 +14,7 @@
 #include "cubestar_tables.h"
 #include "drivers/external_ram.h"
 
-#define PICTURE EXTERNAL_RAM
+#define PICTURE EXTERNAL_MEMORY
 #define PICTURE_COLUMNS 1024
 #define PICTURE_ROWS 512
 #define PICTURE_BYTES (PICTURE_COLUMNS * PICTURE_ROWS)

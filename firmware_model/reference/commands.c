@@ -61,7 +61,7 @@ static uint8_t pattern(unsigned address)
 /* Writes a pattern and reads it back, then its complement; the picture is lost. */
 static void test_memory(void)
 {
-    volatile uint8_t *memory = EXTERNAL_RAM;
+    volatile uint8_t *memory = EXTERNAL_MEMORY;
     retained.image_present = 0;
     bool passed = true;
     for (unsigned flip = 0; flip <= 0xFF; flip += 0xFF) {

@@ -118,8 +118,8 @@ static void start(void)
     uart_start();
     i2c_slave_start();
     pin_set_up(CAMERA_RESET, PIN_OUTPUT, 1);
-    pin_set_up(LED_0, PIN_OUTPUT, 1);
-    pin_set_up(LED_1, PIN_OUTPUT, 1);
+    pin_set_up(LED0, PIN_OUTPUT, 1);
+    pin_set_up(LED1, PIN_OUTPUT, 1);
 }
 
 int main(void)

@@ -32,9 +32,9 @@ void reset_handler(void)
 void TIMER2_handler(void);
 void TIMER3_handler(void);
 void ACMP0_handler(void);
-void SATELLITE_UART_RX_handler(void);
-void SATELLITE_UART_TX_handler(void);
-void SATELLITE_I2C_handler(void);
+void uart_receive_handler(void);
+void uart_send_handler(void);
+void i2c_slave_handler(void);
 
 #define EXCEPTIONS 16
 #define INTERRUPTS 39
@@ -48,7 +48,7 @@ __attribute__((section(".vectors"), used)) static const vector vectors[EXCEPTION
     [EXCEPTIONS + TIMER2_IRQ] = TIMER2_handler,
     [EXCEPTIONS + TIMER3_IRQ] = TIMER3_handler,
     [EXCEPTIONS + ACMP0_IRQ] = ACMP0_handler,
-    [EXCEPTIONS + SATELLITE_UART_RX_IRQ] = SATELLITE_UART_RX_handler,
-    [EXCEPTIONS + SATELLITE_UART_TX_IRQ] = SATELLITE_UART_TX_handler,
-    [EXCEPTIONS + SATELLITE_I2C_IRQ] = SATELLITE_I2C_handler,
+    [EXCEPTIONS + SATELLITE_UART_RX_IRQ] = uart_receive_handler,
+    [EXCEPTIONS + SATELLITE_UART_TX_IRQ] = uart_send_handler,
+    [EXCEPTIONS + SATELLITE_I2C_IRQ] = i2c_slave_handler,
 };

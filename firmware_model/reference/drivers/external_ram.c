@@ -14,9 +14,11 @@
 #define ALE_HIGH_ACTIVE EBI_POLARITY_ALEPOL
 
 /* Alternate functions of the EBI at location 0: address and data lines, ALE, WEn, REn, CS0. */
-static const struct pin lines[] = {
-    {4, 8},  {4, 9},  {4, 10}, {4, 11}, {4, 12}, {4, 13}, {4, 14}, {4, 15}, {0, 15}, {0, 0},
-    {0, 1},  {0, 2},  {0, 3},  {0, 4},  {0, 5},  {0, 6},  {5, 3},  {5, 4},  {5, 5},  {3, 9},
+#define PIN(port, bit) (16 * ((port) - 'A') + (bit))
+static const uint8_t lines[] = {
+    PIN('E', 8),  PIN('E', 9),  PIN('E', 10), PIN('E', 11), PIN('E', 12), PIN('E', 13), PIN('E', 14),
+    PIN('E', 15), PIN('A', 15), PIN('A', 0),  PIN('A', 1),  PIN('A', 2),  PIN('A', 3),  PIN('A', 4),
+    PIN('A', 5),  PIN('A', 6),  PIN('F', 3),  PIN('F', 4),  PIN('F', 5),  PIN('D', 9),
 };
 
 void external_ram_start(void)

@@ -9,7 +9,7 @@
 
 #include "pins.h"
 
-#define EXTERNAL_RAM ((uint8_t *)EXTERNAL_RAM_ADDRESS)
+#define EXTERNAL_MEMORY ((uint8_t *)EXTERNAL_RAM)
 #define EXTERNAL_RAM_BYTES 0x100000u
 
 void external_ram_start(void);

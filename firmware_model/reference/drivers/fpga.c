@@ -16,8 +16,8 @@ void fpga_start(void)
     pin_set_up(FPGA_BANK, PIN_OUTPUT, 0);
     pin_set_up(FPGA_DCLK, PIN_OUTPUT, 0);
     pin_set_up(FPGA_ACK, PIN_INPUT, 0);
-    for (uint8_t i = 0; i < DATA_PINS; i++)
-        pin_set_up((struct pin){FPGA_DATA.port, (uint8_t)(FPGA_DATA.bit + i)}, PIN_INPUT, 0);
+    for (unsigned i = 0; i < DATA_PINS; i++)
+        pin_set_up(FPGA_DATA + i, PIN_INPUT, 0);
 }
 
 void fpga_enable(bool on)
@@ -43,12 +43,12 @@ bool fpga_acknowledges(void)
 /* The byte stands from the rising edge on; the port's synchroniser needs two clocks to see it. */
 void fpga_transfer(uint8_t *to, int count)
 {
-    struct port *clock = PORT(FPGA_DCLK.port);
-    const struct port *data = PORT(FPGA_DATA.port);
+    struct port *clock = PORT_OF(FPGA_DCLK);
+    const struct port *data = PORT_OF(FPGA_DATA);
     for (const uint8_t *end = to + count; to != end; to++) {
-        clock->DOUTSET = 1u << FPGA_DCLK.bit;
+        clock->DOUTSET = BIT_OF(FPGA_DCLK);
         __asm volatile("nop\n nop\n nop");
-        *to = (uint8_t)(data->DIN >> FPGA_DATA.bit);
-        clock->DOUTCLR = 1u << FPGA_DCLK.bit;
+        *to = (uint8_t)(data->DIN >> FPGA_DATA % 16u);
+        clock->DOUTCLR = BIT_OF(FPGA_DCLK);
     }
 }

@@ -9,9 +9,8 @@
 #include <stdint.h>
 
 #include "efm32gg.h"
-#include "pins.h"
 
-/* Modes of a pin, MODEL and MODEH. */
+/* A pin is its port times 16 plus its bit, as pins.h has them. Modes of a pin, MODEL and MODEH. */
 enum pin_mode {
     PIN_DISABLED = 0, /* pulled up where DOUT is 1 */
     PIN_INPUT = 1,
@@ -27,32 +26,33 @@ struct port {
     volatile uint32_t PINLOCKN;
 };
 
-#define PORT(number) ((struct port *)GPIO + (number))
+#define PORT_OF(pin) ((struct port *)GPIO + (pin) / 16u)
+#define BIT_OF(pin) (1u << (pin) % 16u)
 
 /* The level is that of an output, or of a pull. */
-static inline void pin_set_up(struct pin pin, enum pin_mode mode, bool level)
+static inline void pin_set_up(unsigned pin, enum pin_mode mode, bool level)
 {
-    struct port *port = PORT(pin.port);
+    struct port *port = PORT_OF(pin);
     if (level)
-        port->DOUTSET = 1u << pin.bit;
+        port->DOUTSET = BIT_OF(pin);
     else
-        port->DOUTCLR = 1u << pin.bit;
-    volatile uint32_t *modes = pin.bit < 8 ? &port->MODEL : &port->MODEH;
-    unsigned shift = 4u * (pin.bit % 8u);
+        port->DOUTCLR = BIT_OF(pin);
+    volatile uint32_t *modes = pin % 16u < 8 ? &port->MODEL : &port->MODEH;
+    unsigned shift = 4u * (pin % 8u);
     *modes = (*modes & ~(0xFu << shift)) | (uint32_t)mode << shift;
 }
 
-static inline void pin_write(struct pin pin, bool level)
+static inline void pin_write(unsigned pin, bool level)
 {
     if (level)
-        PORT(pin.port)->DOUTSET = 1u << pin.bit;
+        PORT_OF(pin)->DOUTSET = BIT_OF(pin);
     else
-        PORT(pin.port)->DOUTCLR = 1u << pin.bit;
+        PORT_OF(pin)->DOUTCLR = BIT_OF(pin);
 }
 
-static inline bool pin_read(struct pin pin)
+static inline bool pin_read(unsigned pin)
 {
-    return PORT(pin.port)->DIN >> pin.bit & 1;
+    return PORT_OF(pin)->DIN >> pin % 16u & 1;
 }
 
 #endif

@@ -42,7 +42,7 @@ static void addressed(void)
         SATELLITE_I2C->TXDATA = link_i2c_read();
 }
 
-void SATELLITE_I2C_handler(void)
+void i2c_slave_handler(void)
 {
     uint32_t flags = SATELLITE_I2C->IF;
     SATELLITE_I2C->IFC = flags & (I2C_IF_ADDR | I2C_IF_ACK | I2C_IF_SSTOP);

@@ -29,7 +29,7 @@
 #define IMAGER_TRIP_MA 200.0f
 
 static const struct {
-    struct pin closed;
+    unsigned closed; /* pin */
     uint32_t input;
     float ma_per_volt;
 } channels[CHANNELS] = {

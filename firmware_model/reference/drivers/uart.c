@@ -65,7 +65,7 @@ int uart_backlog(void)
     return backlog;
 }
 
-void SATELLITE_UART_TX_handler(void)
+void uart_send_handler(void)
 {
     while (head != tail && SATELLITE_UART->STATUS & USART_STATUS_TXBL)
         SATELLITE_UART->TXDATA = ring[tail++ % UART_SEND_BYTES];
@@ -73,7 +73,7 @@ void SATELLITE_UART_TX_handler(void)
         SATELLITE_UART->IEN &= ~USART_IEN_TXBL;
 }
 
-void SATELLITE_UART_RX_handler(void)
+void uart_receive_handler(void)
 {
     while (SATELLITE_UART->STATUS & USART_STATUS_RXDATAV) {
         uint32_t received = SATELLITE_UART->RXDATAX;
