@@ -14,7 +14,7 @@
 #include "state.h"
 #include "watchdog.h"
 
-#define WAIT_STATES_2 2u /* above 32 MHz */
+#define WAIT_STATES_2 4u /* above 32 MHz */
 #define HFXO_ABOVE_32_MHZ 3u
 #define SELECT_HFXO 2u
 #define BURTC_FROM_LFXO 2u
