@@ -16,8 +16,9 @@ from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.i2cdev.direct import DirectI2c
 from cubestack.emulator.ports.direct import DirectSerial
 from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.sim.microcontroller import Microcontroller
 from cubestack.emulator.sim.power import PowerModel, PowerTable
-from cubestack.emulator.sim.processor import Processor, Program
+from cubestack.emulator.sim.processor import Program
 from cubestack.emulator.sim.virtual_time import Kernel
 
 NODE_PROTOCOL = "node protocol"
@@ -93,7 +94,7 @@ class Board(ABC):
     """What its random numbers are seeded with beside ``seed``."""
 
     engine: RtlEngine | None = None
-    processor: Processor
+    processor: Microcontroller
     program: Program
 
     def __init__(

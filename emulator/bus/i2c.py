@@ -10,11 +10,14 @@ import errno
 from collections import deque
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from functools import partial
+from typing import Any, Protocol, TypeVar
 
 import simpy
 
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+
+T = TypeVar("T")
 
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
@@ -67,14 +70,21 @@ class I2cTarget(Protocol):
     def i2c_start(self, read: bool) -> None:
         """A (repeated) start addressed this target."""
 
-    def i2c_write(self, byte: int) -> bool:
-        """A byte came; returns whether it is acknowledged."""
+    def i2c_write(self, byte: int) -> bool | None:
+        """A byte came; returns whether it is acknowledged, None as ``i2c_read``."""
 
     def i2c_read(self) -> int | None:
         """The next byte to send, 0..255; None stretches the clock: asked again a bit later."""
 
     def i2c_stop(self) -> None:
         """The transfer ended, or went on with another target."""
+
+
+class OpenTarget(I2cTarget, Protocol):
+    """A device that knows by itself which addresses are its own; ``i2c_start`` is not called."""
+
+    def i2c_address(self, address: int, read: bool) -> bool | None:
+        """A (repeated) start with that address; whether it answers, None as ``i2c_read``."""
 
 
 class I2cFaultHook(Protocol):
@@ -117,7 +127,7 @@ class Forwarder:
     def i2c_write(self, byte: int) -> bool:
         """A byte came; one acknowledge is enough."""
         acknowledges = [target.i2c_write(byte) for target in self._targets()]
-        return any(acknowledges)
+        return any(acknowledges)  # nobody of these stretches here
 
     def i2c_read(self) -> int | None:
         """The next byte to send; only one target answers."""
@@ -147,6 +157,7 @@ class I2cBus:
         self.kernel = kernel
         self._targets: dict[int, I2cTarget] = {}
         self._listeners: list[I2cTarget] = []
+        self._open: list[OpenTarget] = []
         self._general = Forwarder(lambda: self._listeners)
         self._taken = False
         self._turns: deque[simpy.Event] = deque()
@@ -166,6 +177,10 @@ class I2cBus:
         self._targets[address] = target
         if general_call:
             self._listeners.append(target)
+
+    def attach_open(self, target: OpenTarget) -> None:
+        """Put a target on the bus that is asked for each address that nobody else has."""
+        self._open.append(target)
 
     @property
     def targets(self) -> Mapping[int, I2cTarget]:
@@ -236,10 +251,13 @@ class I2cBus:
                 if self.fault_hook is not None:
                     yield from self.fault_hook.after_address(message.address)
                 target = self._find(message)
-                if addressed is not None and addressed is not target:
+                if addressed is not None and target is not None and addressed is not target:
                     addressed.i2c_stop()
+                if target is None:
+                    target = yield from self._open_target(message, addressed)
+                else:
+                    target.i2c_start(message.reading)
                 addressed = target
-                target.i2c_start(message.reading)
                 yield from self._bytes(target, message)
         except I2cError as error:
             failure = error
@@ -249,14 +267,30 @@ class I2cBus:
         if failure is not None:
             raise failure
 
-    def _find(self, message: I2cMessage) -> I2cTarget:
+    def _find(self, message: I2cMessage) -> I2cTarget | None:
+        """Who has the address; None where somebody has to be asked."""
         address = message.address
         if address == GENERAL_CALL and self._listeners and not message.reading:
             return self._general
         target = self._targets.get(address)
-        if target is None:
+        if target is None and not self._open:
             raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
         return target
+
+    def _open_target(
+        self, message: I2cMessage, addressed: I2cTarget | None
+    ) -> Generator[simpy.Event, Any, I2cTarget]:
+        """Ask those who know their addresses by themselves; all of them hear the start."""
+        address, found = message.address, None
+        if addressed is not None and addressed not in self._open:
+            addressed.i2c_stop()
+        for target in self._open:
+            ask = partial(target.i2c_address, address, message.reading)
+            if (yield from self._stretched(ask, address)):
+                found = found or target
+        if found is None:
+            raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
+        return found
 
     def _bytes(self, target: I2cTarget, message: I2cMessage) -> Generator[simpy.Event, Any, None]:
         if message.reading:
@@ -275,19 +309,25 @@ class I2cBus:
             yield self.kernel.timeout(BITS_PER_BYTE * self.bit_ps)
             if self.fault_hook is not None:
                 yield from self.fault_hook.after_byte(message.address, read=False)
-            if not target.i2c_write(byte):
+            write = partial(target.i2c_write, byte)
+            if not (yield from self._stretched(write, message.address)):
                 text = f"I2C device {message.address:#04x} refused byte {byte:#04x}"
                 raise I2cError(errno.EIO, text)
 
     def _next_byte(self, target: I2cTarget, address: int) -> Generator[simpy.Event, Any, int]:
-        """Wait while ``target`` stretches the clock."""
+        return (yield from self._stretched(target.i2c_read, address))
+
+    def _stretched(
+        self, ask: Callable[[], T | None], address: int
+    ) -> Generator[simpy.Event, Any, T]:
+        """What a target answers; waits while it stretches the clock."""
         give_up_ps = self.kernel.now + LONGEST_STRETCH_PS
-        while (byte := target.i2c_read()) is None:
+        while (answer := ask()) is None:
             if self.kernel.now >= give_up_ps:
                 text = f"I2C device {address:#04x} held the clock low for over 1 s"
                 raise I2cError(errno.ETIMEDOUT, text)
             yield self.kernel.timeout(self.bit_ps)
-        return byte
+        return answer
 
 
 def _block_length(byte: int, address: int) -> int:

@@ -50,6 +50,20 @@ class PinFaults(Mechanism, FpgaPort):
         """Virtual time of the FPGA."""
         return self._engine.now_ps
 
+    @property
+    def running(self) -> int:
+        """Cameras whose clocks are made now."""
+        return self._engine.running
+
+    @property
+    def driver(self) -> None:
+        """Nobody may go past the faults."""
+        return None
+
+    def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
+        """Not asked of what has no ``driver``."""
+        raise AssertionError("there is no driver whose bursts could end")
+
     def set_pin(self, name: str, value: int) -> None:
         """Drive a pin; one that is in a glitch follows after it."""
         self._driven[name] = value

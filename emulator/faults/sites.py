@@ -11,8 +11,8 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.declaration import Site
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.pixel_clock import PixelSource
+from cubestack.emulator.sim.microcontroller import Microcontroller
 from cubestack.emulator.sim.power import PowerModel
-from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import Kernel
 
 
@@ -49,7 +49,7 @@ class Sites:
     """
 
     kernel: Kernel
-    processor: Processor
+    processor: Microcontroller
     uarts: Mapping[str, Uart]
     buses: Mapping[str, I2cBus]
     supplies: PowerModel

@@ -2,11 +2,7 @@
 
 #include "armv7m/cpu.h"
 #include "armv7m/system.h"
-#if __has_include("efm32gg/part.cpp")
 #include "efm32gg/part.h"
-#else
-#include "part_stub.h"
-#endif
 
 #include <algorithm>
 #include <memory>
@@ -94,6 +90,12 @@ StopReason reason_of(IssMachine &machine, uint32_t exits) {
         return STOP_WATCHPOINT;
     if (exits & armv7m::ExitStep)
         return STOP_STEPPED;
+    const auto stopped_by = machine.system.stopped_by();
+    machine.system.clear_debug_stop();
+    if (stopped_by == System::DebugStop::Breakpoint)
+        return STOP_HALTED;
+    if (stopped_by == System::DebugStop::VectorCatch)
+        return STOP_FAULT;
     if (machine.part && machine.part->outbox.count)
         return STOP_OUTBOX;
     if (exits & armv7m::ExitLockup)
@@ -303,6 +305,15 @@ void iss_watch_hit(const IssMachine *machine, uint32_t *hit) {
     const auto &found = machine->cpu.watch_hit;
     hit[0] = found.pc, hit[1] = found.address, hit[2] = found.size, hit[3] = found.value;
     hit[4] = found.write;
+}
+
+void iss_debugger(IssMachine *machine, int32_t attached, uint32_t catches) {
+    machine->system.set_debugger(attached != 0, catches);
+}
+
+void iss_hang(IssMachine *machine) {
+    if (machine->part)
+        machine->part->hung = true;
 }
 
 void iss_stop(IssMachine *machine) { machine->cpu.stop(); }

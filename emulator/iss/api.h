@@ -83,6 +83,10 @@ void iss_breakpoint(IssMachine *machine, uint32_t address, int32_t on);
 void iss_watchpoint(IssMachine *machine, uint32_t address, uint32_t count, int32_t kind,
                     int32_t on);
 void iss_watch_hit(const IssMachine *machine, uint32_t *hit);  // pc, address, size, value, write
+// A debugger is there: BKPT stops, and so do the exceptions of `catches` (DEMCR.VC_*).
+void iss_debugger(IssMachine *machine, int32_t attached, uint32_t catches);
+// The core executes nothing until a reset; time passes.
+void iss_hang(IssMachine *machine);
 // From another call within a run: it ends after the running instruction.
 void iss_stop(IssMachine *machine);
 

@@ -1,10 +1,6 @@
 #include "fpga_link.h"
 
-#if __has_include("efm32gg/part.cpp")
 #include "efm32gg/part.h"
-#else
-#include "part_stub.h"
-#endif
 
 using efm32gg::Event;
 

@@ -12,7 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cubestack.emulator.iss.binding import LIBRARY, Library, OutgoingRecord
+from cubestack.emulator.iss.binding import (
+    LIBRARY,
+    FpgaDriverRecord,
+    FpgaWireRecord,
+    Library,
+    OutgoingRecord,
+)
 from cubestack.emulator.iss.image import Image
 
 FLASH_BASE = 0x0000_0000
@@ -22,8 +28,8 @@ EXTERNAL_BASE = 0x8000_0000
 
 FLASH_BYTES = 1 << 20
 RAM_BYTES = 128 << 10
-INFORMATION_BYTES = 64 << 10
-"""Of the information block."""
+INFORMATION_BYTES = 3 * 4096
+"""User page, lock bits, device information."""
 
 ANALOG_INPUTS = 32
 """Volts by channel; the part says which is which."""
@@ -214,6 +220,10 @@ class Machine:
         reason = self._library.iss_step(self.handle, until_ps, *within)
         return Stop(StopReason(reason), self.now_ps)
 
+    def hang(self) -> None:
+        """The core executes nothing from now on, until a reset."""
+        self._library.iss_hang(self.handle)
+
     def stop(self) -> None:
         """Called while it runs, from a callback: the run ends after this instruction."""
         self._library.iss_stop(self.handle)
@@ -345,6 +355,17 @@ class Machine:
         """Voltages in ``analog`` are others now: comparators look at them."""
         self._library.iss_analog_changed(self.handle)
 
+    # The FPGA at its pins
+
+    def couple(self, driver: FpgaDriverRecord, wires: ctypes.Array[FpgaWireRecord]) -> None:
+        """Lead port pins to an FPGA; see fpga_link.h."""
+        self._coupled = driver, wires  # its callbacks are kept alive
+        self._library.iss_fpga(self.handle, driver, wires, len(wires))
+
+    def fpga_running(self, running: int) -> None:
+        """Which cameras run at the FPGA, one bit each."""
+        self._library.iss_fpga_running(self.handle, running)
+
     # Debugging
 
     @property
@@ -365,6 +386,10 @@ class Machine:
         found = (ctypes.c_uint32 * 5)()
         self._library.iss_watch_hit(self.handle, found)
         return WatchHit(found[0], found[1], found[2], found[3], bool(found[4]))
+
+    def attach_debugger(self, attached: bool, catches: int = 0) -> None:
+        """A debugger is there: BKPT stops a run, and so do exceptions of ``catches`` (DEMCR)."""
+        self._library.iss_debugger(self.handle, attached, catches)
 
     def _slave(self, unit: int, what: int, byte: int) -> int | None:
         answer = int(self._library.iss_i2c_slave(self.handle, unit, what, byte))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment, PixelSource
 from cubestack.emulator.rtl.sram import Violation, ViolationKind, ViolationLog
 from cubestack.emulator.rtl.wiring import CameraPins, Wiring
-from cubestack.emulator.sim.fpga_port import STEPS, TAKE, Transactions
+from cubestack.emulator.sim.fpga_port import STEPS, TAKE, Driver, Transactions
 
 
 class PinEvent(NamedTuple):
@@ -38,6 +38,9 @@ class BurstEnd(Enum):
     TIME_REACHED = auto()
     ACKNOWLEDGE_CHANGED = auto()
     SEGMENT_OVER = auto()
+
+
+_BURST_ENDS = tuple(BurstEnd)  # declared in the driver's order
 
 
 @dataclass
@@ -125,6 +128,24 @@ class RtlEngine(ABC):
     def _flip(self, register: str, bit: int) -> None:
         """Turn a bit of a register over at ``now_ps`` and let everything settle."""
         raise AssertionError("there is no register to turn over")
+
+    @property
+    def running(self) -> int:
+        """Cameras whose clocks are made now; see ``FpgaPort``."""
+        return sum(1 << camera.number for camera in self._running())
+
+    @property
+    def driver(self) -> Driver | None:
+        """The compiled driver; see ``FpgaPort``."""
+        return None
+
+    def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
+        """Take over a burst that ended; see ``FpgaPort``."""
+        self.now_ps = max(self.now_ps, reached_ps)
+        if _BURST_ENDS[end] is BurstEnd.SEGMENT_OVER:
+            self._follow_segment(self._cameras[camera])
+        self.run(until_ps)
+        return self.running
 
     @property
     def violations(self) -> list[Violation]:

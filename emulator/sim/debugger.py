@@ -173,7 +173,7 @@ class Debugger:
             case StopReason.BREAKPOINT:
                 self._at_breakpoint()
             case StopReason.WATCHPOINT:
-                self._stand(Reason(watch=self._hit(self.machine.watch_hit)))
+                self._stand(Reason(watch=self._hit(self.machine.watch_hit.address)))
             case StopReason.HALTED:
                 self._stand(Reason())
             case StopReason.LOCKED_UP:

@@ -3,10 +3,11 @@
 A transaction on the bus has the phases of :mod:`cubestack.firmware_model.mcu.external_bus`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,12 +84,43 @@ class Transactions:
         return int(self.cycle * (index * self.cycles + self.offsets[step]))
 
 
+class Driver(NamedTuple):
+    """Compiled FPGAs' own functions, for compiled code that stands at their pins.
+
+    Attributes:
+        handle: first argument of the functions.
+        set, get, burst: their addresses.
+        pins: number of each pin.
+    """
+
+    handle: int
+    set: int
+    get: int
+    burst: int
+    pins: Mapping[str, int]
+
+
 class FpgaPort(Protocol):
     """FPGAs as the microcontroller reaches them. Time only moves in the last three calls."""
 
     @property
     def now_ps(self) -> int:
         """Virtual time, which may be ahead of the kernel's."""
+
+    @property
+    def running(self) -> int:
+        """Cameras whose clocks are made now, one bit each; other time changes nothing."""
+
+    @property
+    def driver(self) -> Driver | None:
+        """The FPGAs' own functions, where they are compiled and nothing stands before them.
+
+        Who calls them at a time does so after the bursts of ``running`` up to it, and hands a
+        burst that ends otherwise to ``attend``.
+        """
+
+    def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
+        """A burst of ``driver`` ended so; does what is due, up to ``until_ps``; ``running``."""
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive one of the microcontroller's outputs from ``now_ps`` on; ValueError for others."""

@@ -47,6 +47,7 @@ class PowerModel:
         table: what the parts draw.
         on_overcurrent: interrupt: the comparator of a channel tripped.
         on_switch: told (channel, on) when a load switch changed.
+        on_change: told after a current may have changed.
     """
 
     def __init__(self, env: Kernel, table: PowerTable) -> None:
@@ -62,6 +63,7 @@ class PowerModel:
         self._since_ps = env.now
         self.on_overcurrent: Callable[[str], None] = lambda _channel: None
         self.on_switch: Callable[[str, bool], None] = lambda _channel, _on: None
+        self.on_change: Callable[[], None] = lambda: None
 
     def set_state(self, part: str, state: str) -> None:
         """Part ``part`` is in ``state`` from now on (names of the table, else ValueError)."""
@@ -130,6 +132,7 @@ class PowerModel:
             if above and not self._tripped[channel]:
                 self._env.process(self._interrupt(channel))
             self._tripped[channel] = above
+        self.on_change()
 
     def _interrupt(self, channel: str) -> simpy.events.ProcessGenerator:
         yield self._env.timeout(COMPARATOR_US * PS_PER_US)

@@ -16,7 +16,7 @@ from cubestack.emulator.rtl.contract import BurstEnd, RtlEngine
 from cubestack.emulator.rtl.cxxrtl.build import library_for
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.emulator.sim.fpga_port import STEPS, Transactions
+from cubestack.emulator.sim.fpga_port import STEPS, Driver, Transactions
 
 _KINDS = tuple(sram.RULES)
 _BURST_ENDS = tuple(BurstEnd)  # declared in the driver's order
@@ -106,6 +106,16 @@ class CompiledEngine(RtlEngine):
         if self._driver is None:
             raise RuntimeError("the engine is closed: make a new one")
         return self._driver
+
+    @property
+    def driver(self) -> Driver:
+        """The driver's functions."""
+        library = self._library
+        functions = library.driver_set, library.driver_get, library.driver_burst
+        to_set, to_get, to_burst = (
+            ctypes.cast(function, _POINTER).value or 0 for function in functions
+        )
+        return Driver(self._handle, to_set, to_get, to_burst, self._pins)
 
     @property
     def violation_counts(self) -> Counter[sram.ViolationKind]:

@@ -1,0 +1,152 @@
+"""The CubeStar stack: which pin goes where, whatever runs on its processor.
+
+CubeStar thesis, section 5.2 and tables C.1 to C.4. Camera to FPGA and SRAM, FPGA to processor, and
+the supplies of all three boards. Other memory layouts than the published one are in
+:mod:`cubestack.emulator.boards.cubestar.layouts`.
+"""
+
+from collections import deque
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.boards.cubestar.layouts import BOARDS
+from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
+from cubestack.emulator.faults.sites import CameraSite, Sites
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.factory import EngineKind, make_engine
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.scene.sky import Scene
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES
+from cubestack.firmware_model.interface.cameras.mlx75412 import ROWS
+from cubestack.firmware_model.interface.cubestar.codes import ResetCause
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+
+FORCED_RESETS = {
+    "brown-out": ResetCause.BROWN_OUT_UNREGULATED,
+    "brown-out-regulated": ResetCause.BROWN_OUT_REGULATED,
+    "reset-pin": ResetCause.EXTERNAL_PIN,
+    "hang": ResetCause.WATCHDOG,
+    "lock-up": ResetCause.LOCKUP,
+}
+"""What resets the processor against its program's will, the usual one first, and its cause."""
+
+
+@lru_cache(maxsize=len(BOARDS))
+def _wiring(layout: Layout) -> Wiring:
+    """Kept, as an engine knows its library by the design's text, a slow thing."""
+    return BOARDS[layout].wiring()
+
+
+class CubeStarStack(Board):
+    """The boards of a CubeStar, whatever runs on its processor.
+
+    Attributes:
+        camera: image sensor, which looks at the scene.
+        layout: which boards these are.
+        external_ram: SRAM on the processor's external bus, empty where it has none.
+        stored: exposures of the frames stored last, the newest one at the end; None for a frame
+            that was not sent.
+    """
+
+    engine: RtlEngine
+
+    def __init__(
+        self,
+        scene: Scene | SkyView,
+        *,
+        seed: int,
+        engine: EngineKind,
+        kernel: Kernel | None,
+        i2c_bus: I2cBus | None,
+        layout: Layout,
+    ) -> None:
+        """Power up all but the processor; the arguments are those of ``CubeStarBoard``."""
+        self.layout = BOARDS[layout]
+        super().__init__(self.layout.power, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        self.engine = make_engine(_wiring(layout), kind=engine)
+        self.camera = Mlx75412(scene, seed=seed)
+        bytes_there = EXTERNAL_RAM_BYTES if self.layout.external_ram else 0
+        self.external_ram = np.zeros(bytes_there, np.uint8)
+        self._scramble(self.external_ram)
+        for memory in self.engine.memories.values():
+            self._scramble(memory)
+        self.engine.attach(self.camera)
+        self.camera.on_change = self._camera_changed
+        self._pins = dict.fromkeys(self.layout.controls, 0)
+        self._accesses = False
+        self._storing_since_ps = 0
+        self.stored: deque[RollingShutter | None] = deque([None], maxlen=4)
+
+    @property
+    def scene(self) -> Scene:
+        """What the camera sees; see ``Board``."""
+        return self.camera.scene
+
+    @scene.setter
+    def scene(self, scene: object) -> None:
+        self.camera.scene = scene
+
+    def _sites(self) -> Sites:
+        return replace(
+            super()._sites(),
+            controls=self.layout.controls,
+            cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
+            memories={"external": self.external_ram} if self.layout.external_ram else {},
+        )
+
+    def _camera_changed(self) -> None:
+        self.engine.stream_changed()
+        self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")
+
+    def truth(self) -> NDArray[np.float64] | None:
+        """Attitude (4,) at the mid-exposure of the middle row of the frame stored last.
+
+        For whoever compares results; None when nothing was stored or the scene has no attitude.
+        """
+        latest = self.stored[-1]
+        if latest is None:
+            return None
+        return self.camera.scene.truth(latest.mid_exposure_ps((ROWS - 1) / 2))
+
+    def _pin_changed(self, pin: str, level: int) -> None:
+        stored, self._pins[pin] = self.layout.storing(self._pins), level
+        stores = self.layout.storing(self._pins)
+        if stores > stored:
+            self._storing_since_ps = self.kernel.now
+        elif stores < stored:
+            # The first whole frame was stored, however long the program let the FPGA go on.
+            self.stored.append(self.camera.frame_from(self._storing_since_ps))
+        self._set_states()
+
+    def _accessed(self, busy: bool) -> None:
+        self._accesses = busy
+        self._set_states()
+
+    def _set_states(self) -> None:
+        for part, state in self.layout.states(self._pins, self._accesses).items():
+            self.power.set_state(part, state)
+
+    def _supply_switched(self, channel: str, on: bool) -> None:
+        # A latch-up comes from outside, so the FPGA may have run ahead; see sim/processor.py.
+        now_ps = max(self.kernel.now, self.engine.now_ps)
+        self.engine.run(now_ps)
+        if channel == "imager":
+            self.camera.power(on, now_ps)
+        srams, external = self.engine.memories, self.layout.external_ram
+        if not external:
+            # Without supply an FPGA leads nowhere, as a memory without supply does.
+            reached = all(self.power.is_on(name) for name in ("imager", "memory"))
+            for name in srams:
+                self.engine.power_memory(name, reached)
+        if not on:
+            feeds_srams = channel == ("imager" if external else "memory")
+            for memory in srams.values() if feeds_srams else [self.external_ram]:
+                self._scramble(memory)

@@ -1,0 +1,134 @@
+"""Couples a machine's port pins to an FPGA.
+
+A compiled FPGA's driver is handed to the machine, whose reads and data clocks then cost no Python;
+any other FPGA, and one with faults at its pins, is reached by callbacks, with the same results.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from cubestack.emulator.iss import binding
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.mcu.external_bus import EBI
+
+
+@dataclass(frozen=True)
+class FpgaPin:
+    """A pin of the FPGA, or a bus of them, at neighbouring port pins.
+
+    Attributes:
+        name: at the FPGA.
+        port, bit: of the machine, where its lowest bit is.
+        width: bits.
+        input: the FPGA drives it.
+        alert: its changes raise the machine's pin interrupts, too.
+    """
+
+    name: str
+    port: int
+    bit: int
+    width: int = 1
+    input: bool = False
+    alert: bool = False
+
+
+class FpgaCoupling:
+    """A machine and an FPGA, pin to pin.
+
+    Attributes:
+        fpga: the FPGA, or what stands before it.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        fpga: FpgaPort,
+        pins: Sequence[FpgaPin],
+        *,
+        banks: Sequence[int] = (),
+        compiled: bool = True,
+    ) -> None:
+        """Couple them.
+
+        Args:
+            machine, fpga: to be coupled.
+            pins: which lead where; outputs of the machine that are not among these are the
+                caller's.
+            banks: chip select of each bank of the machine's external bus that leads to the FPGA.
+            compiled: use the FPGA's own functions where there are any.
+        """
+        self._machine, self.fpga, self._banks = machine, fpga, tuple(banks)
+        self._names = [pin.name for pin in pins]
+        self._error: BaseException | None = None
+        driver = fpga.driver if compiled and not banks else None
+        self._compiled = driver is not None
+        self._callbacks = (
+            binding.ATTEND(self._guarded(fpga.attend, 0)),
+            binding.SLOW_GET(self._guarded(self._get, 0)),
+            binding.SLOW_SET(self._guarded(self._set, None)),
+            binding.SLOW_EXTERNAL(self._guarded(self._external, -1)),
+        )
+        addresses = (0, 0, 0, 0) if driver is None else driver[:4]
+        record = binding.FpgaDriverRecord(*addresses, *self._callbacks)
+        numbers = range(len(pins)) if driver is None else [driver.pins[n] for n in self._names]
+        wires = [
+            binding.FpgaWireRecord(pin.port, pin.bit, pin.width, number, pin.input, pin.alert)
+            for pin, number in zip(pins, numbers, strict=True)
+        ]
+        machine.couple(record, (binding.FpgaWireRecord * len(wires))(*wires))
+
+    def before_run(self) -> None:
+        """The machine is about to run: it has to know which cameras do."""
+        self._machine.fpga_running(self.fpga.running)
+
+    def after_run(self, time_ps: int) -> None:
+        """The machine has run to ``time_ps``: the FPGA follows. Raises what callbacks raised."""
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+        self.fpga.run(max(self.fpga.now_ps, time_ps))
+
+    def set_pin(self, name: str, value: int, time_ps: int) -> None:
+        """Drive a pin that the machine reaches through Python."""
+        self.fpga.run(max(self.fpga.now_ps, time_ps))
+        self.fpga.set_pin(name, value)
+
+    def _get(self, pin: int, now_ps: int) -> int:
+        self.fpga.run(max(self.fpga.now_ps, now_ps))
+        return self.fpga.get_pin(self._names[pin])
+
+    def _set(self, pin: int, value: int, now_ps: int) -> None:
+        self.fpga.run(max(self.fpga.now_ps, now_ps))
+        self.fpga.set_pin(self._names[pin], value)
+
+    def _external(self, bank: int, address: int, value: int, now_ps: int) -> int:
+        """One access on the external bus; it began before the machine came to its data."""
+        if bank not in self._banks:
+            return -1
+        self.fpga.run(max(self.fpga.now_ps, now_ps))
+        write = value >= 0
+        data = np.array([value if write else 0], np.uint8)
+        addresses = np.array([address & 0xFF_FFFF], np.int32)
+        cycle = Fraction(PS_PER_S, max(1, self._machine.hz))
+        select = self._banks.index(bank)
+        wanted = Transactions(addresses, data, write, cycle, EBI.cycles, select)
+        self.fpga.access(wanted, self.fpga.now_ps + int(wanted.period) + 1)
+        return int(data[0])
+
+    def _guarded(self, act: Callable[..., int | None], failed: int | None) -> Callable[..., object]:
+        """``act`` for compiled code, which can not pass an exception on."""
+
+        def call(*arguments: int) -> object:
+            try:
+                return act(*arguments)
+            except BaseException as error:
+                self._error = self._error or error
+                self._machine.stop()
+                return failed
+
+        return call

@@ -1,0 +1,267 @@
+"""Runs a user's own firmware in virtual time: a machine behind the kernel's events.
+
+The machine runs by itself up to the kernel's next event, so no input comes late, and returns sooner
+when something is for the outside; the kernel catches up to that picosecond, the board does what is
+due, and the machine goes on. While it sleeps, the kernel goes from event to event without it.
+"""
+
+import logging
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any, Protocol
+
+import simpy
+
+from cubestack.emulator.iss.machine import NEVER, Kind, Machine, Outgoing, Stop, StopReason
+from cubestack.emulator.sim.firmware_fpga import FpgaCoupling
+from cubestack.emulator.sim.fpga_port import FpgaPort
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
+
+LOOK_AHEAD_PS = 10 * PS_PER_MS
+"""Longest run of an awake machine: a host that starts to write is heard after no more than that."""
+
+QUANTUM_PS = 10 * PS_PER_US
+"""Run of a machine that has to take turns with another one at the same picosecond."""
+
+QUIET_PS = 2 * PS_PER_S
+"""A program that sent nothing for so long, and sleeps at last, waits for the outside."""
+
+QUIET_AWAKE_PS = 5 * PS_PER_S
+"""Likewise one that never sleeps: it computes, or polls."""
+
+INWARD = frozenset({Kind.SLEEP, Kind.LOG, Kind.SUPPLY})
+"""What is no work that anybody outside would wait for."""
+
+logger = logging.getLogger(__name__)
+
+Steps = Generator[simpy.Event, Any, None]
+
+
+class Debugger(Protocol):
+    """What runs the machine in place of the processor, and may halt it."""
+
+    def run(self, until_ps: int) -> Stop:
+        """As ``Machine.run``."""
+
+
+@dataclass(eq=False)
+class FirmwareProcessor:
+    """One microcontroller with the user's own firmware.
+
+    Attributes:
+        env: kernel.
+        machine: the microcontroller, loaded, in reset.
+        handlers: what happens to each kind of thing that leaves the machine.
+        causes: the part's bits for each cause of a reset that ``reset`` may be given; those that
+            are not among them hang it instead.
+        couple: leads the machine's pins to an FPGA.
+        on_activity: told when the core falls asleep (False) or awakes (True).
+        console: receives text that the program prints by its debug channels, line by line.
+        on_fault: told of what stops the program for good, with a line of text.
+        debugger: runs the machine, if any.
+        resets: number of resets since power-up.
+    """
+
+    env: Kernel
+    machine: Machine
+    _: KW_ONLY
+    power_on: int = 1
+    handlers: Mapping[Kind, Callable[[Outgoing], None]] = field(default_factory=dict)
+    causes: Mapping[int, int] = field(default_factory=dict)
+    couple: Callable[[FpgaPort], FpgaCoupling] | None = None
+    on_activity: Callable[[bool], None] = lambda _awake: None
+    console: Callable[[str], None] = logger.info
+    on_fault: Callable[[str], None] = logger.error
+
+    def __post_init__(self) -> None:
+        """Power up."""
+        self.debugger: Debugger | None = None
+        self.resets = 0
+        self._fpga: FpgaPort | None = None
+        self._coupling: FpgaCoupling | None = None
+        self._input = self.env.event()
+        self._awake = True
+        self._active_ps = 0
+        self._lines: dict[int, str] = {}
+        self._locked_up = False
+        self.machine.reset(self.power_on)
+        self.on_activity(True)
+        self._running = self.env.process(self._run())
+
+    # --- what boards, faults and hosts use ------------------------------------------------------
+
+    @property
+    def fpga(self) -> FpgaPort | None:
+        """What it has at its pins to the FPGA."""
+        return self._fpga
+
+    @fpga.setter
+    def fpga(self, fpga: FpgaPort | None) -> None:
+        self._fpga = fpga
+        self._coupling = self.couple(fpga) if self.couple is not None and fpga is not None else None
+
+    @property
+    def dozing(self) -> bool:
+        """Whether the core sleeps."""
+        return not self._awake
+
+    @property
+    def waiting(self) -> bool:
+        """Whether nothing happens until somebody outside does something.
+
+        A program sleeps for its next tick as well as for its next telecommand. So one that sleeps
+        waits when nothing is due soon, or when it did nothing that is seen outside for a while.
+        """
+        now_ps = self.env.now
+        if self._locked_up:
+            return True
+        if self._awake:
+            return now_ps > self._active_ps + QUIET_AWAKE_PS
+        due_ps = self.machine.next_event_ps
+        return due_ps >= now_ps + QUIET_PS or now_ps > self._active_ps + QUIET_PS
+
+    def reset(self, cause: int, hang_us: int = 0) -> None:
+        """Reset for a reason, one of ``causes``.
+
+        With ``hang_us`` the program hangs instead: what ends that is its own watchdog.
+        """
+        self.catch_up()
+        if hang_us:
+            self.machine.hang()
+        else:
+            self.machine.reset(self.causes[cause])
+        self.wake()
+
+    def catch_up(self) -> None:
+        """Bring the machine to the kernel's time, before something is done to its inputs."""
+        if self.machine.now_ps < self.env.now:
+            self._run_machine(self.env.now)
+
+    def wake(self) -> None:
+        """Something was done to the machine's inputs: a sleeping one is to be looked at."""
+        if not self._input.triggered:
+            self._input.succeed()
+
+    def give(self, act: Callable[[], None]) -> None:
+        """Do something to the machine's inputs, now."""
+        self.catch_up()
+        act()
+        self.wake()
+
+    # --------------------------------------------------------------------------------------------
+
+    def _run(self) -> Steps:
+        standing = 0
+        while True:
+            yield from self._take_turn()
+            before_ps = self.machine.now_ps
+            stop = self._run_machine(self._until())
+            yield from self._empty_outbox()
+            if self.env.paused:
+                yield self._urgent()
+                continue
+            if self._sleeps(stop):
+                yield from self._sleep()
+                continue
+            ahead_ps = stop.now_ps - self.env.now
+            standing = standing + 1 if stop.now_ps == before_ps and ahead_ps <= 0 else 0
+            if standing > 2:  # a machine that can not go on must not keep the kernel
+                yield from self._stand_still()
+                continue
+            yield self.env.timeout(max(0, ahead_ps))
+
+    def _run_machine(self, until_ps: int) -> Stop:
+        if self._coupling is not None:
+            self._coupling.before_run()
+        runner = self.machine if self.debugger is None else self.debugger
+        stop = runner.run(until_ps)
+        if stop.reason is StopReason.LOCKED_UP and not self._locked_up:
+            self.on_fault("the core is locked up")
+        self._locked_up = stop.reason is StopReason.LOCKED_UP
+        return stop
+
+    def _take_turn(self) -> Steps:
+        """Let everybody else act who is to act now."""
+        if self.env.horizon() == self.env.now:
+            yield self.env.timeout(0)
+
+    def _until(self) -> int:
+        """Nothing else happens before this time."""
+        now_ps, horizon = self.env.now, self.env.horizon()
+        if horizon is None:
+            return now_ps + LOOK_AHEAD_PS
+        if horizon <= now_ps:
+            return now_ps + QUANTUM_PS
+        return min(horizon, now_ps + LOOK_AHEAD_PS)
+
+    def _sleeps(self, stop: Stop) -> bool:
+        """Whether the kernel can go on without the machine for a while."""
+        machine = self.machine
+        return machine.asleep and machine.next_event_ps > max(stop.now_ps, self.env.now)
+
+    def _sleep(self) -> Steps:
+        """Until the machine's own next event, or an input."""
+        due_ps = self.machine.next_event_ps
+        yield from self._await_input(None if due_ps == NEVER else max(due_ps, self.env.now))
+
+    def _stand_still(self) -> Steps:
+        yield from self._await_input(self._until())
+
+    def _await_input(self, until_ps: int | None) -> Steps:
+        """Until an input, one that was there already included, or a time."""
+        alternatives: list[simpy.Event] = [self._input]
+        if until_ps is not None and not self._input.triggered:
+            alternatives.append(self.env.timeout(until_ps - self.env.now))
+        yield simpy.AnyOf(self.env, alternatives)
+        if self._input.triggered:
+            self._input = self.env.event()
+
+    def _urgent(self) -> simpy.Event:
+        """An event at this very time, before all others."""
+        event = simpy.Event(self.env)
+        event._ok, event._value = True, None
+        self.env.schedule(event, simpy.events.URGENT)
+        return event
+
+    # --- what leaves the machine ----------------------------------------------------------------
+
+    def _empty_outbox(self) -> Steps:
+        for one in self.machine.outbox():
+            if one.time_ps > self.env.now:
+                yield self.env.timeout(one.time_ps - self.env.now)
+            if self._coupling is not None:
+                self._coupling.after_run(max(self.env.now, one.time_ps))
+            self._handle(one)
+        if self._coupling is not None:
+            self._coupling.after_run(self.machine.now_ps)
+
+    def _handle(self, one: Outgoing) -> None:
+        if one.kind not in INWARD:
+            self._active_ps = one.time_ps
+        match one.kind:
+            case Kind.SLEEP:
+                awake = one.value == 0
+                if awake != self._awake:
+                    self._awake = awake
+                    self.on_activity(awake)
+            case Kind.RESET:
+                self.resets += 1
+                self._locked_up = False
+            case Kind.ITM:
+                self._print(one.unit, one.value.to_bytes(8, "little")[: max(1, one.extra)])
+            case Kind.SEMIHOSTING:
+                self._print(-1, one.text.encode())
+            case Kind.LOG:
+                logger.warning("%s", one.text)
+            case Kind.FAULT:
+                self.on_fault(one.text)
+        handler = self.handlers.get(one.kind)
+        if handler is not None:
+            handler(one)
+
+    def _print(self, channel: int, data: bytes) -> None:
+        """Whole lines go to the console."""
+        text = self._lines.get(channel, "") + data.decode("latin-1")
+        *lines, self._lines[channel] = text.split("\n")
+        for line in lines:
+            self.console(line.rstrip("\r"))
