@@ -43,7 +43,7 @@ Part::Part(armv7m::Cpu &cpu, const Memories &memories)
     add(new Wdog(*this, instance::WDOG));
     add_interfaces(*this);
     for (const Instance *one : INSTANCES)
-        if (!one->layout->modelled)
+        if (one->base >= PERIPHERALS && !peripheral_at(one->base))
             add(new Unmodelled(*this, *one));
 
     armv7m::Region flash, ram;

@@ -1,0 +1,190 @@
+"""Every register against its table: reset values, reserved bits; the C header's offsets."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS, register_at
+from cubestack.firmware_model.interface.efm32gg.c_header import c_header
+from cubestack.firmware_model.interface.efm32gg.clocks import CLOCKS
+from cubestack.firmware_model.interface.efm32gg.external_bus import EXTERNAL_BUS
+from cubestack.firmware_model.interface.efm32gg.ports import PORTS
+from cubestack.firmware_model.interface.efm32gg.system import SYSTEM
+from cubestack.firmware_model.interface.efm32gg.table import (
+    Instance,
+    Layout,
+    RegisterTableError,
+    peripheral,
+)
+
+from .bench import Bench
+
+UNITS = [(layout, instance) for layout in LAYOUTS for instance in layout.instances]
+MODELLED = [
+    (layout, instance)
+    for layout, instance in UNITS
+    if layout.modelled and layout in (*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS)
+]
+LIVE = {"RMU.RSTCAUSE": 1}
+"""Registers that do not have their reset value after power-on, with what they have."""
+
+PLAIN_UNITS = ("CMU", "GPIO", "EBI", "PRS", "EMU")
+SPECIAL = {"LOCK", "FREEZE", "AUXCTRL", "HFRCOCTRL", "OSCENCMD", "EM4CONF", "HFCORECLKDIV", "CTRL"}
+"""Registers whose write does something, in these units."""
+
+
+@pytest.mark.parametrize(("layout", "instance"), MODELLED, ids=lambda one: one.name)
+def test_reset_values_are_those_of_the_table(layout: Layout, instance: Instance) -> None:
+    machine = Bench().machine
+    for register in layout.registers:
+        value = machine.peek(instance.base + register.offset, 4)
+        expected = LIVE.get(f"{instance.name}.{register.name}", register.reset) & register.readable
+        assert int.from_bytes(value, "little") == expected, register.name
+
+
+@pytest.mark.parametrize(("layout", "instance"), MODELLED, ids=lambda one: one.name)
+def test_reserved_bits_read_0_whatever_is_written(layout: Layout, instance: Instance) -> None:
+    for register in layout.registers:
+        bench = Bench()
+        bench["CMU.HFPERCLKEN0"] = bench["CMU.HFCORECLKEN0"] = 0xFFFF_FFFF
+        bench.machine.write(instance.base + register.offset, 0xFFFF_FFFF)
+        value = bench.machine.read(instance.base + register.offset)
+        assert value is not None
+        assert value & ~register.readable == 0, register.name
+
+
+@pytest.mark.parametrize("pattern", [0x5555_5555, 0xAAAA_AAAA])
+@pytest.mark.parametrize("name", PLAIN_UNITS)
+def test_writable_bits_keep_what_is_written(name: str, pattern: int) -> None:
+    layout, instance = next(unit for unit in UNITS if unit[1].name == name)
+    for register in layout.registers:
+        if register.readable != register.writable or register.name in SPECIAL:
+            continue
+        bench = Bench()
+        if name != "CMU":
+            bench["CMU.HFPERCLKEN0"] = bench["CMU.HFCORECLKEN0"] = 0xFFFF_FFFF
+        bench.machine.write(instance.base + register.offset, pattern)
+        value = bench.machine.read(instance.base + register.offset)
+        assert value == pattern & register.writable, register.name
+
+
+def test_bytes_and_halfwords_reach_their_part_of_a_register() -> None:
+    bench = Bench().clock("GPIO")
+    assert bench.machine.write(0x4000_6004, 0x12, 1)
+    assert bench.machine.write(0x4000_6006, 0x3456, 2)
+    assert bench["GPIO.PA_MODEL"] == 0x3456_0012
+    assert bench.machine.read(0x4000_6007, 1) == 0x34
+
+
+def test_a_unit_without_clock_reads_0_and_takes_nothing() -> None:
+    bench = Bench()
+    bench["GPIO.PA_MODEL"] = 0x4
+    assert bench["GPIO.INSENSE"] == 0
+    assert "GPIO is accessed without its clock" in bench.log()
+    bench.clock("GPIO")
+    assert (bench["GPIO.PA_MODEL"], bench["GPIO.INSENSE"]) == (0, 3)
+    assert bench.log() == ""
+
+
+def test_an_unmodelled_unit_is_reported_once() -> None:
+    bench = Bench().clock("AES")
+    for _ in range(3):
+        bench["AES.CTRL"] = 1
+        assert bench["AES.CTRL"] == 0
+    assert bench.log().count("AES is not modelled") == 1
+
+
+def test_where_there_is_nothing_is_a_bus_fault() -> None:
+    machine = Bench().machine
+    for address in (0x0010_0000, 0x2002_0000, 0x4000_F000, 0x6000_0000, 0xC000_0000):
+        assert machine.read(address) is None, hex(address)
+        assert not machine.write(address, 0), hex(address)
+
+
+def test_the_ram_is_at_its_code_alias_too() -> None:
+    machine = Bench().machine
+    assert machine.write(0x1000_0010, 0xDEAD_BEEF)
+    assert machine.read(0x2000_0010) == 0xDEAD_BEEF
+
+
+def test_the_device_information_says_which_part_it_is() -> None:
+    machine = Bench().machine
+    assert machine.read(0x0FE0_81FC) == 0x2448_0118  # GG, number 280
+    assert machine.read(0x0FE0_81F8) == 128 << 16 | 1024  # sizes in kB
+    assert machine.read(0x0FE0_0000) == 0xFFFF_FFFF  # user data
+
+
+def test_the_c_header_has_the_offsets_of_the_table(tmp_path: Path) -> None:
+    compiler = find_compiler()
+    if compiler is None:
+        pytest.skip("no C++ compiler")
+    (tmp_path / "efm32gg.h").write_text(c_header(LAYOUTS))
+    lines = ['#include "efm32gg.h"', "#include <cstddef>"]
+    lines += [
+        f"static_assert(offsetof({layout.name}_Registers, {one.name}) == {one.offset}, "
+        f'"{layout.name} {one.name}");'
+        for layout in LAYOUTS
+        for one in layout.registers
+    ]
+    source = tmp_path / "check.cpp"
+    source.write_text("\n".join(lines) + "\n")
+    subprocess.run([*compiler.command, "-fsyntax-only", str(source)], check=True)
+
+
+def test_the_c_header_is_c(tmp_path: Path) -> None:
+    compiler = shutil.which("arm-none-eabi-gcc")
+    if compiler is None:
+        pytest.skip("arm-none-eabi-gcc is not installed")
+    source = tmp_path / "check.c"
+    source.write_text(c_header(LAYOUTS) + "int read(void) { return (int)CMU->STATUS; }\n")
+    options = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]
+    subprocess.run([compiler, *options, str(source)], check=True)
+
+
+def test_instances_do_not_overlap_and_names_are_unique() -> None:
+    words = [
+        instance.base + register.offset
+        for layout, instance in UNITS
+        for register in layout.registers
+    ]
+    assert len(set(words)) == len(words)
+    assert len({instance.name for _, instance in UNITS}) == len(UNITS)
+    lines = [number for _, instance in UNITS for number in instance.interrupts.values()]
+    assert {number for number in lines if lines.count(number) > 1} == {6}  # both comparators
+    assert max(lines) == 38
+
+
+def test_an_address_has_a_name() -> None:
+    found = register_at(0x400C_802C)
+    assert found is not None
+    assert (found[0].name, found[1].name) == ("CMU", "STATUS")
+    assert register_at(0x4000_3000) is None
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "000 CTRL rw 0",
+        "002 CTRL rw 0 EN:0",
+        "000 CTRL rw 0 EN:0 ON:0",
+        "000 CTRL rw 2 EN:0",
+        "000 CTRL rw 0 EN:32",
+        "000 CTRL rw 0 EN:0\n000 CMD w 0 GO:0",
+        "xyz CTRL rw 0 EN:0",
+    ],
+)
+def test_a_wrong_line_is_named(line: str) -> None:
+    with pytest.raises(RegisterTableError, match=line.splitlines()[-1][:4]):
+        peripheral("UNIT", "", line)
+
+
+def test_braces_expand_registers_and_fields() -> None:
+    layout = peripheral("UNIT", "", "010/8 CC{0-2}_CTRL rw 0 M{AB}:0:4\n+ X:31:1:r")
+    assert [(one.name, one.offset) for one in layout.registers] == [
+        ("CC0_CTRL", 0x10), ("CC1_CTRL", 0x18), ("CC2_CTRL", 0x20)
+    ]  # fmt: skip
+    assert [(f.name, f.lsb) for f in layout["CC1_CTRL"].fields] == [("MA", 0), ("MB", 4), ("X", 31)]
+    assert layout["CC1_CTRL"].writable == 0xFF
