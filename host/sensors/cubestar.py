@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
-from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.conformance import effects
 from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
 
 if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.boards.cubestar.stack import CubeStarStack
     from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.cubestar.client import CubeStar
@@ -33,8 +33,11 @@ def _open_board(
     *,
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
+    firmware: str = "",
     **common: Any,
-) -> "CubeStarBoard":
+) -> "CubeStarStack":
+    if firmware:
+        return _open_with(firmware, scene, baud or INTERFACE.baud, Layout(layout), **common)
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
@@ -45,6 +48,25 @@ def _open_board(
         layout=Layout(layout),
         **common,
     )
+
+
+def _open_with(
+    firmware: str,
+    scene: "Scene | SkyView",
+    baud: int,
+    layout: Layout,
+    *,
+    switches: CubeStarSwitches = DEFAULT_SWITCHES,
+    **common: Any,
+) -> "CubeStarStack":
+    """A board that runs an image; ValueError for what only our own program can be told."""
+    from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
+    from cubestack.emulator.iss.image import load_image
+
+    if switches != DEFAULT_SWITCHES:
+        raise ValueError("own firmware has no profile and no switches: leave them out")
+    image = load_image(firmware)
+    return CubeStarFirmwareBoard(scene, image, baud=baud, layout=layout, **common)
 
 
 def _load_scene(path: Path) -> "SkyView":
@@ -76,7 +98,7 @@ def _layout_notice(value: str) -> str | None:
     )
 
 
-DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
+DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     name="cubestar",
     title="CubeStar",
     summary="attitudes of the star tracker",
@@ -111,6 +133,13 @@ DEVICE: "Device[CubeStarBoard, CubeStar]" = Device(
             choices=tuple(layout.value for layout in Layout),
             default=Layout.COPIED.value,
             notice=_layout_notice,
+        ),
+        BoardOption(
+            "firmware",
+            "program for the processor: an ELF, Intel HEX or binary file (FILE@0xADDRESS), "
+            "instead of this project's own (docs/own-firmware.md)",
+            default="",
+            metavar="FILE",
         ),
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),
