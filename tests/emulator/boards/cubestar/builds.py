@@ -1,0 +1,26 @@
+"""Compiles the small programs of ``firmware/`` for the board."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cubestack.host.devices.registry import device
+from cubestack.host.export.processor import render_processor
+
+PROGRAMS = Path(__file__).parent / "firmware"
+COMPILER = shutil.which("arm-none-eabi-gcc")
+FLAGS = ("-mcpu=cortex-m3", "-mthumb", "-O2", "-Wall", "-Werror", "-ffreestanding", "-nostdlib")
+
+needs_toolchain = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-none-eabi")
+
+
+def build(name: str, folder: Path) -> Path:
+    """The ELF file of a program, made in ``folder``."""
+    (folder / "processor.h").write_text(render_processor(device("cubestar").processor(), "c"))
+    target = folder / f"{name}.elf"
+    inputs = [PROGRAMS / "start.c", PROGRAMS / f"{name}.c", "-T", PROGRAMS / "board.ld", "-lgcc"]
+    command = [COMPILER or "", *FLAGS, f"-I{folder}", *inputs, "-o", target]
+    subprocess.run(command, check=True)
+    return target

@@ -1,0 +1,80 @@
+"""Own firmware on the board: its pins, the FPGA behind them by every way, power and resets."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
+from cubestack.emulator.iss.image import Image, load_image
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
+from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from tests.emulator.boards.cubestar.builds import build, needs_toolchain
+
+pytestmark = [
+    needs_toolchain,
+    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
+]
+
+RESULTS = 0x1_0000
+"""Where the programs leave their results, in RAM."""
+
+SKY = SkyScene(np.array([0.0, 0.0, 0.0, 1.0]), mag_limit=3.8)
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Image]:
+    folder = tmp_path_factory.mktemp("firmware")
+    return {name: load_image(build(name, folder)) for name in ("toggle", "picture")}
+
+
+def powered(image: Image, **options: Any) -> CubeStarFirmwareBoard:
+    """A board whose camera sends frames already."""
+    board = CubeStarFirmwareBoard(SKY, image, seed=3, **options)
+    assert board.camera.i2c_write(REGISTERS.i2c_address, b"\x81\x00\x21", 0)
+    return board
+
+
+def results(board: CubeStarFirmwareBoard) -> list[int]:
+    words = board.machine.ram[RESULTS : RESULTS + 0x1000].view(np.uint32).tolist()
+    return words[: words.index(0x600D)] if 0x600D in words else []
+
+
+def toggled(image: Image, **options: Any) -> tuple[list[int], Any, bytes, int]:
+    """Everything that the program saw, what was broken, what is in the SRAM."""
+    board = powered(image, **options)
+    board.kernel.advance_to(3 * PS_PER_MS)
+    seen = results(board)
+    assert len(seen) == 3 * 44
+    memory, board_time = board.engine.sram.tobytes(), board.machine.cycles
+    violations = [str(one) for one in board.engine.violations]
+    board.close()
+    return seen, violations, memory, board_time
+
+
+def test_fpga_is_the_same_by_driver_by_callbacks_and_simulated(images: dict[str, Image]) -> None:
+    compiled = toggled(images["toggle"], engine="compiled")
+    assert len(set(compiled[0])) > 20
+    assert toggled(images["toggle"], engine="compiled", callbacks=True) == compiled
+    assert toggled(images["toggle"], engine="python") == compiled
+
+
+def test_picture_goes_through_the_fpga_into_the_external_memory(images: dict[str, Image]) -> None:
+    board = powered(images["picture"], engine="compiled")
+    while not results(board) and board.kernel.now < PS_PER_S:
+        board.kernel.advance_to(board.kernel.now + 20 * PS_PER_MS)
+    picture = board.external_ram[: 512 * 1024]
+    assert results(board)
+    assert np.array_equal(picture, board.engine.sram[: 512 * 1024])
+    assert len(np.unique(picture)) > 10
+    assert board.truth() is not None
+    assert not board.engine.violation_counts
+    board.close()
+
+
+def test_other_layouts_are_refused_in_one_line(images: dict[str, Image]) -> None:
+    with pytest.raises(ValueError, match=r"own firmware runs on memory layout 1, not two-boards"):
+        powered(images["toggle"], layout=Layout.TWO_BOARDS)
