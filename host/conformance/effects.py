@@ -16,6 +16,7 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
 )
 from cubestack.firmware_model.interface.codec.switches import PROFILES, Switches
 from cubestack.host.conformance.contract import CheckRun, FailedError
+from cubestack.host.errors import CommandRefusedError
 
 UPLOADED = 3
 """Number of the block that is uploaded."""
@@ -92,26 +93,27 @@ def check_camera_register(
 
 def check_profile(run: CheckRun, message: Message, seen: list[str]) -> None:
     """Each profile is shown once it is set; the switches are put back."""
-    now = before = _switches(run)
+    changes = _Changes(run)
+    before = changes.now
     for profile in PROFILES:
-        now = _change(run, now, message, Profile=profile)
+        changes.make(message, Profile=profile)
     single = run.target.interface.telecommand(SET_SWITCH)
     for name, one in before.declared().items():
         if not one.hardware:
-            now = _change(run, now, single, **switch_parameters(name, getattr(before, name)))
-    seen.append("read back")
+            changes.make(single, **switch_parameters(name, getattr(before, name)))
+    changes.tell(seen)
 
 
 def check_switch(run: CheckRun, message: Message, seen: list[str]) -> None:
     """Each value of a switch is shown once it is set, and alone; those of the board are refused."""
-    now = _switches(run)
-    for place, (name, one) in enumerate(now.declared().items()):
+    changes = _Changes(run)
+    for place, (name, one) in enumerate(changes.now.declared().items()):
         if one.hardware:
             run.expect_error(bytes([message.id, place, 0]), "BAD_PARAMETER", f"switch {name}")
             continue
-        for value in (*one.choices, getattr(now, name)):
-            now = _change(run, now, message, **switch_parameters(name, value))
-    seen.append("read back")
+        for value in (*one.choices, getattr(changes.now, name)):
+            changes.make(message, **switch_parameters(name, value))
+    changes.tell(seen)
 
 
 #: Checks of the telecommands that every device with switches has.
@@ -122,14 +124,37 @@ def _switches(run: CheckRun) -> Switches:
     return switches_shown(run.target.interface.switches, run.target.node.telemetry(SHOWN))
 
 
-def _change(run: CheckRun, now: Switches, message: Message, **parameters: str) -> Switches:
-    """The switches after a telecommand, which telemetry must show."""
-    run.perform(message.name, parameters)
-    wanted = after(now, message.name, message.unpack(message.pack(**parameters)))
-    found = run.target.node.telemetry(SHOWN)
-    if found != shown_values(wanted):
-        raise FailedError(f"{parameters} was set, {SHOWN} is {found}, not {shown_values(wanted)}")
-    return wanted
+class _Changes:
+    """Sets switches, and holds what is shown then.
+
+    A firmware of one profile alone refuses all that would change anything, and nothing else.
+    """
+
+    def __init__(self, run: CheckRun) -> None:
+        self._run, self.now = run, _switches(run)
+        self._made = self._refused = 0
+
+    def make(self, message: Message, **parameters: str) -> None:
+        """One telecommand, after which telemetry must show the switches as they are to be then."""
+        wanted = after(self.now, message.name, message.unpack(message.pack(**parameters)))
+        try:
+            self._run.perform(message.name, parameters)
+            self._made += wanted != self.now
+            self.now = wanted
+        except CommandRefusedError:
+            if wanted == self.now or self._made:
+                raise
+            self._refused += 1
+        found = self._run.target.node.telemetry(SHOWN)
+        if found != shown_values(self.now):
+            text = f"{SHOWN} is {found}, not {shown_values(self.now)}"
+            raise FailedError(f"{parameters} was set, {text}")
+
+    def tell(self, seen: list[str]) -> None:
+        """That all is well; not so if some changes were refused and some were made."""
+        if self._refused and self._made:
+            raise FailedError(f"{self._refused} changes were refused, {self._made} were made")
+        seen.append("the present one alone" if self._refused else "read back")
 
 
 def _camera_register(run: CheckRun, address: int) -> int:

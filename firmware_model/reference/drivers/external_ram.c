@@ -10,7 +10,7 @@
 #include "efm32gg.h"
 #include "gpio.h"
 
-#define MODE_D8_A24_ALE 1u
+#define MODE_D8_A24_ALE 2u
 #define ALE_HIGH_ACTIVE EBI_POLARITY_ALEPOL
 
 /* Alternate functions of the EBI at location 0: address and data lines, ALE, WEn, REn, CS0. */

@@ -182,6 +182,43 @@ def test_task_that_is_not_done_is_found(good, uart, monkeypatch, telecommand, ch
     assert detail in found[f"telecommand {check}"]
 
 
+def refuse(monkeypatch, node, refuses):
+    """Let changes of the switches be refused for which ``refuses`` says so."""
+    answer = node.answer
+
+    def fixed(payload):
+        message = CUBESTAR.find(payload[0]) if payload else None
+        if message is not None and message.name in ("SetProfile", "SetSwitch"):
+            values = message.unpack(payload[1:]) if len(payload) == 1 + message.length else {}
+            if values and not message.violations(values):
+                now = switches_shown(CubeStarSwitches, node.values["Profile"])
+                if refuses(now, after(now, message.name, values), message.name):
+                    return b"\x03"
+        return answer(payload)
+
+    monkeypatch.setattr(node, "answer", fixed)
+
+
+def test_a_firmware_of_one_profile_may_refuse_the_others(good, uart, monkeypatch):
+    refuse(monkeypatch, good, lambda now, wanted, _name: wanted != now)
+    run = suite(good, uart, allow_write=True)
+    assert failures(run) == {}
+    details = {check.name: check.detail for check in run.checks}
+    assert "the present one alone" in details["telecommand SetSwitch"]
+
+
+@pytest.mark.parametrize(
+    "refuses",
+    [
+        lambda now, wanted, _name: wanted == now,
+        lambda now, wanted, _name: wanted != now and wanted.tracking == now.tracking,
+    ],
+)
+def test_a_firmware_that_refuses_some_switches_is_found(good, uart, monkeypatch, refuses):
+    refuse(monkeypatch, good, refuses)
+    assert "telecommand SetSwitch" in failures(suite(good, uart, allow_write=True))
+
+
 @pytest.mark.parametrize(
     ("change", "detail"),
     [
