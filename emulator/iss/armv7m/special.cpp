@@ -37,7 +37,8 @@ void Cpu::write_special(uint32_t number, uint32_t mask, uint32_t value) {
         if (priority != 0 && (priority < basepri || basepri == 0)) basepri = priority;
         break;
     case 19:
-        if (system->execution_priority() > -1) faultmask = value & 1;
+        // It can always be cleared, as by CPSIE; only NMI and HardFault can not set it.
+        if (!(value & 1) || system->execution_priority() > -1) faultmask = value & 1;
         break;
     case 20:    // SPSEL can only be changed in thread mode
         set_control(handler_mode() ? (uint8_t)((control & 2) | (value & 1)) : (uint8_t)value);
