@@ -164,7 +164,8 @@ template <int Mode> void Cpu::loop() {
     do { \
         if (TRACED && running) { \
             running = false; \
-            if (tracer != nullptr) tracer->instruction(traced_pc, (next), traced_since, now, *this); \
+            if (tracer != nullptr) \
+                tracer->instruction(traced_pc, (next), traced_since, now, *this); \
             stepped(next); \
         } \
     } while (0)

@@ -173,7 +173,9 @@ Result Cpu::load(uint32_t address, uint32_t size, uint32_t &value, bool as_privi
     return load_unwatched(address, size, value, as_privileged);
 }
 
-static uint32_t piece_at(uint32_t address, uint32_t left) { return address & 1 || left < 2 ? 1 : 2; }
+static uint32_t piece_at(uint32_t address, uint32_t left) {
+    return address & 1 || left < 2 ? 1 : 2;
+}
 
 Result Cpu::load_unwatched(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged) {
     if (!(address & (size - 1))) return access(address, size, value, false, as_privileged);

@@ -1,0 +1,96 @@
+"""Programs of arm-none-eabi-gcc and newlib, run whole on the simulator and on unicorn.
+
+Output, registers and all of RAM are equal at their end. Each source runs at one optimization with
+the suite, at all of them when CUBESTACK_LOCKSTEP is set: 50 programs.
+"""
+
+import os
+import shutil
+import subprocess
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.iss.image import load_image
+from cubestack.emulator.iss.machine import RAM_BYTES, Machine, StopReason
+from cubestack.emulator.native.compiler import find_compiler
+
+unicorn = pytest.importorskip("unicorn", reason="unicorn is not installed")
+elffile = pytest.importorskip("elftools.elf.elffile")
+
+SOURCES = Path(__file__).parent / "compiled"
+PROGRAMS = sorted(path.stem for path in SOURCES.glob("*.c") if path.stem != "support")
+OPTIMIZATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
+COMPILER = shutil.which("arm-none-eabi-gcc")
+RAM = 0x2000_0000
+_LONG = 100_000_000_000_000  # ps at 1 MHz: more cycles than any of them takes
+
+if os.environ.get("CUBESTACK_LOCKSTEP"):
+    CASES = list(product(PROGRAMS, OPTIMIZATIONS))
+else:
+    CASES = [(name, OPTIMIZATIONS[i % 5]) for i, name in enumerate(PROGRAMS)]
+
+pytestmark = [
+    pytest.mark.skipif(COMPILER is None, reason="needs arm-none-eabi-gcc"),
+    pytest.mark.skipif(find_compiler() is None, reason="needs a C++ compiler"),
+]
+
+
+@pytest.fixture(scope="module")
+def support(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    built = tmp_path_factory.mktemp("compiled") / "support.o"
+    _compile("-O2", "-c", SOURCES / "support.c", "-o", built)
+    return built
+
+
+def _compile(*arguments: str | Path) -> None:
+    assert COMPILER is not None
+    subprocess.run(
+        [COMPILER, "-mcpu=cortex-m3", "-mthumb", "-std=gnu11", "-fno-builtin-printf", *arguments],
+        check=True,
+        capture_output=True,
+    )
+
+
+@pytest.mark.parametrize(("name", "optimization"), CASES)
+def test_program(name: str, optimization: str, support: Path, tmp_path: Path) -> None:
+    elf = tmp_path / f"{name}.elf"
+    _compile(optimization, SOURCES / f"{name}.c", support, f"-T{SOURCES / 'link.ld'}",
+             "-nostartfiles", "-Wl,--no-warn-rwx-segments", "-lm", "-o", elf)  # fmt: skip
+    with elf.open("rb") as file:
+        table = elffile.ELFFile(file).get_section_by_name(".symtab")
+        symbols = {one.name: one["st_value"] for one in table.iter_symbols()}
+    finished = symbols["finished"] & ~1
+
+    machine = Machine(bare_hz=1_000_000)
+    machine.load(load_image(elf))
+    oracle = _oracle(machine, finished)
+    machine.reset()
+    machine.breakpoints.add(finished)
+    stop = machine.run(_LONG)
+    assert stop.reason == StopReason.BREAKPOINT
+
+    ours = machine.ram.tobytes()
+    theirs = bytes(oracle.mem_read(RAM, RAM_BYTES))
+    start, length = symbols["output"] - RAM, symbols["output_length"] - RAM
+    printed = ours[start : start + int.from_bytes(ours[length : length + 4], "little")]
+    assert printed == theirs[start : start + len(printed)]
+    assert printed.decode().splitlines()[-1].split()[0] == name
+    assert ours == theirs
+    for number in range(13):
+        register = oracle.reg_read(unicorn.arm_const.UC_ARM_REG_R0 + number)
+        assert machine.register(f"r{number}") == register
+
+
+def _oracle(machine: Machine, finished: int) -> "unicorn.Uc":
+    oracle = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+    oracle.ctl_set_cpu_model(unicorn.arm_const.UC_CPU_ARM_CORTEX_M3)
+    oracle.mem_map(0, machine.flash.size)
+    oracle.mem_map(RAM, RAM_BYTES)
+    oracle.mem_write(0, machine.flash.tobytes())
+    stack, start = machine.flash[:8].view("<u4")
+    oracle.reg_write(unicorn.arm_const.UC_ARM_REG_SP, int(stack))
+    oracle.reg_write(unicorn.arm_const.UC_ARM_REG_LR, 0xFFFF_FFFF)
+    oracle.emu_start(int(start) | 1, finished)
+    return oracle
