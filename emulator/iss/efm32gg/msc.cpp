@@ -66,8 +66,9 @@ void Msc::check_wait_states() {
                       (int)FASTEST[wait_states]);
 }
 
-// The array gives a word each 1 + wait_states cycles. The core's prefetch unit asks for words in
-// order as soon as it can; with PREFETCH the controller does so behind a hit as well.
+// The array gives a word each 1 + wait_states cycles. The core's prefetch unit asks for the next
+// word as soon as it has the one before; behind a hit that is assumed to be a cycle ago, and two
+// with PREFETCH, by which the controller looks ahead as well.
 uint32_t Msc::fetch(uint32_t at, bool sequential) {
     const uint32_t tag = at >> 2, slot = tag & lines.mask;
     const bool caching = !(reg(READCTRL) & READCTRL_IFCDIS);
@@ -80,14 +81,14 @@ uint32_t Msc::fetch(uint32_t at, bool sequential) {
     if (counting() && caching)
         misses++;
     const int64_t now = part.cpu.cycles;
-    int64_t ready = now + wait_states;
+    int64_t asked = now;
     if (sequential) {
-        const bool ahead = reg(READCTRL) & READCTRL_PREFETCH || now - array_free <= 1;
-        if (ahead)
-            ready = std::max(array_free + 1 + (int64_t)wait_states, now);
+        const int64_t ahead = reg(READCTRL) & READCTRL_PREFETCH ? 2 : 1;
+        asked = tag == array_tag + 1 ? array_free + 1 : now - ahead;
     }
-    array_free = ready;
-    return (uint32_t)std::clamp<int64_t>(ready - now, 0, wait_states);
+    array_tag = tag;
+    array_free = std::max(asked + (int64_t)wait_states, now - 1);
+    return (uint32_t)std::clamp<int64_t>(array_free - now, 0, wait_states);
 }
 
 int64_t Msc::read_wait(uint32_t at) {

@@ -35,6 +35,7 @@ private:
     uint32_t cache[CACHE_WORDS], missing[CACHE_WORDS];
     uint32_t wait_states = 0;
     int64_t array_free = 0;          // cycle in which the flash array ends its read
+    uint32_t array_tag = 0;          // of the word that it read
     uint32_t hits = 0, misses = 0;
 
     uint32_t address = 0;            // of the write that comes next

@@ -128,7 +128,7 @@ needs_compiler = pytest.mark.skipif(
 
 _START = """
 #include "efm32gg.h"
-#define IN_RAM __attribute__((section(".data.ram"), noinline, long_call))
+#define IN_RAM __attribute__((section(".code_in_ram"), noinline, long_call))
 #define RESULT ((volatile uint32_t *)0x20010000)
 int main(void);
 void IRQ(void) __attribute__((weak, alias("spin")));
@@ -154,7 +154,7 @@ SECTIONS {
         @IRQS@
         *(.text*) *(.rodata*) . = ALIGN(4); data_from = .;
     }
-    .data 0x20000000 : AT(data_from) { data_start = .; *(.data*) . = ALIGN(4); data_end = .; }
+    .data 0x20000000 : AT(data_from) { data_start = .; *(.data*) *(.code_in_ram*) . = ALIGN(4); data_end = .; }
     .bss : { *(.bss*) }
 }
 """

@@ -1,0 +1,257 @@
+"""Energy modes, reset causes, watchdog."""
+
+import pytest
+
+from cubestack.emulator.iss.machine import Kind
+
+from .bench import LOCK_UP, MS, PIN_RESET, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, WFI, Bench, S
+
+SCR = 0xE000_ED10
+DEEP = 4
+AIRCR = 0xE000_ED0C
+CPSID = 0xB672
+
+
+def sleeper(*, deep: bool = False) -> Bench:
+    """Sleeps whenever no interrupt is pending; it takes none. Pin A0 pends one."""
+    bench = Bench(CPSID, WFI, 0xE7FD)
+    bench.clock("GPIO", "LE")
+    bench["GPIO.PA_MODEL"] = 1
+    bench["GPIO.EXTIRISE"] = bench["GPIO.IEN"] = 1
+    bench.machine.write(0xE000_E100, 2)
+    bench.machine.write(SCR, DEEP if deep else 0)
+    bench.run_for(US)
+    return bench
+
+
+def fall_asleep(bench: Bench) -> None:
+    """What has kept it awake is over."""
+    bench.machine.pin(0, 0, 0)
+    bench["GPIO.IFC"] = 1
+    bench.machine.write(0xE000_E280, 2)
+    bench.run_for(20 * US)
+
+
+def wake(bench: Bench) -> None:
+    bench.machine.pin(0, 0, 1)
+    bench.run_for(20 * US)
+
+
+def modes(bench: Bench) -> list[int]:
+    return [item.value for item in bench.out(Kind.SLEEP)]
+
+
+def test_wfi_is_energy_mode_1_and_its_clocks_go_on() -> None:
+    bench = sleeper()
+    cycles = bench.machine.cycles
+    bench.run_for(MS)
+    assert modes(bench) == [1]
+    assert bench.machine.asleep
+    assert bench.machine.cycles - cycles == pytest.approx(14_000, rel=0.01)
+
+
+@pytest.mark.parametrize(("oscillator", "mode"), [("LFRCO", 2), (None, 3)])
+def test_deep_sleep_stops_the_clock_of_the_core(oscillator: str | None, mode: int) -> None:
+    bench = sleeper(deep=True)
+    wake(bench)
+    if oscillator:
+        bench.command(f"CMU.OSCENCMD.{oscillator}EN")
+    modes(bench)
+    fall_asleep(bench)
+    assert modes(bench) == [mode]
+    cycles = bench.machine.cycles
+    bench.run_for(10 * S)
+    assert bench.machine.cycles == cycles
+    bench.machine.pin(0, 0, 1)
+    bench.run_for(US)
+    assert bench.machine.cycles == cycles  # it starts its oscillator first
+    bench.run_for(3 * US)
+    assert bench.machine.cycles > cycles
+    assert modes(bench) == [0]
+
+
+def test_the_part_awakes_on_the_hfrco() -> None:
+    bench = sleeper(deep=True)
+    wake(bench)
+    bench["MSC.READCTRL"] = 4
+    bench.command("CMU.OSCENCMD.HFXOEN")
+    bench.run_for(MS)
+    bench["CMU.CMD"] = 2
+    assert bench.machine.hz == 48_000_000
+    fall_asleep(bench)
+    assert bench.machine.hz == 0
+    wake(bench)
+    assert bench.machine.hz == 14_000_000
+    assert bench.peek("CMU.STATUS") & 0x40F == 0x403
+
+
+def test_em2_can_be_blocked() -> None:
+    bench = sleeper(deep=True)
+    wake(bench)
+    bench["EMU.CTRL"] = 2
+    modes(bench)
+    fall_asleep(bench)
+    assert modes(bench) == [1]
+
+
+def test_the_emu_lock() -> None:
+    bench = Bench()
+    bench["EMU.LOCK"] = 0
+    bench["EMU.CTRL"] = 2
+    assert (bench["EMU.LOCK"], bench["EMU.CTRL"]) == (1, 0)
+    bench["EMU.LOCK"] = 0xADE8
+    bench["EMU.CTRL"] = 2
+    assert bench["EMU.CTRL"] == 2
+
+
+def test_em4_takes_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
+    bench = Bench().clock("GPIO")
+    bench["GPIO.PA_MODEL"] = 1
+    bench["GPIO.EM4WUEN"] = bench["GPIO.EM4WUPOL"] = 1
+    bench["RMU.CMD"] = 1
+    for value in (2, 3, 2, 3, 3, 2, 3, 2, 3, 2, 3, 2, 3):
+        bench["EMU.CTRL"] = value << 2
+    bench.run_for(US)
+    assert modes(bench) == []  # broken once: eight of nine
+    bench["EMU.CTRL"] = 2 << 2
+    bench.run_for(S)
+    assert modes(bench) == [4]
+    bench.out(Kind.RESET)
+    bench.machine.pin(0, 0, 1)
+    bench.run_for(MS)
+    assert [item.value for item in bench.out(Kind.RESET)] == [0x180]
+    assert bench["RMU.RSTCAUSE"] == 0x180
+    bench.clock("GPIO")
+    assert bench["GPIO.EM4WUCAUSE"] == 1
+    bench["GPIO.CMD"] = 1
+    assert bench["GPIO.EM4WUCAUSE"] == 0
+
+
+# -- resets ----------------------------------------------------------------------------------------
+
+
+def test_causes_add_up_until_they_are_cleared() -> None:
+    bench = Bench()
+    assert bench["RMU.RSTCAUSE"] == POWER_ON
+    bench.reset(PIN_RESET)
+    assert bench["RMU.RSTCAUSE"] == POWER_ON | PIN_RESET
+    bench["RMU.CMD"] = 1
+    assert bench["RMU.RSTCAUSE"] == 0
+    bench.reset(WATCHDOG)
+    assert bench["RMU.RSTCAUSE"] == WATCHDOG
+    bench.reset(POWER_ON)
+    assert bench["RMU.RSTCAUSE"] == POWER_ON
+
+
+def test_a_reset_request_resets_registers_and_keeps_the_ram() -> None:
+    bench = Bench()
+    bench.clock("GPIO")
+    bench.machine.write(0x2000_0100, 0x1234_5678)
+    bench["RMU.CMD"] = 1
+    bench.machine.write(AIRCR, 0x05FA_0004)
+    bench.run_for(MS)
+    assert bench["RMU.RSTCAUSE"] == SYSTEM_REQUEST
+    assert bench["CMU.HFPERCLKEN0"] == 0
+    assert bench.machine.read(0x2000_0100) == 0x1234_5678
+
+
+def test_a_lock_up_resets_unless_that_is_switched_off() -> None:
+    undefined = 0xDE00
+    bench = Bench(undefined)
+    bench.out(Kind.RESET)
+    # The vector table leads every fault to the same instruction.
+    bench.run_for(MS)
+    resets = bench.out(Kind.RESET)
+    assert resets
+    assert all(item.value == LOCK_UP for item in resets)
+    bench = Bench(0xE7FE, undefined)
+    bench["RMU.CTRL"] = 1
+    bench.out(Kind.RESET)
+    bench.machine.set_register("pc", 0x102)
+    for vector in range(2, 16):
+        bench.machine.flash[4 * vector] = 3
+    bench.run_for(MS)
+    assert bench.out(Kind.RESET) == []
+    began = bench.now
+    bench.run_for(MS)
+    assert bench.now == began + MS or bench.now - began < 2 * MS
+
+
+def test_the_first_instruction_comes_after_the_start_up() -> None:
+    bench = Bench()
+    bench.machine.reset(PIN_RESET)
+    began, count = bench.now, bench.machine.instructions
+    bench.run_until(began + 162 * US)
+    assert bench.machine.instructions == count
+    bench.run_until(began + 164 * US)
+    assert bench.machine.instructions > count
+
+
+# -- the watchdog ----------------------------------------------------------------------------------
+
+
+def dog(control: int) -> Bench:
+    bench = Bench().clock("LE")
+    bench["RMU.CMD"] = 1
+    bench.out(Kind.RESET)
+    bench["WDOG.CTRL"] = control
+    return bench
+
+
+def bitten(bench: Bench) -> bool:
+    return any(item.value == WATCHDOG for item in bench.out(Kind.RESET))
+
+
+@pytest.mark.parametrize("period", [0, 3, 7])
+def test_the_watchdog_bites_after_its_period(period: int) -> None:
+    bench = dog(1 | period << 8)
+    bench.run_for(3 * MS)  # synchronised
+    bench.run_for((8 << period) * MS - 2 * MS)
+    assert not bitten(bench)
+    bench.run_for(3 * MS)
+    assert bitten(bench)
+    assert bench["RMU.RSTCAUSE"] == WATCHDOG
+
+
+def test_a_fed_watchdog_does_not_bite() -> None:
+    bench = dog(1 | 1 << 8)
+    for _ in range(20):
+        bench.run_for(10 * MS)
+        bench["WDOG.CMD"] = 1
+    assert not bitten(bench)
+    bench.run_for(30 * MS)
+    assert bitten(bench)
+
+
+def test_a_locked_watchdog_can_not_be_stopped() -> None:
+    bench = dog(1 | 1 << 4)
+    bench.run_for(4 * MS)
+    bench["WDOG.CTRL"] = 0
+    assert bench["WDOG.CTRL"] == 0x11
+    bench.run_for(20 * MS)
+    assert bitten(bench)
+
+
+@pytest.mark.parametrize(("runs", "bites"), [(0, False), (1 << 3, True)])
+def test_in_deep_sleep_it_runs_if_it_shall(runs: int, bites: bool) -> None:
+    bench = sleeper(deep=True)
+    bench.out(Kind.RESET)
+    wake(bench)
+    bench["WDOG.CTRL"] = 1 | runs | 2 << 8
+    bench.run_for(4 * MS)
+    fall_asleep(bench)
+    bench.run_for(S)
+    assert bitten(bench) is bites
+
+
+def test_the_watchdog_on_a_crystal_is_exact() -> None:
+    bench = Bench().clock("LE")
+    bench.command("CMU.OSCENCMD.LFXOEN")
+    bench.run_for(1401 * MS)
+    bench["WDOG.CTRL"] = 1 | 2 << 12 | 5 << 8
+    began = bench.now
+    bench.out(Kind.RESET)
+    bench.run_for(MS * 20)
+    (reset,) = bench.out(Kind.RESET)
+    edges = (reset.time_ps - began) * 32768 / S
+    assert 257 + 2 <= edges <= 257 + 3.1

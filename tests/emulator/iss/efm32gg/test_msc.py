@@ -1,0 +1,247 @@
+"""Flash: programming, erasing, locks, wear, stalls; wait states and the instruction cache."""
+
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.iss.machine import Kind
+
+from .bench import MS, US, Bench, compiled, needs_compiler
+
+PAGE = 0x8_0000
+UNLOCK = 0x1B71
+
+
+def erased(bench: Bench, page: int = PAGE) -> Bench:
+    """The page is erased, by registers."""
+    bench["MSC.WRITECTRL"] = 1
+    bench["MSC.ADDRB"] = page
+    bench.command("MSC.WRITECMD.LADDRIM")
+    bench.command("MSC.WRITECMD.ERASEPAGE")
+    return bench
+
+
+def write_word(bench: Bench, address: int, value: int) -> None:
+    bench["MSC.WRITECTRL"] = 1
+    bench["MSC.ADDRB"] = address
+    bench.command("MSC.WRITECMD.LADDRIM")
+    bench["MSC.WDATA"] = value
+    bench.command("MSC.WRITECMD.WRITEONCE")
+
+
+def test_a_page_is_erased_in_20_ms_and_wears() -> None:
+    bench = Bench()
+    bench.machine.flash[PAGE : PAGE + 8192] = 0
+    erased(bench)
+    assert bench.is_set("MSC.STATUS.BUSY")
+    assert not bench.is_set("MSC.IF.ERASE")
+    bench.run_for(19 * MS)
+    assert bench.is_set("MSC.STATUS.BUSY")
+    bench.run_for(MS)
+    assert not bench.is_set("MSC.STATUS.BUSY")
+    assert bench.is_set("MSC.IF.ERASE")
+    assert set(bench.machine.flash[PAGE : PAGE + 4096]) == {0xFF}
+    assert set(bench.machine.flash[PAGE + 4096 : PAGE + 8192]) == {0}
+    erased(bench)
+    bench.run_for(21 * MS)
+    erasures = [(item.value, item.extra) for item in bench.out(Kind.FLASH) if item.unit == 1]
+    assert erasures == [(PAGE, 1), (PAGE, 2)]
+
+
+def test_a_word_is_written_in_20_us_and_bits_only_fall() -> None:
+    bench = Bench()
+    write_word(bench, PAGE, 0x1234_5678)
+    assert bench.is_set("MSC.STATUS.BUSY")
+    bench.run_for(21 * US)
+    assert not bench.is_set("MSC.STATUS.BUSY")
+    assert bench.is_set("MSC.IF.WRITE")
+    assert bench.log() == ""
+    write_word(bench, PAGE, 0xFFFF_0000)
+    bench.run_for(21 * US)
+    assert bench.machine.read(PAGE) == 0x1234_0000
+    assert "written without erasure" in bench.log()
+
+
+def test_a_sequence_of_words_goes_to_the_next_addresses() -> None:
+    bench = Bench()
+    bench["MSC.WRITECTRL"] = 1
+    bench["MSC.ADDRB"] = PAGE
+    bench.command("MSC.WRITECMD.LADDRIM")
+    words = [0x1111_1111, 0x2222_2222, 0x3333_3333]
+    for word in words:
+        while not bench.is_set("MSC.STATUS.WDATAREADY"):
+            bench.run_for(US)
+        bench["MSC.WDATA"] = word
+        bench.command("MSC.WRITECMD.WRITETRIG")
+    bench.run_for(100 * US)
+    bench.command("MSC.WRITECMD.WRITEEND")
+    assert [bench.machine.read(PAGE + 4 * n) for n in range(4)] == [*words, 0xFFFF_FFFF]
+
+
+def test_nothing_is_written_without_enable_or_with_the_key_wrong() -> None:
+    bench = Bench()
+    write = ("MSC.WDATA", 0), ("MSC.WRITECMD", 8)
+    for name, value in write:
+        bench[name] = value
+    assert "WREN" in bench.log()
+    bench["MSC.LOCK"] = 0
+    assert bench["MSC.LOCK"] == 1
+    write_word(bench, PAGE, 0)
+    assert not bench.is_set("MSC.STATUS.BUSY")
+    bench["MSC.LOCK"] = UNLOCK
+    write_word(bench, PAGE, 0)
+    assert bench.is_set("MSC.STATUS.BUSY")
+
+
+@pytest.mark.parametrize("address", [0x10_0000, 0x2000_0000, 0x0FE0_8000])
+def test_an_address_outside_of_the_flash_is_invalid(address: int) -> None:
+    bench = Bench()
+    write_word(bench, address, 0)
+    assert bench.is_set("MSC.STATUS.INVADDR")
+    assert not bench.is_set("MSC.STATUS.BUSY")
+
+
+def test_lock_bits_protect_their_page() -> None:
+    bench = Bench()
+    write_word(bench, 0x0FE0_4000 + 4 * (128 // 32), 0xFFFF_FFFE)  # page 128 is at 0x80000
+    bench.run_for(21 * US)
+    erased(bench)
+    assert bench.is_set("MSC.STATUS.LOCKED")
+    assert not bench.is_set("MSC.STATUS.BUSY")
+    erased(bench, PAGE + 4096)
+    assert bench.is_set("MSC.STATUS.BUSY")
+
+
+def test_the_user_data_page_can_be_written_and_erased() -> None:
+    bench = Bench()
+    write_word(bench, 0x0FE0_0010, 0x5555_AAAA)
+    bench.run_for(21 * US)
+    assert bench.machine.read(0x0FE0_0010) == 0x5555_AAAA
+    erased(bench, 0x0FE0_0000)
+    bench.run_for(21 * MS)
+    assert bench.machine.read(0x0FE0_0010) == 0xFFFF_FFFF
+
+
+def test_code_in_flash_stands_while_the_flash_is_busy() -> None:
+    bench = Bench()
+    erased(bench)
+    count = bench.machine.instructions
+    bench.run_for(19 * MS)
+    assert bench.machine.instructions - count < 5
+    bench.run_for(2 * MS)
+    assert bench.machine.instructions - count > 1000
+
+
+def test_bus_writes_to_the_flash_are_ignored_or_a_fault() -> None:
+    bench = Bench()
+    assert bench.machine.write(PAGE, 0)
+    assert bench.machine.read(PAGE) == 0xFFFF_FFFF
+    bench["MSC.CTRL"] = 0
+    assert not bench.machine.write(PAGE, 0)
+
+
+FROM_RAM = """
+static volatile uint32_t ticks;
+IN_RAM static void put(uint32_t address, uint32_t word)
+{
+    MSC->WRITECTRL = MSC_WRITECTRL_WREN;
+    MSC->ADDRB = address;
+    MSC->WRITECMD = MSC_WRITECMD_LADDRIM;
+    if (MSC->STATUS & (MSC_STATUS_INVADDR | MSC_STATUS_LOCKED))
+        return;
+    while (!(MSC->STATUS & MSC_STATUS_WDATAREADY))
+        ;
+    MSC->WDATA = word;
+    MSC->WRITECMD = MSC_WRITECMD_WRITEONCE;
+    while (MSC->STATUS & MSC_STATUS_BUSY)
+        ticks++;
+    MSC->WRITECTRL = 0;
+}
+int main(void)
+{
+    MSC->LOCK = 0x1B71;
+    for (uint32_t n = 0; n < 8; n++)
+        put(0x80000 + 4 * n, n * 0x01010101u);
+    RESULT[0] = ticks;
+    RESULT[1] = 1;
+    return 0;
+}
+"""
+
+
+@needs_compiler
+def test_a_program_in_ram_writes_the_flash_and_goes_on_meanwhile(tmp_path: Path) -> None:
+    bench = Bench(image=compiled(FROM_RAM, tmp_path))
+    began = bench.now
+    bench.run_for(MS)
+    assert bench.machine.read(0x2001_0004) == 1
+    assert [bench.machine.read(PAGE + 4 * n) for n in range(8)] == [
+        n * 0x0101_0101 for n in range(8)
+    ]
+    ticks = bench.machine.read(0x2001_0000)
+    assert ticks is not None
+    assert 100 < ticks < 8 * 20 * 14 // 5  # it polled all the time
+    times = [item.time_ps for item in bench.out(Kind.FLASH)]
+    assert len(times) == 8
+    assert 8 * 20 * US < times[-1] + 20 * US - began < 8 * 28 * US
+
+
+# -- reading ---------------------------------------------------------------------------------------
+
+NOP = 0xBF00
+
+
+def cycles_of_a_loop(*, mode: int, disabled: bool = False, nops: int = 40) -> float:
+    """Cycles of an instruction in a loop of ``nops`` (each 1 cycle) and a branch."""
+    branch = 0xE000 | (-(nops + 2) & 0x7FF)
+    bench = Bench(*[NOP] * nops, branch)
+    bench["MSC.READCTRL"] = mode | disabled << 3
+    bench.run_for(100 * US)
+    count, cycles = bench.machine.instructions, bench.machine.cycles
+    bench.run_for(1000 * US)
+    return (bench.machine.cycles - cycles) / (bench.machine.instructions - count)
+
+
+def test_wait_states_cost_nothing_inside_the_cache() -> None:
+    assert cycles_of_a_loop(mode=4) == pytest.approx(cycles_of_a_loop(mode=0), rel=1e-3)
+
+
+def test_without_cache_straight_code_takes_a_word_in_1_plus_wait_states() -> None:
+    fast = cycles_of_a_loop(mode=0, disabled=True)
+    slow = cycles_of_a_loop(mode=4, disabled=True)
+    assert fast < 1.1
+    # Two instructions a word; a word each three cycles.
+    assert slow == pytest.approx(1.5, rel=0.1)
+
+
+def test_a_loop_larger_than_512_bytes_does_not_stay_in_the_cache() -> None:
+    assert cycles_of_a_loop(mode=4, nops=500) > 1.3
+    assert cycles_of_a_loop(mode=4, nops=200) < 1.1
+
+
+def test_the_performance_counters_count_hits_and_misses() -> None:
+    bench = Bench(*[NOP] * 40, 0xE000 | (-42 & 0x7FF))
+    bench["MSC.READCTRL"] = 1
+    bench.command("MSC.CMD.INVCACHE")
+    bench.command("MSC.CMD.STARTPC")
+    assert bench.is_set("MSC.STATUS.PCRUNNING")
+    bench.run_for(100 * US)
+    bench.command("MSC.CMD.STOPPC")
+    hits, misses = bench["MSC.CACHEHITS"], bench["MSC.CACHEMISSES"]
+    assert 20 <= misses <= 24
+    assert hits > 500
+    bench.run_for(100 * US)
+    assert bench["MSC.CACHEHITS"] == hits
+
+
+def test_a_data_access_to_the_flash_has_its_wait_states() -> None:
+    bench = Bench()
+
+    def cost(mode: int) -> int:
+        bench["MSC.READCTRL"] = mode
+        before = bench.machine.cycles
+        bench.machine.read(PAGE)
+        return bench.machine.cycles - before
+
+    assert cost(4) - cost(0) == 2
+    assert cost(1) - cost(0) == 1
