@@ -154,7 +154,9 @@ SECTIONS {
         @IRQS@
         *(.text*) *(.rodata*) . = ALIGN(4); data_from = .;
     }
-    .data 0x20000000 : AT(data_from) { data_start = .; *(.data*) *(.code_in_ram*) . = ALIGN(4); data_end = .; }
+    .data 0x20000000 : AT(data_from) {
+        data_start = .; *(.data*) *(.code_in_ram*) . = ALIGN(4); data_end = .;
+    }
     .bss : { *(.bss*) }
 }
 """
