@@ -263,7 +263,7 @@ int32_t iss_i2c_slave(IssMachine *machine, int32_t unit, int32_t what, int32_t b
     switch (what) {
     case 0: return part->i2c_slave_start(unit, byte);
     case 1: return part->i2c_slave_write(unit, byte);
-    case 2: return part->i2c_slave_read(unit);
+    case 2: return part->i2c_slave_read(unit, byte);
     case 3: return part->i2c_slave_stop(unit), 0;
     default: return part->i2c_slave_poll(unit);
     }
@@ -271,7 +271,7 @@ int32_t iss_i2c_slave(IssMachine *machine, int32_t unit, int32_t what, int32_t b
 
 void iss_i2c_answer(IssMachine *machine, int32_t unit, int32_t acknowledged, int32_t data) {
     if (machine->part)
-        machine->part->i2c_answer(unit, acknowledged != 0, data);
+        machine->part->i2c_answer(unit, acknowledged, data);
 }
 
 void iss_analog_changed(IssMachine *machine) {

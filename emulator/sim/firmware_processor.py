@@ -134,13 +134,8 @@ class FirmwareProcessor:
 
     def catch_up(self) -> None:
         """Bring the machine to the kernel's time, before something is done to its inputs."""
-        while self.machine.now_ps < self.env.now:
-            before_ps = self.machine.now_ps
-            stop = self._run_machine(self.env.now)
-            if stop.reason is StopReason.LOCKED_UP or self.env.paused:
-                break
-            if stop.now_ps == before_ps and stop.reason is StopReason.TIME:
-                break
+        if self.machine.now_ps < self.env.now:
+            self._run_machine(self.env.now)
 
     def wake(self) -> None:
         """Something was done to the machine's inputs: a sleeping one is to be looked at."""
@@ -193,8 +188,6 @@ class FirmwareProcessor:
     def _until(self) -> int:
         """Nothing else happens before this time."""
         now_ps, horizon = self.env.now, self.env.horizon()
-        if self.machine.asleep:
-            return now_ps  # what is due; it must not be ahead when an input comes
         if horizon is None:
             return now_ps + LOOK_AHEAD_PS
         if horizon <= now_ps:

@@ -28,6 +28,8 @@ class Msc;
 class Gpio;
 class Ebi;
 class Prs;
+class I2c;
+struct Interfaces;
 
 enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFXO, LFRCO, ULFRCO };
 constexpr int CLOCKS = 11;
@@ -124,10 +126,10 @@ public:
     void uart_receive(int unit, uint32_t data, uint32_t flags);
     int i2c_slave_start(int unit, int address_byte);
     int i2c_slave_write(int unit, int byte);
-    int i2c_slave_read(int unit);
+    int i2c_slave_read(int unit, bool acknowledged);
     int i2c_slave_stop(int unit);
     int i2c_slave_poll(int unit);
-    void i2c_answer(int unit, bool acknowledged, int data);
+    void i2c_answer(int unit, int acknowledged, int data);
 
     // What the core's system says.
     void reset_requested() override;
@@ -146,6 +148,8 @@ public:
     Gpio *gpio = nullptr;
     Ebi *ebi = nullptr;
     Prs *prs = nullptr;
+    std::shared_ptr<Interfaces> interfaces;  // those that the outside talks to
+    I2c *i2c_unit(int unit) const;
 
     // Takes ownership of a peripheral.
     template <class Unit> Unit *add(Unit *unit) {
@@ -171,7 +175,6 @@ private:
     int64_t owed_cycles = 0;       // made while it stood, to be spent when it runs
     bool standing = true, stop_wanted = false, asleep = false, locked = false;
     uint32_t wanted_reset = 0;
-    int slow_ratio = 1;            // HFCORECLK to HFPERCLK
     std::vector<std::unique_ptr<Peripheral>> owned;
     Peripheral *slots[SLOTS] = {};
     std::vector<uint8_t> own_information;
@@ -190,7 +193,6 @@ private:
     void perform_reset();
     bool access_allowed(const Peripheral &unit);
     int64_t bus_wait(const Peripheral &unit, bool write) const;
-    void set_bus_waits();
 };
 
 // Makes the units of interfaces.cpp: serial, counting, analog, DMA.

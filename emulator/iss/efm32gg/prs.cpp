@@ -20,6 +20,13 @@ bool Prs::selects(int channel, int source, int signal) const {
            (int)take(control, CH0_CTRL_SIGSEL) == signal;
 }
 
+bool Prs::listens(int source, int signal) const {
+    for (int channel = 0; channel < CHANNELS; channel++)
+        if (selects(channel, source, signal))
+            return true;
+    return false;
+}
+
 // What a channel's edge detector sees; SWLEVEL inverts (13.3.2).
 bool Prs::input(int channel) const {
     const uint32_t control = reg(CH0_CTRL + 4 * (uint32_t)channel);

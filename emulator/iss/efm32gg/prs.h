@@ -19,6 +19,8 @@ public:
     // the numbers of SOURCESEL and SIGSEL.
     void set(int source, int signal, bool level);
     void pulse(int source, int signal);
+    // Whether a channel has chosen that signal: units that count lazily ask.
+    bool listens(int source, int signal) const;
     bool level(int channel) const { return levels >> channel & 1; }
 
 private:

@@ -121,6 +121,26 @@ class Bench:
         return self
 
 
+def asleep(mode: int = 1) -> Bench:
+    """A part that sleeps in EM1 or EM2, and again after every interrupt, of which none is served.
+
+    Its registers can be reached; interrupts are enabled in the NVIC and masked in the core.
+    """
+    bench = Bench(0xB672, WFI, 0xE7FD)  # CPSID i; loop: WFI
+    bench.machine.reset(POWER_ON)
+    for address, value in (
+        (0xE000_ED10, 4 if mode > 1 else 0),
+        (0xE000_E100, 0xFFFF_FFFF),
+        (0xE000_E104, 0xFFFF_FFFF),
+    ):
+        bench.machine.write(address, value)
+    if mode == 2:
+        bench.command("CMU.OSCENCMD.LFRCOEN")  # without an oscillator it is EM3
+    bench.run_for(START_UP + 200 * US)
+    assert bench.machine.energy_mode == mode
+    return bench
+
+
 COMPILER = shutil.which("arm-none-eabi-gcc")
 needs_compiler = pytest.mark.skipif(
     COMPILER is None, reason="arm-none-eabi-gcc is not installed (Debian: gcc-arm-none-eabi)"

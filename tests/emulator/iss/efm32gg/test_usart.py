@@ -1,0 +1,243 @@
+"""USART and UART: bauds to the picosecond, frames, buffers, flags, routes."""
+
+from fractions import Fraction
+
+import pytest
+
+from cubestack.emulator.iss.machine import Kind
+
+from .bench import Bench, S, asleep, mask_of
+
+HZ = 14_000_000
+PUSH_PULL, INPUT = 4, 1
+PF6, PF7 = 5 * 16 + 6, 5 * 16 + 7
+UART0 = 3
+
+
+def uart(clkdiv: int = 0, frame: int = 0x1005, control: int = 0) -> Bench:
+    """UART0 on PF6 and PF7, both directions on."""
+    bench = Bench().clock("UART0", "GPIO")
+    bench["GPIO.PF_MODEL"] = PUSH_PULL << 24 | INPUT << 28
+    bench["UART0.CTRL"] = control
+    bench["UART0.FRAME"] = frame
+    bench["UART0.CLKDIV"] = clkdiv
+    bench["UART0.ROUTE"] = 3
+    bench["UART0.CMD"] = 0x5
+    return bench
+
+
+def bit_ps(clkdiv: int, oversampling: int = 16) -> Fraction:
+    return Fraction(oversampling * (256 + clkdiv), 256) * S / HZ
+
+
+def sent(bench: Bench) -> list[int]:
+    return [item.value for item in bench.out(Kind.UART)]
+
+
+@pytest.mark.parametrize("clkdiv", [0, 64, 3648, 14 << 8 | 0xC0, 0x1FFFC0])
+@pytest.mark.parametrize(("ovs", "oversampling"), [(0, 16), (1, 8), (2, 6), (3, 4)])
+def test_the_baud_is_exact(clkdiv: int, ovs: int, oversampling: int) -> None:
+    bench = uart(clkdiv, control=ovs << 5)
+    bench["UART0.TXDATA"] = 0x5A
+    frame_ps = 10 * bit_ps(clkdiv, oversampling)
+    [item] = bench.out(Kind.UART)
+    assert (item.unit, item.value) == (UART0 | PF6 << 8, 0x5A)
+    assert item.extra in (int(frame_ps), int(frame_ps) + 1)
+
+
+def test_characters_back_to_back_do_not_drift() -> None:
+    bench = uart(3648 & ~0x3F)
+    bench["UART0.TXDATA"] = 0
+    starts = []
+    for count in range(200):
+        while not bench.is_set("UART0.STATUS.TXBL"):
+            bench.run_for(10**7)
+        bench["UART0.TXDATA"] = count
+        starts += [item.time_ps for item in bench.out(Kind.UART)]
+    frame_ps = 10 * bit_ps(3648)
+    assert len(starts) > 190
+    for count, start in enumerate(starts):
+        assert abs(start - starts[0] - count * frame_ps) <= 1
+
+
+@pytest.mark.parametrize(
+    ("frame", "halves"),
+    [
+        (0x1005, 20),  # 8N1
+        (0x1205, 22),  # 8E1
+        (0x3305, 24),  # 8O2
+        (0x2005, 21),  # 8N1.5
+        (0x0004, 17),  # 7N0.5
+        (0x1006, 22),  # 9N1
+        (0x1001, 12),  # 4N1
+    ],
+)
+def test_frame_formats(frame: int, halves: int) -> None:
+    bench = uart(0, frame)
+    bench["UART0.TXDATAX"] = 0x1FF
+    [item] = bench.out(Kind.UART)
+    assert item.extra == int(halves * bit_ps(0) / 2)
+    assert item.value == (1 << ((frame & 15) + 3)) - 1
+
+
+def test_two_characters_wait_behind_the_one_that_goes_and_a_third_is_an_overflow() -> None:
+    bench = uart()
+    for byte in (1, 2, 3):
+        bench["UART0.TXDATA"] = byte
+    assert not bench.is_set("UART0.IF.TXOF")
+    assert not bench.is_set("UART0.STATUS.TXBL")
+    bench["UART0.TXDATA"] = 4
+    assert bench.is_set("UART0.IF.TXOF")
+    bench.run_for(11 * int(bit_ps(0)))
+    assert not bench.is_set("UART0.STATUS.TXC")
+    bench.run_for(20 * int(bit_ps(0)))
+    assert sent(bench) == [1, 2, 3]
+    assert bench.is_set("UART0.STATUS.TXC")
+    assert bench.is_set("UART0.IF.TXC")
+
+
+def test_half_full_raises_the_buffer_level_earlier() -> None:
+    bench = uart(control=mask_of("USART.CTRL.TXBIL"))
+    bench["UART0.TXDATA"] = 1
+    bench["UART0.TXDATA"] = 2
+    assert bench.is_set("UART0.STATUS.TXBL")
+    bench["UART0.TXDATA"] = 3
+    assert not bench.is_set("UART0.STATUS.TXBL")
+
+
+def test_nothing_on_the_wire_without_route_pin_or_clock() -> None:
+    for name, value in (("UART0.ROUTE", 1), ("GPIO.PF_MODEL", 0), ("CMU.HFPERCLKEN0", 1 << 13)):
+        bench = uart()
+        bench[name] = value
+        bench["UART0.TXDATA"] = 1
+        bench.run_for(20 * int(bit_ps(0)))
+        assert sent(bench) == []
+    bench = uart()
+    bench.command("UART0.CMD.TXDIS")
+    bench["UART0.TXDATA"] = 1
+    assert sent(bench) == []
+    bench.command("UART0.CMD.TXEN")
+    assert sent(bench) == [1]
+
+
+def test_a_break_and_what_else_goes_with_a_character() -> None:
+    bench = uart()
+    bench["UART0.TXDATAX"] = mask_of("USART.TXDATAX.TXBREAK") | mask_of("USART.TXDATAX.TXDISAT")
+    assert sent(bench) == [0x10000]
+    bench.run_for(11 * int(bit_ps(0)))
+    assert not bench.is_set("UART0.STATUS.TXENS")
+
+
+def test_received_characters_are_buffered_and_the_third_but_one_is_lost() -> None:
+    bench = uart()
+    bench.machine.uart_receive(UART0, 0x11)
+    assert bench.is_set("UART0.STATUS.RXDATAV")
+    assert not bench.is_set("UART0.STATUS.RXFULL")
+    bench.machine.uart_receive(UART0, 0x22)
+    assert bench.is_set("UART0.STATUS.RXFULL")
+    bench.machine.uart_receive(UART0, 0x33)  # waits in the shift register
+    assert not bench.is_set("UART0.IF.RXOF")
+    bench.machine.uart_receive(UART0, 0x44)
+    assert bench.is_set("UART0.IF.RXOF")
+    assert bench["UART0.RXDATAXP"] == 0x11
+    assert [bench["UART0.RXDATA"] for _ in range(3)] == [0x11, 0x22, 0x44]
+    assert not bench.is_set("UART0.IF.RXUF")
+    assert bench["UART0.RXDATA"] == 0
+    assert bench.is_set("UART0.IF.RXUF")
+
+
+def test_errors_are_flagged_beside_the_character() -> None:
+    bench = uart()
+    bench.machine.uart_receive(UART0, 0x55, 1)
+    bench.machine.uart_receive(UART0, 0x66, 2)
+    assert bench.is_set("UART0.IF.FERR")
+    assert bench.is_set("UART0.IF.PERR")
+    assert bench["UART0.RXDATAX"] == 0x8055
+    assert bench["UART0.RXDATAX"] == 0x4066
+
+
+def test_a_line_at_another_bit_rate_is_a_framing_error() -> None:
+    bench = uart(3648)
+    bench.machine.uart_receive(UART0, 0x55, round(S / bit_ps(3648)) << 8)
+    assert bench["UART0.RXDATAX"] == 0x55
+    bench.machine.uart_receive(UART0, 0x55, 115200 << 8)
+    assert bench["UART0.RXDATAX"] & 0x8000
+
+
+def test_a_character_reaches_whoever_listens_at_the_pin() -> None:
+    bench = uart()
+    bench.machine.uart_receive(0x100 | PF6, 0x11)
+    assert not bench.is_set("UART0.STATUS.RXDATAV")
+    bench.machine.uart_receive(0x100 | PF7, 0x11)
+    assert bench["UART0.RXDATA"] == 0x11
+    bench["GPIO.PF_MODEL"] = PUSH_PULL << 24
+    bench.machine.uart_receive(0x100 | PF7, 0x11)
+    assert not bench.is_set("UART0.STATUS.RXDATAV")
+
+
+def test_double_registers_carry_two() -> None:
+    bench = uart()
+    bench["UART0.TXDOUBLE"] = 0x4241
+    bench.run_for(22 * int(bit_ps(0)))
+    assert sent(bench) == [0x41, 0x42]
+    bench.machine.uart_receive(UART0, 0x31)
+    bench.machine.uart_receive(UART0, 0x32)
+    assert bench["UART0.RXDOUBLEXP"] == 0x32_0031
+    assert bench["UART0.RXDOUBLE"] == 0x3231
+
+
+def test_loopback_hears_itself() -> None:
+    bench = uart(control=mask_of("USART.CTRL.LOOPBK"))
+    bench["UART0.TXDATA"] = 0xA5
+    bench.run_for(9 * int(bit_ps(0)))
+    assert not bench.is_set("UART0.STATUS.RXDATAV")
+    bench.run_for(2 * int(bit_ps(0)))
+    assert bench["UART0.RXDATA"] == 0xA5
+
+
+def test_multiprocessor_mode_passes_addresses_only() -> None:
+    bench = uart(frame=0x1006, control=mask_of("USART.CTRL.MPM") | mask_of("USART.CTRL.MPAB"))
+    bench.command("UART0.CMD.RXBLOCKEN")
+    bench.machine.uart_receive(UART0, 0x055)
+    assert not bench.is_set("UART0.STATUS.RXDATAV")
+    bench.machine.uart_receive(UART0, 0x1AA)
+    assert bench.is_set("UART0.IF.MPAF")
+    assert bench["UART0.RXDATAX"] == 0x1AA
+
+
+def test_receive_and_transmit_have_interrupts_of_their_own() -> None:
+    bench = uart()
+    pending = 0xE000_E200
+    bench["UART0.IEN"] = mask_of("USART.IEN.RXDATAV")
+    bench.machine.uart_receive(UART0, 1)
+    assert bench.machine.read(pending) == 1 << 20
+    bench["UART0.IEN"] = mask_of("USART.IEN.TXBL")
+    bench.run_for(1000)
+    value = bench.machine.read(pending)
+    assert value is not None
+    assert value & 1 << 21
+
+
+def test_spi_master_sends_words_and_hears_an_idle_line() -> None:
+    bench = Bench().clock("USART1", "GPIO")
+    bench["GPIO.PD_MODEL"] = PUSH_PULL | INPUT << 4
+    bench["USART1.CTRL"] = mask_of("USART.CTRL.SYNC")
+    bench["USART1.CLKDIV"] = 256
+    bench["USART1.ROUTE"] = 0xB | 1 << 8
+    bench["USART1.CMD"] = 0x15
+    bench["USART1.TXDATA"] = 0x9F
+    [item] = bench.out(Kind.SPI)
+    assert item.value == 0x9F
+    assert item.extra == 8 * 4 * S // HZ  # 14 MHz / (2 * (1 + 256 / 256))
+    bench.run_for(9 * 4 * S // HZ)
+    assert bench["USART1.RXDATA"] == 0xFF
+
+
+def test_asleep_in_em2_a_uart_hears_nothing() -> None:
+    bench = asleep(mode=2)
+    bench.clock("UART0", "GPIO")
+    bench["GPIO.PF_MODEL"] = INPUT << 28
+    bench["UART0.ROUTE"] = 1
+    bench["UART0.CMD"] = 1
+    bench.machine.uart_receive(UART0, 1)
+    assert not bench.peek("UART0.STATUS") & mask_of("USART.STATUS.RXDATAV")
