@@ -3,13 +3,13 @@
 The peripherals are in the machine, down to their registers; here are the wires.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.bus.uart import Uart, UartTap
 from cubestack.emulator.camera.common.star_sensor import StarSensor
-from cubestack.emulator.iss.machine import Kind, Machine, Outgoing
+from cubestack.emulator.iss.machine import REGISTERS, Kind, Machine, Outgoing
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
@@ -78,6 +78,25 @@ class SerialWire(UartTap):
         machine, unit = self.processor.machine, BY_PIN | self.rx
         rate = self._uart.form.baud << RATE_SHIFT
         self.processor.give(lambda: machine.uart_receive(unit, byte, flags | rate))
+
+
+@dataclass(frozen=True)
+class Core:
+    """The core's registers, for upsets."""
+
+    processor: FirmwareProcessor
+
+    @property
+    def registers(self) -> Mapping[str, int]:
+        """Those that hold state, and how many bits they have."""
+        special = {"xpsr": 32, "primask": 1, "basepri": 8, "faultmask": 1, "control": 2}
+        return {name: special.get(name, 32) for name in REGISTERS if name != "sp"}
+
+    def flip(self, register: str, bit: int) -> None:
+        """Turn over a bit, now."""
+        machine = self.processor.machine
+        value = machine.register(register) ^ 1 << bit
+        self.processor.give(lambda: machine.set_register(register, value))
 
 
 @dataclass(eq=False)

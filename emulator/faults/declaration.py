@@ -22,6 +22,7 @@ class Site(Enum):
     FPGA = "FPGA"
     SUPPLY = "supply channel"
     PROCESSOR = "processor"
+    CORE = "core of a processor with own firmware"
 
 
 @dataclass(frozen=True)

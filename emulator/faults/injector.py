@@ -1,7 +1,7 @@
 """Injects faults into a board: at once or at a virtual time, for a while or for ever."""
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from cubestack.emulator.faults import parts, table
@@ -196,8 +196,13 @@ class Faults:
             case Site.PROCESSOR:
                 return parts.ProcessorFaults(*who, sites.resets[target])
             case Site.MEMORY:
-                pins = None if engine is None else self._pins
-                return parts.MemoryFaults(*who, sites.all_memories()[target], engine, pins)
+                pins = None if engine is None else (lambda: self._pins)
+                changed = partial(sites.changed, target)
+                memory = sites.all_memories()[target]
+                return parts.MemoryFaults(*who, memory, engine, pins, changed)
+            case Site.CORE:
+                assert sites.core is not None
+                return parts.CoreFaults(*who, sites.core)
         assert engine is not None
         match site:
             case Site.CAMERA:
@@ -213,5 +218,7 @@ class Faults:
     def _pins(self) -> PinFaults:
         """All pins of the FPGA: only one can stand before the processor."""
         assert self._sites.engine is not None
-        self._sites.processor.fpga = pins = PinFaults(self._env, self.report, self._sites.engine)
+        self._sites.processor.fpga = pins = PinFaults(
+            self._env, self.report, self._sites.engine, self._sites.engine.wiring.data
+        )
         return pins

@@ -14,7 +14,7 @@ from cubestack.emulator.faults.injection import Injection, Mechanism, Report, ac
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.pixels import FaultySource
 from cubestack.emulator.faults.seu import flip_bit
-from cubestack.emulator.faults.sites import CameraSite
+from cubestack.emulator.faults.sites import CameraSite, CoreSite
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
@@ -94,21 +94,29 @@ class MemoryFaults(Mechanism):
         report: Report,
         memory: NDArray[np.uint8],
         engine: RtlEngine | None = None,
-        pins: PinFaults | None = None,
+        pins: Callable[[], PinFaults] | None = None,
+        changed: Callable[[int, int], None] = lambda _first, _count: None,
     ) -> None:
-        """``pins`` says when the FPGA's memories are read; None without an FPGA."""
+        """Stand at ``memory``.
+
+        ``pins`` give what says when the FPGA's memories are read; None without an FPGA. ``changed``
+        is told of the first byte that was changed, and of how many.
+        """
         super().__init__(env, report)
         self._memory = memory
         self._engine = engine
         self._stuck: dict[Injection, tuple[int, int]] = {}
-        self._read_by_strobes = pins is not None
-        if pins is not None:
-            pins.around_reads.append(self._hold)
+        self._pins, self._holding, self._changed = pins, False, changed
 
     def prepare(self, injection: Injection) -> None:
         """Refuse stuck bits where no reading can be noticed; FaultError."""
-        if isinstance(injection.fault, table.MemoryStuck) and not self._read_by_strobes:
+        if not isinstance(injection.fault, table.MemoryStuck):
+            return
+        if self._pins is None:
             raise FaultError("memory-stuck: only memories of a device with an FPGA can have it")
+        if not self._holding:
+            self._holding = True
+            self._pins().around_reads.append(self._hold)
 
     def begin(self, injection: Injection) -> None:
         """Act from now on."""
@@ -143,6 +151,7 @@ class MemoryFaults(Mechanism):
 
     def _flip(self, injection: Injection, place: int) -> None:
         flip_bit(self._memory, place)
+        self._changed(place // 8, 1)
         self.report(self.env.now, injection, f"byte {place // 8:#x}, bit {place % 8}")
 
     def _upsets(self, injection: Injection, fault: table.MemoryUpsets) -> Steps:
@@ -161,6 +170,7 @@ class MemoryFaults(Mechanism):
                 places = generator.integers(bits, size=generator.poisson(per_s * BATCH_S))
                 masks = np.left_shift(1, places % 8).astype(np.uint8)
                 np.bitwise_xor.at(self._memory, places // 8, masks)
+                self._changed(0, self._memory.size)
                 self.report(self.env.now, injection, f"{len(places)} bits")
 
     def _hold(self) -> None:
@@ -169,6 +179,7 @@ class MemoryFaults(Mechanism):
             assert isinstance(fault, table.MemoryStuck)
             if self._memory[address] >> bit & 1 != fault.level:
                 flip_bit(self._memory, 8 * address + bit)
+                self._changed(address, 1)
                 text = f"byte {address:#x}, bit {bit} does not hold"
                 self.report(self.env.now, injection, text)
 
@@ -215,6 +226,48 @@ class RegisterFaults(Mechanism):
         places = [
             (name, bit) for name, bits in self.engine.registers.items() for bit in range(bits)
         ]
+        while True:
+            wait_s = float(injection.generator.exponential(1 / (fault.rate * len(places))))
+            yield self.env.timeout(max(1, round(wait_s * PS_PER_S)))
+            if injection not in self.injections:
+                return
+            self._flip(injection, *places[int(injection.generator.integers(len(places)))])
+
+
+@dataclass(eq=False)
+class CoreFaults(Mechanism):
+    """Bits of a core's registers that turn over."""
+
+    core: CoreSite
+
+    def prepare(self, injection: Injection) -> None:
+        """Refuse a register that is none; FaultError."""
+        if isinstance(injection.fault, table.CoreFlip):
+            self._place(injection, injection.fault)
+
+    def begin(self, injection: Injection) -> None:
+        """Act from now on."""
+        fault = injection.fault
+        if isinstance(fault, table.CoreFlip):
+            self._flip(injection, *self._place(injection, fault))
+        elif isinstance(fault, table.CoreUpsets):
+            self.injections.append(injection)
+            self.env.process(self._upsets(injection, fault))
+
+    def _place(self, injection: Injection, fault: table.CoreFlip) -> tuple[str, int]:
+        registers, name = self.core.registers, fault.register
+        if name is None:
+            name = list(registers)[injection.drawn(None, len(registers), 1)]
+        if name not in registers:
+            raise FaultError(f"core-flip: no register {name!r}, only {', '.join(registers)}")
+        return name, injection.drawn(fault.bit, registers[name], 2)
+
+    def _flip(self, injection: Injection, register: str, bit: int) -> None:
+        self.core.flip(register, bit)
+        self.report(self.env.now, injection, f"{register}[{bit}]")
+
+    def _upsets(self, injection: Injection, fault: table.CoreUpsets) -> Steps:
+        places = [(name, bit) for name, bits in self.core.registers.items() for bit in range(bits)]
         while True:
             wait_s = float(injection.generator.exponential(1 / (fault.rate * len(places))))
             yield self.env.timeout(max(1, round(wait_s * PS_PER_S)))

@@ -25,10 +25,10 @@ class PinFaults(Mechanism, FpgaPort):
         around_reads: called before and after bytes are taken from the FPGA.
     """
 
-    def __init__(self, env: Kernel, report: Report, engine: FpgaPort) -> None:
-        """Stand before ``engine``."""
+    def __init__(self, env: Kernel, report: Report, engine: FpgaPort, data: str = "") -> None:
+        """Stand before ``engine``; ``data`` are the pins by which bytes are read one by one."""
         super().__init__(env, report)
-        self._engine = engine
+        self._engine, self._data = engine, data
         self._forced: dict[str, int] = {}
         self._driven: dict[str, int] = {}
         self._rose_ps: dict[str, int] = {}
@@ -72,6 +72,9 @@ class PinFaults(Mechanism, FpgaPort):
 
     def get_pin(self, name: str) -> int:
         """Level of a pin as the processor sees it."""
+        if name == self._data:
+            for act in self.around_reads:
+                act()
         level = self._engine.get_pin(name)
         for injection, fault in self._on(name):
             match fault:

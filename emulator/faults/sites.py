@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,17 @@ class CameraSite:
     channel: str
 
 
+class CoreSite(Protocol):
+    """Registers of a processor that executes machine code."""
+
+    @property
+    def registers(self) -> Mapping[str, int]:
+        """Bits of each register, by name."""
+
+    def flip(self, register: str, bit: int) -> None:
+        """Turn over a bit."""
+
+
 @dataclass(frozen=True)
 class Sites:
     """Everything of a board that a fault can hit; its keys are the targets.
@@ -46,6 +58,8 @@ class Sites:
         cameras: by their names at the engine.
         resets: what resets the processor, by what brings it about.
         memories: bytes of each memory, beside those at the FPGAs.
+        core: of a processor with own firmware; None for a modelled program.
+        changed: told of a memory, and of which bytes, that were changed: (name, first, count).
     """
 
     kernel: Kernel
@@ -58,6 +72,8 @@ class Sites:
     cameras: Mapping[str, CameraSite] = field(default_factory=dict)
     resets: Mapping[str, Callable[[], None]] = field(default_factory=dict)
     memories: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    core: CoreSite | None = None
+    changed: Callable[[str, int, int], None] = lambda _name, _first, _count: None
 
     def targets(self, site: Site) -> tuple[str, ...]:
         """Names of everything that faults of a kind can hit, the usual one first."""
@@ -69,6 +85,7 @@ class Sites:
             Site.CONTROL: self.controls,
             Site.PROCESSOR: self.resets,
             Site.MEMORY: self.all_memories(),
+            Site.CORE: () if self.core is None else ("core",),
         }
         if self.engine is not None:
             names |= {Site.ACKNOWLEDGE: self.engine.wiring.acknowledges, Site.FPGA: ("fpga",)}

@@ -201,6 +201,21 @@ class ProcessorReset(Fault, kind="processor-reset", site=Site.PROCESSOR, momenta
     """The processor starts anew, for the reason that is its target."""
 
 
+@dataclass(frozen=True)
+class CoreFlip(Fault, kind="core-flip", site=Site.CORE, momentary=True):
+    """One bit of a register of the processor's core turns over."""
+
+    register: str | None = choice(None, "name of the register, as debuggers have it")
+    bit: int | None = place("bit of it", 31)
+
+
+@dataclass(frozen=True)
+class CoreUpsets(Fault, kind="core-upsets", site=Site.CORE):
+    """Bits of the core's registers turn over at random places and times."""
+
+    rate: float = number(1e-2, "mean rate of each bit", "/s", 1e-15, 1e3)
+
+
 #: Every fault by its kind, in the order of their declarations.
 FAULTS: dict[str, type[Fault]] = {fault.kind: fault for fault in Fault.__subclasses__()}
 

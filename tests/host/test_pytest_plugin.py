@@ -75,8 +75,8 @@ def test_seed_and_profile_are_the_marker_s_or_the_command_line_s(run: Run) -> No
 
 
 WRONG_MARKERS = {
-    "(3)": "marker cubestack takes scene, seed, faults, layout, profile, set",
-    "(sead=3)": "marker cubestack takes scene, seed, faults, layout, profile, set",
+    "(3)": "marker cubestack takes scene, seed, faults, layout, firmware, profile, set",
+    "(sead=3)": "marker cubestack takes scene, seed, faults, layout, firmware, profile, set",
     "(faults='seed = -1')": "seed must be a whole number from 0, not -1",
     "(layout='2')": "layout is an option of cubestar, not of aramis",
     "(profile='best')": "profile of aramis must be one of published, extended, not 'best'",

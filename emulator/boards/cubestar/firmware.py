@@ -10,12 +10,12 @@ from functools import partial
 
 from cubestack.emulator.boards.contract import NODE_PROTOCOL
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
-from cubestack.emulator.boards.firmware import CameraWire, SerialWire, SlaveWire
+from cubestack.emulator.boards.firmware import CameraWire, Core, SerialWire, SlaveWire
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.iss.image import Image
-from cubestack.emulator.iss.machine import Kind, Machine, Outgoing
+from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Kind, Machine, Outgoing
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling, FpgaPin
@@ -138,7 +138,15 @@ class CubeStarFirmwareBoard(CubeStarStack):
             sites,
             resets=self._resets(),
             memories={**sites.memories, "ram": machine.ram, "flash": machine.flash},
+            core=Core(self.processor),
+            changed=self._memory_changed,
         )
+
+    def _memory_changed(self, name: str, first: int, count: int) -> None:
+        """What was decoded of code that has changed is wrong."""
+        bases = {"ram": RAM_BASE, "flash": FLASH_BASE}
+        if name in bases:
+            self.machine.invalidate(bases[name] + first, count)
 
     def _resets(self) -> dict[str, Callable[[], None]]:
         """What resets the processor against its program's will, the usual one first."""
