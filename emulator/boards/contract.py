@@ -93,6 +93,9 @@ class Board(ABC):
     random_stream: ClassVar[tuple[int, ...]] = ()
     """What its random numbers are seeded with beside ``seed``."""
 
+    firmware: str = ""
+    """Own firmware that it runs, as its ``firmware`` option takes it, hash included."""
+
     engine: RtlEngine | None = None
     processor: Microcontroller
     program: Program
@@ -164,6 +167,10 @@ class Board(ABC):
     def probes(self) -> dict[str, int | str]:
         """What a trace shows of the firmware, as it is now, by name."""
         return {"awake": int(not self.processor.dozing), "resets": self.processor.resets}
+
+    def tell(self, say: Callable[[str], None]) -> None:
+        """Give ``say`` what own firmware prints by debug channels, and reports of its faults."""
+        del say  # a modelled program has none
 
     def close(self) -> None:
         """Release what the board holds."""

@@ -15,6 +15,7 @@ VECTORS = 8
 """Bytes of the vector table that a start needs: stack pointer and reset vector."""
 
 _BASE = re.compile(r"(.+)@(0[xX][0-9a-fA-F]+|\d+)")
+_HASH = re.compile(r"(.+)#([0-9a-f]{8,64})")
 
 
 class ImageError(ValueError):
@@ -60,6 +61,11 @@ class Image:
         object.__setattr__(self, "hash", digest.hexdigest())
 
     @property
+    def mark(self) -> str:
+        """What ``load_image`` takes behind a file's name, to check that it is this program."""
+        return f"#{self.hash[:16]}"
+
+    @property
     def size(self) -> int:
         """Bytes of it."""
         return sum(len(data) for _, data in self.segments)
@@ -70,14 +76,17 @@ def load_image(name: str | Path, memory: Memory | None = None) -> Image:
 
     Args:
         name: of the file; ``FILE@0xADDRESS`` says where plain bytes belong, by default the flash's
-            start.
+            start; ``#HASH`` behind that is how the program's hash begins, to be checked.
         memory: of the machine.
 
     Raises:
         ImageError: it can not be read, or is no program for the machine.
     """
     memory = memory or Memory()
-    path, base = _split(str(name), memory)
+    text, wanted = str(name), ""
+    if (match := _HASH.fullmatch(text)) and not Path(text).exists():
+        text, wanted = match[1], match[2]
+    path, base = _split(text, memory)
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -95,6 +104,8 @@ def load_image(name: str | Path, memory: Memory | None = None) -> Image:
     else:
         image = Image(((base, data),), path)
     check_image(image, memory)
+    if not image.hash.startswith(wanted):
+        raise ImageError(f"{path} has the hash {image.hash[:16]}, not {wanted} as asked for")
     return image
 
 

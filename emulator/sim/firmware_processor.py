@@ -15,10 +15,11 @@ import simpy
 from cubestack.emulator.iss.machine import NEVER, Kind, Machine, Outgoing, Stop, StopReason
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling
 from cubestack.emulator.sim.fpga_port import FpgaPort
-from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
 
-LOOK_AHEAD_PS = 10 * PS_PER_MS
-"""Longest run of an awake machine: a host that starts to write is heard after no more than that."""
+LOOK_AHEAD_PS = 80 * PS_PER_US
+"""Longest run of a machine. Less than the time of a byte on the wires: what a host begins to send
+while the machine is ahead arrives after that, and from then on nothing is late."""
 
 QUANTUM_PS = 10 * PS_PER_US
 """Run of a machine that has to take turns with another one at the same picosecond."""
@@ -83,6 +84,7 @@ class FirmwareProcessor:
         self._awake = True
         self._active_ps = 0
         self._lines: dict[int, str] = {}
+        self._early: list[Outgoing] = []  # what left the machine while it caught up
         self._locked_up = False
         self.machine.reset(self.power_on)
         self.on_activity(True)
@@ -134,8 +136,11 @@ class FirmwareProcessor:
 
     def catch_up(self) -> None:
         """Bring the machine to the kernel's time, before something is done to its inputs."""
-        if self.machine.now_ps < self.env.now:
+        reached_ps = -1
+        while reached_ps < self.machine.now_ps < self.env.now and not self.env.paused:
+            reached_ps = self.machine.now_ps
             self._run_machine(self.env.now)
+            self._early.extend(self.machine.outbox())
 
     def wake(self) -> None:
         """Something was done to the machine's inputs: a sleeping one is to be looked at."""
@@ -226,7 +231,8 @@ class FirmwareProcessor:
     # --- what leaves the machine ----------------------------------------------------------------
 
     def _empty_outbox(self) -> Steps:
-        for one in self.machine.outbox():
+        early, self._early = self._early, []
+        for one in (*early, *self.machine.outbox()):
             if one.time_ps > self.env.now:
                 yield self.env.timeout(one.time_ps - self.env.now)
             if self._coupling is not None:

@@ -88,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
                 **options,
             )
             stack.callback(emulated.close)
+            emulated.board.tell(say)
             opened.append(emulated)
             device_options.tell_notices(found, options, say)
         if len(opened) == 1:

@@ -246,6 +246,8 @@ def power_up(
     else:
         scene_options(device, scene)  # there are none
     board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
+    if board.firmware:
+        chosen["firmware"] = board.firmware
     return EmulatedDevice(device, board, seed, chosen)
 
 

@@ -69,9 +69,11 @@ def board_as_said(device: AnyDevice, options: Options, given: Mapping[str, Any])
 def running(
     device: AnyDevice, experiment: AnyExperiment, board: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """For each result: the profile that ran, and the switches that differ from it, if any."""
+    """For each result: the firmware or profile that ran, and the switches that differ, if any."""
     if "profile" not in board_options(device, experiment):
         return {}
+    if board.get("firmware"):
+        return {"firmware": str(board["firmware"])}
     profile = board.get("profile", DEFAULT_PROFILE)
     switches = device.switches.of(profile, board.get("set", "")).beside(profile)
     return {"profile": profile, **({"switches": switches} if switches else {})}

@@ -66,7 +66,9 @@ def _open_with(
     if switches != DEFAULT_SWITCHES:
         raise ValueError("own firmware has no profile and no switches: leave them out")
     image = load_image(firmware)
-    return CubeStarFirmwareBoard(scene, image, baud=baud, layout=layout, **common)
+    board = CubeStarFirmwareBoard(scene, image, baud=baud, layout=layout, **common)
+    board.firmware = firmware.partition("#")[0] + image.mark
+    return board
 
 
 def _load_scene(path: Path) -> "SkyView":

@@ -127,6 +127,10 @@ class CubeStarFirmwareBoard(CubeStarStack):
         """Whether anything is under way that does not wait for the host."""
         return any(line.uart.busy for line in self.lines) or not self.processor.waiting
 
+    def tell(self, say: Callable[[str], None]) -> None:
+        """Give ``say`` what the firmware prints, and reports of its faults."""
+        self.processor.console = self.processor.on_fault = say
+
     def close(self) -> None:
         """Release what the board holds."""
         super().close()
