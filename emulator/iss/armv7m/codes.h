@@ -56,6 +56,8 @@ enum Code : uint16_t {
     CODE_COUNT
 };
 
+static_assert(CODE_COUNT <= 256, "Operation::in_it is a byte");
+
 constexpr uint16_t LAST_MARKER = C_REGION_END;    // up to here: no instruction
 
 }  // namespace armv7m

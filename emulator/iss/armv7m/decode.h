@@ -17,4 +17,7 @@ inline bool is_wide(uint32_t half) { return half >> 11 >= 0x1D; }
 Operation decode_16(uint32_t half);
 Operation decode_32(uint32_t first, uint32_t second);
 
+// Operation::stall of the operation that was decoded at `offset` of a piece of code.
+uint8_t address_stall(const Operation &op, const uint8_t *code, uint32_t offset);
+
 }  // namespace armv7m

@@ -9,7 +9,7 @@ namespace narrow {
 
 Operation make(uint32_t code, uint32_t d = 0, uint32_t n = 0, uint32_t m = 0, uint32_t value = 0) {
     Operation op = {};
-    op.code = op.in_it = (uint16_t)code;
+    op.code = op.in_it = (uint8_t)code;
     op.d = (uint8_t)d, op.n = (uint8_t)n, op.m = (uint8_t)m;
     op.value = value;
     op.halves = 1;
@@ -20,7 +20,7 @@ Operation make(uint32_t code, uint32_t d = 0, uint32_t n = 0, uint32_t m = 0, ui
 Operation flagged(uint32_t outside, uint32_t inside, uint32_t d, uint32_t n, uint32_t m = 0,
                   uint32_t value = 0) {
     Operation op = make(outside, d, n, m, value);
-    op.in_it = (uint16_t)inside;
+    op.in_it = (uint8_t)inside;
     return op;
 }
 

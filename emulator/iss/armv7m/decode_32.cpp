@@ -288,7 +288,7 @@ Operation decode(uint32_t first, uint32_t second) {
 
 Operation decode_32(uint32_t first, uint32_t second) {
     Operation op = broad::decode(first, second);
-    op.in_it = op.code >= C_B_EQ && op.code <= C_B_LE ? (uint16_t)C_UNDEFINED : op.code;
+    op.in_it = op.code >= C_B_EQ && op.code <= C_B_LE ? (uint8_t)C_UNDEFINED : (uint8_t)op.code;
     return op;
 }
 

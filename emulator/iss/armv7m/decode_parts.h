@@ -10,7 +10,7 @@ namespace armv7m {
 inline Operation wide(uint32_t code, uint32_t d = 0, uint32_t n = 0, uint32_t m = 0,
                       uint32_t value = 0) {
     Operation op = {};
-    op.code = op.in_it = (uint16_t)code;
+    op.code = op.in_it = (uint8_t)code;
     op.d = (uint8_t)d, op.n = (uint8_t)n, op.m = (uint8_t)m;
     op.value = value;
     op.halves = 2;

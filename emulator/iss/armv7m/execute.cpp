@@ -155,6 +155,7 @@ template <int Mode> void Cpu::loop() {
         op = ops + ((target - base) >> 1); \
         if (UNLIKELY(op->code == C_UNDECODED) && !decode_at(target & ~1u, op)) goto far; \
         if ((refill) < 3 && op->halves == 2 && (target & 2)) now++; \
+        now -= op->stall;    /* the refill hides it */ \
         DISPATCH(); \
     } while (0)
 // What everybody who is called may look at.
@@ -279,6 +280,7 @@ leave:
 #undef LOAD
 #undef LOGIC
 #undef NEXT
+#undef NOT_BEHIND
 #undef NO_REGISTER
 #undef PC
 #undef READ
@@ -295,6 +297,7 @@ leave:
 #undef TEST_NZ
 #undef UNLIKELY
 #undef WAIT_FOR_BUS
+#undef WAIT_FOR_STORE
 #undef WRITE
 
 template void Cpu::loop<0>();

@@ -77,16 +77,14 @@ HANDLE(TBB) {
     const uint32_t address = start + r[op->m];
     READ(uint8_t, address, op->m)
     load_end = -1;
-    now -= 1;    // GO counts it again: 2 and the refill
-    GO(pc + 4 + 2 * value, REFILL_REGISTER);
+    GO(pc + 4 + 2 * value, REFILL_LOADED);    // 2, 1 to add, and the refill
 }
 HANDLE(TBH) {
     const uint32_t pc = PC, start = op->n == 15 ? pc + 4 : r[op->n];
     const uint32_t address = start + 2 * r[op->m];
     READ(uint16_t, address, op->m)
     load_end = -1;
-    now -= 1;
-    GO(pc + 4 + 2 * value, REFILL_REGISTER);
+    GO(pc + 4 + 2 * value, REFILL_LOADED);
 }
 // Folded into a 16-bit instruction before it: no cycle of its own (TRM 3.3.1). Whether there was
 // one shows in the cache of decoded code.

@@ -1,13 +1,21 @@
 // Loads and stores (ARMv7-M ARM A4.6, A4.7; cycles in timing.h). Part of Cpu::loop.
 
-// A single load's or store's start: it waits for a store that is still on the bus.
+// The start of a load: it waits for its address, and for a store that is still on the bus. A single
+// store only waits until its data can follow that store's.
 #define WAIT_FOR_BUS() \
     do { \
+        now += op->stall; \
         if (now < bus_free) now = bus_free; \
+    } while (0)
+#define WAIT_FOR_STORE() \
+    do { \
+        now += op->stall; \
+        if (now + 1 < bus_free) now = bus_free - 1; \
     } while (0)
 #define LAST_LOAD_FEEDS(base_register, index_register) \
     ((base_register) == loaded || (index_register) == loaded)
 #define NO_REGISTER 16u
+#define NOT_BEHIND ((uint32_t)loaded)    // a load with write-back overlaps with none before it
 #define KEEP_SP(number, value) ((number) == 13 ? (value) & ~3u : (value))
 
 // Reads `value` of `type` from `address`; afterwards `now` is behind the load.
@@ -37,14 +45,14 @@
         load_end = now; \
     }
 
-// Writes the low bytes of `value`; `extra` cycles beside the first.
+// Writes the low bytes of `value`; `extra`: whether it takes a cycle more.
 #define WRITE(type, address, value, extra) \
-    WAIT_FOR_BUS(); \
+    WAIT_FOR_STORE(); \
     { \
         constexpr uint32_t bytes = sizeof(type); \
         const Page &page = map[(address) >> 20]; \
         const uint32_t offset = (address) & 0xFFFFF; \
-        const uint32_t late = (extra) && now != load_end; \
+        const uint32_t late = (extra); \
         if (LIKELY(!(offset & (bytes - 1)) && offset < page.write_limit)) { \
             const type content = (type)(value); \
             std::memcpy(page.host + offset, &content, bytes); \
@@ -76,14 +84,14 @@
     } \
     HANDLE(name##_P) { \
         const uint32_t address = r[op->n] + op->value; \
-        READ(type, address, NO_REGISTER) \
+        READ(type, address, NOT_BEHIND) \
         r[op->n] = KEEP_SP(op->n, address); \
         r[op->d] = value, loaded = op->d; \
         NEXT(0); \
     } \
     HANDLE(name##_Q) { \
         const uint32_t address = r[op->n]; \
-        READ(type, address, NO_REGISTER) \
+        READ(type, address, NOT_BEHIND) \
         r[op->n] = KEEP_SP(op->n, address + op->value); \
         r[op->d] = value, loaded = op->d; \
         NEXT(0); \
@@ -109,18 +117,18 @@ LOAD(LDRSB, int8_t)
     } \
     HANDLE(name##_M) { \
         const uint32_t address = r[op->n] + (r[op->m] << op->shift); \
-        WRITE(type, address, r[op->d], 1) \
+        WRITE(type, address, r[op->d], now != load_end) \
         NEXT(0); \
     } \
     HANDLE(name##_P) { \
         const uint32_t address = r[op->n] + op->value; \
-        WRITE(type, address, r[op->d], 0) \
+        WRITE(type, address, r[op->d], now == load_end) \
         r[op->n] = KEEP_SP(op->n, address); \
         NEXT(0); \
     } \
     HANDLE(name##_Q) { \
         const uint32_t address = r[op->n]; \
-        WRITE(type, address, r[op->d], 0) \
+        WRITE(type, address, r[op->d], now == load_end) \
         r[op->n] = KEEP_SP(op->n, address + op->value); \
         NEXT(0); \
     }
@@ -164,7 +172,7 @@ HANDLE(LOAD_USER) {
 }
 HANDLE(STORE_USER) {
     const uint32_t address = r[op->n] + op->value;
-    WAIT_FOR_BUS();
+    WAIT_FOR_STORE();
     r[15] = PC, cycles = now + 1;
     const uint32_t content = op->a == 4 ? r[op->d] : r[op->d] & ((1u << 8 * op->a) - 1);
     const Result result = store(address, op->a, content, false);

@@ -35,6 +35,8 @@ bool Cpu::run_aside(uint32_t pc) {
     if (!fetch_half(pc, first)) return false;
     if (is_wide(first) && !fetch_half(pc + 2, second)) return false;
     aside[0] = is_wide(first) ? decode_32(first, second) : decode_16(first);
+    if (const Region *region = find_region(pc, 2))
+        aside[0].stall = address_stall(aside[0], region->host, pc - region->base);
     aside[1].code = aside[1].in_it = aside[2].code = aside[2].in_it = C_REGION_END;
     operations = aside;
     code_base = pc, code_size = 0;    // every branch leaves
@@ -64,6 +66,7 @@ bool Cpu::decode_at(uint32_t pc, Operation *op) {
         std::memcpy(halves, code.host + offset, offset + 4 <= code_size ? 4 : 2);
         if (is_wide(halves[0]) && offset + 4 > code_size) return false;
         *op = is_wide(halves[0]) ? decode_32(halves[0], halves[1]) : decode_16(halves[0]);
+        op->stall = address_stall(*op, code.host, offset);
         code.marks[offset >> 6] = code.marks[(offset + op->halves * 2 - 1) >> 6] = 1;
         if (!breakpoints.empty() && breakpoint_at(pc)) op->code = op->in_it = C_BREAK;
         return true;

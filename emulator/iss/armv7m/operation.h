@@ -9,7 +9,8 @@ namespace armv7m {
 // codes.h says what the fields mean; all zero is "not decoded yet".
 struct Operation {
     uint16_t code;          // its handler
-    uint16_t in_it;         // its handler in an IT block, where most 16-bit instructions set no flags
+    uint8_t in_it;          // its handler in an IT block, where most 16-bit instructions set no flags
+    uint8_t stall;          // 1: the instruction in front computes the address that it needs
     uint8_t d, n, m, a;
     uint32_t value;
     uint8_t halves;         // its length in half-words

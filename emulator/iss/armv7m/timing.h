@@ -6,13 +6,16 @@
 // How the loop charges loads and stores (section 3.3.2):
 //  - a load takes 2 cycles; 1 if it directly follows a single load whose result is not part of its
 //    address;
-//  - a store takes 1 and goes on in the write buffer: its data phase is the next cycle, and the next
-//    load or store waits for the end of that;
+//  - a store takes 1 and goes on in the write buffer: its data phase is the next cycle; a load that
+//    follows waits for the end of that, another store's data phase follows it;
 //  - with the offset in a register a store takes 2, or 1 directly behind a load;
+//  - with write-back a load overlaps with none before it, and a store directly behind a load takes 2
+//    (not in the TRM; measured on an STM32F103, github.com/jnk0le/random, pipeline cycle test);
+//  - either takes 1 more if the instruction in front of it computes its base or index;
 //  - LDM, STM, LDRD, STRD, PUSH and POP take 1 and 1 for each register, and overlap with nothing;
 //  - unaligned halves and words are 2 or 3 accesses.
 // A branch takes 1 and the refill of the pipeline: 1 where the decoder sees the target (B, BL, CBZ),
-// 2 where it is in a register or a table, 3 where it was loaded; 1 more if a 32-bit instruction
+// 2 where it is in a register, 3 where it was loaded or comes from a table; 1 more if a 32-bit instruction
 // stands there across two words, and 3 at the most.
 
 #pragma once
