@@ -335,9 +335,9 @@ class Machine:
         """A byte for the slave; answers as ``i2c_slave_start``."""
         return self._slave(unit, 1, byte)
 
-    def i2c_slave_read(self, unit: int) -> int | None:
-        """The next byte of the slave; None as above."""
-        return self._slave(unit, 2, 0)
+    def i2c_slave_read(self, unit: int, acknowledged: bool = True) -> int | None:
+        """The next byte of the slave; None as above. ``acknowledged``: was the byte before it."""
+        return self._slave(unit, 2, int(acknowledged))
 
     def i2c_slave_stop(self, unit: int) -> None:
         """The transfer is over."""
