@@ -28,6 +28,7 @@ void Gpio::reset() {
         owner = nullptr;
     for (int port = 0; port < PORTS; port++) {
         ports[port].functions = ports[port].function_levels = 0;
+        modes_changed(port);
         refresh(port, 0xFFFF);
     }
 }
@@ -36,18 +37,18 @@ uint32_t Gpio::mode(int port, int bit) const {
     return reg(at(port, bit < 8 ? PA_MODEL : PA_MODEH)) >> 4 * (bit % 8) & 0xF;
 }
 
-uint32_t Gpio::input_word(int port) const {
-    uint32_t enabled = 0;
-    const uint32_t low = reg(at(port, PA_MODEL)), high = reg(at(port, PA_MODEH));
-    for (int bit = 0; bit < 8; bit++)
-        enabled |= (uint32_t)(low >> 4 * bit & 0xF ? 1 : 0) << bit |
-                   (uint32_t)(high >> 4 * bit & 0xF ? 1 : 0) << (bit + 8);
-    return levels[port] & enabled;
+void Gpio::modes_changed(int port) {
+    uint32_t &enabled = ports[port].enabled;
+    enabled = 0;
+    for (int bit = 0; bit < PINS; bit++)
+        enabled |= (uint32_t)(mode(port, bit) != DISABLED) << bit;
 }
 
 uint32_t Gpio::peek(uint32_t offset) const {
-    if (offset < PORTS * PORT_SIZE && offset % PORT_SIZE == PA_DIN)
-        return input_word((int)(offset / PORT_SIZE));
+    if (offset < PORTS * PORT_SIZE && offset % PORT_SIZE == PA_DIN) {
+        const uint32_t port = offset / PORT_SIZE;
+        return levels[port] & ports[port].enabled;
+    }
     return Peripheral::peek(offset);
 }
 
@@ -112,6 +113,7 @@ void Gpio::write_port(int port, uint32_t offset, uint32_t value) {
                 mask |= 0xFu << 4 * bit;
         uint32_t &modes = reg(at(port, offset));
         modes = (modes & ~mask) | (value & mask);
+        modes_changed(port);
         refresh(port, offset == PA_MODEH ? 0xFF00 : 0x00FF);
         return;
     }

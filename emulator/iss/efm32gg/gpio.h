@@ -41,6 +41,7 @@ private:
         uint32_t functions = 0, function_levels = 0;    // pins that peripherals drive, and how
         uint32_t outside = 0, outside_levels = 0;
         uint32_t driven = 0, driven_levels = 0;         // what the part drives
+        uint32_t enabled = 0;                           // pins whose mode lets them be read
     };
 
     Port ports[PORTS];
@@ -55,7 +56,7 @@ private:
     void refresh(int port, uint32_t pins);
     void set_levels(int port, uint32_t now_levels);
     void edge(int port, int bit, bool level);
-    uint32_t input_word(int port) const;
+    void modes_changed(int port);
     void check_em4(int port, int bit, bool level);
 };
 
