@@ -9,10 +9,6 @@ import pytest
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS, register_at
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
-from cubestack.firmware_model.interface.efm32gg.clocks import CLOCKS
-from cubestack.firmware_model.interface.efm32gg.external_bus import EXTERNAL_BUS
-from cubestack.firmware_model.interface.efm32gg.ports import PORTS
-from cubestack.firmware_model.interface.efm32gg.system import SYSTEM
 from cubestack.firmware_model.interface.efm32gg.table import (
     Instance,
     Layout,
@@ -23,11 +19,7 @@ from cubestack.firmware_model.interface.efm32gg.table import (
 from .bench import Bench
 
 UNITS = [(layout, instance) for layout in LAYOUTS for instance in layout.instances]
-MODELLED = [
-    (layout, instance)
-    for layout, instance in UNITS
-    if layout.modelled and layout in (*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS)
-]
+MODELLED = [(layout, instance) for layout, instance in UNITS if layout.modelled]
 LIVE = {"RMU.RSTCAUSE": 1}
 """Registers that do not have their reset value after power-on, with what they have."""
 
