@@ -5,15 +5,16 @@
 - FPGA: every input from the microcontroller and every output, as they stand after each event of the
   simulation. What happens within one event is not there: the pulses of a transfer loop, and memory
   cycles while a picture is stored.
-- Firmware: whether the processor is awake, and variables that are looked at as a debugger would.
+- Firmware: whether the processor is awake, and variables that are looked at as a debugger would. Of
+  a compiled one, the function that runs and the exception that is served, at their own times.
 
 Times are rounded down to 1 ns.
 """
 
 import heapq
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import count
-from typing import IO, Any
+from typing import IO, Any, Protocol
 
 from vcd import VCDWriter
 
@@ -28,6 +29,17 @@ Probes = Callable[[], Mapping[str, int | str]]
 """Looks at values, always the same ones by name: texts, and numbers of at most 32 bits."""
 
 
+class History(Protocol):
+    """Something that knows when its variables changed."""
+
+    @property
+    def variables(self) -> Mapping[str, int | None]:
+        """Bits of each one by name; None for a text."""
+
+    def take(self) -> Iterable[tuple[int, str, int | str]]:
+        """Changes since the last call: time in ps, variable and value, by time."""
+
+
 class VcdTrace:
     """Writes a VCD file while the simulation runs; attach it before that."""
 
@@ -39,13 +51,18 @@ class VcdTrace:
         uarts: Mapping[str, Uart],
         engine: RtlEngine | None = None,
         probes: Probes = dict,
+        history: History | None = None,
     ) -> None:
-        """Trace ``uarts`` and what ``probes`` see, by names; ``stream`` stays its owner's."""
+        """Trace ``uarts``, what ``probes`` see and what ``history`` knows, by names.
+
+        ``stream`` stays its owner's.
+        """
         self._kernel = kernel
         self._engine = engine
         self._device = device
         self._writer = VCDWriter(stream, timescale="1 ns", version="cubestack", date="")
         self._probes = probes
+        self._history = history
         self._variables: dict[str, Any] = {}
         self._last: dict[str, int | str] = {}
         self._pending: list[tuple[int, int, str, int | str]] = []
@@ -54,6 +71,8 @@ class VcdTrace:
         self._lag_ps = 2 * max((uart.byte_ps for uart in uarts.values()), default=0)
         for name, value in probes().items():
             self.declare(f"firmware.{name}", None if isinstance(value, str) else 32)
+        for name, bits in (history.variables if history is not None else {}).items():
+            self.declare(f"firmware.{name}", bits)
         self._pins: tuple[str, ...] = ()
         if engine is not None:
             self._pins = (*engine.wiring.mcu_pins, *engine.wiring.output_pins)
@@ -95,10 +114,14 @@ class VcdTrace:
 
     def _observed_step(self) -> None:
         self._step()
-        self._look()
-        self._flush(self._kernel.now - self._lag_ps)
+        if not self._kernel.paused:  # a debugger leaves no mark
+            self._look()
+            self._flush(self._kernel.now - self._lag_ps)
 
     def _look(self) -> None:
+        if self._history is not None:
+            for time_ps, name, value in self._history.take():
+                self._change(time_ps, f"firmware.{name}", value)
         for name, value in self._probes().items():
             self._change(self._kernel.now, f"firmware.{name}", value)
         if self._engine is not None:

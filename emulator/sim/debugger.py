@@ -27,19 +27,24 @@ from cubestack.emulator.iss.gdb.target import (
     WatchKind,
 )
 from cubestack.emulator.iss.gdb.target import Stop as Reason
-from cubestack.emulator.iss.machine import NEVER, Machine, Stop, StopReason, Watch
-from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.emulator.iss.machine import Machine, Stop, StopReason, Watch, WatchHit
+from cubestack.emulator.sim.virtual_time import Kernel
 
 WATCHES: Mapping[WatchKind, str] = {"write": "w", "read": "r", "access": "a"}
 
-VECTOR_TABLE = 0xE000_ED08
 CFSR = 0xE000_ED28
-"""Addresses of VTOR and CFSR: ARMv7-M Architecture Reference Manual, B3.2.2."""
+"""Address of the fault status: ARMv7-M Architecture Reference Manual, B3.2.2."""
 
-FAULTS = {3: SIGSEGV, 4: SIGSEGV, 5: SIGBUS, 6: SIGILL}
-"""Signals of the faults by their exception numbers."""
+FAULT_SIGNALS = {0xFFFF_0000: SIGILL, 0xFF00: SIGBUS, 0x00FF: SIGSEGV}
+"""By the bits of CFSR: usage faults, bus faults, memory management."""
 
-LONGEST_RESTART_S = 1.0
+ALL_FAULTS = 0x7F0
+"""Bits VC_* of DEMCR but that for a reset: C1.6.5."""
+
+BKPT_BYTES = 2
+
+OWN_COMMANDS = """reset [halt]      reset the processor, and stand at its first instruction
+catch on|off      stop at faults, before their handlers"""
 
 
 class Window(Protocol):
@@ -97,26 +102,19 @@ class Debugger:
     def __post_init__(self) -> None:
         """Take a place before the kernel."""
         self.halted: Reason | None = None
-        self.catching = False
         self._since_ns = 0
         self._range: tuple[int, int] | None = None
         self._to_wake = False  # a step has fallen asleep: stand when it goes on
-        self._restarting = False
-        self._caught: set[int] = set()
+        self._at_bkpt: int | None = None
+        self._told_lock_up = False
         self._watches: dict[tuple[int, int, WatchKind], Watch] = {}
         self._step = self.kernel.step
         vars(self.kernel)["step"] = self._gated_step
-        self.machine.attach_debugger(True)
 
     def close(self) -> None:
         """Let everything run without a debugger."""
-        self.clear_points()
-        self.resume()
-        self.machine.attach_debugger(False)
-        if self._step.__func__ is Kernel.step:  # type: ignore[attr-defined]
-            vars(self.kernel).pop("step", None)
-        else:
-            vars(self.kernel)["step"] = self._step
+        self.detach()
+        vars(self.kernel)["step"] = self._step
 
     def _gated_step(self) -> None:
         self.visit()
@@ -128,79 +126,55 @@ class Debugger:
 
     def run(self, until_ps: int) -> Stop:
         """``Machine.run`` as the debugger wants it; the kernel is paused where it stands then."""
-        self._catch()
-        if self._restarting:
-            self._restarting = False
-            self._stand(Reason())
-            return Stop(StopReason.STEPPED, self.machine.now_ps)
-        if self._to_wake:
-            return self._await_waking(until_ps)
-        if self._range is not None:
-            return self._run_step(until_ps)
-        stop = self.machine.run(until_ps)
+        machine = self.machine
+        if self.kernel.paused:  # somebody gives it an input: it stands where it is
+            return Stop(StopReason.TIME, machine.now_ps)
+        if self._range is None or self._to_wake:
+            stop = machine.run(until_ps)
+        else:
+            stop = machine.step(until_ps, self._range)
         self._look(stop)
-        return stop
-
-    def _run_step(self, until_ps: int) -> Stop:
-        assert self._range is not None
-        low, high = self._range
-        before = self.machine.instructions
-        stop = self.machine.step(until_ps)
-        while (
-            stop.reason is StopReason.STEPPED
-            and low <= self.machine.register("pc") < high
-            and stop.now_ps < until_ps
-        ):
-            stop = self.machine.step(until_ps)
-        self._look(stop)
-        if self.halted is None and self.machine.instructions != before:
-            if self.machine.asleep:
-                self._to_wake = True
-            elif not low <= self.machine.register("pc") < high:
-                self._stand(Reason())
-        return stop
-
-    def _await_waking(self, until_ps: int) -> Stop:
-        """Time passes up to what ends the sleep; stands before what comes then."""
-        stop = self.machine.run(min(until_ps, self.machine.next_event_ps))
-        if not self.machine.asleep:
+        if self._to_wake and not machine.asleep:
             self._stand(Reason())
         return stop
 
     def _look(self, stop: Stop) -> None:
         """Stand where the end of a run is the debugger's."""
+        if stop.reason is not StopReason.LOCKED_UP:
+            self._told_lock_up = False
         match stop.reason:
-            case StopReason.BREAKPOINT:
-                self._at_breakpoint()
-            case StopReason.WATCHPOINT:
-                self._stand(Reason(watch=self._hit(self.machine.watch_hit.address)))
-            case StopReason.HALTED:
+            case StopReason.STEPPED if self.machine.asleep:
+                self._to_wake = True
+            case StopReason.STEPPED:
                 self._stand(Reason())
-            case StopReason.LOCKED_UP:
+            case StopReason.BREAKPOINT:
+                self._stand(Reason(breakpoint=True))
+            case StopReason.WATCHPOINT:
+                self._stand(Reason(watch=self._hit(self.machine.watch_hit)))
+            case StopReason.HALTED:
+                self._at_bkpt = self.machine.register("pc")
+                self._stand(Reason())
+            case StopReason.FAULT:
+                self._stand(Reason(self._fault_signal()))
+            case StopReason.LOCKED_UP if not self._told_lock_up:
+                self._told_lock_up = True
                 self._stand(Reason(SIGSEGV))
 
-    def _at_breakpoint(self) -> None:
-        number = self.machine.register("xpsr") & 0x1FF
-        if self.machine.register("pc") in self._caught and number in FAULTS:
-            self._stand(Reason(self._fault_signal(number)))
-        else:
-            self._stand(Reason(breakpoint=True))
-
-    def _fault_signal(self, number: int) -> int:
+    def _fault_signal(self) -> int:
         """That of the fault; of one that was escalated, that of what it was."""
         status = int.from_bytes(self.machine.peek(CFSR, 4), "little")
-        for shift, kind in ((16, 6), (8, 5), (0, 4)):
-            if number == 3 and status >> shift & (0xFFFF if shift == 16 else 0xFF):
-                number = kind
-                break
-        return FAULTS[number]
+        for mask, signal in FAULT_SIGNALS.items():
+            if status & mask:
+                return signal
+        return SIGSEGV
 
-    def _hit(self, address: int) -> tuple[WatchKind, int]:
-        """The watchpoint that was hit, by an address of the access."""
+    def _hit(self, hit: WatchHit) -> tuple[WatchKind, int]:
+        """The watchpoint that was hit."""
         for start, count, kind in self._watches:
-            if start - 3 <= address < start + count:  # an access has at most four bytes
+            apt = kind == "access" or hit.write == (kind == "write")
+            if apt and start < hit.address + hit.size and hit.address < start + count:
                 return kind, start
-        return "access", address
+        return "access", hit.address
 
     def _stand(self, reason: Reason) -> None:
         self.halted = reason
@@ -208,21 +182,6 @@ class Debugger:
             self.kernel.paused, self._since_ns = True, monotonic_ns()
         self._range = None
         self._to_wake = False
-
-    def _catch(self) -> None:
-        """Breakpoints at the fault handlers, where the vector table has them now."""
-        points = self.machine.breakpoints
-        wanted = set()
-        if self.catching:
-            table = int.from_bytes(self.machine.peek(VECTOR_TABLE, 4), "little")
-            vectors = self.machine.peek(table + 4 * min(FAULTS), 4 * len(FAULTS))
-            wanted = {word & ~1 for word in memoryview(vectors).cast("I")}
-        for address in self._caught - wanted:
-            points.discard(address)
-        for address in wanted - set(points):
-            points.add(address)
-            self._caught.add(address)
-        self._caught &= wanted
 
     # --- the debugger's side --------------------------------------------------------------------
 
@@ -236,6 +195,21 @@ class Debugger:
         """See ``Target``."""
         return (*self.own_regions, *self.windows)
 
+    def attach(self) -> None:
+        """See ``Target``."""
+        self.machine.attach_debugger(True)
+        self.halt()
+
+    def detach(self) -> None:
+        """See ``Target``."""
+        for address in list(self.machine.breakpoints):
+            self.machine.breakpoints.discard(address)
+        for watch in self._watches.values():
+            self.machine.watch(watch, False)
+        self._watches.clear()
+        self.machine.attach_debugger(False)
+        self.resume()
+
     def halt(self) -> None:
         """See ``Target``."""
         if self.halted is None:
@@ -243,6 +217,9 @@ class Debugger:
 
     def resume(self) -> None:
         """See ``Target``."""
+        if self._at_bkpt is not None and self._at_bkpt == self.machine.register("pc"):
+            self.machine.set_register("pc", self._at_bkpt + BKPT_BYTES)
+        self._at_bkpt = None
         self.halted = None
         if self.kernel.paused:
             self.kernel.paused = False
@@ -250,10 +227,8 @@ class Debugger:
 
     def step(self, low: int, high: int) -> None:
         """See ``Target``."""
-        self._range = low, high
-        if self.machine.asleep:
-            self._to_wake = True
         self.resume()
+        self._range, self._to_wake = (low, high), self.machine.asleep
 
     def register(self, name: str) -> int:
         """See ``Target``."""
@@ -279,7 +254,6 @@ class Debugger:
 
     def set_breakpoint(self, address: int, on: bool) -> None:
         """See ``Target``."""
-        self._caught.discard(address)
         (self.machine.breakpoints.add if on else self.machine.breakpoints.discard)(address)
 
     def set_watchpoint(self, address: int, count: int, kind: WatchKind, on: bool) -> None:
@@ -291,42 +265,21 @@ class Debugger:
         else:
             self._watches.pop((address, count, kind), None)
 
-    def clear_points(self) -> None:
-        """See ``Target``."""
-        for address in list(self.machine.breakpoints):
-            self.machine.breakpoints.discard(address)
-        self._caught.clear()
-        for watch in self._watches.values():
-            self.machine.watch(watch, False)
-        self._watches.clear()
-        self.catching = False
-
     def restart(self) -> None:
-        """See ``Target``; virtual time passes up to the first instruction."""
-        self._range, self._to_wake = None, False
-        self._restarting = True
-        self.resume()
+        """See ``Target``."""
+        self._stand(Reason())
         self.reset()
-        end_ps = self.kernel.now + round(LONGEST_RESTART_S * PS_PER_S)
-        while self.halted is None and (self.kernel.horizon() or NEVER) <= end_ps:
-            self._step()
-        self._restarting = False
-        self._stand(self.halted or Reason())
 
     def monitor(self, command: str) -> str:
         """See ``Target``."""
         match command.split():
             case [] | ["help"]:
-                own = "reset [halt]      reset the processor\ncatch on|off      stop at faults"
-                return f"{own}\n{self.command(['help'])}"
-            case ["reset"]:
-                self.reset()
-                return "the processor is reset when it goes on"
-            case ["reset", "halt" | "init"]:
+                return f"{OWN_COMMANDS}\n{self.command(['help'])}"
+            case ["reset"] | ["reset", "halt" | "init"]:
                 self.restart()
                 return ""
             case ["catch", "on" | "off" as state]:
-                self.catching = state == "on"
+                self.machine.attach_debugger(True, ALL_FAULTS if state == "on" else 0)
                 return ""
             case words:
                 return self.command(words)

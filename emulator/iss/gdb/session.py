@@ -41,7 +41,7 @@ class Session:
         self._awaiting = False  # the client waits for the target to stop
         self._last = b""
         self._flashed: dict[int, bytes] = {}
-        target.halt()
+        target.attach()
 
     def receive(self, data: bytes) -> None:
         """Act on what the client sent."""
@@ -67,8 +67,7 @@ class Session:
         """The client has gone: nothing of it is left, and the target runs."""
         if not self.ended:
             self.ended = True
-            self._target.clear_points()
-            self._target.resume()
+            self._target.detach()
 
     def _flush(self) -> None:
         self.output += self._packets.replies

@@ -56,6 +56,12 @@ class Target(Protocol):
     def halted(self) -> Stop | None:
         """Why it stands; None while it runs."""
 
+    def attach(self) -> None:
+        """A client has come: halt."""
+
+    def detach(self) -> None:
+        """The client has gone: remove all breakpoints and watchpoints, and run."""
+
     def halt(self) -> None:
         """Stand before the next instruction."""
 
@@ -82,9 +88,6 @@ class Target(Protocol):
 
     def set_watchpoint(self, address: int, count: int, kind: WatchKind, on: bool) -> None:
         """Stand after an access to these bytes."""
-
-    def clear_points(self) -> None:
-        """Remove all breakpoints and watchpoints."""
 
     def restart(self) -> None:
         """Reset, and stand before the first instruction."""

@@ -58,8 +58,12 @@ class FakeTarget:
     def set_watchpoint(self, address: int, count: int, kind: WatchKind, on: bool) -> None:
         self.calls.append(("watchpoint", address, count, kind, on))
 
-    def clear_points(self) -> None:
-        self.calls.append(("clear",))
+    def attach(self) -> None:
+        self.halt()
+
+    def detach(self) -> None:
+        self.calls.append(("detach",))
+        self.halted = None
 
     def restart(self) -> None:
         self.calls.append(("restart",))

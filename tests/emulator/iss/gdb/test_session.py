@@ -147,7 +147,7 @@ def test_monitor_answers_in_hex(talk: Talk) -> None:
 def test_after_a_good_bye_the_target_runs_free(talk: Talk, packet: str) -> None:
     assert talk.ask(packet) == b"OK"
     assert talk.session.ended
-    assert talk.target.calls == [("clear",), ("resume",)]
+    assert talk.target.calls == [("detach",)]
     assert talk.target.halted is None
 
 

@@ -1,0 +1,169 @@
+"""What went wrong, in one screen: fault status in words, registers, the stacked frame, backtrace.
+
+ARMv7-M Architecture Reference Manual, B3.2.15 to B3.2.18 (fault status registers) and B1.5.6 (the
+stack frame).
+"""
+
+import ctypes
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+
+from cubestack.emulator.iss.insight.backtrace import PSP, backtrace
+from cubestack.emulator.iss.insight.library import insight_library
+from cubestack.emulator.iss.insight.symbols import Symbols
+from cubestack.emulator.iss.machine import Machine
+
+EXCEPTIONS = {
+    0: "",
+    1: "Reset",
+    2: "NMI",
+    3: "HardFault",
+    4: "MemManage",
+    5: "BusFault",
+    6: "UsageFault",
+    11: "SVCall",
+    12: "DebugMonitor",
+    14: "PendSV",
+    15: "SysTick",
+}
+FIRST_INTERRUPT = 16
+FAULTS = (3, 4, 5, 6)
+
+CFSR = {
+    0: ("MemManage", "IACCVIOL", "code was fetched where none may run"),
+    1: ("MemManage", "DACCVIOL", "data access that the MPU does not allow"),
+    3: ("MemManage", "MUNSTKERR", "not allowed to unstack after an exception"),
+    4: ("MemManage", "MSTKERR", "not allowed to stack for an exception: has the stack run over?"),
+    7: ("MemManage", "MMARVALID", ""),
+    8: ("BusFault", "IBUSERR", "code was fetched where there is no memory"),
+    9: ("BusFault", "PRECISERR", "data access where there is nothing"),
+    10: ("BusFault", "IMPRECISERR", "earlier write to where there is nothing; pc is behind it"),
+    11: ("BusFault", "UNSTKERR", "could not unstack after an exception"),
+    12: ("BusFault", "STKERR", "could not stack for an exception: has the stack run over?"),
+    15: ("BusFault", "BFARVALID", ""),
+    16: ("UsageFault", "UNDEFINSTR", "no such instruction"),
+    17: ("UsageFault", "INVSTATE", "not in Thumb state: a jump to an even address?"),
+    18: ("UsageFault", "INVPC", "return from an exception that makes no sense"),
+    19: ("UsageFault", "NOCP", "there is no such coprocessor"),
+    24: ("UsageFault", "UNALIGNED", "unaligned access"),
+    25: ("UsageFault", "DIVBYZERO", "divided by zero"),
+}
+"""Fault, name and meaning by the bit of the configurable fault status register."""
+
+HFSR = {
+    1: ("HardFault", "VECTTBL", "could not read the vector table"),
+    30: ("HardFault", "FORCED", "a fault whose own handler is off or can not run now"),
+    31: ("HardFault", "DEBUGEVT", "BKPT without a debugger"),
+}
+MMARVALID, BFARVALID = 1 << 7, 1 << 15
+
+BRANCH_TO_SELF = b"\xfe\xe7"
+"""``b .``, which a handler ends with that has nothing to do."""
+
+REPORTED_FRAMES = 12
+
+
+@dataclass(frozen=True)
+class Fault:
+    """The core's record of the last fault; ``FaultRecord`` of system.h."""
+
+    exception: int
+    cfsr: int
+    hfsr: int
+    dfsr: int
+    mmfar: int
+    bfar: int
+    pc: int
+    frame: int
+    exc_return: int
+    count: int
+    cycle: int
+
+
+def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType({})) -> str:
+    """Of an exception by its number; ``interrupts`` are the part's by theirs, from 0."""
+    if number - FIRST_INTERRUPT in interrupts:
+        return interrupts[number - FIRST_INTERRUPT]
+    if number >= FIRST_INTERRUPT:
+        return f"IRQ{number - FIRST_INTERRUPT}"
+    return EXCEPTIONS.get(number, f"exception {number}")
+
+
+def last_fault(machine: Machine) -> Fault:
+    """Of a machine; its ``count`` is 0 where there was none since reset."""
+    values = (ctypes.c_int64 * len(fields(Fault)))()
+    insight_library().insight_fault(machine.handle, values)
+    return Fault(*values)
+
+
+def unhandled(machine: Machine) -> bool:
+    """Whether it stands in the handler of a fault for ever."""
+    if machine.register("xpsr") & 0x1FF not in FAULTS:
+        return False
+    return machine.peek(machine.register("pc"), 2) == BRANCH_TO_SELF
+
+
+def fault_report(machine: Machine, symbols: Symbols, time_ps: int) -> str:
+    """One screen about the last fault of ``machine``, and where it is now."""
+    return "\n".join(_lines(machine, symbols, last_fault(machine), time_ps))
+
+
+def reasons(cfsr: int, hfsr: int) -> list[str]:
+    """Each bit that is set, in words."""
+    words = []
+    for table, value in ((CFSR, cfsr), (HFSR, hfsr)):
+        for bit, (fault, name, meaning) in table.items():
+            if value >> bit & 1 and meaning:
+                words.append(f"{fault} {name}: {meaning}")
+    return words
+
+
+def _lines(machine: Machine, symbols: Symbols, fault: Fault, time_ps: int) -> Iterator[str]:
+    where = f"at {time_ps / 1e12:.9f} s"
+    values = {number: machine.register(f"r{number}") for number in range(16)}
+    values[PSP] = machine.register("psp")
+    xpsr, active = machine.register("xpsr"), machine.register("xpsr") & 0x1FF
+    if not fault.count:
+        yield f"firmware: no fault so far, {where}"
+    else:
+        yield f"firmware: {exception_name(fault.exception)} {where}, core cycle {fault.cycle}"
+        for reason in reasons(fault.cfsr, fault.hfsr):
+            yield f"  {reason}"
+        status = f"  CFSR {fault.cfsr:08x}  HFSR {fault.hfsr:08x}  DFSR {fault.dfsr:08x}"
+        if fault.cfsr & MMARVALID:
+            status += f"  MMFAR {fault.mmfar:08x}"
+        if fault.cfsr & BFARVALID:
+            status += f"  BFAR {fault.bfar:08x}"
+        yield status
+        yield f"  faulting instruction {symbols.describe(fault.pc)}"
+        yield from _frame(machine, symbols, fault)
+    mode = f"in {exception_name(active)}" if active else "in Thread mode"
+    yield f"  now {mode}:"
+    for first in range(0, 16, 4):
+        names = ("sp", "lr", "pc")
+        words = (
+            f"{names[n - 13] if n > 12 else f'r{n}':>4} {values[n]:08x}"
+            for n in range(first, first + 4)
+        )
+        yield "  " + " ".join(words)
+    masks = (f"{name} {machine.register(name):x}" for name in ("primask", "basepri", "faultmask"))
+    special = f"msp {machine.register('msp'):08x}  psp {values[PSP]:08x}"
+    yield f"  xpsr {xpsr:08x}  {special}  {'  '.join(masks)}"
+    yield "  backtrace:"
+    for number, frame in enumerate(backtrace(symbols, values, machine.peek)[:REPORTED_FRAMES]):
+        note = f"  [{frame.note}]" if frame.note else ""
+        yield f"    #{number} {symbols.describe(frame.address, frame.place)}{note}"
+
+
+def _frame(machine: Machine, symbols: Symbols, fault: Fault) -> Iterator[str]:
+    if not fault.frame:
+        yield "  no stacked frame: stacking failed"
+        return
+    data = machine.peek(fault.frame, 32)
+    if len(data) < 32:
+        return
+    r0, r1, r2, r3, r12, lr, pc, psr = memoryview(data).cast("I")
+    yield f"  stacked at {fault.frame:08x}: r0 {r0:08x}  r1 {r1:08x}  r2 {r2:08x}  r3 {r3:08x}"
+    yield f"    r12 {r12:08x}  xpsr {psr:08x}  lr {symbols.describe(lr & ~1)}"
+    yield f"    pc {symbols.describe(pc)}"

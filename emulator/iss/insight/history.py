@@ -1,0 +1,34 @@
+"""Where a program was when, for traces: its function, and the exception that it served."""
+
+from collections.abc import Iterator, Mapping
+
+from cubestack.emulator.iss.insight.fault_report import exception_name
+from cubestack.emulator.iss.insight.observer import Observer
+
+FUNCTION, EXCEPTION, HANDLER = "function", "exception", "handler"
+
+
+class History:
+    """Takes an observer's changes, as variables of a trace.
+
+    Attributes:
+        variables: bits of each variable by name; None for a text.
+    """
+
+    variables: Mapping[str, int | None] = {FUNCTION: None, EXCEPTION: 8, HANDLER: None}
+
+    def __init__(self, observer: Observer, interrupts: Mapping[int, str]) -> None:
+        """Take note from now on; ``interrupts`` are names of the part's by number."""
+        self._observer = observer
+        self._interrupts = interrupts
+        self._exception = 0
+        observer.trace()
+
+    def take(self) -> Iterator[tuple[int, str, int | str]]:
+        """What has changed since the last call: time in ps, variable and value, by time."""
+        for change in self._observer.changes():
+            yield change.time_ps, FUNCTION, change.function
+            if change.exception != self._exception:
+                self._exception = change.exception
+                yield change.time_ps, EXCEPTION, change.exception
+                yield change.time_ps, HANDLER, exception_name(change.exception, self._interrupts)

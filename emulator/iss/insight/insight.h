@@ -1,0 +1,285 @@
+// Counts what a program does, and takes note of where it is: for profile, coverage, traces and
+// stack reports. It looks at instructions and changes nothing.
+//
+// Calls are recognised by their instructions (BL, BLX), tail calls by a branch from one function
+// into another, returns by address and stack pointer. An exception is called by nobody: its cycles
+// are its own, not those of what it interrupted. When an exception returns to another stack than
+// it came from, the open calls of the one task are kept until it goes on.
+#pragma once
+
+#include "armv7m/cpu.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+
+namespace insight {
+
+// Where code can be. Arrays have an element for each half-word; the counters may be null.
+struct CodeRange {
+    uint32_t base, size;
+    const uint8_t *host;
+    uint64_t *cycles, *counts;
+    const uint16_t *functions;  // 0: none
+};
+
+// Calls from `site` to `callee`; the site of an exception is EXCEPTION_SITE + its number.
+struct Edge {
+    uint32_t site, callee;
+    uint64_t count, cycles;
+};
+
+// From `time` on the program was in `function` with `exception` active. Picoseconds.
+struct Change {
+    int64_t time;
+    uint16_t function, exception;
+    uint32_t pc;
+};
+
+constexpr uint32_t EXCEPTION_SITE = 0xFFFFF000;
+
+class Insight : public armv7m::Tracer {
+public:
+    static constexpr uint32_t EDGES = 1 << 14, CHANGES = 1 << 14;
+    static constexpr int DEPTH = 1024, TASKS = 16, TASK_DEPTH = 64;
+    // Cycles between two instructions that are waits; what is longer is sleep.
+    static constexpr int64_t LONGEST_WAIT = 64;
+
+    using Now = int64_t (*)(void *owner);
+
+    Insight(Now now, void *owner) : now(now), owner(owner) {}
+
+    void set_range(int index, const CodeRange &range) { ranges[index] = range; }
+    void trace_changes(bool on) { tracing = on; }
+
+    void instruction(uint32_t pc, uint32_t next, int64_t before, int64_t after,
+                     armv7m::Cpu &cpu) override {
+        if (returning) {  // what comes before this instruction is the return's
+            if (before - last <= LONGEST_WAIT) {
+                charge(range_of(last_pc), last_pc, before - last, 0);
+                last = before;
+            }
+            leave_exception(last);
+        }
+        const int64_t begin = wait_or_sleep(before);
+        const CodeRange *range = range_of(pc);
+        charge(range, pc, after - begin, 1);
+        last = after, last_pc = pc;
+        uint32_t &lowest = lowest_sp[cpu.process_stack_in_use()];
+        if (cpu.r[13] < lowest)
+            lowest = cpu.r[13];
+        if (next != pc + 2 && next != pc + 4)
+            jumped(range, pc, next, cpu);
+        if (tracing)
+            look(next, cpu);
+    }
+
+    // Its cycles are the first instruction's.
+    void exception_entry(int number, uint32_t returns_to, armv7m::Cpu &cpu) override {
+        if (returning)
+            leave_exception(last);
+        last = wait_or_sleep(cpu.cycles);
+        push({returns_to, from_process(cpu) ? cpu.process_sp() : 0,
+              EXCEPTION_SITE + (uint32_t)number, cpu.r[15], last, stolen, true});
+        if (tracing)
+            look(cpu.r[15], cpu);
+    }
+
+    void exception_return(uint32_t exc_return, armv7m::Cpu &cpu) override {
+        returning = true;
+        resumed = exc_return & 4 ? cpu.process_sp() : 0;
+    }
+
+    // Callers that are still open are closed; for the end of a profile.
+    void finish() {
+        while (depth)
+            close(last);
+    }
+
+    Edge edges[EDGES] = {};
+    uint32_t edge_count = 0;
+    uint64_t edges_lost = 0;
+    Change changes[CHANGES];
+    uint32_t change_count = 0;
+    int64_t idle = 0;
+    uint32_t lowest_sp[2] = {UINT32_MAX, UINT32_MAX};  // of MSP and PSP while it was in use
+
+private:
+    struct Frame {
+        uint32_t returns_to, sp, site, callee;
+        int64_t start, stolen;
+        bool exception;
+    };
+    struct Task {
+        uint32_t sp = 0;
+        int depth = 0;
+        int64_t since = 0;
+        Frame frames[TASK_DEPTH];
+    };
+
+    // The cycle from which on an instruction or exception at `cycles` counts: what comes between
+    // it and the one before is its own, but for sleep.
+    int64_t wait_or_sleep(int64_t cycles) {
+        const int64_t gap = cycles - last;
+        if (gap <= LONGEST_WAIT)
+            return last;
+        idle += gap;
+        stolen += gap;
+        return cycles;
+    }
+
+    static void charge(const CodeRange *range, uint32_t pc, int64_t cycles, uint64_t count) {
+        if (!range || !range->cycles)
+            return;
+        const uint32_t index = (pc - range->base) >> 1;
+        range->cycles[index] += (uint64_t)cycles;
+        range->counts[index] += count;
+    }
+
+    void leave_exception(int64_t cycles) {
+        returning = false;
+        while (depth && !frames[depth - 1].exception)
+            close(cycles);
+        if (!depth)
+            return;
+        const Frame &marker = frames[depth - 1];
+        const int64_t own = cycles - marker.start - (stolen - marker.stolen);
+        const uint32_t stack = marker.sp;
+        close(cycles);
+        stolen += own;
+        if (stack != resumed)
+            switch_task(stack, resumed, cycles);
+    }
+
+    // LR is EXC_RETURN at an exception's entry.
+    static bool from_process(const armv7m::Cpu &cpu) { return (cpu.r[14] & 0xC) == 0xC; }
+
+    const CodeRange *range_of(uint32_t pc) const {
+        for (const CodeRange &range : ranges)
+            if (pc - range.base < range.size)
+                return &range;
+        return nullptr;
+    }
+
+    uint16_t function_at(uint32_t pc) const {
+        const CodeRange *range = range_of(pc);
+        return range && range->functions ? range->functions[(pc - range->base) >> 1] : 0;
+    }
+
+    void jumped(const CodeRange *range, uint32_t pc, uint32_t next, const armv7m::Cpu &cpu) {
+        const uint32_t sp = cpu.r[13];
+        const uint32_t length = call_length(range, pc);
+        if (length) {
+            open(pc + length, sp, pc, next, cpu.cycles);
+            return;
+        }
+        // Frames above the stack pointer were left by a longjmp or the like.
+        while (depth && !frames[depth - 1].exception && frames[depth - 1].sp < sp)
+            close(cpu.cycles);
+        bool returned = false;
+        while (depth && !frames[depth - 1].exception && frames[depth - 1].sp == sp &&
+               frames[depth - 1].returns_to == next) {
+            close(cpu.cycles);
+            returned = true;
+        }
+        if (returned || !depth || frames[depth - 1].exception)
+            return;
+        const uint16_t from = function_at(pc), to = function_at(next);
+        if (from != to && from && to)
+            open(frames[depth - 1].returns_to, frames[depth - 1].sp, pc, next, cpu.cycles);
+    }
+
+    // Bytes of the call at `pc`; 0 if it is none. ARMv7-M, A7.7.18 and A7.7.19.
+    static uint32_t call_length(const CodeRange *range, uint32_t pc) {
+        if (!range || pc - range->base + 4 > range->size)
+            return 0;
+        const uint8_t *code = range->host + (pc - range->base);
+        const uint32_t first = code[0] | (uint32_t)code[1] << 8;
+        const uint32_t second = code[2] | (uint32_t)code[3] << 8;
+        if ((first & 0xFF87) == 0x4780)
+            return 2;
+        return (first & 0xF800) == 0xF000 && (second & 0xD000) == 0xD000 ? 4 : 0;
+    }
+
+    void open(uint32_t returns_to, uint32_t sp, uint32_t site, uint32_t callee, int64_t cycles) {
+        push({returns_to, sp, site, callee, cycles, stolen, false});
+    }
+
+    // A recursion without end forgets how it began.
+    void push(const Frame &frame) {
+        if (depth == DEPTH)
+            depth = 0;
+        frames[depth++] = frame;
+    }
+
+    void close(int64_t cycles) {
+        const Frame &frame = frames[--depth];
+        const uint32_t mask = EDGES - 1;
+        uint32_t at = (frame.site * 2654435761u ^ frame.callee * 40503u) & mask;
+        while (edges[at].count && (edges[at].site != frame.site || edges[at].callee != frame.callee))
+            at = (at + 1) & mask;
+        if (!edges[at].count) {
+            if (edge_count >= EDGES * 3 / 4) {
+                edges_lost++;
+                return;
+            }
+            edge_count++;
+            edges[at] = {frame.site, frame.callee, 0, 0};
+        }
+        edges[at].count++;
+        edges[at].cycles += (uint64_t)(cycles - frame.start - (stolen - frame.stolen));
+    }
+
+    // The calls above the last marker belong to the task whose stack pointer was `from`.
+    void switch_task(uint32_t from, uint32_t to, int64_t cycles) {
+        int first = depth;
+        while (first && !frames[first - 1].exception)
+            first--;
+        Task *free = nullptr, *wanted = nullptr;
+        for (Task &task : tasks) {
+            if (task.depth && task.sp == to)
+                wanted = &task;
+            else if (!task.depth && !free)
+                free = &task;
+        }
+        if (free && depth - first <= TASK_DEPTH) {
+            free->sp = from, free->depth = depth - first, free->since = cycles - stolen;
+            std::copy(frames + first, frames + depth, free->frames);
+        }
+        depth = first;
+        if (wanted) {
+            const int64_t away = cycles - stolen - wanted->since;
+            for (int n = 0; n < wanted->depth; n++) {
+                frames[depth] = wanted->frames[n];
+                frames[depth++].start += away;
+            }
+            wanted->depth = 0;
+        }
+    }
+
+    void look(uint32_t pc, armv7m::Cpu &cpu) {
+        const uint16_t function = function_at(pc);
+        if (function == shown && cpu.ipsr == shown_exception)
+            return;
+        shown = function, shown_exception = cpu.ipsr;
+        changes[change_count++] = {now(owner), function, cpu.ipsr, pc};
+        if (change_count + 2 >= CHANGES)
+            cpu.stop();
+        if (change_count == CHANGES)
+            change_count--;
+    }
+
+    Now now;
+    void *owner;
+    CodeRange ranges[2] = {};
+    Frame frames[DEPTH];
+    Task tasks[TASKS];
+    int depth = 0;
+    int64_t last = 0, stolen = 0;
+    bool returning = false, tracing = false;
+    uint32_t last_pc = 0;
+    uint32_t resumed = 0;  // process stack pointer to which an exception returns
+    uint16_t shown = 0xFFFF, shown_exception = 0xFFFF;
+};
+
+}  // namespace insight

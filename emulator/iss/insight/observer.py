@@ -1,0 +1,177 @@
+"""Looks at a machine while it runs: cycles and executions by address, calls, where it is when.
+
+The machine is slower meanwhile, and does the same at the same times.
+"""
+
+import ctypes
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.iss.insight.library import (
+    ChangeRecord,
+    EdgeRecord,
+    RangeRecord,
+    insight_library,
+)
+from cubestack.emulator.iss.insight.symbols import Symbols
+from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Machine
+
+EXCEPTION_SITE = 0xFFFF_F000
+MOST_EDGES = 1 << 14
+MOST_CHANGES = 1 << 14
+"""As in insight.h."""
+
+
+@dataclass(frozen=True, order=True)
+class Edge:
+    """Calls from one place to one function.
+
+    Attributes:
+        site: address of the call; of an exception, its number.
+        callee: address of the function.
+        count: how often.
+        cycles: spent in it and in what it called.
+        exception: whether it was called by the processor.
+    """
+
+    site: int
+    callee: int
+    count: int
+    cycles: int
+    exception: bool
+
+
+class Change(NamedTuple):
+    """From ``time_ps`` on the program is in ``function``, with ``exception`` active."""
+
+    time_ps: int
+    function: str
+    exception: int
+
+
+class Figures(NamedTuple):
+    """What else there is.
+
+    Attributes:
+        main_sp: lowest main stack pointer while it was in use; None before the first use.
+        process_sp: likewise, of the process stack.
+        idle_cycles: asleep.
+        edges_lost: calls that there was no room for.
+    """
+
+    main_sp: int | None
+    process_sp: int | None
+    idle_cycles: int
+    edges_lost: int
+
+
+@dataclass
+class Code:
+    """Counters of a memory that code can be in, an element for each half-word."""
+
+    base: int
+    cycles: NDArray[np.uint64]
+    counts: NDArray[np.uint64]
+
+    def cycles_of(self, address: int, end: int) -> int:
+        """Sum over ``address``..``end`` - 1."""
+        first, last = (address - self.base) // 2, (end - self.base + 1) // 2
+        return int(self.cycles[max(first, 0) : max(last, 0)].sum())
+
+
+class Observer:
+    """Looks at one machine from now on.
+
+    Attributes:
+        machine: it.
+        symbols: of its program.
+        codes: counters of flash and RAM.
+    """
+
+    def __init__(self, machine: Machine, symbols: Symbols) -> None:
+        """Count cycles and calls."""
+        self._library = insight_library()
+        self.machine, self.symbols = machine, symbols
+        self.codes = []
+        self._names = [""]
+        self._kept: list[Any] = []
+        ranges = (RangeRecord * 2)()
+        for record, base, memory in zip(
+            ranges, (FLASH_BASE, RAM_BASE), (machine.flash, machine.ram), strict=True
+        ):
+            record.base, record.size, record.host = base, memory.size, memory.ctypes.data
+            halves = memory.size // 2
+            code = Code(base, np.zeros(halves, np.uint64), np.zeros(halves, np.uint64))
+            self.codes.append(code)
+            record.cycles, record.counts = code.cycles.ctypes.data, code.counts.ctypes.data
+            functions = self._functions(base, halves)
+            self._kept.append(functions)
+            record.functions = functions.ctypes.data
+        self._changes = (ChangeRecord * MOST_CHANGES)()
+        self._handle: int | None = self._library.insight_new(machine.handle, ranges, 2)
+
+    def trace(self, on: bool = True) -> None:
+        """Whether to take note of changes from now on; who wants them has to take them."""
+        self._library.insight_trace(self._handle, on)
+
+    def close(self) -> None:
+        """Look no longer."""
+        if self._handle is not None:
+            try:
+                machine: int | None = self.machine.handle
+            except RuntimeError:  # closed
+                machine = None
+            self._library.insight_delete(machine, self._handle)
+            self._handle = None
+
+    def count_of(self, address: int) -> int:
+        """How often the instruction at ``address`` was executed."""
+        for code in self.codes:
+            index = (address - code.base) // 2
+            if 0 <= index < code.counts.size:
+                return int(code.counts[index])
+        return 0
+
+    def edges(self) -> list[Edge]:
+        """Calls so far, those that have not returned among them."""
+        self._library.insight_finish(self._handle)
+        records = (EdgeRecord * MOST_EDGES)()
+        found = self._library.insight_edges(self._handle, records, MOST_EDGES)
+        return [
+            Edge(
+                one.site - EXCEPTION_SITE if one.site >= EXCEPTION_SITE else one.site,
+                one.callee,
+                one.count,
+                one.cycles,
+                one.site >= EXCEPTION_SITE,
+            )
+            for one in records[:found]
+        ]
+
+    def changes(self) -> Iterator[Change]:
+        """Take the changes since the last call, in the order of time."""
+        count = self._library.insight_changes(self._handle, self._changes)
+        for one in self._changes[:count]:
+            name = self._names[one.function] if one.function else f"{one.pc:#010x}"
+            yield Change(one.time, name, one.exception)
+
+    def figures(self) -> Figures:
+        """Stack pointers, and what was not counted."""
+        values = (ctypes.c_int64 * 4)()
+        self._library.insight_figures(self._handle, values)
+        main, process = (None if sp == 0xFFFF_FFFF else sp for sp in values[:2])
+        return Figures(main, process, values[2], values[3])
+
+    def _functions(self, base: int, halves: int) -> NDArray[np.uint16]:
+        """Number of the function of each half-word; 0 for none."""
+        numbers = np.zeros(halves, np.uint16)
+        for function in self.symbols.functions:
+            first, last = (function.address - base) // 2, (function.end - base + 1) // 2
+            if 0 <= first < halves and len(self._names) < 0xFFFF:
+                numbers[first:last] = len(self._names)
+                self._names.append(function.name)
+        return numbers

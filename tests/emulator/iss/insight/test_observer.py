@@ -1,0 +1,176 @@
+"""What the counters say is what the program is known to do."""
+
+import io
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.iss.insight.callgrind import write_callgrind
+from cubestack.emulator.iss.insight.history import History
+from cubestack.emulator.iss.insight.lcov import write_lcov
+from cubestack.emulator.iss.insight.observer import Edge, Observer
+from cubestack.emulator.iss.insight.symbols import Symbols
+from cubestack.emulator.iss.machine import Machine
+
+PS_PER_MS = 10**9
+MOST_RUNS = 10_000
+RUN_PS = 20 * PS_PER_MS
+"""Two hundred ticks."""
+
+
+def run(machine: Machine, until_ps: int) -> None:
+    for _ in range(MOST_RUNS):
+        machine.run(until_ps)
+        list(machine.outbox())
+        if machine.now_ps >= until_ps:
+            return
+    pytest.fail(f"stands at {machine.now_ps} ps")
+
+
+@pytest.fixture
+def observer(machine: Machine, symbols: Symbols) -> Observer:
+    observer = Observer(machine, symbols)
+    run(machine, RUN_PS)
+    return observer
+
+
+def address(observer: Observer, name: str) -> int:
+    function = observer.symbols.function(name)
+    assert function is not None
+    return function.address
+
+
+def calls(observer: Observer, name: str) -> Edge:
+    """The only edge to a function."""
+    (found,) = (edge for edge in observer.edges() if edge.callee == address(observer, name))
+    return found
+
+
+def value(observer: Observer, name: str) -> int:
+    where = observer.symbols.variables[name].address
+    return int.from_bytes(observer.machine.peek(where, 4), "little")
+
+
+def self_cycles(observer: Observer, name: str) -> int:
+    function = observer.symbols.function(name)
+    assert function is not None
+    return sum(code.cycles_of(function.address, function.end) for code in observer.codes)
+
+
+def test_every_cycle_is_somewhere(observer: Observer) -> None:
+    counted = sum(int(code.cycles.sum()) for code in observer.codes)
+    idle = observer.figures().idle_cycles
+    assert idle > 0.9 * observer.machine.cycles
+    assert counted + idle == pytest.approx(observer.machine.cycles, abs=1400)
+
+
+def test_calls_are_counted(observer: Observer) -> None:
+    works, squares = calls(observer, "work"), calls(observer, "square")
+    assert works.count == pytest.approx(value(observer, "ticks"), abs=1)
+    assert squares.count == 5 * works.count == observer.count_of(address(observer, "square"))
+    assert squares.cycles == self_cycles(observer, "square")
+    assert works.cycles == self_cycles(observer, "work") + squares.cycles
+
+
+def test_an_exception_is_not_part_of_what_it_interrupts(observer: Observer) -> None:
+    handler = calls(observer, "SysTick_Handler")
+    assert handler.exception
+    assert handler.site == 15
+    assert handler.count == value(observer, "ticks")
+    start = calls(observer, "main")
+    assert start.cycles == self_cycles(observer, "main") + calls(observer, "work").cycles
+
+
+def test_the_lowest_stack_pointer_is_kept(observer: Observer) -> None:
+    figures = observer.figures()
+    top = observer.symbols.labels["stack_top"]
+    assert figures.process_sp is None
+    assert figures.main_sp is not None
+    assert 32 <= top - figures.main_sp < 128
+
+
+def test_an_observed_machine_does_the_same(machine: Machine, observer: Observer) -> None:
+    other = Machine()
+    assert machine.image is not None
+    other.load(machine.image)
+    other.reset()
+    run(other, RUN_PS)
+    assert other.cycles == machine.cycles
+    assert other.registers() == machine.registers()
+    assert (other.ram == machine.ram).all()
+    other.close()
+
+
+def test_the_profile_has_all_cycles_by_function_and_line(observer: Observer) -> None:
+    stream = io.StringIO()
+    write_callgrind(observer, stream)
+    text = stream.getvalue()
+    counted = sum(int(code.cycles.sum()) for code in observer.codes)
+    assert f"totals: {counted}\n" in text
+    inside = re.sub(r"calls=.*\n.*\n", "", text)
+    assert sum(int(cost) for cost in re.findall(r"^\d+ (\d+)$", inside, re.M)) == counted
+    assert "(exceptions)" in text
+
+
+@pytest.mark.skipif(not shutil.which("callgrind_annotate"), reason="valgrind is not installed")
+def test_callgrind_reads_the_profile(observer: Observer, tmp_path: Path) -> None:
+    path = tmp_path / "callgrind.out"
+    with path.open("w") as stream:
+        write_callgrind(observer, stream)
+    command = ["callgrind_annotate", "--inclusive=yes", "--auto=no", str(path)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found = {
+        name: int(cost.replace(",", ""))
+        for cost, name in re.findall(r"^\s*([\d,]+) \(.*?program\.c:(\w+)", said, re.M)
+    }
+    assert found["work"] == calls(observer, "work").cycles
+    assert found["main"] == calls(observer, "main").cycles
+
+
+def test_coverage_has_lines_and_functions(observer: Observer, symbols: Symbols) -> None:
+    stream = io.StringIO()
+    write_lcov(observer, stream)
+    text = stream.getvalue()
+    source = Path(__file__).with_name("program.c")
+    assert f"SF:{source}\n" in text
+    lines = source.read_text().splitlines()
+    works = calls(observer, "work").count
+    assert f"FNDA:{works},work\n" in text
+    assert "FNDA:0,crash\n" in text
+    number = lines.index("        sum += square(i);") + 1
+    assert f"DA:{number},{5 * works}\n" in text
+    number = lines.index("        crash(command);".replace("crash", "    crash")) + 1
+    assert f"DA:{number},0\n" in text
+
+
+def test_a_history_tells_function_and_exception(machine: Machine, symbols: Symbols) -> None:
+    observer = Observer(machine, symbols)
+    history = History(observer, {})
+    run(machine, PS_PER_MS)
+    changes = list(history.take())
+    assert [time for time, _, _ in changes] == sorted(time for time, _, _ in changes)
+    names = [value for _, variable, value in changes if variable == "function"]
+    assert names[:6] == ["Reset_Handler", "main", "work", "square", "work", "square"]
+    handlers = [(time, value) for time, variable, value in changes if variable == "handler"]
+    assert [value for _, value in handlers[:3]] == ["SysTick", "", "SysTick"]
+    assert handlers[2][0] - handlers[0][0] == pytest.approx(PS_PER_MS / 10, rel=0.01)
+    assert list(history.take()) == []
+
+
+def test_a_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
+    observer = Observer(machine, symbols)
+    history = History(observer, {})
+    for _ in range(MOST_RUNS):
+        machine.run(RUN_PS * 10)
+        list(machine.outbox())
+        if machine.now_ps >= RUN_PS * 3:
+            break
+    standing = machine.now_ps
+    for _ in range(10):  # the buffer is nearly full: each run is short
+        machine.run(RUN_PS * 10)
+    assert machine.now_ps < standing + RUN_PS
+    taken = [name for _, variable, name in history.take() if variable == "function"]
+    assert taken.count("square") == pytest.approx(5 * taken.count("work") / 6, rel=0.01)
