@@ -132,7 +132,8 @@ void Timer::pass(int64_t steps) {
         if (wraps)
             wrapped();
         for (int n = 0; n < CHANNELS; n++)
-            if (compares(n) && count.value == reg(cc(n, CC0_CCV)) && count.value != before.value)
+            if (compares(n) && count.value == reg(cc(n, CC0_CCV)) &&
+                (wraps || count.value != before.value))
                 matched(n);
         show_outputs();
     }

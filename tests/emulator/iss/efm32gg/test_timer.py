@@ -1,0 +1,276 @@
+"""TIMER: against a counter that counts every tick; outputs, captures, cascades, interrupts."""
+
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cubestack.emulator.iss.machine import Kind
+
+from .bench import Bench, S, asleep, mask_of
+
+HZ = 14_000_000
+TICK = S // HZ + 1
+ACCESS = 8 * TICK  # what a few accesses take at most
+UP, DOWN, UP_DOWN = 0, 1, 2
+OF, UF, CC0, CC1, CC2 = 1, 2, 16, 32, 64
+PWM, COMPARE, CAPTURE = 3, 2, 1
+PUSH_PULL, INPUT = 4, 1
+TIMER0_IRQ = 2
+
+
+def timer(mode: int = UP, prescaler: int = 0, top: int = 0xFFFF, more: int = 0) -> Bench:
+    bench = asleep(1, interrupts=False).clock("TIMER0", "TIMER1", "GPIO")
+    bench["TIMER0.CTRL"] = mode | prescaler << 24 | more
+    bench["TIMER0.TOP"] = top
+    return bench
+
+
+def start(bench: Bench) -> int:
+    """Start; about the time of tick 0: an access takes a few cycles."""
+    bench["TIMER0.CMD"] = 1
+    return bench.now
+
+
+def ticks(bench: Bench, count: int, prescaler: int = 0) -> None:
+    bench.run_for((count << prescaler) * S // HZ)
+
+
+@dataclass
+class Oracle:
+    """Counts one tick at a time, as the manual says in words."""
+
+    mode: int
+    top: int
+    compare: int
+    value: int = 0
+    down: bool = False
+    flags: int = 0
+
+    def tick(self) -> None:
+        before = self.value
+        if self.mode == UP:
+            if self.value == self.top:
+                self.value, self.flags = 0, self.flags | OF
+            else:
+                self.value = (self.value + 1) & 0xFFFF
+        elif self.mode == DOWN:
+            if self.value == 0:
+                self.value, self.flags = self.top, self.flags | UF
+            else:
+                self.value -= 1
+        elif self.down:
+            if self.value == 0:
+                self.value, self.down, self.flags = 1, False, self.flags | UF
+            else:
+                self.value -= 1
+        elif self.value == self.top:
+            self.value, self.down, self.flags = self.top - 1, True, self.flags | OF
+        else:
+            self.value += 1
+        if self.value == self.compare != before:
+            self.flags |= CC0
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.sampled_from([UP, DOWN, UP_DOWN]),
+    st.integers(5, 7),
+    st.integers(2, 300),
+    st.integers(0, 310),
+    st.lists(st.integers(0, 700), min_size=1, max_size=6),
+    st.booleans(),
+)
+def test_the_counter_is_that_of_a_counter_that_counts(
+    mode: int, prescaler: int, top: int, compare: int, waits: list[int], watched: bool
+) -> None:
+    bench = timer(mode, prescaler, top)
+    bench["TIMER0.CC0_CTRL"] = COMPARE
+    bench["TIMER0.CC0_CCV"] = compare
+    bench["TIMER0.IEN"] = OF | UF | CC0 if watched else 0
+    oracle = Oracle(mode, top, compare, down=mode == DOWN)
+    origin = start(bench)
+    count = 0
+    for wait in waits:
+        count += wait
+        # Half a tick behind the edge, so that neither side is in doubt.
+        bench.run_until(origin + (2 * count + 1) * (1 << prescaler) * S // (2 * HZ))
+        for _ in range(wait):
+            oracle.tick()
+        assert bench["TIMER0.CNT"] == oracle.value
+        assert bench["TIMER0.IF"] == oracle.flags
+        if mode == UP_DOWN:
+            assert bench.is_set("TIMER0.STATUS.DIR") == oracle.down
+
+
+@pytest.mark.parametrize("prescaler", range(11))
+def test_the_prescaler_divides(prescaler: int) -> None:
+    bench = timer(prescaler=prescaler)
+    origin = start(bench)
+    bench.run_until(origin + (100 * (1 << prescaler)) * S // HZ)
+    assert abs(bench["TIMER0.CNT"] - 100) <= 3
+
+
+def test_an_overflow_interrupts_at_its_time() -> None:
+    bench = timer(top=999)
+    bench["TIMER0.IEN"] = OF
+    origin = start(bench)
+    bench.run_until(origin + 1000 * S // HZ - ACCESS)
+    assert not bench.peek("TIMER0.IF")
+    bench.run_until(origin + 1000 * S // HZ + ACCESS)
+    assert bench.peek("TIMER0.IF") == OF
+    assert bench.machine.read(0xE000_E200) == 1 << TIMER0_IRQ
+    bench["TIMER0.IFC"] = OF
+    assert bench["TIMER0.IF"] == 0
+
+
+def test_one_shot_stops() -> None:
+    bench = timer(top=99, more=mask_of("TIMER.CTRL.OSMEN"))
+    start(bench)
+    ticks(bench, 1000)
+    assert not bench.is_set("TIMER0.STATUS.RUNNING")
+    assert bench["TIMER0.CNT"] == 0
+
+
+def test_stop_and_go_on() -> None:
+    bench = timer()
+    start(bench)
+    ticks(bench, 100)
+    bench["TIMER0.CMD"] = 2
+    value = bench["TIMER0.CNT"]
+    assert abs(value - 100) <= 1
+    ticks(bench, 100)
+    assert bench["TIMER0.CNT"] == value
+    bench["TIMER0.CMD"] = 1
+    ticks(bench, 50)
+    assert abs(bench["TIMER0.CNT"] - value - 50) <= 1
+
+
+def test_buffered_top_and_compare_come_at_the_overflow() -> None:
+    bench = timer(top=99)
+    bench["TIMER0.CC0_CTRL"] = PWM
+    bench["TIMER0.CC0_CCV"] = 10
+    start(bench)
+    ticks(bench, 50)
+    bench["TIMER0.TOPB"] = 199
+    bench["TIMER0.CC0_CCVB"] = 20
+    assert bench.is_set("TIMER0.STATUS.TOPBV")
+    assert bench.is_set("TIMER0.STATUS.CCVBV0")
+    assert (bench["TIMER0.TOP"], bench["TIMER0.CC0_CCV"]) == (99, 10)
+    ticks(bench, 60)
+    assert (bench["TIMER0.TOP"], bench["TIMER0.CC0_CCV"]) == (199, 20)
+    assert not bench.is_set("TIMER0.STATUS.TOPBV")
+
+
+def levels(bench: Bench, pin: int) -> list[tuple[int, int]]:
+    return [(item.time_ps, item.value) for item in bench.out(Kind.PIN) if item.unit == pin]
+
+
+def test_pwm_is_on_the_pin_at_its_times() -> None:
+    bench = timer(prescaler=2, top=99)
+    bench["GPIO.PA_MODEL"] = PUSH_PULL << 4
+    bench["TIMER0.CC1_CTRL"] = PWM
+    bench["TIMER0.CC1_CCV"] = 25
+    bench["TIMER0.ROUTE"] = 2
+    origin = start(bench)
+    ticks(bench, 250, 2)
+    found = levels(bench, 1)
+    assert [level for _, level in found] == [0, 1, 0, 1, 0, 1, 0]
+    for (time, _), tick in zip(found[2:], (25, 100, 125, 200, 225), strict=True):
+        assert abs(time - origin - tick * 4 * S // HZ) <= ACCESS
+
+
+def test_compare_actions_on_the_pin() -> None:
+    bench = timer(top=9)
+    bench["GPIO.PA_MODEL"] = PUSH_PULL
+    bench["TIMER0.CC0_CTRL"] = COMPARE | 1 << 8  # toggles at a match
+    bench["TIMER0.CC0_CCV"] = 3
+    bench["TIMER0.ROUTE"] = 1
+    origin = start(bench)
+    ticks(bench, 35)
+    times = [time for time, _ in levels(bench, 0) if time > origin]
+    assert [round((time - times[0]) * HZ / S) for time in times] == [0, 10, 20, 30]
+
+
+def test_a_cascade_counts_overflows() -> None:
+    bench = timer(top=9)
+    bench["TIMER1.CTRL"] = 2 << 16
+    bench["TIMER1.CMD"] = 1
+    start(bench)
+    ticks(bench, 257)
+    assert bench["TIMER1.CNT"] in (25, 26)
+
+
+def test_timers_start_together_when_they_are_told_so() -> None:
+    bench = timer(more=mask_of("TIMER.CTRL.SYNC"))
+    bench["TIMER1.CTRL"] = mask_of("TIMER.CTRL.SYNC")
+    start(bench)
+    ticks(bench, 77)
+    assert abs(bench["TIMER1.CNT"] - bench["TIMER0.CNT"]) <= 3
+
+
+def test_a_capture_has_the_count_at_the_edge() -> None:
+    bench = timer()
+    bench["GPIO.PA_MODEL"] = INPUT
+    bench["TIMER0.ROUTE"] = 1
+    bench["TIMER0.CC0_CTRL"] = CAPTURE
+    origin = start(bench)
+    for tick, level in ((100, 1), (150, 0), (300, 1)):
+        bench.run_until(origin + tick * S // HZ + TICK // 2)
+        bench.machine.pin(0, 0, level)
+    assert bench["TIMER0.IF"] & CC0
+    assert bench.is_set("TIMER0.STATUS.ICV0")
+    first, second = bench["TIMER0.CC0_CCV"], bench["TIMER0.CC0_CCV"]
+    assert abs(first - 100) <= 3
+    assert second - first == 200
+    assert not bench.is_set("TIMER0.STATUS.ICV0")
+
+
+def test_a_third_capture_overflows() -> None:
+    bench = timer()
+    bench["GPIO.PA_MODEL"] = INPUT
+    bench["TIMER0.ROUTE"] = 1
+    bench["TIMER0.CC0_CTRL"] = CAPTURE | 2 << 24
+    start(bench)
+    for level in (1, 0, 1):
+        ticks(bench, 10)
+        bench.machine.pin(0, 0, level)
+    assert bench.is_set("TIMER0.IF.ICBOF0")
+
+
+def test_an_edge_starts_and_stops_the_timer() -> None:
+    bench = timer(more=1 << 8 | 2 << 10)  # rising starts, falling stops
+    bench["GPIO.PA_MODEL"] = INPUT
+    bench["TIMER0.ROUTE"] = 1
+    bench["TIMER0.CC0_CTRL"] = CAPTURE
+    ticks(bench, 50)
+    assert bench["TIMER0.CNT"] == 0
+    bench.machine.pin(0, 0, 1)
+    ticks(bench, 60)
+    bench.machine.pin(0, 0, 0)
+    ticks(bench, 60)
+    assert abs(bench["TIMER0.CNT"] - 60) <= 1
+
+
+def test_the_counter_goes_on_with_another_clock() -> None:
+    bench = timer()
+    start(bench)
+    ticks(bench, 1000)
+    bench["CMU.HFPERCLKDIV"] = 0x100 | 1
+    before = bench["TIMER0.CNT"]
+    ticks(bench, 1000)
+    assert abs(bench["TIMER0.CNT"] - before - 500) <= 8
+    bench["CMU.HFPERCLKEN0"] = 0
+    bench.clock("GPIO")
+    ticks(bench, 1000)
+    bench.clock("TIMER0")
+    assert abs(bench["TIMER0.CNT"] - before - 500) <= 8
+
+
+def test_a_long_unwatched_time_costs_little() -> None:
+    bench = timer(top=3)
+    start(bench)
+    bench.run_for(S // 100)
+    assert bench["TIMER0.CNT"] <= 3
+    assert bench["TIMER0.IF"] & OF
