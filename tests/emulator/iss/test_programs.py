@@ -31,15 +31,13 @@ class Bench:
         self.times_ps: list[int] = []
 
     def run(self, until_ps: int) -> Stop:
-        """Run on, through all stops but a lock-up; resets that the program asks for are made."""
+        """Run on, through all stops but a lock-up."""
         while True:
             stop = self.machine.run(until_ps)
             for out in self.machine.outbox():
                 if out.kind is Kind.UART and out.unit & 0xFF == UART0:
                     self.text += chr(out.value & 0xFF)
                     self.times_ps.append(out.time_ps)
-                elif out.kind is Kind.RESET:
-                    self.machine.reset(out.value)
             if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP:
                 return stop
 

@@ -1,0 +1,43 @@
+"""The program of this folder on the emulated board, as a user's CI runs it."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cubestack
+
+FOLDER = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the Makefile builds."""
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("needs gcc-arm-none-eabi")
+    folder = tmp_path_factory.mktemp("picture")
+    for name in ("Makefile", "main.c", "picture.ld"):
+        shutil.copy(FOLDER / name, folder)
+    header = FOLDER.parents[1] / ".venv/bin/cubestack"
+    command = str(header) if header.exists() else "cubestack"
+    subprocess.run(["make", "-s", f"CUBESTACK={command}"], cwd=folder, check=True)
+    return folder / "picture.elf"
+
+
+def test_a_picture_comes_through_the_fpga(image: Path) -> None:
+    with cubestack.open_device("cubestar", firmware=str(image)) as cubestar:
+        port = cubestar.serial()
+        assert port.read(6, timeout_s=1) == b"ready\n"
+        port.write(b"p")
+        answer = b""
+        while not answer.endswith(b"\n"):
+            answer += port.read(1, timeout_s=3)
+        stored = cubestar.board.engine.sram[: 512 * 1024]
+        brightest = int(np.argmax(stored))
+        place = f"{brightest % 1024},{brightest // 1024}"
+        told = f"sum {int(stored.sum(dtype=np.uint32))} brightest {stored.max()} at {place}\n"
+        assert answer.decode() == told
+        port.write(b"x")
+        assert port.read(2, timeout_s=1) == b"?\n"
