@@ -29,15 +29,16 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_picture_comes_through_the_fpga(image: Path) -> None:
     with cubestack.open_device("cubestar", firmware=str(image)) as cubestar:
         port = cubestar.serial()
-        assert port.read(6, timeout_s=1) == b"ready\n"
+        port.timeout = 3
+        assert port.read(6) == b"ready\n"
         port.write(b"p")
         answer = b""
         while not answer.endswith(b"\n"):
-            answer += port.read(1, timeout_s=3)
+            answer += port.read()
         stored = cubestar.board.engine.sram[: 512 * 1024]
         brightest = int(np.argmax(stored))
         place = f"{brightest % 1024},{brightest // 1024}"
         told = f"sum {int(stored.sum(dtype=np.uint32))} brightest {stored.max()} at {place}\n"
         assert answer.decode() == told
         port.write(b"x")
-        assert port.read(2, timeout_s=1) == b"?\n"
+        assert port.read(2) == b"?\n"
