@@ -9,7 +9,7 @@ import pytest
 
 import cubestack
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
