@@ -220,8 +220,10 @@ int64_t Dma::round(int channel) {
     const int from_step = (int)take(control, SOURCE_STEP), to_step = (int)take(control, TARGET_STEP);
     for (uint32_t n = 0; n < count; n++) {
         const uint32_t back = left - 1 - n;
+        // Four words at a time go to the same alternate descriptor.
+        const uint32_t to_back = cycle == MEMORY || cycle == PERIPHERAL ? back & 3 : back;
         const uint32_t from = from_step == NO_STEP ? from_end : from_end - (back << from_step);
-        const uint32_t to = to_step == NO_STEP ? to_end : to_end - (back << to_step);
+        const uint32_t to = to_step == NO_STEP ? to_end : to_end - (to_back << to_step);
         uint32_t value = 0;
         if (size > 4 || !part.load(from, size, value, wait) || !part.store(to, size, value, wait)) {
             error(channel);
