@@ -1,0 +1,408 @@
+"""What works in EM2: LEUART, RTC, LETIMER, BURTC with its retention registers, pulse counters."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cubestack.emulator.iss.machine import Kind
+
+from .bench import MS, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, Bench, S, asleep, mask_of
+
+HZ = 32768
+TICK = S // HZ + 1
+PUSH_PULL, INPUT = 4, 1
+PD4, PD5 = 3 * 16 + 4, 3 * 16 + 5
+LEUART0 = 5
+LETIMER_IRQ, BURTC_IRQ = 26, 31
+PENDING, NOT_PENDING = 0xE000_E200, 0xE000_E280
+
+
+def low(mode: int = 2, *units: str, interrupts: bool = False) -> Bench:
+    """A part that sleeps, with LFRCO and the clocks of low energy units."""
+    bench = asleep(mode, interrupts).clock("LE", "GPIO")
+    if mode != 2:
+        bench.command("CMU.OSCENCMD.LFRCOEN")
+        bench.run_for(200 * US)
+    for unit in units:
+        domain = "LFBCLKEN0" if unit.startswith("LEUART") else "LFACLKEN0"
+        bench.set(f"CMU.{domain}.{unit}")
+    bench.run_for(4 * TICK)
+    return bench
+
+
+# -- RTC --
+
+
+def rtc(**registers: int) -> Bench:
+    bench = low(2, "RTC")
+    for name, value in registers.items():
+        bench[f"RTC.{name}"] = value
+    return bench
+
+
+def test_the_rtc_counts_in_em2() -> None:
+    bench = rtc(CTRL=1)
+    bench.run_for(S)
+    assert abs(bench["RTC.CNT"] - HZ) <= 1
+
+
+def test_a_compare_match_wakes_from_em2_at_its_time() -> None:
+    bench = low(2, "RTC", interrupts=True)
+    bench["RTC.COMP0"] = 3276
+    bench["RTC.IEN"] = 2
+    began = bench.now
+    bench["RTC.CTRL"] = 1
+    bench.out(Kind.SLEEP)
+    bench.run_until(began + 3276 * S // HZ - TICK)
+    assert not bench.out(Kind.SLEEP)
+    bench.run_for(3 * TICK)
+    first = bench.out(Kind.SLEEP)[0]
+    assert first.value == 0
+    assert abs(first.time_ps - began - 3276 * S // HZ) <= TICK
+    assert bench["RTC.IF"] & 2
+
+
+def test_compare_0_as_top_makes_a_period() -> None:
+    bench = rtc(COMP0=99, COMP1=50, CTRL=5)
+    matches = 0
+    for _ in range(10):
+        bench.run_for(100 * S // HZ)
+        assert bench["RTC.IF"] & 4
+        matches += bench["RTC.IF"] >> 1 & 1
+        assert not bench["RTC.IF"] & 1
+        bench["RTC.IFC"] = 7
+    assert matches == 10
+    assert bench["RTC.CNT"] <= 99
+
+
+def test_the_overflow_after_24_bits() -> None:
+    bench = rtc(CTRL=1)
+    bench["RTC.CNT"] = 0xFF_FFF0
+    bench.run_for(15 * S // HZ)
+    assert bench["RTC.IF"] == 0
+    bench.run_for(2 * TICK)
+    assert bench["RTC.IF"] & 1
+
+
+def test_disabling_the_rtc_clears_its_count() -> None:
+    bench = rtc(CTRL=1)
+    bench.run_for(MS)
+    bench["RTC.CTRL"] = 0
+    assert bench["RTC.CNT"] == 0
+    bench["RTC.CTRL"] = 1
+    assert bench["RTC.CNT"] <= 1
+
+
+def test_synchronisation_shows_for_two_to_three_clocks() -> None:
+    bench = rtc()
+    bench["RTC.COMP1"] = 5
+    assert bench["RTC.SYNCBUSY"] == 4
+    bench.run_for(2 * S // HZ - TICK // 10)
+    assert bench["RTC.SYNCBUSY"] == 4
+    bench.run_for(TICK + TICK // 5)
+    assert bench["RTC.SYNCBUSY"] == 0
+    bench["RTC.FREEZE"] = 1
+    bench["RTC.COMP1"] = 6
+    bench.run_for(MS)
+    assert (bench["RTC.SYNCBUSY"], bench["RTC.COMP1"]) == (4, 5)
+    bench["RTC.FREEZE"] = 0
+    bench.run_for(MS)
+    assert (bench["RTC.SYNCBUSY"], bench["RTC.COMP1"]) == (0, 6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(1, 70),
+    st.integers(0, 70),
+    st.booleans(),
+    st.booleans(),
+    st.lists(st.integers(0, 200), min_size=1, max_size=5),
+)
+def test_the_rtc_is_a_counter_that_counts(
+    compare0: int, compare1: int, is_top: bool, watched: bool, waits: list[int]
+) -> None:
+    bench = rtc(COMP0=compare0, COMP1=compare1, IEN=7 if watched else 0)
+    bench.run_for(5 * TICK)
+    bench["RTC.CTRL"] = 5 if is_top else 1
+    while not bench.peek("RTC.CNT"):  # until just behind an edge
+        bench.run_for(TICK // 16)
+    value = bench["RTC.CNT"]
+    flags = bench["RTC.IF"]
+    for wait in waits:
+        bench.run_for(wait * S // HZ)
+        for _ in range(wait):
+            top = compare0 if is_top else 0xFF_FFFF
+            value = 0 if value == top else value + 1
+            flags |= (2 if value == compare0 else 0) | (4 if value == compare1 else 0)
+        assert bench["RTC.CNT"] == value
+        assert bench["RTC.IF"] == flags
+
+
+# -- LETIMER --
+
+
+def letimer(control: int = 0, **registers: int) -> Bench:
+    bench = low(2, "LETIMER0")
+    bench["GPIO.PD_MODEL"] = PUSH_PULL << 24 | PUSH_PULL << 28
+    bench["LETIMER0.CTRL"] = control
+    for name, value in registers.items():
+        bench[f"LETIMER0.{name}"] = value
+    return bench
+
+
+TOP = mask_of("LETIMER.CTRL.COMP0TOP")
+
+
+def test_the_letimer_counts_down_from_its_top() -> None:
+    bench = letimer(TOP, COMP0=99)
+    bench["LETIMER0.CMD"] = 1
+    assert bench.is_set("LETIMER0.STATUS.RUNNING")
+    bench.run_for(3 * TICK)
+    assert bench["LETIMER0.CNT"] in (96, 97, 98)
+    assert bench["LETIMER0.IF"] & 4  # from 0 the first clock is an underflow
+    bench["LETIMER0.IFC"] = 0x1F
+    bench.run_for(99 * S // HZ)
+    assert bench["LETIMER0.IF"] & 4
+
+
+def test_the_letimer_wakes_from_em2_each_period() -> None:
+    bench = low(2, "LETIMER0", interrupts=True)
+    bench["LETIMER0.CTRL"] = TOP
+    bench["LETIMER0.COMP0"] = 327
+    bench["LETIMER0.IEN"] = 4
+    bench["LETIMER0.CMD"] = 1
+    times = []
+    bench.out(Kind.SLEEP)
+    for _ in range(5):
+        while not bench.peek("LETIMER0.IF") & 4:
+            bench.run_for(TICK // 2)
+        times.append(bench.out(Kind.SLEEP)[0].time_ps)
+        bench["LETIMER0.IFC"] = 4
+        bench.machine.write(NOT_PENDING, 1 << LETIMER_IRQ)
+        bench.run_for(10 * US)
+        bench.out(Kind.SLEEP)
+    for n in range(4):
+        assert abs(times[n + 1] - times[n] - 328 * S // HZ) <= 2 * US
+
+
+def test_one_shot_repeats_as_often_as_it_is_told() -> None:
+    bench = letimer(TOP | 1, COMP0=9, REP0=3)
+    bench["LETIMER0.CMD"] = 1
+    bench.run_for(15 * TICK)
+    assert bench.is_set("LETIMER0.STATUS.RUNNING")
+    assert bench["LETIMER0.REP0"] == 1
+    bench.run_for(20 * TICK)
+    assert not bench.is_set("LETIMER0.STATUS.RUNNING")
+    assert bench["LETIMER0.IF"] & 8
+
+
+def test_buffered_repeats_take_the_second_count() -> None:
+    bench = letimer(TOP | 2, COMP0=9, REP0=1, REP1=2)
+    bench["LETIMER0.CMD"] = 1
+    bench.run_for(5 * TICK)
+    assert bench["LETIMER0.REP0"] == 2
+    assert bench["LETIMER0.IF"] & 0x10
+    bench.run_for(30 * TICK)
+    assert not bench.is_set("LETIMER0.STATUS.RUNNING")
+
+
+def test_pwm_of_the_letimer_is_on_its_pin() -> None:
+    bench = letimer(TOP | 3 << 2, COMP0=99, COMP1=25, REP0=1)
+    bench["LETIMER0.ROUTE"] = 1
+    bench["LETIMER0.CMD"] = 1
+    bench.run_for(350 * TICK)
+    found = [(one.time_ps, one.value) for one in bench.out(Kind.PIN) if one.unit == 3 * 16 + 6]
+    rises = [time for time, level in found if level]
+    falls = [time for time, level in found if not level and time > rises[0]]
+    assert len(rises) >= 3
+    for rise, fall in zip(rises, falls, strict=False):
+        assert abs(fall - rise - 26 * S // HZ) <= US
+    assert abs(rises[1] - rises[0] - 100 * S // HZ) <= US
+
+
+def test_the_rtc_starts_the_letimer() -> None:
+    bench = low(2, "RTC", "LETIMER0")
+    bench["LETIMER0.CTRL"] = TOP | mask_of("LETIMER.CTRL.RTCC0TEN")
+    bench["LETIMER0.COMP0"] = 999
+    bench["RTC.COMP0"] = 50
+    bench["RTC.CTRL"] = 1
+    bench.run_for(45 * TICK)
+    assert not bench.is_set("LETIMER0.STATUS.RUNNING")
+    bench.run_for(10 * TICK)
+    assert bench.is_set("LETIMER0.STATUS.RUNNING")
+
+
+# -- LEUART --
+
+
+def leuart(clkdiv: int = 617, control: int = 0, *, interrupts: bool = False) -> Bench:
+    bench = low(2, "LEUART0", interrupts=interrupts)
+    bench["GPIO.PD_MODEL"] = PUSH_PULL << 16 | INPUT << 20
+    bench["LEUART0.ROUTE"] = 3
+    bench["LEUART0.CTRL"] = control
+    bench["LEUART0.CLKDIV"] = clkdiv & 0x7FF8
+    bench["LEUART0.CMD"] = 5
+    bench.run_for(4 * TICK)
+    return bench
+
+
+def test_the_leuart_sends_at_9600_baud_in_em2() -> None:
+    bench = leuart()
+    for byte in b"go":
+        bench["LEUART0.TXDATA"] = byte
+        while bench["LEUART0.SYNCBUSY"]:
+            bench.run_for(TICK)
+    bench.run_for(3 * MS)
+    items = bench.out(Kind.UART)
+    assert [item.value for item in items] == list(b"go")
+    assert items[0].unit == LEUART0 | PD4 << 8
+    expected = 10 * (256 + 616) * S // 256 // HZ
+    assert abs(items[0].extra - expected) <= 1
+    assert abs(items[1].time_ps - items[0].time_ps - expected) <= 1
+    assert bench.is_set("LEUART0.STATUS.TXC")
+    assert bench.machine.energy_mode == 2
+
+
+def test_commands_arrive_two_to_three_clocks_later() -> None:
+    bench = leuart()
+    bench["LEUART0.CMD"] = 2
+    assert bench["LEUART0.SYNCBUSY"] == 2
+    assert bench.is_set("LEUART0.STATUS.RXENS")
+    bench.run_for(4 * TICK)
+    assert bench["LEUART0.SYNCBUSY"] == 0
+    assert not bench.is_set("LEUART0.STATUS.RXENS")
+
+
+def test_a_received_character_wakes_from_em2() -> None:
+    bench = leuart(interrupts=True)
+    bench["LEUART0.IEN"] = 4
+    bench.out(Kind.SLEEP)
+    bench.machine.uart_receive(0x100 | PD5, 0x7E)
+    bench.run_for(US)
+    assert bench.out(Kind.SLEEP)[0].value == 0
+    assert bench["LEUART0.RXDATA"] == 0x7E
+
+
+def test_start_and_signal_frames() -> None:
+    bench = leuart(control=mask_of("LEUART.CTRL.SFUBRX"))
+    bench["LEUART0.STARTFRAME"] = 0x02
+    bench["LEUART0.SIGFRAME"] = 0x03
+    bench["LEUART0.CMD"] = 0x10
+    bench.run_for(4 * TICK)
+    for byte in b"ab\x02hi\x03":
+        bench.machine.uart_receive(LEUART0, byte)
+        if byte == 0x62:
+            assert not bench.is_set("LEUART0.STATUS.RXDATAV")
+        elif byte > 3 or byte == 2:
+            assert bench.is_set("LEUART0.IF.STARTF") == (byte not in b"ab")
+    assert bench.is_set("LEUART0.IF.SIGF")
+    assert bench["LEUART0.RXDATA"] == 2
+
+
+def test_the_leuart_overflows_behind_two_and_the_shift_register() -> None:
+    bench = leuart()
+    for byte in range(4):
+        assert not bench.is_set("LEUART0.IF.RXOF")
+        bench.machine.uart_receive(LEUART0, byte)
+    assert bench.is_set("LEUART0.IF.RXOF")
+    assert [bench["LEUART0.RXDATA"] for _ in range(3)] == [0, 1, 3]
+
+
+# -- BURTC --
+
+
+def burtc(control: int = 0) -> Bench:
+    bench = low(1)
+    bench["RMU.CTRL"] = 0
+    bench["BURTC.CTRL"] = control
+    return bench
+
+
+ULFRCO = 3 << 12 | 1
+
+
+def test_the_backup_domain_is_held_in_reset_at_first() -> None:
+    bench = low(1)
+    bench["BURTC.RET0_REG"] = 1
+    assert bench["BURTC.RET0_REG"] == 0
+    assert "BURSTEN" in bench.log()
+    bench["RMU.CTRL"] = 0
+    bench["BURTC.RET0_REG"] = 1
+    assert bench["BURTC.RET0_REG"] == 1
+
+
+def test_512_bytes_survive_every_reset_but_power_on() -> None:
+    bench = burtc()
+    for n in range(128):
+        bench[f"BURTC.RET{n}_REG"] = 0x1234_0000 + n
+    for cause in (SYSTEM_REQUEST, WATCHDOG):
+        bench.reset(cause)
+        bench.clock("LE")
+        assert [bench[f"BURTC.RET{n}_REG"] for n in range(128)] == [
+            0x1234_0000 + n for n in range(128)
+        ]
+    bench.reset(POWER_ON)
+    bench.clock("LE")
+    assert bench["BURTC.RET5_REG"] == 0
+
+
+def test_the_burtc_counts_on_over_a_reset() -> None:
+    bench = burtc(ULFRCO)
+    bench.run_for(100 * MS)
+    assert abs(bench["BURTC.CNT"] - 100) <= 1
+    bench.reset(SYSTEM_REQUEST)
+    bench.run_for(100 * MS)
+    bench.clock("LE")
+    assert abs(bench["BURTC.CNT"] - 200) <= 2
+
+
+def test_the_burtc_interrupts_at_its_compare_value() -> None:
+    bench = burtc(ULFRCO)
+    bench["BURTC.COMP0"] = 10
+    bench["BURTC.IEN"] = 2
+    bench.run_for(8 * MS)
+    assert not bench.peek("BURTC.IF")
+    bench.run_for(4 * MS)
+    assert bench.peek("BURTC.IF") == 2
+    assert bench.machine.read(PENDING) == 1 << BURTC_IRQ
+
+
+def test_the_burtc_prescaler_and_lock() -> None:
+    bench = burtc(ULFRCO | 3 << 8)
+    bench.run_for(800 * MS)
+    assert abs(bench["BURTC.CNT"] - 100) <= 1
+    bench["BURTC.LOCK"] = 0
+    bench["BURTC.CTRL"] = 0
+    assert bench["BURTC.CTRL"] == ULFRCO | 3 << 8
+    assert "BURTC is locked" in bench.log()
+    bench["BURTC.LOCK"] = 0xAEE8
+    bench["BURTC.CTRL"] = 8
+    assert bench["BURTC.CNT"] == 0
+
+
+# -- PCNT --
+
+
+@pytest.mark.parametrize(("control", "counted"), [(1, 5), (2, 5), (0, 0), (1 | 8, 5)])
+def test_a_pulse_counter_counts_edges(control: int, counted: int) -> None:
+    bench = low(1)
+    bench["GPIO.PC_MODEH"] = INPUT << 20
+    bench["PCNT0.CTRL"] = control
+    bench.run_for(4 * TICK)
+    for _ in range(5):
+        bench.machine.pin(2, 13, 1)
+        bench.machine.pin(2, 13, 0)
+    assert bench["PCNT0.CNT"] == counted
+
+
+def test_a_pulse_counter_overflows_at_its_top() -> None:
+    bench = low(1)
+    bench["GPIO.PC_MODEH"] = INPUT << 20
+    bench["PCNT0.TOPB"] = 2
+    bench["PCNT0.CTRL"] = 1
+    bench.run_for(4 * TICK)
+    for _ in range(4):
+        bench.machine.pin(2, 13, 1)
+        bench.machine.pin(2, 13, 0)
+    assert bench["PCNT0.CNT"] == 1
+    assert bench["PCNT0.IF"] & 2
