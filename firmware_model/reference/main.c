@@ -13,13 +13,13 @@
 #include "drivers/clock.h"
 #include "drivers/external_ram.h"
 #include "drivers/fpga.h"
+#include "drivers/gpio.h"
 #include "drivers/i2c_slave.h"
 #include "drivers/reset.h"
 #include "drivers/uart.h"
 #include "drivers/watchdog.h"
 #include "image_sensor.h"
 #include "link.h"
-#include "drivers/gpio.h"
 #include "pins.h"
 #include "processing.h"
 #include "state.h"
@@ -53,8 +53,11 @@ static bool serve(void)
         command_running = true;
         link_taken();
         bool ends = command_execute(&command);
-        if (ends)
+        if (ends) {
+            while (uart_backlog()) /* the acknowledge */
+                watchdog_feed();
             reset();
+        }
         command_running = false;
     }
     return waiting;

@@ -3,7 +3,7 @@
  * EFM32GG Reference Manual, chapters 11 (CMU), 7 (MSC), 20 (TIMER) and 22 (BURTC). TIMER0 and 1 count
  * thirds of a microsecond within one life of the program. BURTC counts on through resets, so that
  * the time goes on after one: it has 32 768 counts a second, 512 of which are 15 625 us. Until its
- * crystal has started, a reset is taken to last RESTART_US.
+ * crystal has started, what lies before `timer_start` is taken to last RESTART_US.
  *
  * SPDX-License-Identifier: BSD-2-Clause
  */
@@ -31,8 +31,7 @@
 
 #define SLICE_COUNTS 512u
 #define SLICE_US 15625u
-#define START_US 1000u   /* from power-up to `timer_start` */
-#define RESTART_US 1000u /* from a reset to there */
+#define RESTART_US 3150u /* most of it is the crystal's start */
 
 static uint64_t now_us;
 static uint32_t seen_ticks;
@@ -88,7 +87,7 @@ void timer_start(void)
     if (retained.clock_runs)
         now_us = burtc_us();
     else
-        now_us = retained.reset_us ? retained.reset_us + RESTART_US : START_US;
+        now_us = retained.reset_us + RESTART_US;
     TIMER0->CMD = TIMER_CMD_START;
     TIMER2->CTRL = PRESCALED_BY_1024 << TIMER_CTRL_PRESC_SHIFT | TIMER_CTRL_OSMEN;
     TIMER2->IEN = TIMER_IEN_OF;

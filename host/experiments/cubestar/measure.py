@@ -59,6 +59,9 @@ SEARCH = "search"
 SKIES = 5
 """Random skies that a threshold is searched with."""
 
+START_S = 0.02
+"""A firmware of one's own starts clocks and peripherals meanwhile, and hears nothing."""
+
 _DN = whole(1, 255)
 THRESHOLD = Kind(
     f"{_DN.what} DN, or {SEARCH}", lambda given: given if given == SEARCH else _DN(given)
@@ -148,6 +151,8 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
         elif options.is_random:
             scene = attitudes.random_view(options, CONDITION, rng)
         with opened(scene, seed=options.seed, faults=options.faults) as emulated:
+            if emulated.board.firmware:
+                emulated.wait(START_S)
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
             threshold = _threshold(emulated, options)
