@@ -20,4 +20,10 @@ Operation decode_32(uint32_t first, uint32_t second);
 // Operation::stall of the operation that was decoded at `offset` of a piece of code.
 uint8_t address_stall(const Operation &op, const uint8_t *code, uint32_t offset);
 
+// Whether an IT at `op`, `offset` bytes into its region, follows a 16-bit instruction. The length of
+// one that was run before outlives its breakpoints, so that these change no cycle.
+inline bool folds(uint32_t offset, const Operation *op) {
+    return offset != 0 && op[-1].halves == 1;
+}
+
 }  // namespace armv7m

@@ -7,6 +7,7 @@
 
 #include "codes.h"
 #include "cpu.h"
+#include "decode.h"
 #include "system.h"
 #include "timing.h"
 

@@ -86,14 +86,12 @@ HANDLE(TBH) {
     load_end = -1;
     GO(pc + 4 + 2 * value, REFILL_LOADED);
 }
-// Folded into a 16-bit instruction before it: no cycle of its own (TRM 3.3.1). Whether there was
-// one shows in the cache of decoded code.
+// Folded into a 16-bit instruction before it: no cycle of its own (TRM 3.3.1).
 HANDLE(IT) {
     const uint32_t pc = PC;
     it = (uint8_t)op->value;
     table = it_handlers;
-    const bool folded = pc != base && op[-1].code > LAST_MARKER && op[-1].halves == 1;
-    NEXT(!folded);
+    NEXT(op == aside ? !op->a : !folds(pc - base, op));
 }
 HANDLE(NOP) { NEXT(1); }
 HANDLE(BARRIER) {

@@ -30,6 +30,7 @@ bool Cpu::find_code(uint32_t pc) {
 
 // Decodes one instruction for itself, with markers behind it, so that the loop comes back.
 bool Cpu::run_aside(uint32_t pc) {
+    const Region *region = find_region(pc, 2);
     uint32_t first, second = 0;
     fetch_fault = Fault::FetchBus;
     if (!fetch_half(pc, first)) return false;
@@ -38,6 +39,11 @@ bool Cpu::run_aside(uint32_t pc) {
     if (const Region *region = find_region(pc, 2))
         aside[0].stall = address_stall(aside[0], region->host, pc - region->base);
     aside[1].code = aside[1].in_it = aside[2].code = aside[2].in_it = C_REGION_END;
+    if (aside[0].code == C_IT && region != nullptr) {    // it may fold as it would in its place
+        const Operation *place = code_of(*region)->operations.get();
+        const uint32_t offset = pc - region->base;
+        aside[0].a = folds(offset, place + offset / 2);
+    }
     operations = aside;
     code_base = pc, code_size = 0;    // every branch leaves
     return true;
