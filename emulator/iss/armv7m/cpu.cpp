@@ -38,7 +38,7 @@ uint32_t Cpu::run() {
     stopped_at = NOWHERE;
     for (;;) {
         if (attention_requested || cycles >= system->next_cycle()) {
-            attention_requested = odd_target = false;
+            attention_requested = false, arriving = NotArriving;
             system->service();
         }
         if (stop_requested) exits |= ExitStop;
@@ -59,7 +59,7 @@ uint32_t Cpu::run() {
             fetch_failed();
             continue;
         }
-        charge_odd_target();
+        arrive();
         if (watched)
             fetch_costs ? loop<3>() : loop<1>();
         else

@@ -204,7 +204,7 @@ private:
     bool decode_at(uint32_t pc, Operation *op);
     bool run_aside(uint32_t pc);
     bool fetch_cost(uint32_t pc, uint32_t halves);
-    void charge_odd_target();
+    void arrive();
 
     // Execution (execute.cpp, special.cpp).
     template <int Mode> void loop();
@@ -239,7 +239,8 @@ private:
     uint32_t fetched = NOWHERE;        // the line, or block, of the last fetch
     Fault fetch_fault = {};            // why find_code found nothing
     bool aside_ready = false;          // aside[0] is to run next
-    bool odd_target = false;           // a branch led to a half-word that is not at a word
+    // A branch left the loop; to a half-word that is not at a word.
+    enum : uint8_t { NotArriving, Arriving, ArrivingOdd } arriving = NotArriving;
 
     // Pipeline (timing.h).
     int64_t load_end = -1, bus_free = 0;

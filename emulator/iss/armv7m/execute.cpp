@@ -150,7 +150,7 @@ template <int Mode> void Cpu::loop() {
         now += 1 + (refill); \
         count++; \
         if (UNLIKELY(target - base >= length)) { \
-            odd_target = (refill) < 3 && (target & 2); \
+            arriving = (refill) < 3 && (target & 2) ? ArrivingOdd : Arriving; \
             goto far; \
         } \
         op = ops + ((target - base) >> 1); \

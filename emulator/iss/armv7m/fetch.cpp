@@ -36,13 +36,12 @@ bool Cpu::run_aside(uint32_t pc) {
     if (!fetch_half(pc, first)) return false;
     if (is_wide(first) && !fetch_half(pc + 2, second)) return false;
     aside[0] = is_wide(first) ? decode_32(first, second) : decode_16(first);
-    if (const Region *region = find_region(pc, 2))
-        aside[0].stall = address_stall(aside[0], region->host, pc - region->base);
     aside[1].code = aside[1].in_it = aside[2].code = aside[2].in_it = C_REGION_END;
-    if (aside[0].code == C_IT && region != nullptr) {    // it may fold as it would in its place
-        const Operation *place = code_of(*region)->operations.get();
+    if (region != nullptr) {    // it takes as long as in its place
         const uint32_t offset = pc - region->base;
-        aside[0].a = folds(offset, place + offset / 2);
+        aside[0].stall = address_stall(aside[0], region->host, offset);
+        if (aside[0].code == C_IT)
+            aside[0].a = folds(offset, code_of(*region)->operations.get() + offset / 2);
     }
     operations = aside;
     code_base = pc, code_size = 0;    // every branch leaves
@@ -80,14 +79,16 @@ bool Cpu::decode_at(uint32_t pc, Operation *op) {
     return false;
 }
 
-// A 32-bit instruction across two words costs the branch to it one cycle more, also where the loop
-// had to be left for it.
-void Cpu::charge_odd_target() {
-    if (!odd_target) return;
-    odd_target = false;
+// What the loop does at a branch's target, where it had to be left for it: a 32-bit instruction
+// across two words costs one cycle more, and the refill hides a stall.
+void Cpu::arrive() {
+    const bool odd = arriving == ArrivingOdd;
+    if (arriving == NotArriving) return;
+    arriving = NotArriving;
     Operation *op = operations + ((r[15] - code_base) >> 1);
     if (op->code == C_UNDECODED && !decode_at(r[15], op)) return;
-    if (op->halves == 2) cycles++;
+    if (odd && op->halves == 2) cycles++;
+    cycles -= op->stall;
 }
 
 // Charges the fetch of an instruction, and asks the MPU. False: it may not be fetched.

@@ -253,6 +253,25 @@ def test_breakpoints_stop_before_and_cost_nothing(load: Load) -> None:
     assert (plain.cycles, plain.instructions) == (broken.cycles, broken.instructions)
 
 
+def test_breakpoints_anywhere_change_no_cycle(load: Load) -> None:
+    text = (
+        "ldr r4, =0x20000100\n movs r6, #6\n .p2align 2\n nop\n"
+        "1: add.w r5, r4, #8\n ldr r0, [r5]\n ldr r1, [r5, #4]\n str r1, [r4]\n bl 3f\n"
+        "subs r6, #1\n ittt ne\n addne r7, r7, r0\n ldrne r2, [r7]\n bne 1b\n 2: b 2b\n"
+        ".p2align 2\n nop\n 3: ldr.w r3, [r4, #12]\n movs r2, #5\n udiv r2, r0, r2\n bx lr\n"
+    )
+    plain, broken = (load(text, r7=DATA) for _ in range(2))
+    plain.run(200_000_000)
+    for address in range(CODE, CODE + 0x40, 2):
+        broken.breakpoints.add(address)
+    stops = 0
+    while broken.run(200_000_000).reason == StopReason.BREAKPOINT:
+        stops += 1
+    assert stops > 50
+    assert plain.registers() == broken.registers()
+    assert (plain.cycles, plain.instructions) == (broken.cycles, broken.instructions)
+
+
 def test_watchpoints_stop_behind_the_access(load: Load) -> None:
     text = "ldr r0, [r1]\n strb r2, [r1, #3]\n str r2, [r1, #4]\n push {r0, r1}\n nop"
     machine = load(text, r1=DATA, r2=7, sp=DATA + 16)
