@@ -201,7 +201,7 @@ void Msc::command(uint32_t value) {
 
 uint8_t *Msc::page(uint32_t at) {
     uint32_t left;
-    if (at >= Part::RAM_CODE || at >= Part::INFORMATION)
+    if (at >= Part::INFORMATION)
         return nullptr;
     return part.memory_at(at, left);
 }

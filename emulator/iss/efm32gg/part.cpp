@@ -84,6 +84,7 @@ void Part::clocks_set() {
     const bool starting = standing && standing_until != NEVER;
     if (!starting && !cycle_time.same_frequency(rate(Clock::HFCORE)))
         rebase(now());
+    set_bus_waits();
     msc->clocks_set();
 }
 
@@ -124,6 +125,7 @@ void Part::perform_reset() {
     cmu->rates(wanted, time);
     std::copy(std::begin(wanted), std::end(wanted), std::begin(rates));
     rebase(time);
+    set_bus_waits();
     msc->clocks_set();
     each([](Peripheral &one) { one.clocks_changed(); });
     cpu.reset();

@@ -175,6 +175,7 @@ private:
     int64_t owed_cycles = 0;       // made while it stood, to be spent when it runs
     bool standing = true, stop_wanted = false, asleep = false, locked = false;
     uint32_t wanted_reset = 0;
+    int slow_ratio = 1;            // HFCORECLK to HFPERCLK
     std::vector<std::unique_ptr<Peripheral>> owned;
     Peripheral *slots[SLOTS] = {};
     std::vector<uint8_t> own_information;
@@ -193,6 +194,7 @@ private:
     void perform_reset();
     bool access_allowed(const Peripheral &unit);
     int64_t bus_wait(const Peripheral &unit, bool write) const;
+    void set_bus_waits();
 };
 
 // Makes the units of interfaces.cpp: serial, counting, analog, DMA.

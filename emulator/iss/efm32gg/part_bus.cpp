@@ -6,6 +6,7 @@
 #include "msc.h"
 #include "part.h"
 
+#include <algorithm>
 #include <cstring>
 
 namespace efm32gg {
@@ -14,12 +15,15 @@ namespace efm32gg {
 // write goes on behind it (chapter 5.2.3).
 static constexpr int64_t READ_WAIT = 2, WRITE_WAIT = 1;
 
+void Part::set_bus_waits() {
+    const Rate &core = rate(Clock::HFCORE), &slow = rate(Clock::HFPER);
+    const double ratio = core.runs() && slow.runs() ? core.frequency() / slow.frequency() : 1;
+    slow_ratio = std::max(1, (int)ratio);
+}
+
 int64_t Part::bus_wait(const Peripheral &unit, bool write) const {
     const int64_t wait = write ? WRITE_WAIT : READ_WAIT;
-    if (!cmu->on_slow_bus(unit.instance))
-        return wait;
-    const double ratio = rate(Clock::HFCORE).frequency() / rate(Clock::HFPER).frequency();
-    return ratio > 1 ? (int64_t)((double)wait * ratio) : wait;
+    return cmu->on_slow_bus(unit.instance) ? wait * slow_ratio : wait;
 }
 
 Peripheral *Part::peripheral_at(uint32_t address) const {
@@ -58,7 +62,7 @@ static bool writable_memory(uint32_t address) { return address >= Part::RAM_CODE
 bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
     uint32_t left;
     value = 0;
-    if (const uint8_t *memory = memory_at(address, left)) {
+    if (const uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
         if (left < (uint32_t)size)
             return false;
         if (!writable_memory(address))
@@ -82,7 +86,7 @@ bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
 
 bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
     uint32_t left;
-    if (uint8_t *memory = memory_at(address, left)) {
+    if (uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
         if (!writable_memory(address))
             return msc->ignores_bus_writes();
         if (left < (uint32_t)size)

@@ -90,19 +90,21 @@ int64_t Part::run(int64_t until) {
             break;
         }
         const int64_t next = std::min(until, events.next_time());
-        if (asleep) {
+        if (hung) {
+            if (next == NEVER)
+                break;
+            advance(next);
+        } else if (asleep) {
             if (wait_for_wake(next))
                 break;
         } else if (standing) {
             advance(std::min(next, standing_until));
-        } else if (hung) {
-            advance(next);
         } else if (stalled_until > now()) {
             advance(std::min(next, stalled_until));
         } else {
             cpu.set_deadline(cycle_at(next));
             const uint32_t ended = cpu.run();
-            if (ended & armv7m::ExitLockup && std::exchange(locked, true)) {
+            if (ended & armv7m::ExitLockup && std::exchange(locked, true) && next != NEVER) {
                 advance(next);
                 continue;
             }
@@ -165,6 +167,8 @@ bool Part::wait_for_wake(int64_t until) {
         next = std::min(next, cycle_time.time(tick - base_cycle));
     if (outside)
         next = std::max(now(), std::min(next, outside->sleep_until(now(), next)));
+    if (next == NEVER)
+        return true;
     advance(next);
     return false;
 }
