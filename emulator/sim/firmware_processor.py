@@ -87,6 +87,8 @@ class FirmwareProcessor:
         self._early: list[Outgoing] = []  # what left the machine while it caught up
         self._locked_up = False
         self.machine.reset(self.power_on)
+        for _ in self.machine.outbox():
+            pass  # being made is no news to anybody
         self.on_activity(True)
         self._running = self.env.process(self._run())
 

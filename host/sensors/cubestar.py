@@ -24,6 +24,9 @@ POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 MAG_LIMIT = 3.8
 """Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
 
+REFERENCE = "reference"
+"""Name of this project's program in C among firmware files."""
+
 WIDEST_PAIR_DEG = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))
 """The list in flash has every pair that a switch wants."""
 
@@ -65,9 +68,15 @@ def _open_with(
 
     if switches != DEFAULT_SWITCHES:
         raise ValueError("own firmware has no profile and no switches: leave them out")
-    image = load_image(firmware)
+    name, mark, wanted = firmware.partition("#")
+    if name == REFERENCE:
+        from cubestack.firmware_model.reference.image import reference_image
+
+        image = load_image(f"{reference_image()}{mark}{wanted}")
+    else:
+        image = load_image(firmware)
     board = CubeStarFirmwareBoard(scene, image, baud=baud, layout=layout, **common)
-    board.firmware = firmware.partition("#")[0] + image.mark
+    board.firmware = name + image.mark
     return board
 
 
@@ -139,7 +148,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         BoardOption(
             "firmware",
             "program for the processor: an ELF, Intel HEX or binary file (FILE@0xADDRESS), "
-            "instead of this project's own (docs/own-firmware.md)",
+            f"or {REFERENCE}, the same in C, instead of this project's own (docs/own-firmware.md)",
             default="",
             metavar="FILE",
         ),

@@ -19,6 +19,7 @@ static inline void make(unsigned pin, unsigned mode) {
 static inline void start_board(void) {
     MSC->READCTRL = (MSC->READCTRL & ~MSC_READCTRL_MODE) | 2u << MSC_READCTRL_MODE_SHIFT;
     CMU->CTRL = (CMU->CTRL & ~CMU_CTRL_HFXOBUFCUR) | 3u << CMU_CTRL_HFXOBUFCUR_SHIFT;
+    CMU->CTRL |= CMU_CTRL_HFLE;
     CMU->HFCORECLKDIV |= CMU_HFCORECLKDIV_HFCORECLKLEDIV;
     CMU->OSCENCMD = CMU_OSCENCMD_HFXOEN;
     while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) {}

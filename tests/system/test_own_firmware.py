@@ -1,0 +1,186 @@
+"""Own firmware end to end: serial line, camera bus, monitors, comparator, watchdog, recordings."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import cubestack
+from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
+from cubestack.emulator.bus.line_format import LineFormat
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.cli.main import main
+from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.devices.records import start_recorder
+from cubestack.host.recording.setups import emulated_setup
+from tests.emulator.boards.cubestar.builds import build, needs_toolchain
+
+pytestmark = [
+    needs_toolchain,
+    pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
+]
+
+
+@pytest.fixture(scope="module")
+def elf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build("console", tmp_path_factory.mktemp("console"))
+
+
+@pytest.fixture
+def star(elf: Path) -> Iterator[AnyEmulated]:
+    with open_device("cubestar", firmware=str(elf)) as opened:
+        yield opened
+
+
+def answer(star: AnyEmulated, letter: bytes, size: int = 64, timeout_s: float = 0.05) -> bytes:
+    """What comes within a while after a letter was sent."""
+    port = star.serial(timeout=timeout_s)
+    port.write(letter)
+    return port.read(size)
+
+
+def board(star: AnyEmulated) -> CubeStarFirmwareBoard:
+    assert isinstance(star.board, CubeStarFirmwareBoard)
+    return star.board
+
+
+def test_serial_line_and_trace_channel(star: AnyEmulated) -> None:
+    lines: list[str] = []
+    star.board.tell(lines.append)
+    port = star.serial(timeout=0.05)
+    assert port.read(64) == b"boot 1\n"
+    assert answer(star, b"h") == b"hello\n"
+    assert answer(star, b"x") == b"?\n"
+    assert lines == ["traced"]
+
+
+def test_registers_of_the_camera(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    board(star).camera.i2c_write(0x2C, b"\x85\x1c\x12\x34", board(star).kernel.now)
+    assert answer(star, b"r") == b"%d\n" % 0x1234
+    board(star).power.switch("imager", False)
+    assert answer(star, b"r") == b"%d\n" % 0xFFFFFFFF
+
+
+def test_current_of_the_imager_by_the_adc(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    shown = int(answer(star, b"m"))
+    assert shown == pytest.approx(board(star).power.current_ma("imager"), abs=1)
+
+
+def test_comparator_sees_a_latch_up_and_the_firmware_cuts_the_supply(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    assert answer(star, b"o") == b"armed\n"
+    star.wait(0.1)
+    assert board(star).power.is_on("imager")
+    port = star.serial(timeout=0.05)
+    star.faults.inject("latch-up", target="imager")
+    assert port.read(64) == b"cut\n"
+    assert not board(star).power.is_on("imager")
+
+
+def test_watchdog_bites(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    assert answer(star, b"w", timeout_s=0.4) == b"stopped\nboot 16\n"
+    assert star.board.processor.resets == 1
+
+
+@pytest.mark.parametrize(
+    ("target", "cause"),
+    [("brown-out", 2), ("brown-out-regulated", 4), ("reset-pin", 8), ("lock-up", 32)],
+)
+def test_forced_resets_tell_their_causes(star: AnyEmulated, target: str, cause: int) -> None:
+    star.wait(0.02)
+    port = star.serial(timeout=0.05)
+    star.faults.inject("processor-reset", target=target)
+    assert port.read(64) == b"boot %d\n" % cause
+
+
+def test_hanging_program_without_a_watchdog_stays_silent(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    star.faults.inject("processor-reset", target="hang")
+    assert answer(star, b"h", timeout_s=3.0) == b""
+
+
+def test_wrong_rate_is_garbage_or_nothing(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    port = star.board.serial()
+    port._line.form = LineFormat(19200)
+    port.write(b"h")
+    assert b"hello" not in port.read(64, 0.05)
+    port._line.form = LineFormat(57600)
+    star.wait(0.05)
+    port.read(64, 0.0)
+    port.write(b"h")
+    star.wait(0.05)
+    assert port.read(64, 0.0) == b"hello\n"
+
+
+def test_upsets_of_core_and_memories_never_end_the_emulator(elf: Path) -> None:
+    for seed in range(6):
+        with open_device("cubestar", firmware=str(elf), seed=seed) as star:
+            star.faults.inject("core-upsets", rate=5.0)
+            star.faults.inject("memory-upsets", target="flash", rate=1e-2)
+            star.faults.inject("memory-upsets", target="ram", rate=1e-2)
+            star.wait(0.1)
+            answer(star, b"h")
+            assert star.faults.events > 10
+
+
+def test_same_seed_same_trace(elf: Path, tmp_path: Path) -> None:
+    def recorded(name: str) -> tuple[str, int, int]:
+        path = tmp_path / name
+        with open_device("cubestar", firmware=str(elf), seed=5) as star:
+            star.faults.inject("uart-corrupt", rate=0.2)
+            for letter in b"hrmxh":
+                answer(star, bytes([letter]))
+            machine = board(star).machine
+            path.write_text("\n".join(map(str, star.faults.log)))
+            return path.read_text(), machine.cycles, machine.instructions
+
+    assert recorded("one") == recorded("two")
+
+
+def test_recording_tells_the_firmware_and_replay_checks_it(
+    elf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = tmp_path / "session.jsonl"
+    program = tmp_path / "program.elf"
+    program.write_bytes(elf.read_bytes())
+    stream = recording.open("w", encoding="utf-8", newline="")
+    with open_device("cubestar", firmware=str(program)) as star, stream:
+        recorder = start_recorder(star, stream, emulated_setup(0, None))
+        answer(star, b"h")
+        recorder.close()
+    assert main(["replay", str(recording)]) == 0
+    changed = program.read_bytes().replace(b"hello", b"jello")
+    program.write_bytes(changed)
+    assert main(["replay", str(recording)]) == 2
+    assert "has the hash" in capsys.readouterr().err
+
+
+BAD = {
+    "empty.elf": (b"", "is empty"),
+    "none.bin": (b"\xff" * 100, "has no vector table"),
+    "text.hex": (b"hello", "is no Intel HEX file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize("command", ["emulate", "measure"])
+def test_bad_image_is_one_line(
+    command: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content, wanted = BAD[name]
+    path = tmp_path / name
+    path.write_bytes(content)
+    assert main([command, "cubestar", "--firmware", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"cubestack {command}: {path}")
+    assert wanted in error
+    assert error.count("\n") == 1
+
+
+def test_options_that_own_firmware_does_not_have(elf: Path) -> None:
+    with pytest.raises(ValueError, match="no profile and no switches"):
+        cubestack.open_device("cubestar", firmware=str(elf), profile="extended")
