@@ -54,7 +54,6 @@ void Msc::set_up_reads() {
         region.read_wait = (uint8_t)wait_states;
     }
     part.cpu.regions_changed();
-    check_wait_states();
 }
 
 void Msc::clocks_set() { check_wait_states(); }
@@ -126,6 +125,7 @@ void Msc::write(uint32_t offset, uint32_t value) {
     case READCTRL:
         store(offset, value);
         set_up_reads();
+        check_wait_states();
         break;
     case WDATA:
         if (!(reg(WRITECTRL) & WRITECTRL_WREN)) {
