@@ -30,6 +30,7 @@ COMMANDS = {
     "conformance": "check a device's protocol against the tables",
     "replay": "play a recording to an emulated device, compare what it says",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",
+    "costs": "measure what a device's program costs as compiled code",
     "bench": "measure the cost of the hot paths on this machine",
 }
 

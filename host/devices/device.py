@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.interface.efm32gg.table import Processor
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
+    from cubestack.host.devices.costs import CostReport
     from cubestack.host.devices.experiment import AnyExperiment
     from cubestack.host.devices.fidelity import Fidelity
 
@@ -165,6 +166,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
+        costs: what its program costs as compiled code; None where there is none to compile.
         processor: its processor as firmware of one's own sees it; None where that can not run.
     """
 
@@ -189,6 +191,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
+    costs: "Callable[[], CostReport] | None" = None
     processor: "Callable[[], Processor] | None" = None
 
     def __post_init__(self) -> None:

@@ -154,6 +154,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         ),
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),
+    costs=call(f"{EXPERIMENTS}.costs:costs"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     conformance=ConformanceNotes(

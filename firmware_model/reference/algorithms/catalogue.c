@@ -8,7 +8,7 @@
 
 /* The reduced pair list; the generator knows the most that any direction needs. */
 static uint16_t reduced_first[REDUCED_PAIRS], reduced_second[REDUCED_PAIRS];
-static float reduced_angle[REDUCED_PAIRS];
+static stored_float reduced_angle[REDUCED_PAIRS];
 
 static bool is_near(const float boresight[3], float cosine, int star) {
     return star_x[star] * boresight[0] + star_y[star] * boresight[1] +

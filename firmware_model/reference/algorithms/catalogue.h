@@ -14,21 +14,24 @@
 
 /* CUT_COSINE: 35 deg, assisted matching (section 4.3.4). TRACKING_COSINE: 30.3 deg (5.3.4). */
 
+/* As flash has it, whatever precision the program computes in. */
+typedef float stored_float;
+
 /* Stars by rising Hipparcos number: inertial unit vectors. */
-extern const float star_x[STAR_COUNT], star_y[STAR_COUNT], star_z[STAR_COUNT];
+extern const stored_float star_x[STAR_COUNT], star_y[STAR_COUNT], star_z[STAR_COUNT];
 
 /* Hipparcos numbers, for telemetry alone; the published flash did not have them. */
 extern const uint32_t star_hip[STAR_COUNT];
 
 /* Pairs by rising angle, in rad. */
 extern const uint16_t pair_first[PAIR_COUNT], pair_second[PAIR_COUNT];
-extern const float pair_angle[PAIR_COUNT];
+extern const stored_float pair_angle[PAIR_COUNT];
 
 /* A list of pairs: that in flash, or the reduced one in RAM. */
 struct pair_list {
     int count;
     const uint16_t *first, *second;
-    const float *angle;
+    const stored_float *angle;
 };
 
 /* Marks the stars whose angle from a unit vector has at least this cosine; how many there are. */

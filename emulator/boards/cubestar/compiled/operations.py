@@ -1,0 +1,73 @@
+"""Cycles of single operations, out of ``firmware_model/reference/costs/operations.c``.
+
+Each is the difference of two functions, with and without it, over a thousand turns.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cubestack.emulator.iss.calls import Calls
+from cubestack.emulator.iss.machine import RAM_BASE
+
+#: Each operation's function, by name, and the one that does all but the operation.
+OPERATIONS: Mapping[str, str | None] = {
+    **dict.fromkeys(("f32_add", "f32_mul", "f32_div"), "plain_floats"),
+    **dict.fromkeys(("f32_sqrt", "f32_atan2", "f32_acos", "f32_sin"), "plain_units"),
+    "f32_compare": "plain_compare",
+    "f32_convert": "plain_convert",
+    **dict.fromkeys(("i32_add", "i32_mul", "i32_div", "table_byte"), "plain_wholes"),
+    "loop": None,
+    **dict.fromkeys(("call", "ram_read", "ram_write"), "plain_loop"),
+    **dict.fromkeys(("ebi_read", "ebi_write", "port_read", "port_write"), "plain_loop"),
+    "transfer_byte": None,
+}
+
+FEW, MANY = 200, 1200
+_OPERANDS = 64
+_INTERRUPT_ENABLE, _INTERRUPT_CLEAR, _INTERRUPT_UNPEND = 0xE000_E100, 0xE000_E180, 0xE000_E280
+_SEED = 2013
+
+
+def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
+    """Cycles of each operation by name."""
+    rng = np.random.default_rng(_SEED)
+    kind = np.float64 if double else np.float32
+    operands = {
+        "left": rng.normal(0, 10, _OPERANDS).astype(kind),
+        "right": rng.normal(0, 10, _OPERANDS).astype(kind),
+        "unit": rng.uniform(-1, 1, _OPERANDS).astype(kind),
+        "whole": rng.integers(-100_000, 100_000, _OPERANDS, np.int32),
+        "other": rng.integers(1, 1000, _OPERANDS, np.int32),
+    }
+    for name, values in operands.items():
+        calls.put(name, values.tobytes())
+    found = {}
+    for name, plain in OPERATIONS.items():
+        units = np.abs(operands["unit"]) if name == "f32_sqrt" else operands["unit"]
+        calls.put("unit", units.tobytes())
+        cycles = _turn(calls, "plain_loop" if name == "loop" else name)
+        found[name] = round(cycles - (_turn(calls, plain) if plain else 0), 1)
+    flash, ram = calls.symbols["pair_angle"], RAM_BASE
+    beyond_ram = _turn(calls, "read_words", flash) - _turn(calls, "read_words", ram)
+    found["flash_read"] = round(found["ram_read"] + beyond_ram, 1)
+    found["uart_interrupt"] = found["i2c_interrupt"] = round(_interrupt(calls), 1)
+    return found
+
+
+def _turn(calls: Calls, name: str, *arguments: int) -> float:
+    """Cycles of one turn of a function's loop."""
+    for _ in range(2):  # the second time the cache is warm
+        few, many = (calls.call(name, turns, *arguments) for turns in (FEW, MANY))
+    return (many - few) / (MANY - FEW)
+
+
+def _interrupt(calls: Calls) -> float:
+    """Entry, a byte through a queue, and return."""
+    machine = calls.machine
+    masked = _turn(calls, "byte_interrupt_taken")
+    machine.write(_INTERRUPT_UNPEND, 1)
+    machine.write(_INTERRUPT_ENABLE, 1)
+    taken = _turn(calls, "byte_interrupt_taken")
+    machine.write(_INTERRUPT_CLEAR, 1)
+    return taken - masked

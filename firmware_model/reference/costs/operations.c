@@ -1,0 +1,135 @@
+/* Operations of the cost table, as a compiler makes them.
+ *
+ * Each function repeats one operation on operands that change. It is called with two numbers of
+ * turns, so that what the call itself costs falls out, and beside a `plain_` function that does all
+ * but the operation.
+ *
+ * SPDX-License-Identifier: BSD-2-Clause
+ */
+#include <math.h>
+#include <stdint.h>
+
+#include "efm32gg.h" /* generated */
+#include "float_functions.h"
+
+#define OPERANDS 64 /* a power of two */
+#define OPERAND(turn) ((turn) % OPERANDS)
+
+/* Filled from outside: floats of any sign, floats of -1 to 1, integers. */
+volatile float left[OPERANDS], right[OPERANDS], unit[OPERANDS], result[OPERANDS];
+volatile int32_t whole[OPERANDS], other[OPERANDS], answer[OPERANDS];
+volatile uint8_t bytes[OPERANDS];
+
+#define EXTERNAL ((volatile uint8_t *)0x80000000u)
+#define PORT (&GPIO->PD_DIN)
+#define PORT_SET (&GPIO->PD_DOUTSET)
+#define PORT_CLEAR (&GPIO->PD_DOUTCLR)
+
+#define REPEATED(name, ...)                             \
+    void name(uint32_t turns) {                         \
+        for (uint32_t turn = 0; turn < turns; turn++) { \
+            __VA_ARGS__;                                \
+        }                                               \
+    }
+
+#define FLOATS(expression)                                             \
+    float x = left[OPERAND(turn)], y = right[OPERAND(turn)];           \
+    result[OPERAND(turn)] = (expression);                              \
+    (void)y
+
+#define UNITS(expression)                \
+    float x = unit[OPERAND(turn)];       \
+    result[OPERAND(turn)] = (expression)
+
+#define WHOLES(expression)                                             \
+    int32_t x = whole[OPERAND(turn)], y = other[OPERAND(turn)];        \
+    answer[OPERAND(turn)] = (expression);                              \
+    (void)y
+
+REPEATED(plain_floats, FLOATS(x))
+REPEATED(f32_add, FLOATS(x + y))
+REPEATED(f32_mul, FLOATS(x * y))
+REPEATED(f32_div, FLOATS(x / y))
+
+REPEATED(plain_units, UNITS(x))
+REPEATED(f32_sqrt, UNITS(sqrtf(x)))
+REPEATED(f32_acos, UNITS(arc_cosine(x)))
+REPEATED(f32_sin, UNITS(sine(x)))
+REPEATED(f32_atan2, UNITS(arc_tangent(x, 0.3f)))
+
+/* A comparison decides something: the plain function decides by the integers. */
+REPEATED(plain_compare, {
+    float x = left[OPERAND(turn)], y = right[OPERAND(turn)];
+    int32_t decided = whole[OPERAND(turn)];
+    answer[OPERAND(turn)] = decided < 0 ? 1 : 2;
+    (void)x, (void)y;
+})
+REPEATED(f32_compare, {
+    float x = left[OPERAND(turn)], y = right[OPERAND(turn)];
+    int32_t decided = whole[OPERAND(turn)];
+    answer[OPERAND(turn)] = x < y ? 1 : 2;
+    (void)decided;
+})
+REPEATED(plain_convert, {
+    int32_t x = whole[OPERAND(turn)];
+    answer[OPERAND(turn)] = x;
+})
+REPEATED(f32_convert, {
+    int32_t x = whole[OPERAND(turn)];
+    result[OPERAND(turn)] = (float)x;
+})
+
+REPEATED(plain_wholes, WHOLES(x))
+REPEATED(i32_add, WHOLES(x + y))
+REPEATED(i32_mul, WHOLES(x * y))
+REPEATED(i32_div, WHOLES(x / y))
+
+/* An entry of a table of bytes, found by a computed place. */
+REPEATED(table_byte, WHOLES(x + bytes[OPERAND(x)]))
+
+REPEATED(plain_loop, __asm volatile(""))
+REPEATED(plain_twice, __asm volatile(""); __asm volatile(""))
+
+/* A function that saves four registers and the return address. */
+__attribute__((noinline)) static void callee(void) {
+    __asm volatile("" : : : "r4", "r5", "r6", "r8", "lr");
+}
+
+REPEATED(call, callee())
+
+REPEATED(ram_read, (void)left[0])
+REPEATED(ram_write, answer[0] = 0)
+
+/* Words of a memory, far from each other, so that no cache has them. */
+void read_words(uint32_t turns, const volatile uint32_t *memory) {
+    for (uint32_t turn = 0; turn < turns; turn++) {
+        (void)memory[turn * 67 % 8192];
+    }
+}
+
+REPEATED(ebi_read, (void)*EXTERNAL)
+REPEATED(ebi_write, *EXTERNAL = 0)
+REPEATED(port_read, (void)*PORT)
+REPEATED(port_write, *PORT_SET = 1)
+
+/* The copy loop's turn: clock high, a byte, clock low; see drivers/fpga.c. */
+REPEATED(transfer_byte, {
+    *PORT_SET = 1;
+    __asm volatile("nop\n nop\n nop");
+    EXTERNAL[turn] = (uint8_t)*PORT;
+    *PORT_CLEAR = 1;
+})
+
+/* An interrupt that takes a byte into a queue, pended by the program itself. */
+static volatile uint8_t queue[OPERANDS], received;
+static volatile uint32_t head;
+
+void byte_interrupt(void) {
+    uint8_t byte = received;
+    queue[OPERAND(head)] = byte;
+    head = head + 1;
+}
+
+#define SET_PENDING ((volatile uint32_t *)0xE000E200u)
+
+REPEATED(byte_interrupt_taken, *SET_PENDING = 1; __asm volatile("dsb\n isb"))

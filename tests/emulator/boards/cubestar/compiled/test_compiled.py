@@ -1,0 +1,109 @@
+"""The reference algorithms as compiled code on the simulated part: same bits, and their cycles."""
+
+import shutil
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+from cubestack.emulator.boards.cubestar.compiled import operations, picture
+from cubestack.emulator.boards.cubestar.compiled.build import (
+    COMPILER,
+    Build,
+    compiled,
+    compiler_version,
+    rewritten,
+)
+from cubestack.emulator.boards.cubestar.compiled.machine import Timing, started
+from cubestack.emulator.iss.calls import CallError, Calls
+from cubestack.firmware_model.mcu.compiled import compiled_table, measured
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.host.experiments.cubestar.costs import generated
+
+from .....firmware_model.cubestar.sky import take
+
+needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
+
+
+@pytest.fixture(scope="module")
+def shot() -> NDArray[np.uint8]:
+    pose = Rotation.from_euler("zxz", [40, 65, -110], degrees=True)
+    return take(onboard_catalogue(), pose).picture
+
+
+@pytest.fixture(scope="module")
+def fast() -> Calls:
+    return started(compiled(Build("O2"), generated()), Timing())
+
+
+@needs_compiler
+@pytest.mark.parametrize("level", ["O0", "O2", "Os"])
+def test_the_compiled_program_finds_the_same_attitude_to_the_bit(
+    level: str, shot: NDArray[np.uint8]
+) -> None:
+    calls = started(compiled(Build(level), generated()), Timing())
+    expected = picture.charged(shot, onboard_catalogue(), Meter(CORTEX_M3))
+    found = picture.run(calls, shot)
+    assert (found.stars, found.quaternion) == (expected.stars, expected.quaternion)
+    assert found.cycles.keys() == expected.cycles.keys()
+    assert 0.5 < sum(found.cycles.values()) / sum(expected.cycles.values()) < 3
+
+
+@needs_compiler
+def test_operations_cost_what_was_recorded(fast: Calls) -> None:
+    compiler, recorded = measured()
+    if compiler != compiler_version():
+        pytest.skip(f"recorded of {compiler}")
+    (of_this_build,) = (
+        one for one in recorded if (one.build, one.timing) == (str(Build("O2")), str(Timing()))
+    )
+    found = operations.measure(fast)
+    assert found == pytest.approx(of_this_build.operations, rel=0.1, abs=2)
+
+
+@needs_compiler
+def test_waits_of_the_memories_cost_cycles(shot: NDArray[np.uint8]) -> None:
+    image = compiled(Build("O2"), generated())
+    cycles = [
+        sum(picture.run(started(image, timing), shot).cycles.values())
+        for timing in (
+            Timing(flash_waits=0),
+            Timing(),
+            Timing(cache=False),
+            Timing(cache=False, bus=(3, 3, 15, 3)),
+        )
+    ]
+    assert cycles == sorted(cycles)
+    assert cycles[-1] > 1.5 * cycles[0]
+
+
+@needs_compiler
+def test_a_call_that_faults_or_is_none_is_told(fast: Calls) -> None:
+    with pytest.raises(KeyError):
+        fast.call("no_such_function")
+    with pytest.raises(CallError, match="fault"):
+        fast.call("read_words", 1, 0x6000_0000)
+
+
+def test_sources_are_rewritten_as_a_careless_programmer_has_them() -> None:
+    line = "float y = 0.5f * sqrtf(x) + 0x1.8p+1f; // pair_2.0f"
+    assert rewritten(line, "own") == line
+    assert rewritten("float y = 0.5f * sqrtf(x);", "literals") == "float y = 0.5 * sqrt(x);"
+    assert rewritten("float y = 1e-3f;", "double") == "double y = 1e-3f;"
+    assert rewritten("typedef float stored_float;\n", "double") == "typedef float stored_float;\n"
+    with pytest.raises(ValueError, match="not O9"):
+        Build("O9")
+
+
+def test_the_recorded_tables_are_whole() -> None:
+    table = compiled_table("-O2 own")
+    assert table.operations.keys() == CORTEX_M3.operations.keys()
+    assert table.operations["f32_add"].provenance == "measured"
+    assert table.operations["flash_erase"] == CORTEX_M3.operations["flash_erase"]
+    slow, fast_table = compiled_table("-O0 double"), compiled_table("-O2 float")
+    assert slow.operations["f32_mul"].cycles > 2 * fast_table.operations["f32_mul"].cycles
+    with pytest.raises(ValueError, match="was not measured"):
+        compiled_table("-O9 own")
