@@ -14,6 +14,7 @@
 #include "supply_monitor.h"
 
 #define ACK_TIMEOUT_US 2000000u
+#define POLL_US 10u
 #define TRANSFER_PIECE 4096 /* bytes; the watchdog is fed after each */
 
 /* Starts the sensor and lets its first, invalid frame pass (imagerEnable). */
@@ -33,6 +34,7 @@ static uint8_t enable_sensor(void)
     return NO_FLAG;
 }
 
+/* Polls for it; a picture's time need not be known better than to POLL_US. */
 static bool await_acknowledge(void)
 {
     uint64_t started = time_us();
@@ -40,6 +42,7 @@ static bool await_acknowledge(void)
         if (since(started) >= ACK_TIMEOUT_US)
             return false;
         watchdog_feed();
+        spin_us(POLL_US);
     }
     return true;
 }

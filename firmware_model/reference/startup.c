@@ -2,8 +2,11 @@
  *
  * SPDX-License-Identifier: BSD-2-Clause
  */
+#include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
+#include "drivers/clock.h"
 #include "efm32gg.h"
 #include "pins.h"
 
@@ -18,13 +21,12 @@ void unexpected_handler(void)
         ;
 }
 
+/* The host is not heard until main runs, so the fast clock comes first; it needs no RAM. */
 void reset_handler(void)
 {
-    const uint32_t *from = data_from;
-    for (uint32_t *to = data_start; to != data_end; to++)
-        *to = *from++;
-    for (uint32_t *to = bss_start; to != bss_end; to++)
-        *to = 0;
+    clock_start();
+    memcpy(data_start, data_from, (size_t)((char *)data_end - (char *)data_start));
+    memset(bss_start, 0, (size_t)((char *)bss_end - (char *)bss_start));
     main();
     unexpected_handler();
 }

@@ -16,6 +16,7 @@
 
 #define WAIT_STATES_2 4u /* above 32 MHz */
 #define HFXO_ABOVE_32_MHZ 3u
+#define LFXO_AFTER_1K_CYCLES 1u /* else it would not be ready within a turn of the loop */
 #define SELECT_HFXO 2u
 #define BURTC_FROM_LFXO 2u
 #define BURTC_IN_EM4 3u
@@ -31,7 +32,7 @@
 
 #define SLICE_COUNTS 512u
 #define SLICE_US 15625u
-#define RESTART_US 3150u /* most of it is the crystal's start */
+#define RESTART_US 1420u /* the fast crystal starts, the RAM is set up */
 
 static uint64_t now_us;
 static uint32_t seen_ticks;
@@ -41,8 +42,9 @@ void clock_start(void)
 {
     MSC->READCTRL = (MSC->READCTRL & ~MSC_READCTRL_MODE) |
                     WAIT_STATES_2 << MSC_READCTRL_MODE_SHIFT | MSC_READCTRL_PREFETCH;
-    CMU->CTRL = (CMU->CTRL & ~CMU_CTRL_HFXOBUFCUR) |
-                HFXO_ABOVE_32_MHZ << CMU_CTRL_HFXOBUFCUR_SHIFT | CMU_CTRL_HFLE;
+    CMU->CTRL = (CMU->CTRL & ~(CMU_CTRL_HFXOBUFCUR | CMU_CTRL_LFXOTIMEOUT)) |
+                HFXO_ABOVE_32_MHZ << CMU_CTRL_HFXOBUFCUR_SHIFT |
+                LFXO_AFTER_1K_CYCLES << CMU_CTRL_LFXOTIMEOUT_SHIFT | CMU_CTRL_HFLE;
     CMU->HFCORECLKDIV |= CMU_HFCORECLKDIV_HFCORECLKLEDIV;
     CMU->OSCENCMD = CMU_OSCENCMD_HFXOEN | CMU_OSCENCMD_LFXOEN;
     while (!(CMU->STATUS & CMU_STATUS_HFXORDY))
@@ -127,6 +129,13 @@ void timer_retain(void)
     uint32_t slices = (BURTC->CNT - retained.clock_ticks) / SLICE_COUNTS;
     retained.clock_ticks += slices * SLICE_COUNTS;
     retained.clock_us += (uint64_t)slices * SLICE_US;
+}
+
+/* A turn takes three cycles. */
+void spin_us(uint32_t us)
+{
+    uint32_t turns = us * (CLOCK_HZ / 1000000u) / 3u;
+    __asm volatile("1: subs %0, #1\n bne 1b" : "+r"(turns) : : "cc");
 }
 
 /* --- sleep ---------------------------------------------------------------------------------------- */

@@ -31,6 +31,9 @@ void wake(void);
 /* Sleeps for a time, whatever happens meanwhile. */
 void pause_us(uint32_t us);
 
+/* Stays awake for about so long. */
+void spin_us(uint32_t us);
+
 /* From `started_us` until now, in us. */
 uint32_t since(uint64_t started_us);
 
