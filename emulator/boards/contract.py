@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.insight import Insight
 from cubestack.emulator.bus.i2c import Forwarder, I2cBus, I2cTarget
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injector import Faults
@@ -85,7 +86,9 @@ class Board(ABC):
         seed: of everything random but the scene.
         power: supplies; the place for latch-ups.
         lines: serial lines, the satellite's first.
+        on_close: what is to be done before the board is closed.
         engine: FPGAs and their SRAMs; None on a board without.
+        insight: into firmware of the user's own; None where none runs.
         processor: microcontroller with the running program.
         program: firmware program that runs now; a reset makes a new one.
     """
@@ -97,6 +100,7 @@ class Board(ABC):
     """Own firmware that it runs, as its ``firmware`` option takes it, hash included."""
 
     engine: RtlEngine | None = None
+    insight: Insight | None = None
     processor: Microcontroller
     program: Program
 
@@ -123,6 +127,7 @@ class Board(ABC):
         self.seed = seed
         self.power = PowerModel(self.kernel, power)
         self.lines: tuple[SerialLine, ...] = ()
+        self.on_close: list[Callable[[], None]] = []
         self._rng = np.random.default_rng([seed, *self.random_stream])
 
     @property
@@ -174,6 +179,8 @@ class Board(ABC):
 
     def close(self) -> None:
         """Release what the board holds."""
+        for act in self.on_close:
+            act()
         if self.engine is not None:
             self.engine.close()
 

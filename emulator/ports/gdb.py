@@ -8,6 +8,7 @@ import contextlib
 import select
 import socket
 import time
+from collections.abc import Callable
 
 from cubestack.emulator.iss.gdb.session import Session
 from cubestack.emulator.iss.gdb.target import Target
@@ -24,6 +25,7 @@ class GdbEndpoint(Endpoint):
 
     Attributes:
         address: host and port.
+        on_close: called at the end of ``close``.
     """
 
     def __init__(self, port: int, target: Target) -> None:
@@ -47,6 +49,7 @@ class GdbEndpoint(Endpoint):
         self._client: socket.socket | None = None
         self._session: Session | None = None
         self._looked_ns = 0
+        self.on_close: Callable[[], None] = lambda: None
 
     @property
     def connected(self) -> bool:
@@ -99,6 +102,7 @@ class GdbEndpoint(Endpoint):
         """Drop the client and stop listening."""
         self._drop()
         self._server.close()
+        self.on_close()
 
     def _accept(self) -> None:
         try:

@@ -12,10 +12,12 @@ from typing import Any, Protocol
 
 import simpy
 
+from cubestack.emulator.iss.insight.fault_report import fault_report, last_fault, unhandled
+from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import NEVER, Kind, Machine, Outgoing, Stop, StopReason
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling
 from cubestack.emulator.sim.fpga_port import FpgaPort
-from cubestack.emulator.sim.virtual_time import PS_PER_S, PS_PER_US, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
 
 LOOK_AHEAD_PS = 80 * PS_PER_US
 """Longest run of a machine. Less than the time of a byte on the wires: what a host begins to send
@@ -29,6 +31,9 @@ QUIET_PS = 2 * PS_PER_S
 
 QUIET_AWAKE_PS = 5 * PS_PER_S
 """Likewise one that never sleeps: it computes, or polls."""
+
+FAULT_LOOK_PS = 10 * PS_PER_MS
+"""Time between two looks whether the program stands in the handler of a fault."""
 
 INWARD = frozenset({Kind.SLEEP, Kind.LOG, Kind.SUPPLY})
 """What is no work that anybody outside would wait for."""
@@ -86,6 +91,7 @@ class FirmwareProcessor:
         self._lines: dict[int, str] = {}
         self._early: list[Outgoing] = []  # what left the machine while it caught up
         self._locked_up = False
+        self._look_ps = self._told_faults = 0
         self.machine.reset(self.power_on)
         for _ in self.machine.outbox():
             pass  # being made is no news to anybody
@@ -164,9 +170,10 @@ class FirmwareProcessor:
             before_ps = self.machine.now_ps
             stop = self._run_machine(self._until())
             yield from self._empty_outbox()
-            if self.env.paused:
+            while self.env.paused:  # by the debugger: as if it had not stopped here
                 yield self._urgent()
-                continue
+                stop = self._run_machine(self._until())
+                yield from self._empty_outbox()
             if self._sleeps(stop):
                 yield from self._sleep()
                 continue
@@ -183,9 +190,21 @@ class FirmwareProcessor:
         runner = self.machine if self.debugger is None else self.debugger
         stop = runner.run(until_ps)
         if stop.reason is StopReason.LOCKED_UP and not self._locked_up:
-            self.on_fault("the core is locked up")
+            self.on_fault(f"the core is locked up\n{self._report()}")
         self._locked_up = stop.reason is StopReason.LOCKED_UP
+        if stop.now_ps >= self._look_ps:
+            self._look_ps = stop.now_ps + FAULT_LOOK_PS
+            self._look_for_fault()
         return stop
+
+    def _look_for_fault(self) -> None:
+        """Tell of a fault whose handler does nothing, once each."""
+        if unhandled(self.machine) and last_fault(self.machine).count != self._told_faults:
+            self._told_faults = last_fault(self.machine).count
+            self.on_fault(f"the firmware does not handle a fault\n{self._report()}")
+
+    def _report(self) -> str:
+        return fault_report(self.machine, Symbols.of(self.machine.image), self.machine.now_ps)
 
     def _take_turn(self) -> Steps:
         """Let everybody else act who is to act now."""
@@ -255,6 +274,7 @@ class FirmwareProcessor:
             case Kind.RESET:
                 self.resets += 1
                 self._locked_up = False
+                self._told_faults = 0
             case Kind.ITM:
                 self._print(one.unit, one.value.to_bytes(8, "little")[: max(1, one.extra)])
             case Kind.SEMIHOSTING:

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Any, get_args
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
 from cubestack.host.devices.emulated import AnyEmulated, check_options
+from cubestack.host.devices.insight import InsightFiles, open_gdb
 from cubestack.host.devices.records import create_file, start_recorder, start_trace
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import flag
+from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
     from cubestack.emulator.faults.injector import Faults
+    from cubestack.emulator.ports.gdb import GdbEndpoint
     from cubestack.emulator.recording.recorder import Recorder
     from cubestack.firmware_model.formats.setup import Setup
 
@@ -97,9 +100,9 @@ def tell_notices(
 
 
 def inject_plan(
-    faults: "Faults", path: Path | None, say: Callable[[str], None] | None = None
+    faults: "Faults", path: Path | None, told: Callable[[str], None] | None = None
 ) -> None:
-    """Inject the plan in ``path``, if one is given; ``say`` is told what each fault does.
+    """Inject the plan in ``path``, if one is given; ``told`` is told what each fault does.
 
     Raises FaultError (a ValueError) for a plan that makes no sense.
     """
@@ -108,8 +111,8 @@ def inject_plan(
     if path is None:
         return
     faults.load(load_plan(path))
-    if say is not None:
-        tell = say
+    if told is not None:
+        tell = told
         faults.on_event = lambda event: tell(str(event))
 
 
@@ -124,6 +127,54 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.vcd",
         help="lines, buses, FPGA pins and firmware for a waveform viewer",
     )
+
+
+def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options about firmware of the user's own."""
+    parser.add_argument(
+        "--gdb",
+        type=whole(0, 0xFFFF),
+        metavar="PORT",
+        help="serve gdb on this port of this machine, for --firmware (docs/own-firmware.md)",
+    )
+    parser.add_argument(
+        "--gdb-wait", action="store_true", help="run nothing until gdb lets it: with --gdb"
+    )
+    parser.add_argument(
+        "--profile-out",
+        type=Path,
+        metavar="FILE",
+        help="cycles by function and line of --firmware, for kcachegrind",
+    )
+    parser.add_argument(
+        "--coverage-out",
+        type=Path,
+        metavar="FILE",
+        help="executed lines of --firmware, as lcov has them",
+    )
+
+
+def insight(
+    args: argparse.Namespace, stack: ExitStack
+) -> "Callable[[AnyEmulated], GdbEndpoint | None]":
+    """What to do with each device that is powered up; ``stack`` writes the files in the end.
+
+    Raises ValueError for a file that can not be written. The answer gives the port for gdb, if one
+    is wanted; it raises ValueError for a device without firmware of its own, and PortError.
+    """
+    files = InsightFiles(args.profile_out, args.coverage_out).open(stack)
+    if args.gdb_wait and args.gdb is None:
+        raise ValueError("--gdb-wait: give the port as well: --gdb PORT")
+
+    def look_at(emulated: AnyEmulated) -> "GdbEndpoint | None":
+        files(emulated)
+        if args.gdb is None:
+            return None
+        endpoint = open_gdb(emulated, args.gdb, wait=args.gdb_wait)
+        say(f"gdb: target remote {endpoint.name}")
+        return endpoint
+
+    return look_at
 
 
 def record(

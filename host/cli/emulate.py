@@ -24,8 +24,15 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import add_port_arguments, open_ports
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.options import flag
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import progress, say
+
+ONE_DEVICE = (
+    *("scene", "faults", "record", "trace", "set"),
+    *("gdb", "gdb_wait", "profile_out", "coverage_out"),
+)
+"""Options that belong to one device."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="real: virtual time is wall time; fast: ahead while there is work",
     )
     device_options.add_record_arguments(parser)
+    device_options.add_insight_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -69,11 +77,12 @@ def run(args: argparse.Namespace) -> int:
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
     if len(args.devices) > 1:
-        for name in ("scene", "faults", "record", "trace", "set"):
-            if getattr(args, name):
-                raise ValueError(f"--{name} belongs to one device, and there are several")
+        for name in ONE_DEVICE:
+            if getattr(args, name) not in (None, False, ""):
+                raise ValueError(f"{flag(name)} belongs to one device, and there are several")
     with ExitStack() as stack:
         opened: list[AnyEmulated] = []
+        gdb = None
         for name in args.devices:
             found = device(name)
             options = device_options.chosen_options(args, found)
@@ -95,6 +104,7 @@ def run(args: argparse.Namespace) -> int:
             device_options.inject_plan(emulated.faults, args.faults, say)
             setup = emulated_setup(args.seed, args.scene, args.faults, options)
             device_options.record(args, emulated, stack, setup)
+            gdb = device_options.insight(args, stack)(emulated)
         board = emulated.board  # what records may have taken the place of its bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
@@ -105,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
         scheduler = stack.enter_context(
             open_scheduler(
                 board.kernel,
-                [endpoint for _, _, endpoint in served],
+                [*(endpoint for _, _, endpoint in served), *([gdb] if gdb is not None else [])],
                 lambda: any(one.board.busy() for one in opened),
                 pace=args.pace,
                 i2c=adapter if calls else None,

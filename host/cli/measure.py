@@ -14,12 +14,19 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from typing import Any
 
 from rich.table import Table
 
 from cubestack.host.cli.arguments import add_options, chosen, typed
-from cubestack.host.cli.device_options import add_engine_arguments, add_option, tell_notices
+from cubestack.host.cli.device_options import (
+    add_engine_arguments,
+    add_insight_arguments,
+    add_option,
+    insight,
+    tell_notices,
+)
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import devices
@@ -73,6 +80,8 @@ def add_board(
     """Declare how the device's FPGA is run, and what of its board the user chooses."""
     if device.has_fpga and experiment.powers_up:
         add_engine_arguments(parser)
+    if device.processor is not None and "firmware" in board_options(device, experiment):
+        add_insight_arguments(parser)
     for option in board_options(device, experiment).values():
         add_option(parser, option)
 
@@ -96,16 +105,20 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
     def bar(items: Iterable[Any], total: int, label: str) -> Iterator[Any]:
         return progress(items, total, label, quiet=args.json or not label)
 
-    opened = Opener(device, getattr(args, "engine", "auto"), board, bar)
     started = time.monotonic()
     results: list[Result] = []
     least: float | None = getattr(args, "min_right", None)
-    for result in bar(experiment.run(opened, options), experiment.count(options), experiment.label):
-        results.append(result)
-        if least is not None and not hasattr(result, "right"):
-            raise ValueError(f"results of {device.name} do not say what is right: no --min-right")
-        if args.json:
-            print(json.dumps(result.as_dict() | runs), flush=True)
+    with ExitStack() as stack:
+        look_at = insight(args, stack) if hasattr(args, "gdb") else lambda _emulated: None
+        opened = Opener(device, getattr(args, "engine", "auto"), board, bar, look_at)
+        shown = bar(experiment.run(opened, options), experiment.count(options), experiment.label)
+        for result in shown:
+            results.append(result)
+            if least is not None and not hasattr(result, "right"):
+                what = f"results of {device.name} do not say what is right"
+                raise ValueError(f"{what}: no --min-right")
+            if args.json:
+                print(json.dumps(result.as_dict() | runs), flush=True)
     if not args.json:
         _report(experiment, results, time.monotonic() - started, runs)
     enough = least is None or _are_right(results, least)

@@ -36,7 +36,13 @@ def start_trace(emulated: AnyEmulated, stream: IO[str]) -> "VcdTrace":
 
     board = emulated.board
     trace = VcdTrace(
-        stream, emulated.device.name, board.kernel, board.uarts, board.engine, board.probes
+        stream,
+        emulated.device.name,
+        board.kernel,
+        board.uarts,
+        board.engine,
+        board.probes,
+        None if board.insight is None else board.insight.history,
     )
     trace.listen(board.i2c_bus)
     return trace

@@ -1,6 +1,6 @@
 """Powers devices up for experiments, and the options of all that are measured."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic
@@ -38,12 +38,14 @@ class Opener(Generic[BoardT_co, ClientT_co]):
         engine: how its FPGA is run.
         board: options of its board.
         shown: shows how many are done of what takes seconds the first time.
+        opened: told of each device that was powered up.
     """
 
     device: Device[BoardT_co, ClientT_co]
     engine: Engine = "auto"
     board: Mapping[str, Any] = field(default_factory=dict)
     shown: Shown = _silent
+    opened: Callable[[EmulatedDevice[BoardT_co, ClientT_co]], object] = lambda _emulated: None
 
     def __call__(
         self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **options: Any
@@ -65,4 +67,9 @@ class Opener(Generic[BoardT_co, ClientT_co]):
             except ValueError:
                 emulated.close()
                 raise
+        try:
+            self.opened(emulated)
+        except (ValueError, OSError):
+            emulated.close()
+            raise
         return emulated

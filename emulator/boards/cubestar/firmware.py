@@ -11,6 +11,7 @@ from functools import partial
 from cubestack.emulator.boards.contract import NODE_PROTOCOL
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
 from cubestack.emulator.boards.firmware import CameraWire, Core, SerialWire, SlaveWire
+from cubestack.emulator.boards.insight import Insight
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
@@ -60,6 +61,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
     """
 
     processor: FirmwareProcessor
+    insight: Insight
 
     def __init__(
         self,
@@ -99,6 +101,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
         self.external_ram = self.machine.external
         self._scramble(self.machine.ram)
         self.machine.load(image)
+        self.insight = Insight(self.machine)
         self._camera_wire = CameraWire(self.camera, wired.CAMERA_I2C.pin("SDA"))
         self._set_analog()
         bus = dict.fromkeys(
@@ -131,9 +134,14 @@ class CubeStarFirmwareBoard(CubeStarStack):
         """Give ``say`` what the firmware prints, and reports of its faults."""
         self.processor.console = self.processor.on_fault = say
 
+    def reset_pin(self) -> None:
+        """Reset the processor by its pin."""
+        self.processor.reset(ResetCause.EXTERNAL_PIN)
+
     def close(self) -> None:
         """Release what the board holds."""
         super().close()
+        self.insight.close()
         self.machine.close()
 
     def _sites(self) -> Sites:

@@ -88,6 +88,11 @@ class ImageSensor(ABC, Generic[S, C]):
         return Fraction(PS_PER_S, self._hz)
 
     @property
+    def registers(self) -> RegisterFile:
+        """Its registers, for who looks past its control bus."""
+        return self._registers
+
+    @property
     def running(self) -> bool:
         """Whether the part has power and is out of reset."""
         return self._clock is not None

@@ -60,22 +60,33 @@ class RegisterFile:
             self._log(INFO, "read %s, which is not modelled", register.name)
         return self._written[address]
 
+    def peek(self, address: int) -> int:
+        """What was written to an address, without any effect; 0 where no register is known."""
+        return self._written.get(address, 0)
+
+    def written(self) -> dict[str, int]:
+        """What was written last, by the registers' names."""
+        return {register.name: self._value(register, self._written) for register in self._table}
+
     def sync(self) -> None:
         """Make all written values active."""
         self._active = dict(self._written)
 
     def active(self, name: str) -> int:
         """Value of register ``name`` that is in effect."""
-        register, value = self._table[name], 0
-        for address in register.addresses:
-            value = value << register.unit_bits | self._active[address]
-        return value
+        return self._value(self._table[name], self._active)
 
     def store(self, name: str, value: int) -> None:
         """Set a register from the camera's side, active at once."""
         register = self._table[name]
         for address, byte in zip(register.addresses, register.units(value), strict=True):
             self._written[address] = self._active[address] = byte
+
+    def _value(self, register: registers.CameraRegister, values: dict[int, int]) -> int:
+        value = 0
+        for address in register.addresses:
+            value = value << register.unit_bits | values[address]
+        return value
 
     def _step(self) -> tuple[int, registers.CameraRegister | None]:
         """The pointer's address and register; the pointer moves on."""

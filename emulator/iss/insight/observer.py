@@ -111,6 +111,8 @@ class Observer:
             functions = self._functions(base, halves)
             self._kept.append(functions)
             record.functions = functions.ctypes.data
+        self._found: list[Edge] = []
+        self._last = Figures(None, None, 0, 0)
         self._changes = (ChangeRecord * MOST_CHANGES)()
         self._handle: int | None = self._library.insight_new(machine.handle, ranges, 2)
 
@@ -118,8 +120,17 @@ class Observer:
         """Whether to take note of changes from now on; who wants them has to take them."""
         self._library.insight_trace(self._handle, on)
 
+    def add(self, other: "Observer") -> None:
+        """Count what another one has counted of the same program; both have been closed."""
+        for mine, its in zip(self.codes, other.codes, strict=True):
+            mine.cycles += its.cycles
+            mine.counts += its.counts
+        self._found += other._found
+
     def close(self) -> None:
-        """Look no longer."""
+        """Look no longer; what was counted stays."""
+        if self._handle is not None:
+            self._found, self._last = self.edges(), self.figures()
         if self._handle is not None:
             try:
                 machine: int | None = self.machine.handle
@@ -138,6 +149,8 @@ class Observer:
 
     def edges(self) -> list[Edge]:
         """Calls so far, those that have not returned among them."""
+        if self._handle is None:
+            return self._found
         self._library.insight_finish(self._handle)
         records = (EdgeRecord * MOST_EDGES)()
         found = self._library.insight_edges(self._handle, records, MOST_EDGES)
@@ -154,6 +167,8 @@ class Observer:
 
     def changes(self) -> Iterator[Change]:
         """Take the changes since the last call, in the order of time."""
+        if self._handle is None:
+            return
         count = self._library.insight_changes(self._handle, self._changes)
         for one in self._changes[:count]:
             name = self._names[one.function] if one.function else f"{one.pc:#010x}"
@@ -161,6 +176,8 @@ class Observer:
 
     def figures(self) -> Figures:
         """Stack pointers, and what was not counted."""
+        if self._handle is None:
+            return self._last
         values = (ctypes.c_int64 * 4)()
         self._library.insight_figures(self._handle, values)
         main, process = (None if sp == 0xFFFF_FFFF else sp for sp in values[:2])

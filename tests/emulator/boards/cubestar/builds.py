@@ -11,7 +11,16 @@ from cubestack.host.export.processor import render_processor
 
 PROGRAMS = Path(__file__).parent / "firmware"
 COMPILER = shutil.which("arm-none-eabi-gcc")
-FLAGS = ("-mcpu=cortex-m3", "-mthumb", "-O2", "-Wall", "-Werror", "-ffreestanding", "-nostdlib")
+FLAGS = (
+    "-mcpu=cortex-m3",
+    "-mthumb",
+    "-O2",
+    "-g",
+    "-Wall",
+    "-Werror",
+    "-ffreestanding",
+    "-nostdlib",
+)
 
 needs_toolchain = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-none-eabi")
 

@@ -14,6 +14,7 @@ void reset_handler(void) {
 
 __attribute__((weak)) void systick_handler(void) {}
 __attribute__((weak)) void even_pins_handler(void) {}
+__attribute__((weak)) void uart_handler(void) {}
 __attribute__((weak)) void fault_handler(void) {
     for (;;) {}
 }
@@ -25,4 +26,5 @@ __attribute__((section(".vectors"), used)) static const uintptr_t vectors[16 + 3
     (uintptr_t)fault_handler,
     [15] = (uintptr_t)systick_handler,
     [16 + 1] = (uintptr_t)even_pins_handler,  // GPIO_EVEN
+    [16 + SATELLITE_UART_RX_IRQ] = (uintptr_t)uart_handler,
 };

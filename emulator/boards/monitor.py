@@ -1,0 +1,195 @@
+"""What ``monitor`` commands of a debugger tell of a board, and do to it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.faults.injector import Faults
+from cubestack.emulator.iss.insight.fault_report import fault_report
+from cubestack.emulator.iss.insight.symbols import Symbols
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
+
+HELP = """time              virtual time, core clock, sleep
+camera            registers of the camera
+power             supply currents
+pins              FPGA pins from and to the processor
+regs [UNIT[.REGISTER]]      registers of a peripheral, without side effects
+faults            what can be injected
+faults inject KIND [TARGET] [PARAMETER=VALUE ...]
+faults log|clear  what faults have done; end them
+symbols WHAT      an address, or a name
+report            last fault of the firmware, registers, backtrace"""
+
+
+class Camera(Protocol):
+    """What the commands need of a camera."""
+
+    @property
+    def registers(self) -> RegisterFile:
+        """Its registers."""
+
+
+class FirmwareBoard(Protocol):
+    """What the commands need of a board."""
+
+    kernel: Kernel
+    machine: Machine
+    power: PowerModel
+
+    @property
+    def engine(self) -> RtlEngine | None:
+        """Its FPGAs."""
+
+    @property
+    def faults(self) -> Faults:
+        """Injects faults into it."""
+
+    @property
+    def camera(self) -> Camera:
+        """Its camera."""
+
+
+class Monitor:
+    """The commands on one board."""
+
+    def __init__(self, board: FirmwareBoard, symbols: Symbols) -> None:
+        """Answer for ``board``, whose program has ``symbols``."""
+        self._board = board
+        self._symbols = symbols
+        self._commands: Mapping[str, Callable[[list[str]], str]] = {
+            "help": lambda _words: HELP,
+            "time": self._time,
+            "camera": self._camera,
+            "power": self._power,
+            "pins": self._pins,
+            "regs": self._registers,
+            "faults": self._faults,
+            "symbols": self._lookup,
+            "report": self._report,
+        }
+
+    def __call__(self, words: list[str]) -> str:
+        """What a command answers; ValueError for one that makes no sense."""
+        command = self._commands.get(words[0])
+        if command is None:
+            known = ", ".join(["reset", "catch", *self._commands])
+            raise ValueError(f"no command {words[0]!r}; known: {known}")
+        return command(words[1:])
+
+    def _time(self, _words: list[str]) -> str:
+        machine = self._board.machine
+        state = f"asleep in EM{machine.energy_mode}" if machine.asleep else "awake"
+        return (
+            f"{machine.now_ps / PS_PER_S:.12f} s, core cycle {machine.cycles} at {machine.hz} Hz, "
+            f"{machine.instructions} instructions, {state}"
+        )
+
+    def _camera(self, _words: list[str]) -> str:
+        values = self._board.camera.registers.written()
+        return "\n".join(f"{name:24} {value:#06x}" for name, value in values.items())
+
+    def _power(self, _words: list[str]) -> str:
+        power = self._board.power
+        lines = [f"total {power.current_ma():.1f} mA"]
+        for channel in power.table.channels:
+            state = "on" if power.is_on(channel) else "off"
+            lines.append(f"{channel} {state} {power.current_ma(channel):.1f} mA")
+        return "\n".join(lines)
+
+    def _pins(self, _words: list[str]) -> str:
+        engine = self._board.engine
+        if engine is None:
+            return "no FPGA"
+        names = (*engine.wiring.mcu_pins, *engine.wiring.output_pins)
+        return "\n".join(f"{name} {engine.get_pin(name):#x}" for name in names)
+
+    def _registers(self, words: list[str]) -> str:
+        if not words:
+            return " ".join(instance.name for layout in LAYOUTS for instance in layout.instances)
+        unit, _, name = words[0].upper().partition(".")
+        layout, instance = find_instance(unit)
+        registers = [one for one in layout.registers if name in ("", one.name)]
+        if not registers:
+            known = " ".join(one.name for one in layout.registers)
+            raise ValueError(f"{unit} has no register {name}; known: {known}")
+        return "\n".join(
+            register_text(self._board.machine, instance, register) for register in registers
+        )
+
+    def _faults(self, words: list[str]) -> str:
+        faults = self._board.faults
+        match words:
+            case []:
+                return "\n".join(f"{kind} {' '.join(to)}" for kind, to in faults.kinds().items())
+            case ["log"]:
+                return "\n".join(str(event) for event in faults.log)
+            case ["clear"]:
+                faults.clear()
+                return ""
+            case ["inject", kind, *rest]:
+                given = dict(word.split("=", 1) for word in rest if "=" in word)
+                targets = [word for word in rest if "=" not in word]
+                if len(targets) > 1:
+                    raise ValueError(f"one target, not {' '.join(targets)}")
+                for_s = given.pop("for_s", None)
+                faults.inject(
+                    kind,
+                    target=targets[0] if targets else None,
+                    for_s=None if for_s is None else float(for_s),
+                    **{name: _value(text) for name, text in given.items()},
+                )
+                return f"injected: {' '.join(words[1:])}"
+        raise ValueError("usage: faults [log|clear|inject KIND [TARGET] [PARAMETER=VALUE ...]]")
+
+    def _lookup(self, words: list[str]) -> str:
+        if len(words) != 1:
+            raise ValueError("usage: symbols ADDRESS|NAME")
+        found = self._symbols.labels.get(words[0])
+        try:
+            address = found if found is not None else int(words[0], 0)
+        except ValueError:
+            raise ValueError(f"no symbol {words[0]!r}") from None
+        return self._symbols.describe(address & ~1)
+
+    def _report(self, _words: list[str]) -> str:
+        machine = self._board.machine
+        return fault_report(machine, self._symbols, machine.now_ps)
+
+
+def find_instance(name: str) -> tuple[Layout, Instance]:
+    """A peripheral by its name; ValueError says which there are."""
+    for layout in LAYOUTS:
+        for instance in layout.instances:
+            if instance.name == name:
+                return layout, instance
+    known = " ".join(instance.name for layout in LAYOUTS for instance in layout.instances)
+    raise ValueError(f"no peripheral {name!r}; known: {known}")
+
+
+def register_text(machine: Machine, instance: Instance, register: Register) -> str:
+    """A register with its fields that are not 0."""
+    data = machine.peek(instance.base + register.offset, 4)
+    if len(data) < 4:
+        return f"{instance.name}.{register.name} can not be read"
+    value = int.from_bytes(data, "little")
+    fields = (
+        f"{field.name}={(value & field.mask) >> field.lsb:#x}"
+        for field in register.fields
+        if field.name and value & field.mask
+    )
+    return f"{instance.name}.{register.name} {value:08x} {' '.join(fields)}".rstrip()
+
+
+def _value(text: str) -> Any:
+    """A number, true or false, or a word."""
+    for convert in (lambda word: int(word, 0), float):
+        try:
+            return convert(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text, text)
