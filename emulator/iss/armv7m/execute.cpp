@@ -127,6 +127,10 @@ template <int Mode> void Cpu::loop() {
     uint32_t traced_pc = 0;
     int64_t traced_since = 0;
     it_operation = nullptr;
+    // Where the MPU alone wants to hear of fetches, no line is at hand.
+    static constexpr uint32_t NO_TAG[1] = {NOWHERE};
+    const uint32_t *const tags = lines ? lines->tags : NO_TAG;
+    const uint32_t shift = lines ? lines->shift : 2, mask = lines ? lines->mask : 0;
 
 #define PC (base + (uint32_t)(((char *)op - (char *)ops) >> 3))
 #define HANDLE(name) L_##name:
@@ -189,15 +193,19 @@ between:
     if (UNLIKELY(now >= limit)) goto leave;
     if (op->code > LAST_MARKER) {
         if (FETCHED) {
-            const uint32_t pc = PC;
-            if (guarded || pc >> lines->shift != fetched ||
-                (pc + 2u * op->halves - 2) >> lines->shift != fetched) {
+            const uint32_t pc = PC, first = pc >> shift;
+            const uint32_t last = (pc + 2u * op->halves - 2) >> shift;
+            const bool at_hand = (first == fetched || tags[first & mask] == first) &&
+                                 (last == first || tags[last & mask] == last);
+            if (UNLIKELY(!at_hand || guarded)) {
                 SYNC();
                 if (!fetch_cost(pc, op->halves)) {
                     fetch_failed();
                     goto failed;
                 }
                 now = cycles;
+            } else {
+                fetched = last;
             }
         }
         if (TRACED) running = true, traced_pc = PC, traced_since = now;
