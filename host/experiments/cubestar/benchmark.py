@@ -30,6 +30,7 @@ print(100 / times[len(times) // 2])
 def _figures(device: "Device[CubeStarBoard, CubeStar]") -> dict[str, float]:
     from cubestack.emulator.boards.cubestar.benchmark import rtl_clocks_per_s, strobes_per_s
     from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+    from cubestack.emulator.iss.benchmark import instructions_per_s
     from cubestack.emulator.rtl.benchmark import cold_build_s
     from cubestack.emulator.scene.sky import SkyScene
 
@@ -44,8 +45,23 @@ def _figures(device: "Device[CubeStarBoard, CubeStar]") -> dict[str, float]:
         client.pause(1.0)
         figures["realtime_ratio"] = simulated_ratio(emulated, lambda: client.pause(float(LOOP_S)))
         client.command("StopLoop")
+    figures["instructions_per_s"] = round(instructions_per_s())
+    figures["firmware_ratio"] = _firmware_ratio(device)
     figures["cold_build_s"] = round(cold_build_s(cubestar_wiring()), 1)
     return figures | _i2c()
+
+
+def _firmware_ratio(device: "Device[CubeStarBoard, CubeStar]") -> float:
+    """The 1 Hz loop of the reference firmware on the instruction-set simulator."""
+    from cubestack.emulator.scene.sky import SkyScene
+
+    scene = SkyScene.pointing(84.0, -1.0)
+    with power_up(device, scene, engine="compiled", firmware="reference") as emulated:
+        client = emulated.client.client
+        client.pause(0.2)  # it starts
+        client.command("Trigger")
+        client.pause(1.0)
+        return simulated_ratio(emulated, lambda: client.pause(float(LOOP_S)))
 
 
 def _capture(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> dict[str, float]:
@@ -99,6 +115,8 @@ BENCHMARK = Benchmark(
         "capture_wall_ms": "wall time of one capture: exposure, read-out, FPGA store",
         "readout_wall_ms": "wall time of one transfer, FPGA's SRAM to processor",
         "realtime_ratio": "simulated seconds per wall second of the full 1 Hz loop",
+        "instructions_per_s": "of the instruction-set simulator, in an arithmetic loop",
+        "firmware_ratio": "as realtime_ratio, with the reference firmware on the simulator",
         "cold_build_s": "translating and compiling the FPGA with an empty cache",
         "i2c_ROUTE_fast": "byte reads a second of a program below `cubestack run`, by either route",
         "i2c_ROUTE_real": "the same at 400 kHz in the wire's time, which would be 10 256",
