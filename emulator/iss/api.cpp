@@ -96,10 +96,10 @@ StopReason reason_of(IssMachine &machine, uint32_t exits) {
         return STOP_HALTED;
     if (stopped_by == System::DebugStop::VectorCatch)
         return STOP_FAULT;
-    if (machine.part && machine.part->outbox.count)
-        return STOP_OUTBOX;
     if (exits & armv7m::ExitLockup)
         return STOP_LOCKED_UP;
+    if (machine.part && machine.part->outbox.count)
+        return STOP_OUTBOX;
     if (changed)
         return asleep ? STOP_ASLEEP : STOP_AWAKE;
     return STOP_TIME;

@@ -59,12 +59,12 @@ void System::reset(bool power_on) {
         if (parameters.trace_probe) itm.enable_all();
         demcr = dcrdr = dfsr = patch_control = patch_remap = 0;
         for (uint32_t &each : patch) each = 0;
+        record = {};
     }
     sleeping = Sleep::Awake;
     event = lockup = false;
     actlr = vtor = prigroup = scr = cfsr = hfsr = mmfar = bfar = 0;
     ccr = CCR_STKALIGN;
-    record = {};
     if (protected_before) cpu.protection_changed();
     uint32_t stack = 0, start = 0;
     if (!fetch_vector(0, stack) || !fetch_vector(RESET, start)) {

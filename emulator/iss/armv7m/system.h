@@ -90,7 +90,7 @@ struct ExceptionState {
 // laid to; `frame` is where the stack frame begins, 0 if stacking failed: r0-r3, r12, lr, pc, xPSR.
 struct FaultRecord {
     uint32_t exception, cfsr, hfsr, dfsr, mmfar, bfar, pc, frame, exc_return;
-    uint32_t count;    // of all since reset
+    uint32_t count;    // of all since power-on
     int64_t cycle;
 };
 

@@ -112,7 +112,8 @@ int64_t Part::run(int64_t until) {
                                         armv7m::ExitSleep);
             if (ended & armv7m::ExitSleep && fall_asleep())
                 exits |= ExitAsleep;
-            if (exits && !wanted_reset)
+            // A lock-up is seen as it is, before the reset that it leads to.
+            if (exits && (!wanted_reset || exits & armv7m::ExitLockup))
                 break;
         }
     }

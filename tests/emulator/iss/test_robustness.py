@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from cubestack.emulator.iss.insight.fault_report import last_fault
 from cubestack.emulator.iss.machine import EXTERNAL_BASE, RAM_BASE, Kind, Machine, StopReason
 
 from .wild_images import KINDS, START, make
@@ -69,7 +70,9 @@ def test_random_images_run_to_their_time(machine, kind):
                 disturb(machine, chance)
             step = chance.choice((1, 1000, 100_000, MILLISECOND))
             until = min(begin + MILLISECOND, machine.now_ps + step)
-            assert machine.run(until).now_ps >= until or list(machine.outbox()) or machine.asleep
+            stop = machine.run(until)
+            told = list(machine.outbox()) or stop.reason is not StopReason.TIME
+            assert stop.now_ps >= until or told
             if machine.now_ps >= begin + MILLISECOND:
                 break
         assert len(machine.registers()) == 23
@@ -117,9 +120,14 @@ def test_an_endless_loop_with_interrupts_off_takes_its_time_and_no_more(machine)
     assert machine.now_ps - begin >= MILLISECOND
 
 
-def test_a_fault_in_the_hard_fault_handler_resets_the_part(machine):
+def test_a_lock_up_is_seen_before_the_part_resets(machine):
     image = program(0xDE00, vectors={3: 0x3000_0001})
+    begin = start(machine, image)
+    assert machine.run(begin + MILLISECOND).reason == StopReason.LOCKED_UP
+    assert machine.register("pc") == 0x3000_0000
     assert Kind.RESET in outcome(machine, image)
+    assert last_fault(machine).exception == 0  # it is still known
+    assert last_fault(machine).pc == 0x3000_0000
 
 
 @pytest.mark.parametrize(
