@@ -40,7 +40,7 @@ void LowEnergy::write(uint32_t offset, uint32_t value) {
 
 // Two to three clocks later.
 void LowEnergy::start() {
-    const Rate rate = part.unit_rate(instance);
+    const Rate rate = synchronizer();
     if (late_count && !arrived.pending() && !(reg(freeze) & 1) && rate.runs())
         part.schedule(arrived, rate.time(rate.edges(part.now()) + 3));
 }

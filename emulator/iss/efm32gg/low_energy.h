@@ -23,6 +23,8 @@ protected:
     // Of units with immediate synchronization (RTC, LETIMER) a write arrives at once, and SYNCBUSY
     // shows that it happened.
     virtual bool immediate() const { return false; }
+    // The clock that a write has to wait for.
+    virtual Rate synchronizer() const { return part.unit_rate(instance); }
 
 private:
     static constexpr int MOST = 8;

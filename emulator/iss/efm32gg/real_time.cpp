@@ -1,5 +1,6 @@
 #include "real_time.h"
 
+#include "emu.h"
 #include "letimer.h"
 #include "prs.h"
 #include "rmu.h"
@@ -58,8 +59,10 @@ void CompareCounter::fold() {
         }
     value = after(passed);
     counted += passed;
-    if (flags)
+    if (flags) {
         raise(flags);
+        flagged();
+    }
 }
 
 void CompareCounter::plan() {
@@ -211,6 +214,17 @@ Rate Burtc::clock() const {
     if (!oscillator_hertz || !counts())
         return Rate();
     return {oscillator_hertz, (int64_t)1 << take(reg(CTRL), CTRL_PRESC), oscillator_origin};
+}
+
+// Its own clock; while it has none, nothing is to be waited for but the bus.
+Rate Burtc::synchronizer() const {
+    const Rate own = clock();
+    return own.runs() ? own : part.rate(Clock::HFCORELE);
+}
+
+void Burtc::flagged() {
+    if (part.mode == 4 && reg(IF) & reg(IEN) && part.emu->reg(emu::EM4CONF) & emu::EM4CONF_BURTCWU)
+        part.emu->wake_from_em4(0);
 }
 
 void Burtc::write(uint32_t offset, uint32_t value) {

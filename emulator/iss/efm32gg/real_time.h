@@ -33,6 +33,7 @@ protected:
     virtual bool compare_is_top() const = 0;
     virtual void matched(int compare) { (void)compare; }
     virtual bool watched(int compare) const { return (void)compare, false; }
+    virtual void flagged() {}  // IF has changed
 
     void apply(uint32_t offset, uint32_t value) override;
     void clear_count();
@@ -91,7 +92,9 @@ private:
 
     uint32_t busy_bit(uint32_t offset) const override;
     Rate clock() const override;
+    Rate synchronizer() const override;
     bool counts() const override;
+    void flagged() override;
     bool compare_is_top() const override { return reg(burtc::CTRL) & burtc::CTRL_COMP0TOP; }
     void take_oscillator();
 };

@@ -441,8 +441,9 @@ void Timer::prs_changed(int channel, bool level) {
 
 void Timer::edge(int n, bool rising) {
     inputs[n] = rising;
-    if (!part.unit_rate(instance).runs())
+    if (!part.unit_rate(instance).runs() || within_edge)
         return;
+    within_edge = true;
     fold();
     const uint32_t control = reg(cc(n, CC0_CTRL)), which = take(control, CC0_CTRL_ICEDGE);
     const bool wanted = which == 2 || (which == 0 && rising) || (which == 1 && !rising);
@@ -460,6 +461,7 @@ void Timer::edge(int n, bool rising) {
     if (wanted && cc_mode(n) == CAPTURE)
         capture(n);
     plan();
+    within_edge = false;
 }
 
 // CCV has the oldest capture, CCVB the one after it (20.3.2.2).

@@ -41,6 +41,7 @@ private:
     int64_t counted = 0;      // its edges that are in `count`
     Count count = {};
     bool listening = false;   // to pins
+    bool within_edge = false; // what an edge does may come back as an edge
     bool running = false, buffered_top = false, inputs[CHANNELS] = {};
     bool buffered[CHANNELS] = {}, outputs[CHANNELS] = {}, skipped[CHANNELS] = {};
     int captured[CHANNELS] = {};
