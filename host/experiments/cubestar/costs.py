@@ -91,10 +91,11 @@ def generated() -> dict[str, str]:
 def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
     """Each build in turn."""
     from cubestack.emulator.boards.cubestar.compiled import operations
-    from cubestack.emulator.boards.cubestar.compiled.build import compiled
+    from cubestack.emulator.boards.cubestar.compiled.build import compiled, compiler_version
     from cubestack.emulator.boards.cubestar.compiled.machine import started
     from cubestack.emulator.boards.cubestar.compiled.picture import run
 
+    compiler_version()
     pixels, sources, images = picture(), generated(), {}
     for case in _cases(levels, precisions):
         if case.build not in images:

@@ -20,6 +20,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from cubestack.emulator.iss.image import Image, load_image
+from cubestack.emulator.native.compiler import CompilerError
 
 REFERENCE = Path(__file__).parents[4] / "firmware_model" / "reference"
 LEVELS = ("O0", "O1", "O2", "O3", "Os")
@@ -35,8 +36,8 @@ FLAGS = (
 _LITERAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|0x[0-9a-f.]+p[+-]?\d+)f\b")
 
 
-class NoCompilerError(RuntimeError):
-    """The compiler is not there."""
+class NoCrossCompilerError(CompilerError):
+    """The compiler for the part is not there."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +64,11 @@ class Build:
 def compiler_version() -> str:
     """First line of what the compiler says of itself.
 
-    Raises NoCompilerError.
+    Raises NoCrossCompilerError.
     """
     program = shutil.which(COMPILER)
     if program is None:
-        raise NoCompilerError(
+        raise NoCrossCompilerError(
             f"{COMPILER} is not installed: apt install gcc-arm-none-eabi libnewlib-arm-none-eabi"
         )
     answer = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
@@ -92,7 +93,7 @@ def rewritten(text: str, precision: str) -> str:
 def compiled(build: Build, generated: dict[str, str]) -> Image:
     """The program; ``generated`` are texts of further sources and headers by name.
 
-    Raises NoCompilerError.
+    Raises NoCrossCompilerError.
     """
     compiler_version()
     with tempfile.TemporaryDirectory() as name:

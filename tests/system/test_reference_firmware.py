@@ -1,0 +1,19 @@
+"""The reference firmware says over the wire, bit by bit, what the Python program says of a picture.
+
+Two hundred pictures: ``python -m tests.system.reference_pictures``.
+"""
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+
+from .reference_pictures import compare
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_pictures_are_told_alike_in_every_mode() -> None:
+    found = list(compare(3, 16, "reference"))
+    assert [one.differences for one in found] == [[]] * 3
+    assert {one.mode for one in found} == {"lost", "assisted", "as it stands"}
+    assert any(one.solved for one in found)
+    assert all(one.stars > 3 for one in found)
