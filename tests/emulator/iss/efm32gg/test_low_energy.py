@@ -308,6 +308,23 @@ def test_the_leuart_overflows_behind_two_and_the_shift_register() -> None:
     assert [bench["LEUART0.RXDATA"] for _ in range(3)] == [0, 1, 3]
 
 
+def test_the_dma_takes_characters_in_em2_when_it_may_wake() -> None:
+    bench = leuart(control=mask_of("LEUART.CTRL.RXDMAWU")).clock("DMA")
+    word = 3 << 26 | 3 << 4 | 1  # basic, four bytes from a fixed address
+    for n, value in enumerate((0x4008_401C, 0x2000_1003, word)):
+        bench.machine.write(0x2000_0400 + 4 * n, value)
+    bench["DMA.CTRLBASE"] = 0x2000_0400
+    bench["DMA.CONFIG"] = 1
+    bench["DMA.CH0_CTRL"] = 16 << 16
+    bench["DMA.CHENS"] = 1
+    for byte in b"abcd":
+        bench.machine.uart_receive(LEUART0, byte)
+        bench.run_for(MS)
+    assert bench.machine.energy_mode == 2
+    assert bench.machine.peek(0x2000_1000, 4) == b"abcd"
+    assert bench["DMA.IF"] == 1
+
+
 # -- BURTC --
 
 
