@@ -307,6 +307,8 @@ void iss_watch_hit(const IssMachine *machine, uint32_t *hit) {
     hit[4] = found.write;
 }
 
+void iss_semihosting(IssMachine *machine, int32_t on) { machine->system.set_semihosting(on); }
+
 void iss_debugger(IssMachine *machine, int32_t attached, uint32_t catches) {
     machine->system.set_debugger(attached != 0, catches);
 }

@@ -85,6 +85,9 @@ void iss_watchpoint(IssMachine *machine, uint32_t address, uint32_t count, int32
 void iss_watch_hit(const IssMachine *machine, uint32_t *hit);  // pc, address, size, value, write
 // A debugger is there: BKPT stops, and so do the exceptions of `catches` (DEMCR.VC_*).
 void iss_debugger(IssMachine *machine, int32_t attached, uint32_t catches);
+
+// BKPT 0xAB is a call of semihosting (console, clock, exit); off, a breakpoint as any other.
+void iss_semihosting(IssMachine *machine, int32_t on);
 // The core executes nothing until a reset; time passes.
 void iss_hang(IssMachine *machine);
 // From another call within a run: it ends after the running instruction.

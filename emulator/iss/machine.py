@@ -391,6 +391,10 @@ class Machine:
         """A debugger is there: BKPT stops a run, and so do exceptions of ``catches`` (DEMCR)."""
         self._library.iss_debugger(self.handle, attached, catches)
 
+    def semihosting(self, on: bool) -> None:
+        """Whether BKPT 0xAB is a call: console, clock and exit; else it is a fault."""
+        self._library.iss_semihosting(self.handle, on)
+
     def _slave(self, unit: int, what: int, byte: int) -> int | None:
         answer = int(self._library.iss_i2c_slave(self.handle, unit, what, byte))
         return None if answer < 0 else answer

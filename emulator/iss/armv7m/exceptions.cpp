@@ -48,7 +48,8 @@ System::System(Cpu &cpu, const SystemParameters &parameters, SystemListener &lis
     : parameters(parameters), nvic(parameters.interrupts, parameters.priority_bits),
       systick(parameters.systick_calibration, parameters.reference_cycles,
               parameters.reference_ticks),
-      mpu(parameters.mpu_regions), dwt(parameters.comparators), cpu(cpu), listener(listener) {}
+      mpu(parameters.mpu_regions), dwt(parameters.comparators), cpu(cpu), listener(listener),
+      semihosting(parameters.semihosting) {}
 
 void System::reset(bool power_on) {
     const bool protected_before = mpu.enabled();
@@ -195,7 +196,7 @@ bool System::fault(Fault kind, uint32_t address) {
 void System::svc() { pend_synchronous(SVCALL); }
 
 bool System::bkpt(uint32_t immediate) {
-    if (parameters.semihosting && immediate == 0xAB) {
+    if (semihosting && immediate == 0xAB) {
         semihost();
         return true;
     }

@@ -38,7 +38,7 @@ struct SystemParameters {
     // So many core cycles are so many ticks of SysTick's reference clock. 0: there is no
     // reference, CLKSOURCE reads 1.
     int64_t reference_cycles = 0, reference_ticks = 1;
-    bool semihosting = false;            // BKPT 0xAB is a call, not a fault
+    bool semihosting = false;            // BKPT 0xAB is a call, not a fault; set_semihosting
     bool trace_probe = true;             // the ITM is on after reset, as a probe would leave it
 };
 
@@ -151,6 +151,7 @@ public:
     void set_debugger(bool attached, uint32_t catches = 0);
     enum class DebugStop : uint8_t { None, Breakpoint, VectorCatch };
     DebugStop stopped_by() const { return debug_stop; }
+    void set_semihosting(bool on) { semihosting = on; }
     void clear_debug_stop() { debug_stop = DebugStop::None; }
 
     int execution_priority() const;                // lower is more urgent; 256: Thread
@@ -212,6 +213,7 @@ private:
     Sleep sleeping = Sleep::Awake;
     int64_t asleep_since = 0;
     bool event = false, lockup = false, debugger = false, frame_stacked = false;
+    bool semihosting;
     DebugStop debug_stop = DebugStop::None;
     uint32_t catch_mask = 0;
     uint32_t actlr = 0, vtor = 0, prigroup = 0, scr = 0, ccr = CCR_STKALIGN;

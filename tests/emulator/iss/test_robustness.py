@@ -120,6 +120,18 @@ def test_an_endless_loop_with_interrupts_off_takes_its_time_and_no_more(machine)
     assert machine.now_ps - begin >= MILLISECOND
 
 
+@pytest.mark.parametrize("on", [False, True])
+def test_semihosting_is_a_switch(machine, on):
+    machine.semihosting(on)
+    # ADR r1, text; MOVS r0, #4 (SYS_WRITE0); BKPT 0xAB; B here; the text
+    begin = start(machine, program(0xA101, 0x2004, 0xBEAB, 0xE7FE, 0x6968, 0x0021))
+    machine.run(begin + MILLISECOND)
+    text = [one.text for one in machine.outbox() if one.kind is Kind.SEMIHOSTING]
+    assert text == (["hi!"] if on else [])
+    assert machine.register("xpsr") & 0x1FF == (0 if on else 3)
+    machine.semihosting(False)
+
+
 def test_a_lock_up_is_seen_before_the_part_resets(machine):
     image = program(0xDE00, vectors={3: 0x3000_0001})
     begin = start(machine, image)
