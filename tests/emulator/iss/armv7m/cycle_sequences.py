@@ -2,6 +2,11 @@
 
 Each has its code beside its source text, so that no assembler is needed to run it;
 ``test_cycles.py`` compares the two where there is one.
+
+A whole program beside these: AES blocks of 10, 12 and 14 rounds by github.com/jnk0le/cortexm-AES,
+CM3_1T, take 657, 779 and 901 cycles on an STM32F103 without wait states, so its README; the same
+instructions take 631, 747 and 863 here, 4 % fewer. An unrolled round is 55 cycles there and here;
+what is missing is in the branch that closes the loop.
 """
 
 from typing import NamedTuple
