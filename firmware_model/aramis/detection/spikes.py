@@ -11,8 +11,8 @@ its comment has method 2 as the faster. Here method 2 is faster, and they do dif
 remove: method 2 loses stars that fall on the border of windows, none of which has half of its
 pixels lit.
 
-Method 1 is charged as printed: every window's pixels are read again, 25 for each pixel. A program
-that kept the sums of columns would look at a fifth of them.
+Method 1 runs as two sums, down the columns and along the rows of what they give: each step adds
+the pixel that comes into the window and takes off the one that leaves it.
 """
 
 from enum import IntEnum
@@ -52,9 +52,9 @@ def _centre(mask: Mask, needed: int, meter: Meter) -> Mask:
     rows, columns = mask.shape
     bright = _sliding(_sliding(mask.astype(np.uint8)).T).T
     present = np.outer(_present(rows), _present(columns))
-    looks = int(_present(rows).sum()) * int(_present(columns).sum())
-    meter.charge(table_byte=looks, i32_add=looks, loop=looks)
-    meter.charge(i32_add=mask.size, loop=mask.size, ram_write=mask.size)
+    steps = 2 * mask.size
+    meter.charge(table_byte=2 * steps, i32_add=2 * steps, loop=steps, ram_write=steps)
+    meter.charge(i32_add=mask.size)
     return WINDOW**2 * bright.astype(np.int32) >= needed * present
 
 

@@ -56,7 +56,7 @@ def test_a_random_sky_lost_in_space() -> None:
         assert frame.error_cross_deg < 0.01
         assert len(frame.truth or ()) == len(frame.quaternion or ()) == 4
         assert frame.matched >= 3
-        assert frame.phase_ms["total"] > 300
+        assert frame.phase_ms["total"] > 200
     assert frames[0].truth != frames[1].truth
 
 
