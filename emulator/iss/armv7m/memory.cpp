@@ -81,7 +81,7 @@ static void forget(Operation *operations, uint32_t offset, uint32_t size) {
 
 void Cpu::written(const uint8_t *host, uint32_t size) {
     for (Code &code : codes) {
-        const uint64_t offset = (uint64_t)(host - code.host);
+        const uint64_t offset = (uintptr_t)host - (uintptr_t)code.host;
         if (offset >= code.size) continue;
         const uint32_t length = (uint32_t)std::min<uint64_t>(size, code.size - offset);
         for (uint64_t block = offset >> MARK_SHIFT; block <= (offset + length - 1) >> MARK_SHIFT;

@@ -43,13 +43,15 @@ def assemble(text: str, folder: Path) -> bytes:
 def load(tmp_path: Path) -> Load:
     """Makes a machine about to run some lines at ``CODE``; all faults end in a loop."""
 
-    def make(text: str, at: int = CODE, **registers: int) -> Machine:
-        machine = Machine(bare_hz=1_000_000)
-        vectors = [0x2001_0000, CODE | 1] + [HANDLER | 1] * 14
+    def make(text: str, at: int = CODE, part: bool = False, **registers: int) -> Machine:
+        machine = Machine(bare_hz=None if part else 1_000_000)
+        vectors = [0x2001_0000] + [HANDLER | 1] * 15
         machine.poke(0, b"".join(word.to_bytes(4, "little") for word in vectors))
         machine.poke(HANDLER, b"\xfe\xe7")
         machine.poke(at, assemble(text, tmp_path))
         machine.reset()
+        if part:  # it leaves its reset late
+            run_to(machine, 200_000_000)
         machine.write(SHCSR, 7 << 16)
         for name, value in registers.items():
             machine.set_register(name, value)
@@ -57,6 +59,15 @@ def load(tmp_path: Path) -> Load:
         return machine
 
     return make
+
+
+def run_to(machine: Machine, until_ps: int) -> int:
+    """Run to a time, over breakpoints; how many there were."""
+    stops = 0
+    while machine.now_ps < until_ps:
+        stops += machine.run(until_ps).reason == StopReason.BREAKPOINT
+        list(machine.outbox())
+    return stops
 
 
 def steps(machine: Machine, count: int) -> None:
@@ -253,23 +264,56 @@ def test_breakpoints_stop_before_and_cost_nothing(load: Load) -> None:
     assert (plain.cycles, plain.instructions) == (broken.cycles, broken.instructions)
 
 
-def test_breakpoints_anywhere_change_no_cycle(load: Load) -> None:
-    text = (
-        "ldr r4, =0x20000100\n movs r6, #6\n .p2align 2\n nop\n"
-        "1: add.w r5, r4, #8\n ldr r0, [r5]\n ldr r1, [r5, #4]\n str r1, [r4]\n bl 3f\n"
-        "subs r6, #1\n ittt ne\n addne r7, r7, r0\n ldrne r2, [r7]\n bne 1b\n 2: b 2b\n"
-        ".p2align 2\n nop\n 3: ldr.w r3, [r4, #12]\n movs r2, #5\n udiv r2, r0, r2\n bx lr\n"
-    )
-    plain, broken = (load(text, r7=DATA) for _ in range(2))
-    plain.run(200_000_000)
+MIXED = """
+    ldr r4, =0x20000100
+    movs r6, #6
+    .p2align 2
+    nop
+1:  add.w r5, r4, #8
+    ldr r0, [r5]
+    ldr r1, [r5, #4]
+    str r1, [r4]
+    bl 3f
+    subs r6, #1
+    ittt ne
+    addne r7, r7, r0
+    ldrne r2, [r7]
+    bne 1b
+2:  b 2b
+    .p2align 2
+    nop
+3:  ldr.w r3, [r4, #12]
+    movs r2, #5
+    udiv r2, r0, r2
+    bx lr
+"""
+
+
+def state(machine: Machine) -> tuple[dict[str, int], int, int]:
+    return machine.registers(), machine.cycles, machine.instructions
+
+
+@pytest.mark.parametrize("part", [False, True])  # without and with flash waits and cache
+def test_breakpoints_anywhere_change_no_cycle(load: Load, part: bool) -> None:
+    plain, broken = (load(MIXED, part=part, r7=DATA) for _ in range(2))
+    end = plain.now_ps + (20_000_000 if part else 200_000_000)
     for address in range(CODE, CODE + 0x40, 2):
         broken.breakpoints.add(address)
-    stops = 0
-    while broken.run(200_000_000).reason == StopReason.BREAKPOINT:
-        stops += 1
-    assert stops > 50
-    assert plain.registers() == broken.registers()
-    assert (plain.cycles, plain.instructions) == (broken.cycles, broken.instructions)
+    assert run_to(plain, end) == 0
+    assert run_to(broken, end) > 50
+    assert state(plain) == state(broken)
+
+
+@pytest.mark.parametrize("part", [False, True])
+def test_slices_and_steps_change_no_cycle(load: Load, part: bool) -> None:
+    plain, sliced, stepped = (load(MIXED, part=part, r7=DATA) for _ in range(3))
+    start, slice_ps = plain.now_ps, 100_000 if part else 1_000_000
+    run_to(plain, start + 200 * slice_ps)
+    for number in range(1, 201):
+        run_to(sliced, start + number * slice_ps)
+    while stepped.cycles < plain.cycles:
+        stepped.step()
+    assert state(plain) == state(sliced) == state(stepped)
 
 
 def test_watchpoints_stop_behind_the_access(load: Load) -> None:
